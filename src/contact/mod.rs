@@ -1,0 +1,66 @@
+//! Equilibrium of one configuration, equation (2), in f64 on the CPU.
+
+use crate::JointVector;
+use glam::DVec3;
+
+/// What became of one configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Status {
+    /// Nothing touches: tau = 0.
+    Free = 0,
+    /// In contact, converged.
+    Contact = 1,
+    /// In contact, not converged: torque and forces are the last iterate's and are not to be trusted.
+    Unconverged = 2,
+    /// More contacts than the solver has room for.
+    Overflow = 3,
+    /// Not computed, or outside the measured region.
+    Outside = 4,
+}
+
+impl Status {
+    /// The status whose number is `number`, if there is one.
+    #[must_use]
+    pub fn from_number(number: u8) -> Option<Self> {
+        [Self::Free, Self::Contact, Self::Unconverged, Self::Overflow, Self::Outside].into_iter().nth(number.into())
+    }
+}
+
+/// Equilibrium of the object with the proxy at one configuration.
+#[derive(Clone, Debug)]
+pub struct Equilibrium {
+    pub status: Status,
+    pub iterations: u32,
+    /// Relative residual of the force balance, in the energy norm [1].
+    pub residual: f64,
+    /// Stored energy U: elastic and contact springs [J].
+    pub energy: f64,
+    /// Smallest signed distance of the proxy's nodes to the surface at rest, less their radius; negative inside [m].
+    pub gap: f64,
+    /// Contact torque on the proxy, tau = sum_i J_i^T (force on x_i) [N m].
+    pub torque: JointVector,
+    /// Contact forces on the object's nodes, ascending by node, each node once [N].
+    pub forces: Vec<NodeForce>,
+    /// Contacts seen from the proxy.
+    pub touches: Vec<Touch>,
+}
+
+/// Contact force f_j on one node of the object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NodeForce {
+    pub node: u32,
+    /// [N]
+    pub force: DVec3,
+}
+
+/// One proxy node in contact: pushed by `force` at x_i, pushing back on three object nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct Touch {
+    pub proxy_node: u32,
+    /// The three object nodes and the weight with which each carries the reaction.
+    pub nodes: [u32; 3],
+    pub weights: [f64; 3],
+    /// Force on the proxy node [N].
+    pub force: DVec3,
+}
