@@ -1,0 +1,132 @@
+//! `haptize doctor`: what this machine offers, and what to do about what it lacks.
+//!
+//! Nothing here is needed for correct results except a place to write to. Real-time scheduling and locked memory keep
+//! the 1 kHz loop punctual (`play --realtime`).
+
+use super::{Failure, Report};
+use serde::Serialize;
+use std::{fmt::Write, thread};
+
+/// No arguments of its own.
+#[derive(clap::Args)]
+pub struct Arguments {}
+
+/// One thing looked at.
+#[derive(Serialize)]
+struct Finding {
+    /// What was looked at.
+    subject: &'static str,
+    /// True where it is as it should be.
+    good: bool,
+    /// True where haptize cannot work without it.
+    essential: bool,
+    /// What was seen.
+    seen: String,
+    /// What to do where it is not good; empty where it is.
+    remedy: &'static str,
+}
+
+/// Looks at the machine.
+pub fn run(_: &Arguments) -> Result<Report, Failure> {
+    let threads = thread::available_parallelism().map_or(1, usize::from);
+    let findings = [writing(), scheduling(), locking()];
+    let whole = findings.iter().all(|finding| finding.good || !finding.essential);
+
+    let mut text = String::new();
+    writeln!(text, "haptize {} on {} {}", env!("CARGO_PKG_VERSION"), std::env::consts::OS, std::env::consts::ARCH)?;
+    writeln!(text, "CPU threads            {threads}")?;
+    for finding in &findings {
+        writeln!(text, "{:<22} {}", finding.subject, finding.seen)?;
+        if !finding.good {
+            writeln!(text, "{:<22} -> {}", "", finding.remedy)?;
+        }
+    }
+    let json = serde_json::json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "system": std::env::consts::OS,
+        "architecture": std::env::consts::ARCH,
+        "threads": threads,
+        "findings": findings,
+        "whole": whole,
+    });
+    Ok(Report { text, json, whole })
+}
+
+/// Can results be written to the current folder?
+fn writing() -> Finding {
+    let seen = tempfile::tempfile_in(".").and_then(|mut file| std::io::Write::write_all(&mut file, &[0; 4096]));
+    Finding {
+        subject: "current folder",
+        good: seen.is_ok(),
+        essential: true,
+        seen: seen.map_or_else(|error| format!("cannot be written: {error}"), |()| "can be written".into()),
+        remedy: "change to a folder of yours with free space: results go to ./out unless -o says otherwise",
+    }
+}
+
+/// May a thread of this process run under a real-time policy? Tried on a thread that ends at once.
+#[cfg(target_os = "linux")]
+fn scheduling() -> Finding {
+    let permitted = thread::spawn(|| {
+        let parameters = libc::sched_param { sched_priority: 1 };
+        // SAFETY: pid 0 is the calling thread, `parameters` outlives the call, and the thread ends right after it.
+        unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) == 0 }
+    })
+    .join()
+    .unwrap_or(false);
+    Finding {
+        subject: "real-time scheduling",
+        good: permitted,
+        essential: false,
+        seen: if permitted { "permitted" } else { "not permitted: ticks of `play --realtime` may be late" }.into(),
+        remedy: "add `@realtime - rtprio 80` to /etc/security/limits.d/realtime.conf, join the group `realtime` \
+                 (groupadd -f realtime; usermod -aG realtime $USER), log in again",
+    }
+}
+
+/// Elsewhere than on Linux the loop runs at the normal priority.
+#[cfg(not(target_os = "linux"))]
+fn scheduling() -> Finding {
+    Finding {
+        subject: "real-time scheduling",
+        good: false,
+        essential: false,
+        seen: "not used on this system: ticks of `play --realtime` may be late".into(),
+        remedy: "use Linux for a punctual 1 kHz loop; everything else works here",
+    }
+}
+
+/// May this process lock a dataset's worth of memory?
+#[cfg(unix)]
+fn locking() -> Finding {
+    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    // SAFETY: `limit` is a valid place for one rlimit.
+    let known = unsafe { libc::getrlimit(libc::RLIMIT_MEMLOCK, &raw mut limit) == 0 };
+    // SAFETY: geteuid has no preconditions.
+    let privileged = unsafe { libc::geteuid() == 0 };
+    let unlimited = privileged || (known && limit.rlim_cur == libc::RLIM_INFINITY);
+    Finding {
+        subject: "locked memory",
+        good: unlimited,
+        essential: false,
+        seen: if unlimited {
+            "unlimited".into()
+        } else {
+            format!("at most {} KiB: a page fault may delay a tick", limit.rlim_cur / 1024)
+        },
+        remedy: "add `@realtime - memlock unlimited` to /etc/security/limits.d/realtime.conf, join the group \
+                 `realtime`, log in again",
+    }
+}
+
+/// Elsewhere than on Unix memory is not locked.
+#[cfg(not(unix))]
+fn locking() -> Finding {
+    Finding {
+        subject: "locked memory",
+        good: false,
+        essential: false,
+        seen: "not used on this system: a page fault may delay a tick".into(),
+        remedy: "use Linux for a punctual 1 kHz loop; everything else works here",
+    }
+}

@@ -1,0 +1,124 @@
+//! Command line: one thin file a subcommand, everything else in the library.
+//!
+//! A subcommand `name` is a file `name.rs` beside this one with
+//! - `pub struct Arguments`, deriving `clap::Args`: its arguments, documented, since the doc comments are the help text;
+//! - `pub fn run(arguments: &Arguments) -> Result<Report, Failure>`: its work.
+//!
+//! and three lines here: `mod name;`, a variant of [`Command`] and an arm of [`Command::run`]. A subcommand appears
+//! here only once it works. It never prints its result itself: it returns a [`Report`], and `--json` (an option of every
+//! subcommand) decides here which half of it goes to standard output. Notes and progress go to standard error.
+//!
+//! Exit codes: 0 the work is whole, 1 it failed or is not whole, 2 the command line itself is wrong (given by clap).
+
+mod doctor;
+
+use clap::{Parser, Subcommand};
+use std::{
+    error::Error,
+    io::{self, ErrorKind, Write},
+    process::ExitCode,
+};
+
+/// Haptize: contact solved beforehand for every joint configuration, felt at 1 kHz.
+#[derive(Parser)]
+#[command(version, arg_required_else_help = true)]
+struct CommandLine {
+    #[command(subcommand)]
+    command: Command,
+    /// Print one machine-readable JSON object on standard output.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Say what this machine offers: threads, graphics adapters, real-time rights.
+    Doctor(doctor::Arguments),
+}
+
+impl Command {
+    fn run(&self) -> Result<Report, Failure> {
+        match self {
+            Self::Doctor(arguments) => doctor::run(arguments),
+        }
+    }
+}
+
+/// Why a subcommand failed: any room's error. Its message names file and line where there is one, and the remedy.
+pub type Failure = Box<dyn Error + Send + Sync>;
+
+/// What a subcommand found out or did, for people and for programs.
+pub struct Report {
+    /// For people: whole lines, the last one ended too.
+    pub text: String,
+    /// For programs: one object.
+    pub json: serde_json::Value,
+    /// False where something is missing from the result (unfinished, or not as it should be): exit code 1.
+    pub whole: bool,
+}
+
+/// Runs what the command line asks for.
+pub fn run() -> ExitCode {
+    let line = CommandLine::parse();
+    match line.command.run().and_then(|report| print(&report, line.json).map(|()| report.whole)) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(failure) => {
+            // Standard error may be closed; there is nobody left to tell then.
+            let _ = writeln!(io::stderr(), "haptize: {}", explain(failure.as_ref()));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Prints one half of `report`. A reader that has seen enough (`haptize info ... | head`) is no failure.
+fn print(report: &Report, json: bool) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    let printed = if json { writeln!(out, "{:#}", report.json) } else { write!(out, "{}", report.text) };
+    match printed.and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(format!("cannot write to standard output: {error}; free some space or redirect it elsewhere").into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The error's message, and those of its causes that it does not already quote.
+fn explain(error: &(dyn Error + 'static)) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(inner) = cause {
+        let message = inner.to_string();
+        if !text.contains(&message) {
+            text.push_str("\n  because: ");
+            text.push_str(&message);
+        }
+        cause = inner.source();
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        CommandLine::command().debug_assert();
+    }
+
+    #[derive(Debug, thiserror::Error)]
+    #[error("outer {quoted}")]
+    struct Outer {
+        quoted: &'static str,
+        source: io::Error,
+    }
+
+    #[test]
+    fn an_explanation_names_each_cause_once() {
+        let outer = |quoted| Outer { quoted, source: io::Error::other("inner") };
+        assert_eq!(explain(&outer("quotes inner")), "outer quotes inner");
+        assert_eq!(explain(&outer("alone")), "outer alone\n  because: inner");
+    }
+}
