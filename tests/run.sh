@@ -1,0 +1,91 @@
+#!/usr/bin/env bash
+# Every check of this repository, in the order in which it is cheapest to fail: formatting, lints, tests, documentation,
+# and the demo as a newcomer runs it. Needs a Rust toolchain; installs lavapipe, Mesa's software Vulkan, where it is
+# missing, since the compute kernels are always tested on it: the same on every machine.
+#
+#   bash tests/run.sh
+set -uo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+PATH=$PATH:$HOME/.cargo/bin:/usr/sbin:/sbin
+export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-auto} RUST_BACKTRACE=1
+
+summary=()
+failures=0
+
+# step NAME COMMAND...: runs it, and remembers how it ended and how long it took.
+step() {
+    local name=$1 begin=$SECONDS
+    shift
+    printf '\n== %s\n' "$name"
+    if "$@"; then
+        summary+=("$(printf 'passed  %4d s  %s' $((SECONDS - begin)) "$name")")
+    else
+        summary+=("$(printf 'FAILED  %4d s  %s' $((SECONDS - begin)) "$name")")
+        failures=$((failures + 1))
+    fi
+}
+
+# The file by which the Vulkan loader finds lavapipe; nothing where it is not installed.
+lavapipe() {
+    find /usr/share/vulkan/icd.d /usr/local/share/vulkan/icd.d /etc/vulkan/icd.d -name 'lvp_icd*.json' 2>/dev/null | head -n 1
+}
+
+have_lavapipe() {
+    [ -n "$(lavapipe)" ] && ldconfig -p | grep -q 'libvulkan\.so\.1'
+}
+
+install_lavapipe() {
+    have_lavapipe && return
+    if ! command -v apt-get >/dev/null; then
+        echo 'lavapipe (software Vulkan) is missing and this is no Debian or Ubuntu: install it and run this again.'
+        echo '  Fedora: dnf install mesa-vulkan-drivers vulkan-loader    Arch: pacman -S vulkan-swrast vulkan-icd-loader'
+        return 1
+    fi
+    local as_root=()
+    [ "$(id -u)" = 0 ] || as_root=(sudo)
+    "${as_root[@]}" apt-get update -qq &&
+        DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -y -qq --no-install-recommends \
+            mesa-vulkan-drivers libvulkan1 >/dev/null || {
+        echo 'lavapipe could not be installed: as root, run apt-get install mesa-vulkan-drivers libvulkan1'
+        return 1
+    }
+    have_lavapipe
+}
+
+have_rust() {
+    command -v cargo >/dev/null || { echo 'cargo is missing: install Rust from https://rustup.rs'; return 1; }
+    cargo fmt --version && cargo clippy --version || rustup component add rustfmt clippy
+}
+
+# The demo as on a fresh machine: no Vulkan driver, no display, an empty folder.
+demo() {
+    cargo build --release --locked --quiet || return 1
+    local binary=$PWD/target/release/haptize place
+    [ -z "${CARGO_TARGET_DIR:-}" ] || binary=$CARGO_TARGET_DIR/release/haptize
+    place=$(mktemp -d) || return 1
+    (cd "$place" && env -u DISPLAY -u WAYLAND_DISPLAY VK_DRIVER_FILES=/none VK_ICD_FILENAMES=/none \
+        timeout 300 "$binary" && ls -l out)
+    local code=$?
+    rm -rf "$place"
+    return $code
+}
+
+step 'Rust toolchain' have_rust
+step 'lavapipe' install_lavapipe
+# Vulkan sees lavapipe and nothing else; a test that finds no adapter fails.
+VK_DRIVER_FILES=$(lavapipe)
+export VK_DRIVER_FILES VK_ICD_FILENAMES=$VK_DRIVER_FILES
+
+step 'formatting' cargo fmt --all --check
+step 'lints' cargo clippy --locked --all-targets --quiet -- -D warnings
+step 'tests' cargo test --locked --quiet
+step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --no-deps --quiet
+step 'demo' demo
+
+printf '\n== summary (%d s)\n' "$SECONDS"
+printf '%s\n' "${summary[@]}"
+if [ "$failures" -gt 0 ]; then
+    echo "$failures of ${#summary[@]} steps failed"
+    exit 1
+fi
+echo 'all passed'
