@@ -1,0 +1,303 @@
+//! The recording of a rendering session: one row a tick, the object's shape at chosen instants, and their summary.
+//!
+//! The number of contacting object nodes (paper's Fig. 5) is that of the heaviest grid corner in contact: the contact
+//! list Cvo of the grid point with the largest interpolation weight. It is thus a number that was solved for, where
+//! the union over the corners would count nodes that never touch at the same time.
+
+use super::{
+    accounts::Accounts,
+    flags::{Fault, Flags},
+};
+use crate::JointVector;
+use glam::DVec3;
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// One tick of the haptic loop, at its beginning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tick {
+    /// Since the start [s].
+    pub time: f64,
+    /// Where the hand wants the device; the device's own position where no hand is simulated [rad or m].
+    pub hand: JointVector,
+    /// Device position y [rad or m].
+    pub device: JointVector,
+    /// Proxy position x [rad or m].
+    pub proxy: JointVector,
+    /// Torque commanded to the device [N m or N].
+    pub device_torque: JointVector,
+    /// Contact torque tau_bar on the proxy, after the boundary layer [N m or N].
+    pub contact_torque: JointVector,
+    /// Interpolated contact index, 0 to 1.
+    pub index: f64,
+    /// Whether the index exceeds its threshold.
+    pub contact: bool,
+    /// Object nodes in contact at the heaviest grid corner in contact; 0 out of contact or where none are stored.
+    pub contact_nodes: u32,
+    /// Remarks on the tick.
+    pub flags: Flags,
+    /// Why the torque is being brought to zero, if it is.
+    pub fault: Option<Fault>,
+    /// Energy accounts at the beginning of the tick.
+    pub accounts: Accounts,
+}
+
+/// The object at one instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// [s]
+    pub time: f64,
+    /// Proxy position whose contact forces deform the object [rad or m].
+    pub proxy: JointVector,
+    /// Positions n of the object's nodes, surface nodes first [m].
+    pub nodes: Vec<DVec3>,
+}
+
+/// A joint's name and the unit of its coordinate.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JointLabel {
+    /// As in the dataset.
+    pub name: String,
+    /// `rad` or `m`.
+    pub unit: String,
+}
+
+/// Everything that was recorded.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trace {
+    /// One per joint.
+    pub joints: Vec<JointLabel>,
+    /// Ascending in time.
+    pub ticks: Vec<Tick>,
+    /// Ascending in time; empty without graphics.
+    pub frames: Vec<Frame>,
+}
+
+/// What one wants to know of a session at a glance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// Ticks recorded.
+    pub ticks: usize,
+    /// Duration [s].
+    pub seconds: f64,
+    /// Share of ticks in contact, 0 to 1.
+    pub contact_share: f64,
+    /// Most object nodes in contact at once.
+    pub max_contact_nodes: u32,
+    /// Largest size of the contact torque [N m].
+    pub max_contact_torque: f64,
+    /// Largest change of the contact torque from tick to tick, per millisecond [N m/ms].
+    pub max_contact_torque_step: f64,
+    /// Largest size of the torque on the device [N m].
+    pub max_device_torque: f64,
+    /// Largest change of the torque on the device from tick to tick, per millisecond [N m/ms].
+    pub max_device_torque_step: f64,
+    /// Largest residual of the energy accounts [J].
+    pub max_account_residual: f64,
+    /// The same over the accounts' turnover [1].
+    pub max_relative_account_residual: f64,
+    /// Least that proxy and coupling had absorbed at any tick [J]: not below zero but for rounding.
+    pub min_absorbed: f64,
+    /// Energy that the contact torque gave beyond what was stored, at the last tick [J].
+    pub leak: f64,
+    /// Energy made by holding the device's torque between ticks, at the last tick [J].
+    pub hold_gain: f64,
+    /// Energy that the device's port took in, at the last tick [J].
+    pub port_work: f64,
+    /// Ticks with the proxy outside the grid.
+    pub outside: usize,
+    /// Ticks with the proxy beside an absent grid point.
+    pub absent: usize,
+    /// Ticks with the proxy beside an unconverged grid point.
+    pub unconverged: usize,
+    /// Ticks with the torque on the device limited in size or rate.
+    pub limited: usize,
+    /// Ticks with a fault.
+    pub faults: usize,
+}
+
+impl Trace {
+    /// Figures over the whole recording.
+    #[must_use]
+    pub fn summary(&self) -> Summary {
+        let mut s = Summary { ticks: self.ticks.len(), ..Summary::default() };
+        let flagged = |flags: Flags| self.ticks.iter().filter(|tick| tick.flags.intersects(flags)).count();
+        s.outside = flagged(Flags::OUTSIDE);
+        s.absent = flagged(Flags::ABSENT);
+        s.unconverged = flagged(Flags::UNCONVERGED);
+        s.limited = flagged(Flags::SIZE_LIMITED | Flags::RATE_LIMITED);
+        s.faults = self.ticks.iter().filter(|tick| tick.fault.is_some()).count();
+        for tick in &self.ticks {
+            s.max_contact_nodes = s.max_contact_nodes.max(tick.contact_nodes);
+            s.max_contact_torque = s.max_contact_torque.max(tick.contact_torque.norm());
+            s.max_device_torque = s.max_device_torque.max(tick.device_torque.norm());
+            let residual = tick.accounts.residual().abs();
+            s.max_account_residual = s.max_account_residual.max(residual);
+            if tick.accounts.turnover > 0.0 {
+                s.max_relative_account_residual =
+                    s.max_relative_account_residual.max(residual / tick.accounts.turnover);
+            }
+            s.min_absorbed = s.min_absorbed.min(tick.accounts.absorbed());
+        }
+        for pair in self.ticks.windows(2) {
+            let milliseconds = 1e3 * (pair[1].time - pair[0].time);
+            if milliseconds > 0.0 {
+                let step = |a: &JointVector, b: &JointVector| distance(a, b) / milliseconds;
+                s.max_contact_torque_step =
+                    s.max_contact_torque_step.max(step(&pair[0].contact_torque, &pair[1].contact_torque));
+                s.max_device_torque_step =
+                    s.max_device_torque_step.max(step(&pair[0].device_torque, &pair[1].device_torque));
+            }
+        }
+        if let (Some(first), Some(last)) = (self.ticks.first(), self.ticks.last()) {
+            s.seconds = last.time - first.time;
+            s.contact_share = self.ticks.iter().filter(|tick| tick.contact).count() as f64 / self.ticks.len() as f64;
+            s.leak = last.accounts.leak;
+            s.hold_gain = last.accounts.hold_gain();
+            s.port_work = last.accounts.port_work;
+        }
+        s
+    }
+
+    /// Writes all ticks as CSV: one header line with units, then one row a tick. Numbers are printed so that reading
+    /// them gives the same bits.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write_ticks(&self, out: &mut impl Write) -> io::Result<()> {
+        write!(out, "time [s]")?;
+        for (what, torque) in
+            [("hand", false), ("device", false), ("proxy", false), ("device torque", true), ("contact torque", true)]
+        {
+            for joint in &self.joints {
+                let unit = match (torque, joint.unit.as_str()) {
+                    (false, unit) => unit,
+                    (true, "m") => "N",
+                    (true, _) => "N m",
+                };
+                write!(out, ",{what} {} [{unit}]", plain(&joint.name))?;
+            }
+        }
+        write!(out, ",contact index,contact,contact nodes,flags,fault")?;
+        for name in [
+            "kinetic",
+            "spring",
+            "coupling work",
+            "field work",
+            "stop work",
+            "proxy dissipation",
+            "coupling dissipation",
+            "stored",
+            "leak",
+            "port work",
+            "residual",
+        ] {
+            write!(out, ",{name} [J]")?;
+        }
+        writeln!(out)?;
+        for tick in &self.ticks {
+            write!(out, "{}", tick.time)?;
+            for vector in [&tick.hand, &tick.device, &tick.proxy, &tick.device_torque, &tick.contact_torque] {
+                for value in vector.iter() {
+                    write!(out, ",{value}")?;
+                }
+            }
+            let fault = tick.fault.map(|fault| fault.to_string()).unwrap_or_default();
+            let (index, contact, nodes) = (tick.index, u8::from(tick.contact), tick.contact_nodes);
+            write!(out, ",{index},{contact},{nodes},{},{fault}", tick.flags.bits())?;
+            let a = &tick.accounts;
+            for value in [
+                a.kinetic,
+                a.spring,
+                a.coupling_work,
+                a.field_work,
+                a.stop_work,
+                a.proxy_dissipation,
+                a.coupling_dissipation,
+                a.stored,
+                a.leak,
+                a.port_work,
+                a.residual(),
+            ] {
+                write!(out, ",{value}")?;
+            }
+            writeln!(out)?;
+        }
+        Ok(())
+    }
+
+    /// Writes all frames as CSV: time, node, position.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write_frames(&self, out: &mut impl Write) -> io::Result<()> {
+        writeln!(out, "time [s],node,x [m],y [m],z [m]")?;
+        for frame in &self.frames {
+            for (node, n) in frame.nodes.iter().enumerate() {
+                writeln!(out, "{},{node},{},{},{}", frame.time, n.x, n.y, n.z)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A joint's name without the characters that structure a CSV file.
+fn plain(name: &str) -> String {
+    name.chars().map(|c| if matches!(c, ',' | '"' | '\n' | '\r') { '_' } else { c }).collect()
+}
+
+/// Euclidean distance of two vectors of the same length.
+fn distance(a: &JointVector, b: &JointVector) -> f64 {
+    a.iter().zip(b.iter()).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tick(time: f64, torque: f64) -> Tick {
+        let one = JointVector::from_slice(&[torque]);
+        Tick {
+            time,
+            hand: one,
+            device: one,
+            proxy: one,
+            device_torque: one,
+            contact_torque: one,
+            index: 1.0,
+            contact: torque != 0.0,
+            contact_nodes: 3,
+            flags: Flags::default(),
+            fault: None,
+            accounts: Accounts::default(),
+        }
+    }
+
+    fn trace() -> Trace {
+        let joints = vec![JointLabel { name: "base, left".into(), unit: "rad".into() }];
+        Trace { joints, ticks: vec![tick(0.0, 0.0), tick(0.002, 0.5), tick(0.003, 0.25)], frames: vec![] }
+    }
+
+    #[test]
+    fn the_largest_torque_step_is_per_millisecond() {
+        let summary = trace().summary();
+        assert_eq!(summary.max_contact_torque_step, 0.25);
+        assert_eq!(summary.max_contact_torque, 0.5);
+        assert!((summary.contact_share - 2.0 / 3.0).abs() < f64::EPSILON);
+    }
+
+    #[test]
+    fn every_row_has_as_many_fields_as_the_header() {
+        let mut bytes = Vec::new();
+        trace().write_ticks(&mut bytes).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let fields: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
+        assert_eq!(fields.len(), 4);
+        assert!(fields.iter().all(|&count| count == fields[0]), "{text}");
+    }
+
+    #[test]
+    fn an_empty_recording_has_a_summary() {
+        assert_eq!(Trace::default().summary(), Summary::default());
+    }
+}
