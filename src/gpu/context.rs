@@ -1,0 +1,285 @@
+//! The adapter that is chosen, the device opened on it, and every way in which they fail, as a `Result`.
+//!
+//! wgpu reports three kinds of failure besides returned errors: a lost device (callback), errors that no scope captures
+//! (callback; wgpu's default is to panic), and waits that never end. All three end up in [`GpuError`]: the callbacks
+//! store the first message, [`Context::check`] returns it, and every wait has a limit.
+
+use std::{
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
+
+/// Longest wait for one submission. A dispatch is sized for tens of milliseconds; software Vulkan on a busy machine may
+/// need a thousand times that. Beyond it the device hangs.
+const WAIT_LIMIT: Duration = Duration::from_secs(120);
+
+/// Why the GPU could not do it.
+#[derive(Debug, thiserror::Error)]
+pub enum GpuError {
+    /// No adapter of the kind asked for.
+    #[error(
+        "no {wanted} Vulkan, Metal or DX12 adapter; found: {found}. Install your GPU's Vulkan driver (or Mesa's software \
+         Vulkan, package mesa-vulkan-drivers, for --backend gpu without a GPU), or use --backend cpu"
+    )]
+    NoAdapter {
+        /// `hardware` or `usable`.
+        wanted: &'static str,
+        /// Adapters that were there, or `none`.
+        found: String,
+    },
+    /// The adapter refuses a device with WebGPU's default limits.
+    #[error("adapter {adapter} gives no device: {reason}. Update its driver, or use --backend cpu")]
+    NoDevice {
+        /// The adapter's name.
+        adapter: String,
+        /// wgpu's reason.
+        reason: String,
+    },
+    /// The device was lost: driver reset, removal, or a dispatch that ran too long.
+    #[error("the GPU was lost: {0}. Use --backend cpu, or update the driver")]
+    Lost(String),
+    /// Device memory is exhausted.
+    #[error("the GPU is out of memory: {0}. Use a smaller object, close other programs, or use --backend cpu")]
+    OutOfMemory(String),
+    /// wgpu or naga refuses a shader, pipeline or command: a defect of this crate or of the driver.
+    #[error("the GPU refused a command: {0}. Please report this with the output of `haptize doctor`")]
+    Refused(String),
+    /// A submission did not end in time.
+    #[error("the GPU did not answer within {0:?}. Use --backend cpu, or update the driver")]
+    TimedOut(Duration),
+    /// The object does not fit the device's limits.
+    #[error("{what} needs {needed} bytes, the GPU binds at most {limit}. Use --backend cpu for this scene")]
+    TooLarge {
+        /// Which buffer.
+        what: &'static str,
+        /// Its size [B].
+        needed: u64,
+        /// The limit [B].
+        limit: u64,
+    },
+    /// Outputs that no invocation wrote: a dispatch was cut short.
+    #[error(
+        "the GPU left {count} of {total} results unwritten. Use --backend cpu, and report this with `haptize doctor`"
+    )]
+    NeverWritten {
+        /// Results still poisoned.
+        count: usize,
+        /// Results asked for.
+        total: usize,
+    },
+}
+
+/// Which adapters qualify.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AdapterChoice {
+    /// A GPU made of silicon: what automatic choice takes; a software rasteriser is slower than the CPU backend.
+    Hardware,
+    /// Any adapter, software Vulkan included.
+    Any,
+}
+
+/// One adapter, in words for `doctor` and for a dataset's provenance.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AdapterSummary {
+    /// Such as `llvmpipe (LLVM 15.0.6, 256 bits)`.
+    pub name: String,
+    /// Driver and its version.
+    pub driver: String,
+    /// `Vulkan`, `Metal` or `Dx12`.
+    pub interface: String,
+    /// `discrete GPU`, `integrated GPU`, `virtual GPU`, `software` or `unknown`.
+    pub kind: &'static str,
+    /// True for a GPU made of silicon.
+    pub hardware: bool,
+    /// Largest buffer that one binding reaches [B].
+    pub binding_limit: u64,
+}
+
+impl AdapterSummary {
+    fn of(adapter: &wgpu::Adapter) -> Self {
+        let info = adapter.get_info();
+        let kind = match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+            wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+            wgpu::DeviceType::VirtualGpu => "virtual GPU",
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Other => "unknown",
+        };
+        Self {
+            name: info.name,
+            driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+            interface: format!("{:?}", info.backend),
+            kind,
+            hardware: preference(info.device_type) < preference(wgpu::DeviceType::Other),
+            binding_limit: adapter.limits().max_storage_buffer_binding_size,
+        }
+    }
+}
+
+impl std::fmt::Display for AdapterSummary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({}, {}, {})", self.name, self.kind, self.interface, self.driver)
+    }
+}
+
+/// Lower is better.
+fn preference(kind: wgpu::DeviceType) -> u8 {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    }
+}
+
+fn instance() -> wgpu::Instance {
+    wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends: wgpu::Backends::PRIMARY,
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    })
+}
+
+/// All adapters of this machine, best first; empty where there is no driver. Never fails.
+#[must_use]
+pub fn adapters() -> Vec<AdapterSummary> {
+    candidates(&instance()).iter().map(AdapterSummary::of).collect()
+}
+
+fn candidates(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
+    let mut found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    found.sort_by_key(|adapter| preference(adapter.get_info().device_type));
+    found
+}
+
+/// First message of each kind of failure that arrives by callback.
+#[derive(Default)]
+struct Failures {
+    lost: Option<String>,
+    error: Option<GpuError>,
+}
+
+/// An open device.
+pub struct Context {
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    adapter: AdapterSummary,
+    failures: Arc<Mutex<Failures>>,
+}
+
+fn lock(failures: &Mutex<Failures>) -> MutexGuard<'_, Failures> {
+    // A message is stored whole or not at all, so a panic elsewhere leaves nothing half-written.
+    failures.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Context {
+    /// Opens the best adapter that qualifies.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] with what was found; [`GpuError::NoDevice`] when none of them gives a device.
+    pub fn open(choice: AdapterChoice) -> Result<Self, GpuError> {
+        let found = candidates(&instance());
+        let names: Vec<String> = found.iter().map(|adapter| AdapterSummary::of(adapter).to_string()).collect();
+        let mut refusal = None;
+        for adapter in &found {
+            let summary = AdapterSummary::of(adapter);
+            if choice == AdapterChoice::Hardware && !summary.hardware {
+                continue;
+            }
+            match Self::open_on(adapter, summary) {
+                Ok(context) => return Ok(context),
+                Err(error) => refusal = refusal.or(Some(error)),
+            }
+        }
+        Err(refusal.unwrap_or_else(|| GpuError::NoAdapter {
+            wanted: if choice == AdapterChoice::Hardware { "hardware" } else { "usable" },
+            found: if names.is_empty() { "none".to_owned() } else { names.join("; ") },
+        }))
+    }
+
+    fn open_on(adapter: &wgpu::Adapter, summary: AdapterSummary) -> Result<Self, GpuError> {
+        let offered = adapter.limits();
+        // WebGPU's defaults, which every device has, but for the two sizes that decide which objects fit.
+        let limits = wgpu::Limits {
+            max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
+            max_buffer_size: offered.max_buffer_size,
+            ..wgpu::Limits::default()
+        };
+        let descriptor =
+            wgpu::DeviceDescriptor { label: Some("haptize"), required_limits: limits, ..Default::default() };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|error| GpuError::NoDevice { adapter: summary.to_string(), reason: error.to_string() })?;
+        let failures = Arc::new(Mutex::new(Failures::default()));
+        let on_lost = Arc::clone(&failures);
+        device.set_device_lost_callback(move |reason, message| {
+            lock(&on_lost).lost.get_or_insert_with(|| format!("{reason:?}: {message}"));
+        });
+        let on_error = Arc::clone(&failures);
+        device.on_uncaptured_error(Arc::new(move |error| {
+            lock(&on_error).error.get_or_insert_with(|| GpuError::from(error));
+        }));
+        Ok(Self { device, queue, adapter: summary, failures })
+    }
+
+    /// The adapter in use.
+    #[must_use]
+    pub fn adapter(&self) -> &AdapterSummary {
+        &self.adapter
+    }
+
+    /// Largest buffer that one binding reaches [B].
+    #[must_use]
+    pub fn binding_limit(&self) -> u64 {
+        let limits = self.device.limits();
+        limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+    }
+
+    /// The failure that a callback stored, if any. A lost device stays lost; another error is reported once.
+    ///
+    /// # Errors
+    /// That failure.
+    pub fn check(&self) -> Result<(), GpuError> {
+        let mut failures = lock(&self.failures);
+        if let Some(message) = &failures.lost {
+            return Err(GpuError::Lost(message.clone()));
+        }
+        failures.error.take().map_or(Ok(()), Err)
+    }
+
+    /// Waits until `submission` is done and its callbacks have run.
+    ///
+    /// # Errors
+    /// When the device was lost, refused a command, or does not answer.
+    pub fn wait(&self, submission: wgpu::SubmissionIndex) -> Result<(), GpuError> {
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(WAIT_LIMIT) };
+        let outcome = self.device.poll(wait);
+        self.check()?;
+        match outcome {
+            Ok(_) => Ok(()),
+            Err(wgpu::PollError::Timeout) => Err(GpuError::TimedOut(WAIT_LIMIT)),
+            Err(error) => Err(GpuError::Lost(error.to_string())),
+        }
+    }
+
+    /// Runs `work`, which creates objects on the device, and turns what the device refuses into an error.
+    pub(super) fn scoped<T>(&self, work: impl FnOnce(&wgpu::Device) -> T) -> Result<T, GpuError> {
+        let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
+        let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let made = work(&self.device);
+        let refused = [validation, internal, memory].map(|scope| pollster::block_on(scope.pop()));
+        self.check()?;
+        refused.into_iter().flatten().next().map_or(Ok(made), |error| Err(error.into()))
+    }
+}
+
+impl From<wgpu::Error> for GpuError {
+    fn from(error: wgpu::Error) -> Self {
+        match error {
+            wgpu::Error::OutOfMemory { source } => Self::OutOfMemory(source.to_string()),
+            wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. } => {
+                Self::Refused(description)
+            }
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! One compute pipeline with its bindings, and the storage buffers it works on.
+//!
+//! Group 0 holds all bindings, numbered in the order of the kernel's [`Access`] list. Counts of workgroups above the
+//! limit of one dimension are folded into two; the shader unfolds them and guards the tail.
+
+use super::{
+    context::{Context, GpuError},
+    shaders::Shader,
+};
+use bytemuck::Pod;
+use std::sync::mpsc;
+
+/// Every byte of an output before the dispatch that writes it. As u32 it is no status, count or node number in use; as
+/// f32 it is -1.2e13, no length, force or energy of a haptic scene.
+pub const POISON: u8 = 0xD5;
+
+/// How a kernel uses a binding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Uniform buffer.
+    Uniform,
+    /// Storage buffer that is only read.
+    Read,
+    /// Storage buffer that is written.
+    Write,
+}
+
+impl Access {
+    fn layout(self, binding: u32) -> wgpu::BindGroupLayoutEntry {
+        let ty = match self {
+            Self::Uniform => wgpu::BufferBindingType::Uniform,
+            Self::Read => wgpu::BufferBindingType::Storage { read_only: true },
+            Self::Write => wgpu::BufferBindingType::Storage { read_only: false },
+        };
+        wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+            count: None,
+        }
+    }
+}
+
+/// A compute pipeline.
+pub struct Kernel {
+    pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+}
+
+impl Kernel {
+    /// Compiles `shader` with the given override constants.
+    ///
+    /// # Errors
+    /// When the device refuses the shader or runs out of memory.
+    pub fn new(
+        context: &Context,
+        shader: &Shader,
+        overrides: &[(&str, f64)],
+        accesses: &[Access],
+    ) -> Result<Self, GpuError> {
+        context.scoped(|device| {
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(shader.name),
+                source: wgpu::ShaderSource::Wgsl(shader.source().into()),
+            });
+            let entries: Vec<_> = (0u32..).zip(accesses).map(|(binding, access)| access.layout(binding)).collect();
+            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(shader.name),
+                entries: &entries,
+            });
+            let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(shader.name),
+                bind_group_layouts: &[Some(&layout)],
+                immediate_size: 0,
+            });
+            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(shader.name),
+                layout: Some(&pipeline_layout),
+                module: &module,
+                entry_point: Some(shader.entry),
+                compilation_options: wgpu::PipelineCompilationOptions { constants: overrides, ..Default::default() },
+                cache: None,
+            });
+            Self { pipeline, layout }
+        })
+    }
+
+    /// Binds `buffers`, in the order of the kernel's accesses.
+    ///
+    /// # Errors
+    /// When number, kind or size do not fit.
+    pub fn bind(&self, context: &Context, buffers: &[&StorageBuffer]) -> Result<wgpu::BindGroup, GpuError> {
+        context.scoped(|device| {
+            let entries: Vec<_> = (0u32..)
+                .zip(buffers)
+                .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.raw.as_entire_binding() })
+                .collect();
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &self.layout,
+                entries: &entries,
+            })
+        })
+    }
+
+    /// Records one dispatch of `workgroups` workgroups.
+    pub fn record(&self, pass: &mut wgpu::ComputePass<'_>, bound: &wgpu::BindGroup, workgroups: u32) {
+        if workgroups == 0 {
+            return;
+        }
+        let [x, y] = fold(workgroups);
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, bound, &[]);
+        pass.dispatch_workgroups(x, y, 1);
+    }
+}
+
+/// Most workgroups that one dimension of a dispatch may have: WebGPU's default limit.
+pub const WORKGROUPS_PER_DIMENSION: u32 = 65_535;
+
+/// Least two-dimensional grid of workgroups with at least `workgroups` of them, as square as the fold demands.
+#[must_use]
+pub fn fold(workgroups: u32) -> [u32; 2] {
+    let rows = workgroups.div_ceil(WORKGROUPS_PER_DIMENSION).max(1);
+    [workgroups.div_ceil(rows), rows]
+}
+
+/// A buffer on the device that kernels bind and the host fills and reads.
+pub struct StorageBuffer {
+    pub(super) raw: wgpu::Buffer,
+}
+
+impl StorageBuffer {
+    /// A buffer of `bytes` bytes, at least 16 (an empty binding is not allowed).
+    ///
+    /// # Errors
+    /// When it exceeds what one binding reaches, or memory.
+    pub fn new(context: &Context, what: &'static str, bytes: u64) -> Result<Self, GpuError> {
+        Self::with_usage(context, what, bytes, wgpu::BufferUsages::STORAGE)
+    }
+
+    /// A uniform buffer that holds `value`.
+    ///
+    /// # Errors
+    /// When memory is exhausted.
+    pub fn uniform<T: Pod>(context: &Context, what: &'static str, value: &T) -> Result<Self, GpuError> {
+        let buffer = Self::with_usage(context, what, size_of::<T>() as u64, wgpu::BufferUsages::UNIFORM)?;
+        buffer.write(context, std::slice::from_ref(value));
+        Ok(buffer)
+    }
+
+    /// A buffer that holds `values`.
+    ///
+    /// # Errors
+    /// When it exceeds what one binding reaches, or memory.
+    pub fn from_slice<T: Pod>(context: &Context, what: &'static str, values: &[T]) -> Result<Self, GpuError> {
+        let buffer = Self::new(context, what, size_of_val(values) as u64)?;
+        buffer.write(context, values);
+        Ok(buffer)
+    }
+
+    fn with_usage(
+        context: &Context,
+        what: &'static str,
+        bytes: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<Self, GpuError> {
+        let limit = context.binding_limit();
+        if bytes > limit {
+            return Err(GpuError::TooLarge { what, needed: bytes, limit });
+        }
+        let raw = context.scoped(|device| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(what),
+                size: bytes.next_multiple_of(4).max(16),
+                usage: usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            })
+        })?;
+        Ok(Self { raw })
+    }
+
+    /// Size [B].
+    #[must_use]
+    pub fn size(&self) -> u64 {
+        self.raw.size()
+    }
+
+    /// Copies `values` to the buffer's start, before the next submission.
+    pub fn write<T: Pod>(&self, context: &Context, values: &[T]) {
+        if !values.is_empty() {
+            context.queue.write_buffer(&self.raw, 0, bytemuck::cast_slice(values));
+        }
+    }
+
+    /// Fills the first `bytes` bytes with [`POISON`], before the next submission.
+    pub fn poison(&self, context: &Context, bytes: u64) {
+        let bytes = usize::try_from(bytes.min(self.size())).unwrap_or(usize::MAX) / 4 * 4;
+        context.queue.write_buffer(&self.raw, 0, &vec![POISON; bytes]);
+    }
+
+    /// Reads the first `count` elements. Submits, and waits.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn read<T: Pod>(&self, context: &Context, count: usize) -> Result<Vec<T>, GpuError> {
+        let staging = Staging::new(context, (count * size_of::<T>()) as u64)?;
+        let mut encoder = context.device.create_command_encoder(&Default::default());
+        staging.record(&mut encoder, &[self]);
+        let submission = context.queue.submit([encoder.finish()]);
+        staging.take(context, submission, |bytes| bytemuck::pod_collect_to_vec(&bytes[..count * size_of::<T>()]))
+    }
+}
+
+/// A buffer that the host maps, filled from storage buffers one behind the other.
+pub struct Staging {
+    raw: wgpu::Buffer,
+}
+
+impl Staging {
+    /// Room for `bytes` bytes.
+    ///
+    /// # Errors
+    /// When memory is exhausted.
+    pub fn new(context: &Context, bytes: u64) -> Result<Self, GpuError> {
+        let raw = context.scoped(|device| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("staging"),
+                size: bytes.next_multiple_of(8).max(16),
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        })?;
+        Ok(Self { raw })
+    }
+
+    /// Records the copies of as much of `sources` as there is room for.
+    pub fn record(&self, encoder: &mut wgpu::CommandEncoder, sources: &[&StorageBuffer]) {
+        let mut offset = 0;
+        for source in sources {
+            let bytes = source.size().min(self.raw.size() - offset);
+            encoder.copy_buffer_to_buffer(&source.raw, 0, &self.raw, offset, bytes);
+            offset += bytes;
+        }
+    }
+
+    /// Waits for `submission` and hands the bytes to `use_bytes`.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn take<T>(
+        &self,
+        context: &Context,
+        submission: wgpu::SubmissionIndex,
+        use_bytes: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T, GpuError> {
+        let (sender, receiver) = mpsc::channel();
+        self.raw.map_async(wgpu::MapMode::Read, .., move |outcome| {
+            // The receiver outlives the wait below; without it nobody needs the outcome.
+            let _ = sender.send(outcome);
+        });
+        context.wait(submission)?;
+        match receiver.try_recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => return Err(GpuError::Lost(error.to_string())),
+            Err(_) => return Err(GpuError::Lost("the read-back was never answered".to_owned())),
+        }
+        let view = self.raw.get_mapped_range(..).map_err(|error| GpuError::Refused(error.to_string()))?;
+        let used = use_bytes(&view);
+        drop(view);
+        self.raw.unmap();
+        Ok(used)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folding_covers_every_workgroup_and_stays_within_the_limit() {
+        for workgroups in [1, 2, 65_534, 65_535, 65_536, 131_070, 131_071, 1 << 24, u32::MAX >> 1] {
+            let [x, y] = fold(workgroups);
+            assert!(x <= WORKGROUPS_PER_DIMENSION, "{workgroups}");
+            assert!(u64::from(x) * u64::from(y) >= u64::from(workgroups), "{workgroups}");
+            assert!(u64::from(x) * u64::from(y) < u64::from(workgroups) + u64::from(y), "{workgroups}: no wasted row");
+        }
+        assert_eq!(fold(65_535), [65_535, 1]);
+    }
+}

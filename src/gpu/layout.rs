@@ -1,0 +1,131 @@
+//! Structs shared with WGSL. A test compares every offset and size with naga's reflection of `shaders/`.
+
+use bytemuck::{Pod, Zeroable};
+
+/// `Parameters` of `shaders/types.wgsl`: what all stages of a batch need (uniform).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented where the shader reads them")]
+pub struct Parameters {
+    pub configurations: u32,
+    pub joints: u32,
+    pub proxy_nodes: u32,
+    pub surface_nodes: u32,
+    pub triangles: u32,
+    pub max_iterations: u32,
+    pub stiffness: f32,
+    pub tolerance: f32,
+    pub extent: f32,
+    pub padding_0: u32,
+    pub padding_1: u32,
+    pub padding_2: u32,
+}
+
+/// `Joint` of `shaders/types.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented where the shader reads them")]
+pub struct Joint {
+    pub origin: [f32; 3],
+    pub kind: u32,
+    pub axis: [f32; 3],
+    pub padding: u32,
+}
+
+/// `ProxyNode` of `shaders/types.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented where the shader reads them")]
+pub struct ProxyNode {
+    pub position: [f32; 3],
+    pub link: u32,
+}
+
+/// `Outcome` of `shaders/types.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented where the shader writes them")]
+pub struct Outcome {
+    pub status: u32,
+    pub iterations: u32,
+    pub residual: f32,
+    pub energy: f32,
+    pub gap: f32,
+    pub touches: u32,
+    pub padding_0: u32,
+    pub padding_1: u32,
+}
+
+/// `Touch` of `shaders/types.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented where the shader writes them")]
+pub struct Touch {
+    pub nodes: [u32; 3],
+    pub proxy_node: u32,
+    pub weights: [f32; 3],
+    pub depth: f32,
+    pub force: [f32; 3],
+    pub padding: u32,
+}
+
+/// `FrameParameters` of `shaders/frame.wgsl` (uniform).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented where the shader reads them")]
+pub struct FrameParameters {
+    pub nodes: u32,
+    pub period: f32,
+    pub padding_0: u32,
+    pub padding_1: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::shaders::{ALL, parse};
+    use std::{collections::HashMap, mem::offset_of};
+
+    /// Name, offset of each member, and the struct's size, as WGSL lays it out.
+    type Reflected = HashMap<String, (Vec<(String, u32)>, u32)>;
+
+    fn reflect() -> Reflected {
+        let mut structs = Reflected::new();
+        for shader in ALL {
+            for (_, ty) in parse(shader).expect("shader parses").types.iter() {
+                if let (Some(name), naga::TypeInner::Struct { members, span }) = (&ty.name, &ty.inner) {
+                    let members = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect();
+                    structs.insert(name.clone(), (members, *span));
+                }
+            }
+        }
+        structs
+    }
+
+    /// The same for a Rust struct.
+    macro_rules! layout {
+        ($name:ident: $($field:ident),+) => {
+            (stringify!($name), vec![$((stringify!($field).to_owned(), offset_of!($name, $field) as u32)),+],
+                size_of::<$name>() as u32)
+        };
+    }
+
+    #[test]
+    fn every_shared_struct_is_laid_out_as_in_wgsl() {
+        let reflected = reflect();
+        let expected = [
+            layout!(Parameters: configurations, joints, proxy_nodes, surface_nodes, triangles, max_iterations, stiffness,
+                tolerance, extent, padding_0, padding_1, padding_2),
+            layout!(Joint: origin, kind, axis, padding),
+            layout!(ProxyNode: position, link),
+            layout!(Outcome: status, iterations, residual, energy, gap, touches, padding_0, padding_1),
+            layout!(Touch: nodes, proxy_node, weights, depth, force, padding),
+            layout!(FrameParameters: nodes, period, padding_0, padding_1),
+        ];
+        for (name, members, size) in expected {
+            let (wgsl_members, wgsl_size) = reflected.get(name).unwrap_or_else(|| panic!("{name} is in no shader"));
+            assert_eq!(&members, wgsl_members, "{name}");
+            assert_eq!(size, *wgsl_size, "size of {name}");
+        }
+    }
+}
