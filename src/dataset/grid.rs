@@ -10,14 +10,18 @@ pub struct Axis {
     pub name: String,
     /// `rad` or `m`.
     pub unit: String,
+    /// First grid line [rad or m].
     pub start: f64,
+    /// Distance between grid lines, positive [rad or m].
     pub step: f64,
+    /// Number of grid lines.
     pub count: usize,
 }
 
 /// A uniform grid, last axis fastest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
+    /// One per joint, in the chain's order.
     pub axes: Vec<Axis>,
 }
 
@@ -40,6 +44,12 @@ impl Grid {
     #[must_use]
     pub fn points(&self) -> usize {
         self.axes.iter().map(|axis| axis.count).product()
+    }
+
+    /// Number of grid lines of each axis.
+    #[must_use]
+    pub fn counts(&self) -> Vec<usize> {
+        self.axes.iter().map(|axis| axis.count).collect()
     }
 
     /// Configuration q of grid point `point`.

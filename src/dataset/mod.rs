@@ -5,16 +5,26 @@
 //! those of point p are `contact_nodes[offsets[p]..offsets[p + 1]]` with `contact_forces` beside them.
 //! Points are numbered with the last axis fastest.
 
+mod atomic;
+mod check;
 mod column;
+mod error;
+mod file;
 mod grid;
+mod summary;
 
+pub use atomic::replace_file;
 pub use column::Column;
+pub use error::Error;
 pub use grid::{Axis, Grid};
+pub use summary::{StatusCounts, Summary};
 
-use crate::contact::Status;
+use crate::contact::{NodeForce, Status};
+use glam::DVec3;
 
 /// A dataset. Columns are owned (just baked) or lie in a mapped file (just opened); both read alike.
 pub struct Dataset {
+    /// The configurations q.
     pub grid: Grid,
     /// tau, joint fastest: entry `point * joints + joint` [N m].
     pub torque: Column<f64>,
@@ -34,6 +44,7 @@ pub struct Dataset {
     pub surface: Option<Surface>,
     /// The scene's text; empty for scanned datasets without one.
     pub scene: String,
+    /// Where it comes from.
     pub provenance: Provenance,
 }
 
@@ -41,6 +52,7 @@ pub struct Dataset {
 pub struct Contacts {
     /// One more than there are points.
     pub offsets: Column<u64>,
+    /// Nodes of the object's surface, ascending within a row.
     pub nodes: Column<u32>,
     /// Three numbers a contact [N].
     pub forces: Column<f32>,
@@ -59,12 +71,13 @@ pub struct Surface {
 pub struct Provenance {
     /// Version of this crate.
     pub version: String,
+    /// How equation (2) was solved, as the scene names it.
     pub algorithm: String,
     /// Relative residual asked for [1].
     pub tolerance: f64,
     /// `cpu` or `gpu`.
     pub backend: String,
-    /// Name of the adapter, or of the CPU backend's threads.
+    /// Name of the adapter, or of the CPU's architecture (not its threads: their number changes nothing in the data).
     pub adapter: String,
     /// Date of the bake, ISO 8601, UTC.
     pub date: String,
@@ -82,5 +95,23 @@ impl Dataset {
     pub fn torque(&self, point: usize) -> &[f64] {
         let joints = self.grid.joints();
         &self.torque[point * joints..(point + 1) * joints]
+    }
+
+    /// Contact forces of grid point `point`, ascending by node; none where they are not stored [N].
+    pub fn forces(&self, point: usize) -> impl ExactSizeIterator<Item = NodeForce> {
+        let (nodes, forces) = self.contacts.as_ref().map_or((&[][..], &[][..]), |contacts| contacts.row(point));
+        nodes.iter().zip(forces.chunks_exact(3)).map(|(&node, force)| NodeForce {
+            node,
+            force: DVec3::new(force[0].into(), force[1].into(), force[2].into()),
+        })
+    }
+}
+
+impl Contacts {
+    /// Nodes and forces (three numbers each) of grid point `point`.
+    #[must_use]
+    pub fn row(&self, point: usize) -> (&[u32], &[f32]) {
+        let (start, end) = (self.offsets[point] as usize, self.offsets[point + 1] as usize);
+        (&self.nodes[start..end], &self.forces[3 * start..3 * end])
     }
 }

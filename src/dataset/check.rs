@@ -1,0 +1,117 @@
+//! What must hold of every dataset, in memory or in a file, before anything uses it.
+//!
+//! Lengths fit the grid, contact rows are ordered and within, statuses are known, every number is finite. Checked in an
+//! order in which no check relies on one that comes later, and without allocating, so that hostile counts cost nothing.
+
+use super::{Column, Contacts, Dataset, Grid, Surface};
+use crate::{MAX_JOINTS, contact::Status};
+
+/// `Err` says what is wrong.
+pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
+    let points = check_grid(&dataset.grid)?;
+    let torques = points.checked_mul(dataset.grid.joints()).ok_or("the grid has too many points")?;
+    length("torque", &dataset.torque, torques)?;
+    length("status", &dataset.status, points)?;
+    if let Some(point) = dataset.status.iter().position(|&number| Status::from_number(number).is_none()) {
+        return Err(format!("status {} of point {point} is unknown", dataset.status[point]));
+    }
+    finite("torque", &dataset.torque, |x: &f64| x.is_finite())?;
+    if let Some(energy) = &dataset.energy {
+        length("energy", energy, points)?;
+        finite("energy", energy, |x: &f64| x.is_finite())?;
+    }
+    for (name, column) in [("gap", &dataset.gap), ("residual", &dataset.residual)] {
+        if let Some(column) = column {
+            length(name, column, points)?;
+            finite(name, column, |x: &f32| x.is_finite())?;
+        }
+    }
+    if let Some(iterations) = &dataset.iterations {
+        length("iterations", iterations, points)?;
+    }
+    if let Some(surface) = &dataset.surface {
+        check_surface(surface)?;
+    }
+    match (&dataset.contacts, &dataset.surface) {
+        (Some(contacts), Some(surface)) => check_contacts(contacts, points, surface.nodes.len() / 3),
+        (Some(_), None) => Err("contact forces name the nodes of a surface that is not there".into()),
+        (None, _) => Ok(()),
+    }
+}
+
+/// The number of points of a sound grid.
+pub(super) fn check_grid(grid: &Grid) -> Result<usize, String> {
+    if grid.axes.is_empty() || grid.axes.len() > MAX_JOINTS {
+        return Err(format!("the grid has {} axes, not 1 to {MAX_JOINTS}", grid.axes.len()));
+    }
+    let mut points = 1_usize;
+    for axis in &grid.axes {
+        let name = &axis.name;
+        if axis.unit != "rad" && axis.unit != "m" {
+            return Err(format!("axis {name} has unit {:?}, not rad or m", axis.unit));
+        }
+        if axis.count == 0 {
+            return Err(format!("axis {name} has no grid lines"));
+        }
+        points = points.checked_mul(axis.count).ok_or("the grid has too many points")?;
+        // Where a step is lost in rounding at either end, neighbouring grid lines coincide.
+        let (first, last) = (axis.coordinate(0), axis.coordinate(axis.count - 1));
+        let ascends = axis.step > 0.0 && first + axis.step > first && last - axis.step < last;
+        if !(axis.step.is_finite() && first.is_finite() && last.is_finite() && ascends) {
+            return Err(format!(
+                "axis {name} from {} by {} does not ascend through finite numbers",
+                axis.start, axis.step
+            ));
+        }
+    }
+    Ok(points)
+}
+
+fn check_surface(surface: &Surface) -> Result<(), String> {
+    let (nodes, triangles) = (&surface.nodes, &surface.triangles);
+    if !nodes.len().is_multiple_of(3) || !triangles.len().is_multiple_of(3) {
+        return Err("the surface has an incomplete node or triangle".into());
+    }
+    finite("surface_nodes", nodes, |x: &f64| x.is_finite())?;
+    within("surface_triangles", triangles, nodes.len() / 3)
+}
+
+fn check_contacts(contacts: &Contacts, points: usize, surface_nodes: usize) -> Result<(), String> {
+    let Contacts { offsets, nodes, forces } = contacts;
+    length("contact_offsets", offsets, points.checked_add(1).ok_or("the grid has too many points")?)?;
+    length("contact_forces", forces, nodes.len().checked_mul(3).ok_or("there are too many contacts")?)?;
+    if offsets[0] != 0 || offsets[points] != nodes.len() as u64 {
+        return Err(format!("contact_offsets do not run from 0 to the {} contacts", nodes.len()));
+    }
+    if let Some(point) = offsets.windows(2).position(|pair| pair[0] > pair[1]) {
+        return Err(format!("contact_offsets descend at point {point}"));
+    }
+    within("contact_nodes", nodes, surface_nodes)?;
+    // Ascending offsets that end at nodes.len() are all within.
+    let row = |point: usize| &nodes[offsets[point] as usize..offsets[point + 1] as usize];
+    if let Some(point) = (0..points).find(|&point| row(point).windows(2).any(|pair| pair[0] >= pair[1])) {
+        return Err(format!("contact_nodes of point {point} do not ascend"));
+    }
+    finite("contact_forces", forces, |x: &f32| x.is_finite())
+}
+
+fn length<T: bytemuck::Pod>(name: &str, column: &Column<T>, expected: usize) -> Result<(), String> {
+    match column.len() {
+        found if found == expected => Ok(()),
+        found => Err(format!("{name} has {found} entries where the grid asks for {expected}")),
+    }
+}
+
+fn finite<T>(name: &str, column: &[T], is_finite: impl Fn(&T) -> bool) -> Result<(), String> {
+    match column.iter().position(|x| !is_finite(x)) {
+        None => Ok(()),
+        Some(entry) => Err(format!("entry {entry} of {name} is not a finite number")),
+    }
+}
+
+fn within(name: &str, column: &[u32], nodes: usize) -> Result<(), String> {
+    match column.iter().position(|&node| node as usize >= nodes) {
+        None => Ok(()),
+        Some(entry) => Err(format!("entry {entry} of {name} is node {}, of {nodes}", column[entry])),
+    }
+}

@@ -1,0 +1,60 @@
+//! What can be wrong with a dataset file, each with the file's name and the remedy.
+
+use std::{io, path::PathBuf};
+
+/// A dataset could not be read, written or exported.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The file is missing, or may not be read.
+    #[error("{path}: cannot be read: {source}; check the path and its permissions")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The folder is missing or read-only, or the disk is full. Whatever stood at `path` before is still there.
+    #[error(
+        "{path}: cannot be written: {source}; free some space or choose another folder (an earlier file is untouched)"
+    )]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Not a file of this program.
+    #[error("{path}: not a haptize dataset: {reason}; give a file written by `haptize bake` or `haptize gridize`")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What gave it away.
+        reason: String,
+    },
+    /// Another version of the format.
+    #[error("{path}: has format {found:?}, this program reads {expected:?}; bake it again with this program")]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// What the file says.
+        found: String,
+        /// What this program writes.
+        expected: &'static str,
+    },
+    /// Cut short, altered, or never right.
+    #[error("{path}: is damaged: {reason}; copy it again from its source, or bake it again")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong in it.
+        reason: String,
+    },
+    /// A dataset in memory that contradicts itself and so was not written.
+    #[error("{path}: not written, because the dataset contradicts itself: {reason}")]
+    Inconsistent {
+        /// The file that was to be written.
+        path: PathBuf,
+        /// What contradicts what.
+        reason: String,
+    },
+}
