@@ -4,6 +4,7 @@
 //! the 1 kHz loop punctual (`play --realtime`).
 
 use super::{Failure, Report};
+use haptize::gpu::{AdapterSummary, adapters};
 use serde::Serialize;
 use std::{fmt::Write, thread};
 
@@ -29,12 +30,26 @@ struct Finding {
 /// Looks at the machine.
 pub fn run(_: &Arguments) -> Result<Report, Failure> {
     let threads = thread::available_parallelism().map_or(1, usize::from);
+    let adapters = adapters();
+    let automatic = if adapters.iter().any(|adapter| adapter.hardware) { "gpu" } else { "cpu" };
     let findings = [writing(), scheduling(), locking()];
     let whole = findings.iter().all(|finding| finding.good || !finding.essential);
 
     let mut text = String::new();
     writeln!(text, "haptize {} on {} {}", env!("CARGO_PKG_VERSION"), std::env::consts::OS, std::env::consts::ARCH)?;
     writeln!(text, "CPU threads            {threads}")?;
+    match adapters.as_slice() {
+        [] => writeln!(
+            text,
+            "graphics adapters      none found: `--backend gpu` needs a Vulkan driver, nothing else does"
+        )?,
+        found => {
+            for (rank, adapter) in found.iter().enumerate() {
+                writeln!(text, "{:<22} {adapter}", if rank == 0 { "graphics adapters" } else { "" })?;
+            }
+        }
+    }
+    writeln!(text, "{:<22} {automatic} (a hardware GPU, else all CPU threads)", "`--backend auto` takes")?;
     for finding in &findings {
         writeln!(text, "{:<22} {}", finding.subject, finding.seen)?;
         if !finding.good {
@@ -46,10 +61,23 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
         "system": std::env::consts::OS,
         "architecture": std::env::consts::ARCH,
         "threads": threads,
+        "adapters": adapters.iter().map(describe).collect::<Vec<_>>(),
+        "automatic_backend": automatic,
         "findings": findings,
         "whole": whole,
     });
     Ok(Report { text, json, whole })
+}
+
+fn describe(adapter: &AdapterSummary) -> serde_json::Value {
+    serde_json::json!({
+        "name": adapter.name,
+        "kind": adapter.kind,
+        "interface": adapter.interface,
+        "driver": adapter.driver,
+        "hardware": adapter.hardware,
+        "binding_limit_bytes": adapter.binding_limit,
+    })
 }
 
 /// Can results be written to the current folder?
