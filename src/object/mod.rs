@@ -1,10 +1,32 @@
 //! The deformable virtual object: surface, springs, and the compliance C = K^-1 that contact needs.
+//!
+//! [`Object::build`] makes the surface that the scene names, checks it, joins its nodes by springs, proves
+//! K = Kn + Kg symmetric positive definite by factorising it (section 2.1, equation (2)), and inverts it on the
+//! surface nodes. An object that the ground does not hold, or a surface that is not closed, is refused with the reason.
 
+mod compliance;
+mod error;
+mod factor;
+mod ground;
+mod import;
+mod sphere;
+mod springs;
+mod stiffness;
+mod topology;
+
+pub use compliance::Compliance;
+pub use error::{ObjectError, SurfaceDefect};
+pub use factor::{Factor, FactorError};
+pub use stiffness::Stiffness;
+pub use topology::Topology;
+
+use crate::scene::{ObjectSpec, Shape};
 use glam::DVec3;
 
 /// A deformable object at rest.
 ///
 /// Nodes `0..surface_nodes` lie on the surface and are the only ones that triangles name; interior nodes follow.
+#[derive(Clone, Debug)]
 pub struct Object {
     /// Rest positions n0 of all nodes [m].
     pub rest: Vec<DVec3>,
@@ -12,6 +34,7 @@ pub struct Object {
     pub surface_nodes: usize,
     /// Outward-oriented closed surface, corner nodes counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// Neighbours on the surface.
     pub topology: Topology,
     /// K = Kn + Kg over all nodes [N/m].
     pub stiffness: Stiffness,
@@ -21,30 +44,103 @@ pub struct Object {
     pub mass: Vec<f64>,
     /// Damping of each node against the ground [N s/m].
     pub damping: Vec<f64>,
+    /// What was repaired on the way, one sentence each, for the user to read.
+    pub warnings: Vec<String>,
 }
 
-/// Symmetric sparse matrix of 3 x 3 blocks, both halves stored, rows compressed.
-pub struct Stiffness {
-    /// Row starts, one more than there are nodes.
-    pub offsets: Vec<usize>,
-    /// Column (node) of each block, ascending within a row.
-    pub columns: Vec<u32>,
-    /// The blocks [N/m].
-    pub blocks: Vec<glam::DMat3>,
+impl Object {
+    /// The object that a scene asks for; reads the mesh file if the scene names one.
+    ///
+    /// # Errors
+    /// When the file cannot be read, the surface is not closed and orientable, a number is out of range, or the ground
+    /// does not hold the object.
+    pub fn build(spec: &ObjectSpec) -> Result<Self, ObjectError> {
+        let mut warnings = Vec::new();
+        let (nodes, triangles) = match &spec.shape {
+            Shape::Sphere { centre, radius, rings, segments } => {
+                check_order(rings.saturating_mul(*segments).saturating_add(2))?;
+                sphere::generate(*centre, *radius, *rings, *segments)?
+            }
+            Shape::Mesh { file, scale, centre } => import::read(file, *scale, *centre, &mut warnings)?,
+        };
+        Self::assemble(spec, nodes, triangles, warnings)
+    }
+
+    /// The same object on a surface that is already at hand, such as the one stored in a dataset: the shape that the
+    /// scene names is not read.
+    ///
+    /// # Errors
+    /// As for [`Object::build`], except for the file.
+    pub fn from_surface(spec: &ObjectSpec, nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, ObjectError> {
+        Self::assemble(spec, nodes, triangles, Vec::new())
+    }
+
+    fn assemble(
+        spec: &ObjectSpec,
+        nodes: Vec<DVec3>,
+        mut triangles: Vec<[u32; 3]>,
+        mut warnings: Vec<String>,
+    ) -> Result<Self, ObjectError> {
+        check_parameters(spec)?;
+        check_order(nodes.len())?;
+        let surface = topology::close(&nodes, &mut triangles)
+            .map_err(|defect| ObjectError::Surface { surface: surface_name(spec), defect })?;
+        warnings.extend(surface.warnings);
+        let grounded = ground::select(&spec.ground, &nodes)?;
+        ground::check_components(&surface.components, &grounded)?;
+        let stiffness = springs::assemble(spec, &nodes, &surface.edges, &grounded)?;
+        let factor = factor::prove_positive_definite(&stiffness)?;
+        let compliance = Compliance::of(&factor, nodes.len(), nodes.len());
+        Ok(Self {
+            surface_nodes: nodes.len(),
+            mass: vec![spec.node_mass; nodes.len()],
+            damping: vec![spec.node_damping; nodes.len()],
+            rest: nodes,
+            triangles,
+            topology: surface.topology,
+            stiffness,
+            compliance,
+            warnings,
+        })
+    }
 }
 
-/// Dense symmetric matrix over the 3S surface coordinates, row-major: entry (3i + a, 3j + b) [m/N].
-pub struct Compliance {
-    /// 3S.
-    pub order: usize,
-    pub entries: Vec<f64>,
+/// Most memory that the dense compliance may take [B]: it is what a laptop can hold beside everything else.
+const MAX_COMPLIANCE_BYTES: usize = 4 << 30;
+
+/// Refuses an object whose dense compliance of (3S)^2 numbers would not fit in memory, before anything is allocated.
+fn check_order(nodes: usize) -> Result<(), ObjectError> {
+    let order = nodes.saturating_mul(3);
+    let bytes = order.saturating_mul(order).saturating_mul(size_of::<f64>());
+    if bytes > MAX_COMPLIANCE_BYTES {
+        return Err(ObjectError::TooLarge { nodes, bytes, limit: MAX_COMPLIANCE_BYTES });
+    }
+    Ok(())
 }
 
-/// Who touches whom on the surface.
-pub struct Topology {
-    /// Triangle across edge k of each triangle, edge k joining corners k and (k + 1) % 3.
-    pub across: Vec<[u32; 3]>,
-    /// Triangles around node j: `around[around_offsets[j]..around_offsets[j + 1]]`.
-    pub around_offsets: Vec<u32>,
-    pub around: Vec<u32>,
+/// Numbers that a scene file has had checked already, and a specification made in code has not.
+fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {
+    let positive = [
+        ("spring stiffness", spec.springs.stiffness),
+        ("ground stiffness", spec.ground.stiffness),
+        ("node mass", spec.node_mass),
+    ];
+    for (name, value) in positive {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(ObjectError::Parameter { name, value, range: "positive and finite" });
+        }
+    }
+    if !(spec.node_damping >= 0.0 && spec.node_damping.is_finite()) {
+        let value = spec.node_damping;
+        return Err(ObjectError::Parameter { name: "node damping", value, range: "zero or positive, and finite" });
+    }
+    Ok(())
+}
+
+/// How messages call the surface.
+fn surface_name(spec: &ObjectSpec) -> String {
+    match &spec.shape {
+        Shape::Sphere { .. } => "sphere".to_owned(),
+        Shape::Mesh { file, .. } => file.display().to_string(),
+    }
 }

@@ -1,48 +1,12 @@
 //! The virtual proxy: a serial chain of revolute and prismatic joints with contact nodes on its links.
+//!
+//! Link i's frame sits at joint i and is parallel to the world at q = 0. Frame i follows from frame i - 1 (the world for
+//! the first) by o_i = o_(i-1) + R_(i-1) origin_i, and R_i = R_(i-1) Rot(axis_i, q_i) for a revolute joint, or
+//! o_i += q_i R_(i-1) axis_i for a prismatic one. Nothing here allocates once a [`Pose`] has its size.
 
-use crate::scene::JointKind;
-use glam::{DMat3, DVec3};
+mod chain;
+mod inertia;
+mod jacobian;
 
-/// A serial chain.
-pub struct Chain {
-    pub joints: Vec<Joint>,
-    /// Contact nodes of all links, link by link.
-    pub nodes: Vec<Node>,
-}
-
-pub struct Joint {
-    pub name: String,
-    pub kind: JointKind,
-    /// In the parent link's frame [m].
-    pub origin: DVec3,
-    /// Unit vector in the joint's frame.
-    pub axis: DVec3,
-    pub limits: [f64; 2],
-    pub mass: f64,
-    pub centre_of_mass: DVec3,
-    pub inertia: DVec3,
-    pub rotor_inertia: f64,
-}
-
-/// A contact node x_i.
-#[derive(Clone, Copy, Debug)]
-pub struct Node {
-    /// The joint whose link carries it.
-    pub link: usize,
-    /// In the link's frame [m].
-    pub position: DVec3,
-    /// [m]
-    pub radius: f64,
-}
-
-/// The chain placed in the world at one configuration.
-#[derive(Clone, Debug, Default)]
-pub struct Pose {
-    /// Link frames: origin [m] and rotation.
-    pub origins: Vec<DVec3>,
-    pub rotations: Vec<DMat3>,
-    /// Joint axes, unit vectors in the world.
-    pub axes: Vec<DVec3>,
-    /// Node positions x_i [m].
-    pub nodes: Vec<DVec3>,
-}
+pub use chain::{Chain, Joint, Node, Pose};
+pub use inertia::JointMatrix;

@@ -1,0 +1,194 @@
+//! Why an object is refused, and what to do about it.
+
+use super::FactorError;
+use glam::DVec3;
+use std::path::PathBuf;
+
+/// Why no object can be made of a specification.
+#[derive(Debug, thiserror::Error)]
+pub enum ObjectError {
+    /// The mesh file cannot be read.
+    #[error("{}: cannot read the mesh: {reason}", .file.display())]
+    File {
+        /// The file that the scene names.
+        file: PathBuf,
+        /// What the system or the reader says.
+        reason: String,
+    },
+    /// The mesh file's extension names no known format.
+    #[error("{}: not a known mesh format: give a file that ends in .obj, .stl or .ply", .file.display())]
+    Format {
+        /// The file that the scene names.
+        file: PathBuf,
+    },
+    /// The surface is not what contact can be computed on.
+    #[error("{surface}: {defect}")]
+    Surface {
+        /// The mesh file, or `sphere`.
+        surface: String,
+        /// What is wrong with it.
+        defect: SurfaceDefect,
+    },
+    /// A number is out of range.
+    #[error("{name} is {value}: it must be {range}")]
+    Parameter {
+        /// Which number.
+        name: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it may be.
+        range: &'static str,
+    },
+    /// The dense compliance would not fit in memory.
+    #[error(
+        "an object of {nodes} surface nodes needs {} GiB of compliance, more than {} GiB: use a coarser surface",
+        .bytes >> 30, .limit >> 30
+    )]
+    TooLarge {
+        /// Nodes on the surface.
+        nodes: usize,
+        /// Memory of the compliance [B].
+        bytes: usize,
+        /// Memory that it may take [B].
+        limit: usize,
+    },
+    /// The ground names a node that is not there.
+    #[error("ground names node {node}, but the object has nodes 0 to {}: correct the list", .count - 1)]
+    GroundNode {
+        /// The node named.
+        node: u32,
+        /// Number of nodes.
+        count: usize,
+    },
+    /// The ground holds no node at all.
+    #[error("no node lies below z = {height} m, the lowest is at z = {lowest} m: raise the ground's height")]
+    NothingBelow {
+        /// Height below which nodes are grounded [m].
+        height: f64,
+        /// Height of the lowest node [m].
+        lowest: f64,
+    },
+    /// A connected part of the object floats.
+    #[error(
+        "the ground holds no node of the part of {nodes} nodes around node {node}, which would float away: \
+         ground at least one of its nodes"
+    )]
+    Ungrounded {
+        /// A node of the part.
+        node: u32,
+        /// Number of nodes in it.
+        nodes: usize,
+    },
+    /// The stiffness is singular, though every part is grounded: springs and ground leave a motion free.
+    #[error(
+        "the stiffness is not positive definite (reciprocal condition {reciprocal_condition:.0e}): node {node} can move \
+         along ({:.2}, {:.2}, {:.2}) almost without force; axial springs leave such mechanisms: ground more nodes, \
+         stiffen the ground, or use isotropic springs", .direction.x, .direction.y, .direction.z
+    )]
+    Mechanism {
+        /// The node that moves most.
+        node: u32,
+        /// Unit vector along which it moves.
+        direction: DVec3,
+        /// Smallest over largest eigenvalue, estimated.
+        reciprocal_condition: f64,
+    },
+    /// The factorisation failed for a reason other than the object's.
+    #[error(transparent)]
+    Factor(#[from] FactorError),
+}
+
+/// What keeps triangles from being a closed, orientable surface of proper triangles.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SurfaceDefect {
+    /// There are no triangles.
+    #[error("the surface has no triangles")]
+    Empty,
+    /// A coordinate is NaN or infinite.
+    #[error("node {node} has a coordinate that is not a finite number")]
+    NotFinite {
+        /// The node.
+        node: u32,
+    },
+    /// A triangle names a node that is not there.
+    #[error("triangle {triangle} names node {node}, but there are only {count} nodes")]
+    NodeOutOfRange {
+        /// The triangle.
+        triangle: u32,
+        /// The node that it names.
+        node: u32,
+        /// Number of nodes.
+        count: usize,
+    },
+    /// A triangle without area.
+    #[error("triangle {triangle} (nodes {} {} {}) has no area: remove it or merge its nodes", .corners[0], .corners[1], .corners[2])]
+    DegenerateTriangle {
+        /// The triangle.
+        triangle: u32,
+        /// Its nodes.
+        corners: [u32; 3],
+    },
+    /// Two triangles on the same three nodes.
+    #[error("triangles {first} and {second} have the same three nodes: remove one")]
+    RepeatedTriangle {
+        /// One of them.
+        first: u32,
+        /// The other.
+        second: u32,
+    },
+    /// Two nodes at the same place.
+    #[error("nodes {first} and {second} lie at the same point: merge them")]
+    CoincidentNodes {
+        /// One of them.
+        first: u32,
+        /// The other.
+        second: u32,
+    },
+    /// A node of no triangle.
+    #[error("node {node} belongs to no triangle: remove it")]
+    UnusedNode {
+        /// The node.
+        node: u32,
+    },
+    /// An edge with a triangle on one side only.
+    #[error(
+        "the surface is open: edge {} to {} has a triangle on one side only ({triangle}); there are {edges} such edges: \
+         close the holes", .nodes[0], .nodes[1]
+    )]
+    Open {
+        /// The two ends of one such edge.
+        nodes: [u32; 2],
+        /// Its triangle.
+        triangle: u32,
+        /// Number of such edges.
+        edges: usize,
+    },
+    /// An edge with more than two triangles.
+    #[error("the surface is not a manifold: edge {} to {} has {triangles} triangles, not 2", .nodes[0], .nodes[1])]
+    NonManifoldEdge {
+        /// The two ends of the edge.
+        nodes: [u32; 2],
+        /// Number of triangles that share it.
+        triangles: usize,
+    },
+    /// A node at which two sheets touch.
+    #[error(
+        "the surface is not a manifold: separate sheets meet at node {node} only: give each sheet a node of its own"
+    )]
+    PinchedNode {
+        /// The node.
+        node: u32,
+    },
+    /// A one-sided surface, such as a Klein bottle.
+    #[error("the surface has no inside: its triangles cannot be oriented alike across edge {} to {}", .nodes[0], .nodes[1])]
+    NonOrientable {
+        /// The two ends of the edge at which orientation fails.
+        nodes: [u32; 2],
+    },
+    /// A surface that encloses nothing.
+    #[error("the part of the surface around node {node} encloses no volume: it is folded flat")]
+    NoVolume {
+        /// A node of the part.
+        node: u32,
+    },
+}

@@ -1,0 +1,171 @@
+//! Surfaces from mesh files: OBJ, STL and PLY, chosen by the file's extension.
+//!
+//! Polygons are cut into triangle fans. Nodes at exactly the same point become one node (an STL file has no others, and
+//! grouped OBJ files repeat those on the seams). Nodes keep the order of a PLY file; in OBJ and STL files they are
+//! numbered in the order in which triangles first name them, and nodes that no triangle names are dropped. Coordinates
+//! become `scale * coordinate + centre`.
+
+use super::{ObjectError, topology::place};
+use glam::DVec3;
+use ply_rs_bw::ply::{Property, PropertyAccess};
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Seek};
+use std::path::Path;
+
+/// Nodes and triangles as a reader finds them.
+type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
+
+/// Reads the surface in `file`; what is merged on the way is told in `warnings`.
+pub(super) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<String>) -> Result<Surface, ObjectError> {
+    if !(scale > 0.0 && scale.is_finite()) {
+        return Err(ObjectError::Parameter { name: "scale", value: scale, range: "positive and finite" });
+    }
+    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+    let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let reader = match extension.as_str() {
+        "obj" => read_obj,
+        "stl" => read_stl,
+        "ply" => read_ply,
+        _ => return Err(ObjectError::Format { file: file.to_owned() }),
+    };
+    let stream = File::open(file).map_err(|error| unreadable(error.to_string()))?;
+    let (nodes, mut triangles) = reader(&mut BufReader::new(stream)).map_err(unreadable)?;
+    let count = nodes.len();
+    let mut nodes = weld(nodes, &mut triangles);
+    if nodes.len() < count && extension != "stl" {
+        let (file, merged) = (file.display(), count - nodes.len());
+        warnings.push(format!("{file}: {merged} of {count} nodes lay exactly on another and were merged with it"));
+    }
+    nodes.iter_mut().for_each(|node| *node = scale * *node + centre);
+    Ok((nodes, triangles))
+}
+
+fn read_obj(stream: &mut BufReader<File>) -> Result<Surface, String> {
+    let options =
+        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+    // Materials are of no concern here: the files that name them need not exist.
+    let (models, _) = tobj::load_obj_buf(stream, &options, |_| Ok(Default::default())).map_err(|e| e.to_string())?;
+    let (mut nodes, mut triangles) = (Vec::new(), Vec::new());
+    for tobj::Model { mesh, .. } in models {
+        let first = node_number(nodes.len())?;
+        nodes.extend(mesh.positions.as_chunks().0.iter().copied().map(DVec3::from_array));
+        triangles.extend(mesh.indices.as_chunks().0.iter().map(|corners| corners.map(|node| first + node)));
+    }
+    Ok((nodes, triangles))
+}
+
+fn read_stl(stream: &mut (impl Read + Seek)) -> Result<Surface, String> {
+    let mesh = stl_io::read_stl(stream).map_err(|error| error.to_string())?;
+    node_number(mesh.vertices.len())?;
+    let nodes = mesh.vertices.iter().map(|v| DVec3::from_array(v.0.map(f64::from))).collect();
+    let triangles = mesh.faces.iter().map(|face| face.vertices.map(|node| node as u32)).collect();
+    Ok((nodes, triangles))
+}
+
+fn read_ply(stream: &mut impl BufRead) -> Result<Surface, String> {
+    let vertices = ply_rs_bw::parser::Parser::<PlyVertex>::new();
+    let faces = ply_rs_bw::parser::Parser::<PlyFace>::new();
+    let header = vertices.read_header(stream).map_err(|error| error.to_string())?;
+    let (mut nodes, mut triangles) = (Vec::new(), Vec::new());
+    for (name, element) in &header.elements {
+        match name.as_str() {
+            "vertex" => {
+                for vertex in vertices.read_payload_for_element(stream, element, &header).map_err(|e| e.to_string())? {
+                    nodes.push(vertex.position);
+                }
+            }
+            "face" => {
+                for face in faces.read_payload_for_element(stream, element, &header).map_err(|e| e.to_string())? {
+                    let corners = face.corners.ok_or("a face has a negative or non-integer node number")?;
+                    if corners.len() < 3 {
+                        return Err(format!("a face has {} nodes", corners.len()));
+                    }
+                    triangles.extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]]));
+                }
+            }
+            _ => {
+                faces.read_payload_for_element(stream, element, &header).map_err(|error| error.to_string())?;
+            }
+        }
+    }
+    node_number(nodes.len())?;
+    Ok((nodes, triangles))
+}
+
+/// A vertex; a coordinate that the file lacks stays NaN, which the surface's check refuses.
+struct PlyVertex {
+    position: DVec3,
+}
+
+impl PropertyAccess for PlyVertex {
+    fn new() -> Self {
+        Self { position: DVec3::NAN }
+    }
+
+    fn set_property(&mut self, key: &String, property: Property) {
+        let axis = match key.as_str() {
+            "x" => 0,
+            "y" => 1,
+            "z" => 2,
+            _ => return,
+        };
+        match property {
+            Property::Float(value) => self.position[axis] = value.into(),
+            Property::Double(value) => self.position[axis] = value,
+            _ => {}
+        }
+    }
+}
+
+/// A face; `None` where a corner is not a node number.
+struct PlyFace {
+    corners: Option<Vec<u32>>,
+}
+
+impl PropertyAccess for PlyFace {
+    fn new() -> Self {
+        Self { corners: None }
+    }
+
+    fn set_property(&mut self, key: &String, property: Property) {
+        fn numbers<T: TryInto<u32>>(values: Vec<T>) -> Option<Vec<u32>> {
+            values.into_iter().map(|value| value.try_into().ok()).collect()
+        }
+        if key == "vertex_indices" || key == "vertex_index" {
+            self.corners = match property {
+                Property::ListChar(values) => numbers(values),
+                Property::ListUChar(values) => numbers(values),
+                Property::ListShort(values) => numbers(values),
+                Property::ListUShort(values) => numbers(values),
+                Property::ListInt(values) => numbers(values),
+                Property::ListUInt(values) => Some(values),
+                _ => None,
+            };
+        }
+    }
+}
+
+/// `count` as a node number: files with more nodes than that are refused.
+fn node_number(count: usize) -> Result<u32, String> {
+    u32::try_from(count).map_err(|_| format!("{count} nodes are more than can be numbered"))
+}
+
+/// Merges nodes at exactly the same point. Triangles that name nodes out of range are left for the surface's check.
+fn weld(nodes: Vec<DVec3>, triangles: &mut [[u32; 3]]) -> Vec<DVec3> {
+    let mut places = HashMap::with_capacity(nodes.len());
+    let mut kept = Vec::with_capacity(nodes.len());
+    let numbers: Vec<u32> = nodes
+        .iter()
+        .map(|&node| {
+            *places.entry(place(node)).or_insert_with(|| {
+                kept.push(node);
+                kept.len() as u32 - 1
+            })
+        })
+        .collect();
+    for corner in triangles.as_flattened_mut() {
+        *corner = numbers.get(*corner as usize).copied().unwrap_or(u32::MAX);
+    }
+    kept
+}

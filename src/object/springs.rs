@@ -1,0 +1,46 @@
+//! Springs along the edges of the surface and to the ground: K = Kn + Kg of equation (2).
+//!
+//! A spring of stiffness k between nodes a and b adds B to the blocks (a, a) and (b, b), and -B to (a, b) and (b, a):
+//! B = k I for an isotropic spring, B = k e e^T for an axial one, e its direction at rest. A ground spring adds kg I to
+//! the diagonal block. Kn and Kg are positive semidefinite by construction, so K is singular only where a rigid motion or
+//! a mechanism is left free.
+
+use super::{ObjectError, Stiffness, SurfaceDefect};
+use crate::scene::{ObjectSpec, SpringKind};
+use glam::{DMat3, DVec3};
+
+/// K over all nodes. `edges`: each edge once, as its two ends.
+pub(super) fn assemble(
+    spec: &ObjectSpec,
+    nodes: &[DVec3],
+    edges: &[[u32; 2]],
+    grounded: &[bool],
+) -> Result<Stiffness, ObjectError> {
+    let mut stiffness = Stiffness::with_pattern(nodes.len(), edges);
+    for (node, _) in grounded.iter().enumerate().filter(|(_, held)| **held) {
+        stiffness.add(node, node, DMat3::from_diagonal(DVec3::splat(spec.ground.stiffness)));
+    }
+    for &[a, b] in edges {
+        let (i, j) = (a as usize, b as usize);
+        let block = match spec.springs.kind {
+            SpringKind::Isotropic => DMat3::from_diagonal(DVec3::splat(spec.springs.stiffness)),
+            SpringKind::Axial => {
+                let direction = (nodes[j] - nodes[i]).try_normalize().ok_or_else(|| ObjectError::Surface {
+                    surface: super::surface_name(spec),
+                    defect: SurfaceDefect::CoincidentNodes { first: a, second: b },
+                })?;
+                spec.springs.stiffness * outer(direction)
+            }
+        };
+        stiffness.add(i, i, block);
+        stiffness.add(j, j, block);
+        stiffness.add(i, j, -block);
+        stiffness.add(j, i, -block);
+    }
+    Ok(stiffness)
+}
+
+/// e e^T.
+fn outer(e: DVec3) -> DMat3 {
+    DMat3::from_cols(e * e.x, e * e.y, e * e.z)
+}

@@ -1,0 +1,282 @@
+//! Is the surface closed, and who touches whom on it?
+//!
+//! Contact needs an inside: every edge must have exactly two triangles that run along it in opposite senses, the triangles
+//! around a node must form one fan, and every connected part must enclose a positive volume. A surface whose triangles
+//! merely point the wrong way is turned, with a warning; anything else is refused with the reason.
+//!
+//! Each connected part is taken as a body of its own: a shell inside another is not a cavity of it.
+
+use super::SurfaceDefect;
+use crate::tolerances::MIN_TRIANGLE_ASPECT;
+use glam::DVec3;
+use std::collections::HashMap;
+
+/// Who touches whom on the surface.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Topology {
+    /// Triangle across edge k of each triangle, edge k joining corners k and (k + 1) % 3.
+    pub across: Vec<[u32; 3]>,
+    /// Triangles around node j: `around[around_offsets[j]..around_offsets[j + 1]]`.
+    pub around_offsets: Vec<u32>,
+    /// See `around_offsets`; ascending for each node.
+    pub around: Vec<u32>,
+}
+
+impl Topology {
+    /// Triangles around `node`, ascending.
+    #[must_use]
+    pub fn triangles_around(&self, node: usize) -> &[u32] {
+        &self.around[self.around_offsets[node] as usize..self.around_offsets[node + 1] as usize]
+    }
+}
+
+/// What [`close`] finds.
+pub(super) struct ClosedSurface {
+    pub topology: Topology,
+    /// Each edge once, as its two ends.
+    pub edges: Vec<[u32; 2]>,
+    /// Nodes of each connected part, ascending.
+    pub components: Vec<Vec<u32>>,
+    pub warnings: Vec<String>,
+}
+
+/// Checks that `triangles` form closed, orientable surfaces of proper triangles, and turns them outward.
+pub(super) fn close(nodes: &[DVec3], triangles: &mut [[u32; 3]]) -> Result<ClosedSurface, SurfaceDefect> {
+    check_nodes(nodes)?;
+    check_triangles(nodes, triangles)?;
+    let (around_offsets, around) = triangles_around(nodes.len(), triangles);
+    if let Some(node) = (0..nodes.len()).find(|&j| around_offsets[j] == around_offsets[j + 1]) {
+        return Err(SurfaceDefect::UnusedNode { node: node as u32 });
+    }
+    let (edges, across) = pair_edges(triangles)?;
+    let parts = orient(triangles, &across)?;
+    let mut warnings = Vec::new();
+    turn_outward(nodes, triangles, &parts, &mut warnings)?;
+    // Turning a triangle renumbers its edges, so the neighbours are found anew.
+    let (_, across) = pair_edges(triangles)?;
+    let topology = Topology { across, around_offsets, around };
+    check_fans(&topology, triangles)?;
+    let components = parts.iter().map(|part| nodes_of(&part.triangles, triangles)).collect();
+    Ok(ClosedSurface { topology, edges, components, warnings })
+}
+
+fn check_nodes(nodes: &[DVec3]) -> Result<(), SurfaceDefect> {
+    let mut places = HashMap::with_capacity(nodes.len());
+    for (node, position) in nodes.iter().enumerate() {
+        let node = node as u32;
+        if !position.is_finite() {
+            return Err(SurfaceDefect::NotFinite { node });
+        }
+        if let Some(first) = places.insert(place(*position), node) {
+            return Err(SurfaceDefect::CoincidentNodes { first, second: node });
+        }
+    }
+    Ok(())
+}
+
+/// The bits of a point: equal for equal points. Adding zero makes -0 into 0.
+pub(super) fn place(position: DVec3) -> [u64; 3] {
+    position.to_array().map(|x| (x + 0.0).to_bits())
+}
+
+fn check_triangles(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), SurfaceDefect> {
+    if triangles.is_empty() {
+        return Err(SurfaceDefect::Empty);
+    }
+    let mut seen = HashMap::with_capacity(triangles.len());
+    for (triangle, corners) in triangles.iter().enumerate() {
+        let triangle = triangle as u32;
+        if let Some(&node) = corners.iter().find(|&&node| node as usize >= nodes.len()) {
+            return Err(SurfaceDefect::NodeOutOfRange { triangle, node, count: nodes.len() });
+        }
+        let [a, b, c] = corners.map(|node| nodes[node as usize]);
+        let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        let double_area = (b - a).cross(c - a).length();
+        // Not `<=`, so that an overflow to infinity or NaN is refused as well.
+        let proper = double_area > MIN_TRIANGLE_ASPECT * longest;
+        if !proper {
+            return Err(SurfaceDefect::DegenerateTriangle { triangle, corners: *corners });
+        }
+        let mut sorted = *corners;
+        sorted.sort_unstable();
+        if let Some(first) = seen.insert(sorted, triangle) {
+            return Err(SurfaceDefect::RepeatedTriangle { first, second: triangle });
+        }
+    }
+    Ok(())
+}
+
+fn triangles_around(nodes: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<u32>) {
+    let mut offsets = vec![0u32; nodes + 1];
+    for &node in triangles.as_flattened() {
+        offsets[node as usize + 1] += 1;
+    }
+    for node in 0..nodes {
+        offsets[node + 1] += offsets[node];
+    }
+    let mut next = offsets.clone();
+    let mut around = vec![0; 3 * triangles.len()];
+    for (triangle, corners) in triangles.iter().enumerate() {
+        for &node in corners {
+            around[next[node as usize] as usize] = triangle as u32;
+            next[node as usize] += 1;
+        }
+    }
+    (offsets, around)
+}
+
+/// One side of an edge: its ends in ascending order, its triangle, and which of the triangle's edges it is.
+type Side = ([u32; 2], u32, usize);
+
+/// Each edge once, and the triangle across each edge of each triangle.
+#[expect(clippy::type_complexity)]
+fn pair_edges(triangles: &[[u32; 3]]) -> Result<(Vec<[u32; 2]>, Vec<[u32; 3]>), SurfaceDefect> {
+    let mut sides: Vec<Side> = Vec::with_capacity(3 * triangles.len());
+    for (triangle, corners) in triangles.iter().enumerate() {
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            sides.push(([a.min(b), a.max(b)], triangle as u32, k));
+        }
+    }
+    sides.sort_unstable();
+    let mut edges = Vec::with_capacity(sides.len() / 2);
+    let mut across = vec![[0; 3]; triangles.len()];
+    let mut open = None;
+    let mut open_edges = 0;
+    for group in sides.chunk_by(|a, b| a.0 == b.0) {
+        match group {
+            [(nodes, first, i), (_, second, j)] => {
+                edges.push(*nodes);
+                across[*first as usize][*i] = *second;
+                across[*second as usize][*j] = *first;
+            }
+            [(nodes, triangle, _)] => {
+                open_edges += 1;
+                open.get_or_insert((*nodes, *triangle));
+            }
+            many => return Err(SurfaceDefect::NonManifoldEdge { nodes: many[0].0, triangles: many.len() }),
+        }
+    }
+    match open {
+        Some((nodes, triangle)) => Err(SurfaceDefect::Open { nodes, triangle, edges: open_edges }),
+        None => Ok((edges, across)),
+    }
+}
+
+/// A connected part of the surface.
+struct Part {
+    triangles: Vec<u32>,
+    /// Triangles that were turned to agree with the part's first.
+    turned: usize,
+}
+
+/// Turns triangles so that neighbours run along their common edge in opposite senses; the parts that are connected.
+fn orient(triangles: &mut [[u32; 3]], across: &[[u32; 3]]) -> Result<Vec<Part>, SurfaceDefect> {
+    let mut turned: Vec<Option<bool>> = vec![None; triangles.len()];
+    let mut parts = Vec::new();
+    for seed in 0..triangles.len() {
+        if turned[seed].is_some() {
+            continue;
+        }
+        turned[seed] = Some(false);
+        let mut part = Part { triangles: vec![seed as u32], turned: 0 };
+        let mut next = 0;
+        while let Some(&current) = part.triangles.get(next) {
+            next += 1;
+            let corners = triangles[current as usize];
+            let current_turned = turned[current as usize] == Some(true);
+            for k in 0..3 {
+                let neighbour = across[current as usize][k];
+                let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                let wanted = runs_along(triangles[neighbour as usize], a, b) != current_turned;
+                match turned[neighbour as usize] {
+                    None => {
+                        turned[neighbour as usize] = Some(wanted);
+                        part.turned += usize::from(wanted);
+                        part.triangles.push(neighbour);
+                    }
+                    Some(found) if found != wanted => return Err(SurfaceDefect::NonOrientable { nodes: [a, b] }),
+                    Some(_) => {}
+                }
+            }
+        }
+        parts.push(part);
+    }
+    for (corners, turned) in triangles.iter_mut().zip(turned) {
+        if turned == Some(true) {
+            corners.swap(1, 2);
+        }
+    }
+    Ok(parts)
+}
+
+/// Does the triangle run from a to b, rather than from b to a?
+fn runs_along(corners: [u32; 3], a: u32, b: u32) -> bool {
+    (0..3).any(|k| corners[k] == a && corners[(k + 1) % 3] == b)
+}
+
+/// Turns the parts whose signed volume is negative.
+fn turn_outward(
+    nodes: &[DVec3],
+    triangles: &mut [[u32; 3]],
+    parts: &[Part],
+    warnings: &mut Vec<String>,
+) -> Result<(), SurfaceDefect> {
+    let mut total_turned = 0;
+    for part in parts {
+        let seed = triangles[part.triangles[0] as usize][0];
+        let origin = nodes[seed as usize];
+        let (mut volume, mut size) = (0.0, 0.0);
+        for &triangle in &part.triangles {
+            let [a, b, c] = triangles[triangle as usize].map(|node| nodes[node as usize] - origin);
+            let six_volumes = a.dot(b.cross(c));
+            volume += six_volumes;
+            size += a.length() * (b - a).cross(c - a).length();
+        }
+        let solid = volume.abs() > MIN_TRIANGLE_ASPECT * size;
+        if !solid {
+            return Err(SurfaceDefect::NoVolume { node: seed });
+        }
+        let mut turned = part.turned;
+        if volume < 0.0 {
+            turned = part.triangles.len() - turned;
+            for &triangle in &part.triangles {
+                triangles[triangle as usize].swap(1, 2);
+            }
+        }
+        total_turned += turned;
+    }
+    if total_turned > 0 {
+        let all = triangles.len();
+        warnings.push(format!("{total_turned} of {all} triangles of the surface faced inward and were turned"));
+    }
+    Ok(())
+}
+
+/// Refuses nodes at which two sheets touch: walking from triangle to triangle must visit all triangles around the node.
+fn check_fans(topology: &Topology, triangles: &[[u32; 3]]) -> Result<(), SurfaceDefect> {
+    for node in 0..topology.around_offsets.len() - 1 {
+        let around = topology.triangles_around(node);
+        let mut current = around[0] as usize;
+        let mut visited = 0;
+        while visited < around.len() {
+            visited += 1;
+            let corner = triangles[current].iter().position(|&corner| corner as usize == node).unwrap_or(0);
+            current = topology.across[current][corner] as usize;
+            if current == around[0] as usize {
+                break;
+            }
+        }
+        if visited != around.len() {
+            return Err(SurfaceDefect::PinchedNode { node: node as u32 });
+        }
+    }
+    Ok(())
+}
+
+fn nodes_of(part: &[u32], triangles: &[[u32; 3]]) -> Vec<u32> {
+    let mut nodes: Vec<u32> = part.iter().flat_map(|&triangle| triangles[triangle as usize]).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
+}

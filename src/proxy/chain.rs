@@ -1,0 +1,124 @@
+//! The chain and its forward kinematics.
+
+use crate::JointVector;
+use crate::scene::{JointKind, ProxySpec};
+use glam::{DMat3, DVec3};
+
+/// A serial chain.
+#[derive(Clone, Debug)]
+pub struct Chain {
+    /// From the base outwards.
+    pub joints: Vec<Joint>,
+    /// Contact nodes of all links, link by link.
+    pub nodes: Vec<Node>,
+}
+
+/// One joint and the link that it moves.
+#[derive(Clone, Debug)]
+pub struct Joint {
+    /// As the scene names it.
+    pub name: String,
+    /// Turning or sliding.
+    pub kind: JointKind,
+    /// In the parent link's frame [m].
+    pub origin: DVec3,
+    /// Unit vector in the joint's frame.
+    pub axis: DVec3,
+    /// Least and greatest joint coordinate [rad or m].
+    pub limits: [f64; 2],
+    /// Mass of the link [kg].
+    pub mass: f64,
+    /// In the link's frame [m].
+    pub centre_of_mass: DVec3,
+    /// Principal moments about the centre of mass, along the link frame's axes [kg m^2].
+    pub inertia: DVec3,
+    /// Reflected inertia of the actuator [kg m^2 or kg].
+    pub rotor_inertia: f64,
+}
+
+/// A contact node x_i.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Node {
+    /// The joint whose link carries it.
+    pub link: usize,
+    /// In the link's frame [m].
+    pub position: DVec3,
+    /// Zero for the paper's point nodes [m].
+    pub radius: f64,
+}
+
+/// The chain placed in the world at one configuration.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// Origins of the link frames [m].
+    pub origins: Vec<DVec3>,
+    /// Rotations of the link frames: from the link's frame to the world.
+    pub rotations: Vec<DMat3>,
+    /// Joint axes, unit vectors in the world.
+    pub axes: Vec<DVec3>,
+    /// Node positions x_i [m].
+    pub nodes: Vec<DVec3>,
+}
+
+impl Chain {
+    /// The chain of a validated scene.
+    #[must_use]
+    pub fn new(spec: &ProxySpec) -> Self {
+        let joints = spec.joints.iter().map(|joint| Joint {
+            name: joint.name.clone(),
+            kind: joint.kind,
+            origin: joint.origin,
+            axis: joint.axis.normalize_or(DVec3::Z),
+            limits: joint.limits,
+            mass: joint.mass,
+            centre_of_mass: joint.centre_of_mass,
+            inertia: joint.inertia,
+            rotor_inertia: joint.rotor_inertia,
+        });
+        let nodes = spec.joints.iter().enumerate().flat_map(|(link, joint)| {
+            joint.nodes.iter().map(move |node| Node { link, position: node.position, radius: node.radius })
+        });
+        Self { joints: joints.collect(), nodes: nodes.collect() }
+    }
+
+    /// Number of joints d.
+    #[must_use]
+    pub fn degrees_of_freedom(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// The chain at q = 0.
+    #[must_use]
+    pub fn new_pose(&self) -> Pose {
+        let mut pose = Pose::default();
+        self.pose(&JointVector::zeros(self.joints.len()), &mut pose);
+        pose
+    }
+
+    /// Places the chain at configuration `q`, one number per joint; missing ones count as zero. Allocates only where
+    /// `pose` does not have the chain's size yet.
+    pub fn pose(&self, q: &[f64], pose: &mut Pose) {
+        let joints = self.joints.len();
+        pose.origins.resize(joints, DVec3::ZERO);
+        pose.rotations.resize(joints, DMat3::IDENTITY);
+        pose.axes.resize(joints, DVec3::ZERO);
+        pose.nodes.resize(self.nodes.len(), DVec3::ZERO);
+
+        let (mut origin, mut rotation) = (DVec3::ZERO, DMat3::IDENTITY);
+        for (index, joint) in self.joints.iter().enumerate() {
+            let coordinate = q.get(index).copied().unwrap_or(0.0);
+            let axis = rotation * joint.axis;
+            origin += rotation * joint.origin;
+            match joint.kind {
+                JointKind::Revolute => rotation *= DMat3::from_axis_angle(joint.axis, coordinate),
+                JointKind::Prismatic => origin += coordinate * axis,
+            }
+            pose.origins[index] = origin;
+            pose.rotations[index] = rotation;
+            pose.axes[index] = axis;
+        }
+        for (position, node) in pose.nodes.iter_mut().zip(&self.nodes) {
+            *position = pose.origins[node.link] + pose.rotations[node.link] * node.position;
+        }
+    }
+}
