@@ -1,0 +1,250 @@
+//! What a scene says, validated: plain data that the other rooms read.
+//!
+//! All quantities are SI. Gains of the haptic loop are given joint by joint, because the coordinates of a chain may mix
+//! radians and metres: where a doc says [N m/rad], a prismatic joint has [N/m], and so on.
+
+use crate::JointVector;
+use glam::DVec3;
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// The deformable virtual object (section 2.1).
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectSpec {
+    /// Where the surface comes from.
+    pub shape: Shape,
+    /// Springs Kn between its nodes.
+    pub springs: SpringSpec,
+    /// Springs Kg to the mechanical ground.
+    pub ground: GroundSpec,
+    /// Mass of each node [kg].
+    pub node_mass: f64,
+    /// Damping of each node against the ground [N s/m].
+    pub node_damping: f64,
+}
+
+/// Where the surface comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Two poles and `rings` rings of `segments` nodes on a sphere.
+    Sphere {
+        /// [m]
+        centre: DVec3,
+        /// [m]
+        radius: f64,
+        /// Rings between the poles, at equal steps of the polar angle.
+        rings: usize,
+        /// Nodes of each ring.
+        segments: usize,
+    },
+    /// A closed triangle mesh: OBJ, STL or PLY by the file's extension. `scale` multiplies its coordinates (0.001 for
+    /// millimetres), `centre` is then added [m].
+    Mesh {
+        /// Relative to the scene file's folder when the scene names it so; ready to open here.
+        file: PathBuf,
+        /// [1]
+        scale: f64,
+        /// [m]
+        centre: DVec3,
+    },
+}
+
+/// Springs along the edges of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpringSpec {
+    /// How each spring resists.
+    pub kind: SpringKind,
+    /// Stiffness of each spring [N/m].
+    pub stiffness: f64,
+}
+
+/// How a spring resists a relative displacement d of its two ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SpringKind {
+    /// Along its rest direction e only: k e (e . d).
+    Axial,
+    /// In all directions alike: k d.
+    Isotropic,
+}
+
+/// Ground springs Kg.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroundSpec {
+    /// Stiffness at each grounded node, in all directions alike [N/m].
+    pub stiffness: f64,
+    /// Which nodes it holds.
+    pub nodes: GroundNodes,
+}
+
+/// Which nodes the ground holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum GroundNodes {
+    /// Every node of the object.
+    All,
+    /// Nodes by number.
+    Listed(Vec<u32>),
+    /// Nodes whose rest position lies below this height z [m].
+    Below(f64),
+}
+
+/// The multi-link virtual proxy: a serial chain of one to six joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProxySpec {
+    /// From the base outwards.
+    pub joints: Vec<JointSpec>,
+}
+
+/// One joint and the link that it moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointSpec {
+    /// For axes of figures and columns of exports.
+    pub name: String,
+    /// Turning or sliding.
+    pub kind: JointKind,
+    /// Joint frame's origin in the parent link's frame at q = 0 [m]; all frames are parallel to the world at q = 0.
+    pub origin: DVec3,
+    /// Axis of rotation or translation in the joint's frame; a unit vector after validation.
+    pub axis: DVec3,
+    /// Least and greatest joint coordinate [rad or m].
+    pub limits: [f64; 2],
+    /// Mass of the link [kg].
+    pub mass: f64,
+    /// Centre of mass in the link's frame [m].
+    pub centre_of_mass: DVec3,
+    /// Principal moments of inertia about the centre of mass, along the link frame's axes [kg m^2].
+    pub inertia: DVec3,
+    /// Reflected inertia of the actuator about the joint, positive, so that the chain's inertia is positive definite in
+    /// every configuration [kg m^2 or kg].
+    pub rotor_inertia: f64,
+    /// Contact nodes of this link, in the link's frame.
+    pub nodes: Vec<ProxyNodeSpec>,
+}
+
+/// How a joint moves its link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum JointKind {
+    /// Turns about its axis; its coordinate is an angle [rad].
+    Revolute,
+    /// Slides along its axis; its coordinate is a length [m].
+    Prismatic,
+}
+
+/// A contact node of a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProxyNodeSpec {
+    /// In the link's frame [m].
+    pub position: DVec3,
+    /// Zero for the paper's point nodes [m].
+    pub radius: f64,
+}
+
+/// Equation (2) and how it is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactSpec {
+    /// Contact stiffness: of one spring Kc between a proxy node and an object node; the energy form's stiffness at a
+    /// contact point is kc = 3 Kc (three nodes of a triangle) [N/m].
+    pub stiffness: f64,
+    /// How equation (2) is solved.
+    pub algorithm: Algorithm,
+    /// Relative residual at which a configuration counts as converged [1].
+    pub tolerance: f64,
+    /// After as many a configuration that has not converged is flagged.
+    pub max_iterations: u32,
+}
+
+/// How equation (2) is solved for one configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Algorithm {
+    /// Minimum of the stored energy; geometry follows the deformation.
+    Energy,
+    /// The paper's four-step iteration (section 2.1).
+    Paper,
+    /// Minimum of the stored energy with the geometry frozen at rest.
+    Linearised,
+}
+
+/// The uniform grid over C-space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GridSpec {
+    /// One per joint, in the chain's order.
+    pub axes: Vec<AxisSpec>,
+}
+
+/// Grid coordinates `start + k step`, `k < count`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisSpec {
+    /// [rad or m]
+    pub start: f64,
+    /// Positive [rad or m].
+    pub step: f64,
+    /// At least 2.
+    pub count: usize,
+}
+
+/// The 1 kHz loop (section 3.1).
+#[derive(Clone, Debug, PartialEq)]
+pub struct HapticsSpec {
+    /// Ticks per second [Hz].
+    pub rate: f64,
+    /// Contact where the interpolated contact index exceeds this, Ith [1].
+    pub threshold: f64,
+    /// Slope Ks of the boundary layer at each joint [N m/rad].
+    pub boundary_slope: JointVector,
+    /// mu of the passivity condition Ks <= mu bv / T [1].
+    pub passivity_factor: f64,
+    /// Extra damping bv of the proxy at each joint [N m s/rad].
+    pub proxy_damping: JointVector,
+    /// Stiffness Kvc of the virtual coupling at each joint [N m/rad].
+    pub coupling_stiffness: JointVector,
+    /// Damping Bvc of the virtual coupling at each joint [N m s/rad].
+    pub coupling_damping: JointVector,
+    /// Device damping bd at each joint [N m s/rad].
+    pub device_damping: JointVector,
+    /// Apparent inertia of the device at each joint [kg m^2].
+    pub device_inertia: JointVector,
+    /// Greatest torque of each joint, in size [N m].
+    pub torque_limit: JointVector,
+    /// Greatest rate of change of each joint's torque, in size [N m/s].
+    pub torque_rate_limit: JointVector,
+    /// The hand that holds the device.
+    pub hand: HandSpec,
+}
+
+/// The simulated hand: a mass on the device, pulled along the motion by a spring and a damper at each joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HandSpec {
+    /// Between the motion and the hand [N m/rad].
+    pub stiffness: JointVector,
+    /// Between the motion and the hand [N m s/rad].
+    pub damping: JointVector,
+    /// Of the hand itself, moving with the device [kg m^2].
+    pub inertia: JointVector,
+}
+
+/// The graphics loop (section 3.2).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GraphicsSpec {
+    /// Frames per second [Hz].
+    pub rate: f64,
+}
+
+/// Named motions of the hand, as waypoints in C-space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotionSpec {
+    /// Approach, press into the object, release; empty where the scene has none.
+    pub press: Vec<Waypoint>,
+    /// Slide across the object in contact; empty where the scene has none.
+    pub scrape: Vec<Waypoint>,
+}
+
+/// The hand passes `q` at `time`; between waypoints it moves along a smooth (minimum-jerk) path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Waypoint {
+    /// Since the motion began [s].
+    pub time: f64,
+    /// Configuration [rad or m].
+    pub q: JointVector,
+}
