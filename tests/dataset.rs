@@ -4,7 +4,7 @@
 
 use haptize::{
     contact::Status,
-    dataset::{Axis, Contacts, Dataset, Error, Grid, Provenance, Surface},
+    dataset::{Axis, Contacts, Dataset, Error, Format, Grid, Provenance, Surface},
 };
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -428,4 +428,72 @@ fn the_file_is_as_readable_as_any_other_new_file() {
     File::create(&other).unwrap();
     let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode();
     assert_eq!(mode(&path), mode(&other));
+}
+
+/// The array `name` of an archive: shape and numbers.
+fn array<T: npyz::Deserialize>(path: &Path, name: &str) -> Option<(Vec<u64>, Vec<T>)> {
+    let mut archive = zip::ZipArchive::new(File::open(path).unwrap()).unwrap();
+    let entry = archive.by_name(&npyz::npz::file_name_from_array_name(name)).ok()?;
+    let array = npyz::NpyFile::new(entry).unwrap();
+    Some((array.shape().to_vec(), array.into_vec().unwrap()))
+}
+
+#[test]
+fn the_numpy_archive_holds_the_same_numbers() {
+    let folder = Folder::new();
+    let path = folder.file("a.npz");
+    let dataset = sample();
+    assert_eq!(dataset.export(&path, Format::Npz).unwrap(), [path.clone()]);
+    assert_eq!(array(&path, "torque"), Some((vec![2, 3, 2], dataset.torque.to_vec())));
+    assert_eq!(array(&path, "energy"), Some((vec![2, 3], dataset.energy.as_ref().unwrap().to_vec())));
+    assert_eq!(array(&path, "gap"), Some((vec![2, 3], dataset.gap.as_ref().unwrap().to_vec())));
+    assert_eq!(array(&path, "status"), Some((vec![2, 3], dataset.status.to_vec())));
+    assert_eq!(array(&path, "iterations"), Some((vec![2, 3], dataset.iterations.as_ref().unwrap().to_vec())));
+    let contacts = dataset.contacts.as_ref().unwrap();
+    assert_eq!(array(&path, "contact_offsets"), Some((vec![7], contacts.offsets.to_vec())));
+    assert_eq!(array(&path, "contact_forces"), Some((vec![5, 3], contacts.forces.to_vec())));
+    let q: Vec<f64> = (0..6).flat_map(|point| dataset.grid.configuration(point).to_vec()).collect();
+    assert_eq!(array(&path, "q"), Some((vec![2, 3, 2], q)));
+    assert_eq!(array(&path, "q2"), Some((vec![3], (0..3).map(|k| dataset.grid.axes[1].coordinate(k)).collect())));
+    assert_eq!(array(&path, "joint_names"), Some((vec![2], vec!["base".to_string(), "\"s\", lide".to_string()])));
+    assert_eq!(array(&path, "scene"), Some((vec![], vec![dataset.scene.clone()])));
+
+    bare().export(&path, Format::Npz).unwrap();
+    assert_eq!(array::<f64>(&path, "energy"), None);
+}
+
+#[test]
+fn the_text_files_hold_the_same_numbers() {
+    let folder = Folder::new();
+    let (path, other) = (folder.file("a.csv"), folder.file("a.contacts.csv"));
+    let dataset = sample();
+    assert_eq!(dataset.export(&path, Format::Csv).unwrap(), [path.clone(), other.clone()]);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut lines = text.lines();
+    assert_eq!(
+        lines.next().unwrap(),
+        "base [rad],\"\"\"s\"\", lide [m]\",torque base [N m],\"force \"\"s\"\", lide [N]\",energy [J],gap [m],\
+         status (0 free; 1 contact; 2 unconverged; 3 overflow; 4 outside),residual [1],iterations,contacts"
+    );
+    let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(|field| field.parse().unwrap()).collect()).collect();
+    assert_eq!(rows.len(), 6);
+    let contacts = [0.0, 2.0, 1.0, 2.0, 0.0, 0.0];
+    for (point, row) in rows.iter().enumerate() {
+        assert_eq!(row[..2], dataset.grid.configuration(point)[..]);
+        assert_eq!(row[2..4], *dataset.torque(point));
+        assert_eq!(row[4], dataset.energy.as_ref().unwrap()[point]);
+        assert_eq!(row[5] as f32, dataset.gap.as_ref().unwrap()[point]);
+        assert_eq!(row[6], f64::from(dataset.status[point]));
+        assert_eq!(row[7] as f32, dataset.residual.as_ref().unwrap()[point]);
+        assert_eq!(row[8], f64::from(dataset.iterations.as_ref().unwrap()[point]));
+        assert_eq!(row[9], contacts[point]);
+    }
+    let text = std::fs::read_to_string(&other).unwrap();
+    assert_eq!(text.lines().count(), 6);
+    let forces = &dataset.contacts.as_ref().unwrap().forces;
+    assert_eq!(text.lines().nth(3).unwrap(), format!("2,1,{:?},{:?},{:?}", forces[6], forces[7], forces[8]));
+
+    std::fs::remove_file(&other).unwrap();
+    assert_eq!(bare().export(&path, Format::Csv).unwrap(), [path]);
+    assert!(!other.exists());
 }

@@ -94,12 +94,12 @@ macro_rules! element {
 }
 element!(f64 => F64, u64 => U64, f32 => F32, u32 => U32, u8 => U8);
 
-/// A tensor about to be written.
-struct Tensor<'a> {
-    name: &'static str,
-    dtype: Dtype,
-    shape: Vec<usize>,
-    bytes: &'a [u8],
+/// A tensor about to be written; `bytes` is aligned to its type.
+pub(super) struct Tensor<'a> {
+    pub(super) name: &'static str,
+    pub(super) dtype: Dtype,
+    pub(super) shape: Vec<usize>,
+    pub(super) bytes: &'a [u8],
 }
 
 impl<'a> Tensor<'a> {
@@ -109,7 +109,7 @@ impl<'a> Tensor<'a> {
 }
 
 /// All tensors of a dataset, widest type first.
-fn tensors(dataset: &Dataset) -> Vec<Tensor<'_>> {
+pub(super) fn tensors(dataset: &Dataset) -> Vec<Tensor<'_>> {
     let grid = dataset.grid.counts();
     let mut torque_shape = grid.clone();
     torque_shape.push(dataset.grid.joints());

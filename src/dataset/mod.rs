@@ -9,6 +9,7 @@ mod atomic;
 mod check;
 mod column;
 mod error;
+mod export;
 mod file;
 mod grid;
 mod summary;
@@ -16,6 +17,7 @@ mod summary;
 pub use atomic::replace_file;
 pub use column::Column;
 pub use error::Error;
+pub use export::Format;
 pub use grid::{Axis, Grid};
 pub use summary::{StatusCounts, Summary};
 

@@ -1,0 +1,40 @@
+//! Datasets for other programs: NumPy archives and comma-separated text.
+
+mod csv;
+mod npz;
+
+use super::{Dataset, Error};
+use std::path::{Path, PathBuf};
+
+/// What to export to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// NumPy archive, uncompressed: `numpy.load(FILE)["torque"]`.
+    Npz,
+    /// Comma-separated text, one row a grid point, and a second file with one row a contact force.
+    Csv,
+}
+
+impl Format {
+    /// The usual extension of such files.
+    #[must_use]
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Npz => "npz",
+            Self::Csv => "csv",
+        }
+    }
+}
+
+impl Dataset {
+    /// Exports the dataset to `path`, replacing it whole or not at all; returns the files written.
+    ///
+    /// # Errors
+    /// [`Error::Write`] from the system.
+    pub fn export(&self, path: &Path, format: Format) -> Result<Vec<PathBuf>, Error> {
+        match format {
+            Format::Npz => npz::export(self, path),
+            Format::Csv => csv::export(self, path),
+        }
+    }
+}

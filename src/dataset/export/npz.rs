@@ -1,0 +1,86 @@
+//! NumPy archive: every tensor of the file under its own name, and what the file has in its header as arrays.
+//!
+//! `q` (n1, .., nd, d) are the configurations, `q1` .. `qd` the grid lines of each axis, `joint_names` and `joint_units`
+//! their names, `scene` and `provenance` texts. Arrays are streamed, not compressed: numbers of a smooth field hardly are.
+
+use super::super::{Dataset, Error, file, replace_file};
+use npyz::{AutoSerialize, DType, TypeStr, WriterBuilder};
+use safetensors::Dtype;
+use std::{
+    io::{self, Seek, Write},
+    path::{Path, PathBuf},
+};
+use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
+
+/// Room for the header of an array beside its data [bytes].
+const ARRAY_HEADER: u64 = 1 << 16;
+
+pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
+    replace_file(path, |writer| write(dataset, ZipWriter::new(writer)))
+        .map_err(|source| Error::Write { path: path.into(), source })?;
+    Ok(vec![path.into()])
+}
+
+fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Result<()> {
+    let grid = &dataset.grid;
+    for tensor in file::tensors(dataset) {
+        let (name, shape) = (tensor.name, &tensor.shape);
+        match tensor.dtype {
+            Dtype::F64 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, f64>(tensor.bytes)),
+            Dtype::U64 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, u64>(tensor.bytes)),
+            Dtype::F32 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, f32>(tensor.bytes)),
+            Dtype::U32 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, u32>(tensor.bytes)),
+            _ => array(&mut zip, name, shape, tensor.bytes),
+        }?;
+    }
+    let mut shape = grid.counts();
+    shape.push(grid.joints());
+    let configurations = (0..grid.points()).map(|point| grid.configuration(point));
+    let coordinates = configurations.flat_map(|q| (0..q.len()).map(move |joint| q[joint]));
+    stream(&mut zip, "q", &shape, f64::default_dtype(), coordinates)?;
+    for (k, axis) in grid.axes.iter().enumerate() {
+        let lines = (0..axis.count).map(|line| axis.coordinate(line));
+        stream(&mut zip, &format!("q{}", k + 1), &[axis.count], f64::default_dtype(), lines)?;
+    }
+    let joints = [grid.joints()];
+    texts(&mut zip, "joint_names", &joints, grid.axes.iter().map(|axis| axis.name.clone()).collect())?;
+    texts(&mut zip, "joint_units", &joints, grid.axes.iter().map(|axis| axis.unit.clone()).collect())?;
+    texts(&mut zip, "scene", &[], vec![dataset.scene.clone()])?;
+    texts(&mut zip, "provenance", &[], vec![serde_json::to_string(&dataset.provenance)?])?;
+    zip.finish()?;
+    Ok(())
+}
+
+fn array<W: Write + Seek, T: AutoSerialize + Copy>(
+    zip: &mut ZipWriter<W>,
+    name: &str,
+    shape: &[usize],
+    values: &[T],
+) -> io::Result<()> {
+    stream(zip, name, shape, T::default_dtype(), values.iter().copied())
+}
+
+/// Text in NumPy has a fixed width: that of the longest, at least one character.
+fn texts<W: Write + Seek>(zip: &mut ZipWriter<W>, name: &str, shape: &[usize], texts: Vec<String>) -> io::Result<()> {
+    let width = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
+    let kind: TypeStr = format!("<U{width}").parse().map_err(io::Error::other)?;
+    stream(zip, name, shape, DType::new_scalar(kind), texts.into_iter())
+}
+
+fn stream<W: Write + Seek, T: npyz::Serialize>(
+    zip: &mut ZipWriter<W>,
+    name: &str,
+    shape: &[usize],
+    kind: DType,
+    values: impl Iterator<Item = T>,
+) -> io::Result<()> {
+    let shape: Vec<u64> = shape.iter().map(|&count| count as u64).collect();
+    let bytes = shape.iter().product::<u64>() * kind.num_bytes().unwrap_or(1) as u64;
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .large_file(bytes + ARRAY_HEADER > u32::MAX.into());
+    zip.start_file(npyz::npz::file_name_from_array_name(name), options)?;
+    let mut writer = npyz::WriteOptions::new().dtype(kind).shape(&shape).writer(zip).begin_nd()?;
+    writer.extend(values)?;
+    writer.finish()
+}
