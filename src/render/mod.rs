@@ -1,5 +1,15 @@
 //! Rendering: from a dataset to the torque of the haptic device at 1 kHz and the moving object at 60 Hz (section 3).
 
 pub mod accounts;
+pub mod boundary;
+pub mod field;
 pub mod flags;
+pub mod stencil;
 pub mod trace;
+
+#[cfg(test)]
+use crate as engine;
+
+#[cfg(test)]
+#[path = "../../tests/synthetic/mod.rs"]
+mod synthetic;
