@@ -3,12 +3,12 @@
 //! Lengths fit the grid, contact rows are ordered and within, statuses are known, every number is finite. Checked in an
 //! order in which no check relies on one that comes later, and without allocating, so that hostile counts cost nothing.
 
-use super::{Column, Contacts, Dataset, Grid, Surface};
-use crate::{MAX_JOINTS, contact::Status};
+use super::{Column, Contacts, Dataset, Surface};
+use crate::contact::Status;
 
 /// `Err` says what is wrong.
 pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
-    let points = check_grid(&dataset.grid)?;
+    let points = dataset.grid.check()?;
     let torques = points.checked_mul(dataset.grid.joints()).ok_or("the grid has too many points")?;
     length("torque", &dataset.torque, torques)?;
     length("status", &dataset.status, points)?;
@@ -37,34 +37,6 @@ pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
         (Some(_), None) => Err("contact forces name the nodes of a surface that is not there".into()),
         (None, _) => Ok(()),
     }
-}
-
-/// The number of points of a sound grid.
-pub(super) fn check_grid(grid: &Grid) -> Result<usize, String> {
-    if grid.axes.is_empty() || grid.axes.len() > MAX_JOINTS {
-        return Err(format!("the grid has {} axes, not 1 to {MAX_JOINTS}", grid.axes.len()));
-    }
-    let mut points = 1_usize;
-    for axis in &grid.axes {
-        let name = &axis.name;
-        if axis.unit != "rad" && axis.unit != "m" {
-            return Err(format!("axis {name} has unit {:?}, not rad or m", axis.unit));
-        }
-        if axis.count == 0 {
-            return Err(format!("axis {name} has no grid lines"));
-        }
-        points = points.checked_mul(axis.count).ok_or("the grid has too many points")?;
-        // Where a step is lost in rounding at either end, neighbouring grid lines coincide.
-        let (first, last) = (axis.coordinate(0), axis.coordinate(axis.count - 1));
-        let ascends = axis.step > 0.0 && first + axis.step > first && last - axis.step < last;
-        if !(axis.step.is_finite() && first.is_finite() && last.is_finite() && ascends) {
-            return Err(format!(
-                "axis {name} from {} by {} does not ascend through finite numbers",
-                axis.start, axis.step
-            ));
-        }
-    }
-    Ok(points)
 }
 
 fn check_surface(surface: &Surface) -> Result<(), String> {

@@ -269,7 +269,7 @@ fn decode(path: &Path, map: Mmap) -> Result<Dataset, Error> {
     let provenance: Provenance =
         serde_json::from_str(text("provenance")?).map_err(|error| damaged(format!("provenance: {error}")))?;
     let scene = text("scene")?.to_string();
-    check::check_grid(&grid).map_err(damaged)?;
+    grid.check().map_err(damaged)?;
 
     let mut tensors: BTreeMap<_, _> = metadata.tensors().into_iter().map(|(name, info)| (name, info.clone())).collect();
     let windows = Windows { map: Arc::new(map), start };

@@ -1,6 +1,6 @@
 //! The uniform grid over C-space.
 
-use crate::JointVector;
+use crate::{JointVector, MAX_JOINTS};
 use serde::{Deserialize, Serialize};
 
 /// Grid coordinates `start + k step`, `k < count`, of one joint.
@@ -50,6 +50,38 @@ impl Grid {
     #[must_use]
     pub fn counts(&self) -> Vec<usize> {
         self.axes.iter().map(|axis| axis.count).collect()
+    }
+
+    /// Number of points of a sound grid: 1 to [`MAX_JOINTS`] axes of ascending, finite, distinct grid lines, and no more
+    /// points than can be counted.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self) -> Result<usize, String> {
+        if self.axes.is_empty() || self.axes.len() > MAX_JOINTS {
+            return Err(format!("the grid has {} axes, not 1 to {MAX_JOINTS}", self.axes.len()));
+        }
+        let mut points = 1_usize;
+        for axis in &self.axes {
+            let name = &axis.name;
+            if axis.unit != "rad" && axis.unit != "m" {
+                return Err(format!("axis {name} has unit {:?}, not rad or m", axis.unit));
+            }
+            if axis.count == 0 {
+                return Err(format!("axis {name} has no grid lines"));
+            }
+            points = points.checked_mul(axis.count).ok_or("the grid has too many points")?;
+            // Where a step is lost in rounding at either end, neighbouring grid lines coincide.
+            let (first, last) = (axis.coordinate(0), axis.coordinate(axis.count - 1));
+            let ascends = axis.step > 0.0 && first + axis.step > first && last - axis.step < last;
+            if !(axis.step.is_finite() && first.is_finite() && last.is_finite() && ascends) {
+                return Err(format!(
+                    "axis {name} from {} by {} does not ascend through finite numbers",
+                    axis.start, axis.step
+                ));
+            }
+        }
+        Ok(points)
     }
 
     /// Configuration q of grid point `point`.

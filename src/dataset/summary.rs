@@ -20,7 +20,7 @@ pub struct Summary {
     pub max_energy: Option<f64>,
     /// Greatest depth of a proxy node below the surface at rest; negative when none gets inside [m].
     pub max_depth: Option<f64>,
-    /// Greatest residual of a point in contact [1].
+    /// Greatest residual of a converged point in contact [1].
     pub max_residual: Option<f64>,
     /// Stored contact forces, over all points.
     pub contacts: Option<usize>,
@@ -98,11 +98,11 @@ impl Dataset {
         }
     }
 
-    /// Greatest residual of a point in contact [1]; `None` where residuals are not stored.
+    /// Greatest residual of a converged point in contact [1]; `None` where residuals are not stored.
     #[must_use]
     pub fn max_residual(&self) -> Option<f64> {
         let residual = self.residual.as_ref()?;
-        let in_contact = |point: &usize| matches!(self.status(*point), Status::Contact | Status::Unconverged);
-        Some((0..residual.len()).filter(in_contact).map(|point| residual[point].into()).fold(0.0, f64::max))
+        let converged = (0..residual.len()).filter(|&point| self.status(point) == Status::Contact);
+        Some(converged.map(|point| residual[point].into()).fold(0.0, f64::max))
     }
 }

@@ -1,11 +1,21 @@
 //! Sweeps: a virtual object haptized over a grid in C-space.
 
+mod columns;
+mod part;
+mod report;
+mod sweep;
+
+pub use report::{Iterations, SweepReport};
+pub use sweep::{Progress, Run, Sweep, SweepError};
+
 use crate::{JointVector, contact::Equilibrium};
 
 /// What solves equation (2) for many configurations: the CPU on all cores, or a GPU.
+///
+/// The result for a configuration depends on nothing else: not on the others of its batch, nor on earlier batches.
 pub trait Backend {
     /// Why a batch failed.
-    type Error: std::error::Error;
+    type Error: std::error::Error + Send + Sync + 'static;
 
     /// Equilibria of `configurations`, in the same order.
     ///

@@ -1,0 +1,167 @@
+//! The part: an unfinished sweep on disk, so that killing the process loses one chunk at most.
+//!
+//! ```text
+//! "haptize part 1\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
+//! ```
+//!
+//! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`]. Frames are only ever appended. What
+//! a crash leaves at the end (half a frame, or a wrong checksum) is cut off and computed again: a part never adds a wrong
+//! number to a dataset, and the finished file is the same, bit for bit, as without the interruption.
+
+use super::{SweepError, columns::Columns};
+use crate::dataset::{Grid, Provenance};
+use serde::{Deserialize, Serialize};
+use std::{
+    fs::{File, OpenOptions, TryLockError},
+    io::{self, BufReader, Read, Seek, SeekFrom, Write},
+    path::{Path, PathBuf},
+};
+
+const MAGIC: &[u8] = b"haptize part 1\n";
+/// Length and checksum before each body [bytes].
+const FRAME: usize = 8 + 4;
+
+/// Everything that a sweep's numbers depend on: a part may only be continued by the sweep that began it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Binding {
+    pub grid: Grid,
+    pub scene: String,
+    /// CRC-32 of the object's surface at rest: it may come from a mesh file, whose contents the scene does not hold.
+    pub surface: u32,
+    pub provenance: Provenance,
+}
+
+impl Binding {
+    /// What differs from `other` so that its numbers cannot be continued; the date may differ.
+    fn difference(&self, other: &Self) -> Option<&'static str> {
+        let (mine, its) = (&self.provenance, &other.provenance);
+        let differences = [
+            ("another version of this program", mine.version != its.version),
+            ("another algorithm", mine.algorithm != its.algorithm),
+            ("another backend", mine.backend != its.backend),
+            ("another adapter", mine.adapter != its.adapter),
+            ("another tolerance", mine.tolerance != its.tolerance),
+            ("another grid", self.grid != other.grid),
+            ("another mesh", self.surface != other.surface),
+            ("another text of the scene", self.scene != other.scene),
+        ];
+        differences.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
+    }
+}
+
+/// An open part, locked against other processes.
+pub(super) struct Part {
+    path: PathBuf,
+    file: File,
+}
+
+impl Part {
+    /// Begins a part at `path`, or with `resume` continues the one that is there; then its points are added to `columns`
+    /// and `binding` takes its date.
+    pub fn open(path: &Path, resume: bool, binding: &mut Binding, columns: &mut Columns) -> Result<Self, SweepError> {
+        let failed = |source| SweepError::Part { path: path.into(), source };
+        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        match file.try_lock() {
+            Ok(()) => (),
+            Err(TryLockError::WouldBlock) => return Err(SweepError::Busy { path: path.into() }),
+            // Some network file systems have no locks; only the second of two bakes at once would notice.
+            Err(TryLockError::Error(_)) => (),
+        }
+        let mut part = Self { path: path.into(), file };
+        if !(resume && part.read(binding, columns)?) {
+            part.begin(binding).map_err(failed)?;
+        }
+        Ok(part)
+    }
+
+    /// Adds a chunk whose first point has number `first`.
+    pub fn append(&mut self, first: usize, chunk: &Columns) -> Result<(), SweepError> {
+        self.write(&chunk.encode(first)).map_err(|source| SweepError::Part { path: self.path.clone(), source })
+    }
+
+    /// Removes the part, whose points are all in a finished file now.
+    pub fn remove(self) -> Result<(), SweepError> {
+        let Self { path, file } = self;
+        drop(file);
+        std::fs::remove_file(&path).map_err(|source| SweepError::Part { path, source })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn begin(&mut self, binding: &Binding) -> io::Result<()> {
+        self.file.set_len(0)?;
+        self.file.rewind()?;
+        self.file.write_all(MAGIC)?;
+        self.write(&serde_json::to_vec(binding)?)
+    }
+
+    fn write(&mut self, body: &[u8]) -> io::Result<()> {
+        let length = (body.len() as u64).to_le_bytes();
+        let checksum = crc32fast::hash(body).to_le_bytes();
+        self.file.write_all(&[&length[..], &checksum, body].concat())
+    }
+
+    /// Reads the part from its start, cuts off what is not whole, and leaves the file there; false when nothing is.
+    fn read(&mut self, binding: &mut Binding, columns: &mut Columns) -> Result<bool, SweepError> {
+        let failed = |source| SweepError::Part { path: self.path.clone(), source };
+        let mut left = self.file.metadata().map_err(failed)?.len();
+        let mut reader = BufReader::new(&self.file);
+        let mut magic = Vec::new();
+        (&mut reader).take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(failed)?;
+        if magic != MAGIC {
+            // Killed while it wrote its first line; anything else is not ours to overwrite.
+            return if MAGIC.starts_with(&magic) { Ok(false) } else { Err(self.foreign("a haptize part")) };
+        }
+        left -= MAGIC.len() as u64;
+        let mut whole = MAGIC.len() as u64;
+        let mut next = |whole: &mut u64| -> Result<Option<Vec<u8>>, SweepError> {
+            let body = frame(&mut reader, &mut left).map_err(failed)?;
+            *whole += body.as_ref().map_or(0, |body| (FRAME + body.len()) as u64);
+            Ok(body)
+        };
+        let Some(body) = next(&mut whole)? else { return Ok(false) };
+        let found: Binding = serde_json::from_slice(&body).map_err(|error| self.foreign(&error.to_string()))?;
+        if let Some(difference) = found.difference(binding) {
+            return Err(SweepError::OtherPart { path: self.path.clone(), difference });
+        }
+        let (points, joints) = (binding.grid.points(), binding.grid.joints());
+        loop {
+            let before = whole;
+            let chunk = next(&mut whole)?.and_then(|body| Columns::decode(&body, columns.points(), joints));
+            match chunk {
+                Some(chunk) if chunk.points() <= points - columns.points() => columns.append(&chunk),
+                _ => {
+                    whole = before;
+                    break;
+                }
+            }
+        }
+        drop(reader);
+        self.file.set_len(whole).map_err(failed)?;
+        self.file.seek(SeekFrom::Start(whole)).map_err(failed)?;
+        binding.provenance.date = found.provenance.date;
+        Ok(true)
+    }
+
+    fn foreign(&self, reason: &str) -> SweepError {
+        SweepError::ForeignPart { path: self.path.clone(), reason: reason.into() }
+    }
+}
+
+/// The next frame's body, of a file with `left` bytes left; `None` when there is no whole one.
+fn frame(reader: &mut impl Read, left: &mut u64) -> io::Result<Option<Vec<u8>>> {
+    let Some(room) = left.checked_sub(FRAME as u64) else { return Ok(None) };
+    let (mut length, mut checksum) = ([0; 8], [0; 4]);
+    reader.read_exact(&mut length)?;
+    reader.read_exact(&mut checksum)?;
+    let length = u64::from_le_bytes(length);
+    // The length is bounded by the file's before anything is allocated for it.
+    let Some(after) = room.checked_sub(length) else { return Ok(None) };
+    let mut body = vec![0; usize::try_from(length).map_err(io::Error::other)?];
+    reader.read_exact(&mut body)?;
+    *left = after;
+    Ok((crc32fast::hash(&body) == u32::from_le_bytes(checksum)).then_some(body))
+}

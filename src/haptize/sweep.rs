@@ -1,0 +1,343 @@
+//! A sweep: equation (2) solved at every point of a grid in C-space, in chunks, by any [`Backend`].
+//!
+//! Each configuration is solved on its own, so the dataset depends neither on the number of threads nor on how the grid
+//! is cut into chunks, and an interrupted sweep continues where it stopped (see [`Sweep::bake`]).
+
+use super::{
+    Backend, SweepReport,
+    columns::Columns,
+    part::{Binding, Part},
+};
+use crate::{
+    JointVector,
+    contact::Status,
+    dataset::{self, Axis, Contacts, Dataset, Grid, Provenance, Surface},
+    object::Object,
+    scene::{JointKind, Scene},
+};
+use clap::ValueEnum;
+use std::{
+    collections::TryReserveError,
+    ffi::OsString,
+    io,
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
+};
+
+/// A sweep failed, or was stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    /// The grid is none.
+    #[error("the scene's grid: {0}; correct [[grid.axes]] in the scene")]
+    Grid(String),
+    /// The columns do not fit in memory.
+    #[error("the grid's {points} points need {} MB of memory ({source}); take a coarser grid", bytes / 1_000_000)]
+    Memory {
+        /// Grid points.
+        points: usize,
+        /// Memory of their columns, contacts aside [bytes].
+        bytes: usize,
+        /// What the allocator said.
+        source: TryReserveError,
+    },
+    /// The backend failed; what was solved before is in the part, where there is one.
+    #[error("the backend failed at grid points {first} to {last}: {source}")]
+    Backend {
+        /// First point of the chunk.
+        first: usize,
+        /// Last point of the chunk.
+        last: usize,
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The backend returned another number of results than it was asked for.
+    #[error("the backend returned {found} results for {asked} configurations; please report this as a defect")]
+    Miscount {
+        /// Results asked for.
+        asked: usize,
+        /// Results returned.
+        found: usize,
+    },
+    /// Stopped from outside.
+    #[error("stopped after {done} of {points} grid points; {}", remedy(part.as_deref()))]
+    Stopped {
+        /// Points done.
+        done: usize,
+        /// Points asked for.
+        points: usize,
+        /// Where they are kept.
+        part: Option<PathBuf>,
+    },
+    /// The part cannot be read or written.
+    #[error("{path}: {source}; free some space or choose another folder, then continue with --resume")]
+    Part {
+        /// The part.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Another process writes the part.
+    #[error("{path}: another process is baking into this file; wait for it, or choose another output")]
+    Busy {
+        /// The part.
+        path: PathBuf,
+    },
+    /// A file in the part's place that is none.
+    #[error("{path}: cannot be continued: {reason}; move it away, or bake without --resume")]
+    ForeignPart {
+        /// The part.
+        path: PathBuf,
+        /// What gave it away.
+        reason: String,
+    },
+    /// The part of another sweep.
+    #[error("{path}: cannot be continued, it was begun with {difference}; restore that, or bake without --resume")]
+    OtherPart {
+        /// The part.
+        path: PathBuf,
+        /// What is different.
+        difference: &'static str,
+    },
+    /// The finished dataset could not be written; its points are in the part.
+    #[error(transparent)]
+    Dataset(#[from] dataset::Error),
+}
+
+fn remedy(part: Option<&Path>) -> String {
+    match part {
+        Some(part) => format!("they are kept in {}: continue with the same command and --resume", part.display()),
+        None => "nothing was kept".into(),
+    }
+}
+
+/// How far a sweep has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Points done, those taken over from a part included.
+    pub done: usize,
+    /// Points in all.
+    pub points: usize,
+    /// Points done that are in contact.
+    pub contact_points: usize,
+    /// Points a second, of this run; 0 before the first chunk [1/s].
+    pub rate: f64,
+}
+
+/// How a sweep is run; nothing of it changes the result.
+pub struct Run<'a> {
+    /// Configurations handed to the backend at once, at least 1.
+    pub chunk: usize,
+    /// When this becomes true the sweep stops after the chunk at hand.
+    pub stop: &'a AtomicBool,
+    /// Called at the start and after every chunk.
+    pub progress: &'a mut dyn FnMut(Progress),
+}
+
+/// A sweep, ready to run.
+pub struct Sweep {
+    grid: Grid,
+    surface_nodes: Vec<f64>,
+    surface_triangles: Vec<u32>,
+    scene: String,
+    provenance: Provenance,
+    with_forces: bool,
+}
+
+impl Sweep {
+    /// The sweep that `scene` asks for, over `object`, which was built from it.
+    ///
+    /// Provenance is given `backend` (`cpu` or `gpu`), `adapter` and `date` (ISO 8601, UTC): they are not measured here,
+    /// so that the same sweep makes the same file.
+    ///
+    /// # Errors
+    /// [`SweepError::Grid`].
+    pub fn new(scene: &Scene, object: &Object, backend: &str, adapter: &str, date: &str) -> Result<Self, SweepError> {
+        let axes = scene.proxy.joints.iter().zip(&scene.grid.axes).map(|(joint, axis)| Axis {
+            name: joint.name.clone(),
+            unit: match joint.kind {
+                JointKind::Revolute => "rad".into(),
+                JointKind::Prismatic => "m".into(),
+            },
+            start: axis.start,
+            step: axis.step,
+            count: axis.count,
+        });
+        let grid = Grid { axes: axes.collect() };
+        if grid.joints() != scene.proxy.joints.len() {
+            return Err(SweepError::Grid(format!("{} axes for {} joints", grid.joints(), scene.proxy.joints.len())));
+        }
+        grid.check().map_err(SweepError::Grid)?;
+        let surface = &object.rest[..object.surface_nodes];
+        Ok(Self {
+            grid,
+            surface_nodes: surface.iter().flat_map(|node| node.to_array()).collect(),
+            surface_triangles: object.triangles.as_flattened().to_vec(),
+            scene: scene.text.clone(),
+            provenance: Provenance {
+                version: env!("CARGO_PKG_VERSION").into(),
+                algorithm: scene
+                    .contact
+                    .algorithm
+                    .to_possible_value()
+                    .map_or_else(String::new, |v| v.get_name().into()),
+                tolerance: scene.contact.tolerance,
+                backend: backend.into(),
+                adapter: adapter.into(),
+                date: date.into(),
+            },
+            with_forces: scene.graphics.is_some(),
+        })
+    }
+
+    /// The grid.
+    #[must_use]
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Memory of the finished columns with `contacts` contact forces at each point [bytes]; chunks in flight come on top.
+    #[must_use]
+    pub fn memory_needed(&self, contacts: usize) -> usize {
+        let points = self.grid.points();
+        let contacts = if self.with_forces { points.saturating_mul(contacts) } else { 0 };
+        Columns::bytes(points, self.grid.joints(), contacts)
+    }
+
+    /// Where [`Sweep::bake`] keeps what it has of `output`.
+    #[must_use]
+    pub fn part_of(output: &Path) -> PathBuf {
+        let mut name = OsString::from(output);
+        name.push(".part");
+        name.into()
+    }
+
+    /// Sweeps in memory.
+    ///
+    /// # Errors
+    /// [`SweepError::Memory`], [`SweepError::Backend`], [`SweepError::Stopped`].
+    pub fn run<B: Backend>(&self, backend: &mut B, run: Run<'_>) -> Result<(Dataset, SweepReport), SweepError> {
+        let columns = self.empty_columns()?;
+        self.finish(backend, run, columns, self.provenance.clone(), None)
+    }
+
+    /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole.
+    ///
+    /// With `resume` it continues from such a part; the file is then the same, bit for bit, as without the interruption,
+    /// the date of the beginning included. Without a part it begins.
+    ///
+    /// # Errors
+    /// Any [`SweepError`]; the part then keeps what is done, and an earlier file `output` is untouched.
+    pub fn bake<B: Backend>(
+        &self,
+        backend: &mut B,
+        output: &Path,
+        resume: bool,
+        run: Run<'_>,
+    ) -> Result<(Dataset, SweepReport), SweepError> {
+        let mut surface = crc32fast::Hasher::new();
+        surface.update(bytemuck::cast_slice(&self.surface_nodes));
+        surface.update(bytemuck::cast_slice(&self.surface_triangles));
+        let mut binding = Binding {
+            grid: self.grid.clone(),
+            scene: self.scene.clone(),
+            surface: surface.finalize(),
+            provenance: self.provenance.clone(),
+        };
+        let mut columns = self.empty_columns()?;
+        let mut part = Part::open(&Self::part_of(output), resume, &mut binding, &mut columns)?;
+        let finished = self.finish(backend, run, columns, binding.provenance, Some(&mut part))?;
+        finished.0.save(output)?;
+        part.remove()?;
+        Ok(finished)
+    }
+
+    fn empty_columns(&self) -> Result<Columns, SweepError> {
+        let points = self.grid.points();
+        Columns::with_room(points, self.grid.joints()).map_err(|source| SweepError::Memory {
+            points,
+            bytes: self.memory_needed(0),
+            source,
+        })
+    }
+
+    /// Solves the points that `columns` lacks.
+    fn finish<B: Backend>(
+        &self,
+        backend: &mut B,
+        run: Run<'_>,
+        mut columns: Columns,
+        provenance: Provenance,
+        mut part: Option<&mut Part>,
+    ) -> Result<(Dataset, SweepReport), SweepError> {
+        let (points, joints, resumed) = (self.grid.points(), self.grid.joints(), columns.points());
+        let start = Instant::now();
+        let mut contact_points = in_contact(&columns);
+        (run.progress)(Progress { done: resumed, points, contact_points, rate: 0.0 });
+        let mut configurations: Vec<JointVector> = Vec::new();
+        while columns.points() < points {
+            let first = columns.points();
+            if run.stop.load(Ordering::Relaxed) {
+                let part = part.map(|part| part.path().to_path_buf());
+                return Err(SweepError::Stopped { done: first, points, part });
+            }
+            let last = points.min(first + run.chunk.max(1)) - 1;
+            configurations.clear();
+            configurations.extend((first..=last).map(|point| self.grid.configuration(point)));
+            let equilibria = backend.solve(&configurations).map_err(|source| SweepError::Backend {
+                first,
+                last,
+                source: Box::new(source),
+            })?;
+            if equilibria.len() != configurations.len() {
+                return Err(SweepError::Miscount { asked: configurations.len(), found: equilibria.len() });
+            }
+            let mut chunk = Columns::default();
+            equilibria.iter().for_each(|equilibrium| chunk.push(equilibrium, joints, self.with_forces));
+            if let Some(part) = &mut part {
+                part.append(first, &chunk)?;
+            }
+            columns.append(&chunk);
+            contact_points += in_contact(&chunk);
+            let rate = (columns.points() - resumed) as f64 / start.elapsed().as_secs_f64().max(f64::MIN_POSITIVE);
+            (run.progress)(Progress { done: columns.points(), points, contact_points, rate });
+        }
+        let dataset = self.dataset(columns, provenance);
+        let report = SweepReport::of(&dataset, resumed, start.elapsed());
+        Ok((dataset, report))
+    }
+
+    fn dataset(&self, columns: Columns, provenance: Provenance) -> Dataset {
+        let offsets = std::iter::once(0).chain(columns.contacts.iter().scan(0, |sum, &count| {
+            *sum += count;
+            Some(*sum)
+        }));
+        let contacts = self.with_forces.then(|| Contacts {
+            offsets: offsets.collect::<Vec<u64>>().into(),
+            nodes: columns.nodes.into(),
+            forces: columns.forces.into(),
+        });
+        Dataset {
+            grid: self.grid.clone(),
+            torque: columns.torque.into(),
+            energy: Some(columns.energy.into()),
+            gap: Some(columns.gap.into()),
+            status: columns.status.into(),
+            residual: Some(columns.residual.into()),
+            iterations: Some(columns.iterations.into()),
+            contacts,
+            surface: Some(Surface {
+                nodes: self.surface_nodes.clone().into(),
+                triangles: self.surface_triangles.clone().into(),
+            }),
+            scene: self.scene.clone(),
+            provenance,
+        }
+    }
+}
+
+/// Number of points at which something touches.
+fn in_contact(columns: &Columns) -> usize {
+    let untouched = [Status::Free as u8, Status::Outside as u8];
+    columns.status.iter().filter(|status| !untouched.contains(status)).count()
+}
