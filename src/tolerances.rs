@@ -18,3 +18,60 @@ pub const MIN_RECIPROCAL_CONDITION: f64 = f64::EPSILON / 1e-6;
 /// Shift, relative to the norm of K, under which the free motion of a singular K is sought [1]: the square root of
 /// machine precision is far above the rounding of a factorisation and far below the stiffness of any spring that counts.
 pub const MECHANISM_SHIFT: f64 = 1.5e-8;
+// --- contact ---
+
+/// Least squared length, area or distance that is divided by [m^2, m^4]: far below any mesh of this world (edges over
+/// 1 nm) and far above the smallest normal f64, so that a quotient stays finite.
+pub const MINIMUM_SQUARE: f64 = 1e-60;
+
+/// Least distance of a proxy node to its closest edge or vertex that curvature is divided by [m]: below a nanometre the
+/// direction between the two is rounding (coordinates of 0.1 m carry 1e-17 m, a direction good to 1e-6 needs 1e-11 m).
+pub const MINIMUM_CURVATURE_RADIUS: f64 = 1e-11;
+
+/// Slack of squared lower bounds in culling, relative to the square of the scene's size [1]: a squared distance between
+/// points of coordinates up to L is rounded by a few eps L^2 (eps = 2.2e-16); 64 eps covers bound and distance.
+pub const CULLING_SLACK: f64 = 64.0 * f64::EPSILON;
+
+/// Least contact force in the energy norm, sqrt(c^T C c), that a residual is measured against [sqrt(J)]: its square
+/// 1e-24 J is a nanonewton over a femtometre.
+pub const RESIDUAL_FLOOR: f64 = 1e-12;
+
+/// Rounding of the stored energy, in units of eps (E + sum lambda_i L): sums of about a hundred products each rounded
+/// by eps / 2, and depths rounded by a few eps L, are within 16 of these units; steps whose predicted decrease lies
+/// below are judged by the model alone.
+pub const ENERGY_ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+/// Share of the predicted decrease that a trust-region step must achieve to be taken [1] (Conn, Gould & Toint 2000,
+/// section 6.1: any value in (0, 1/4); small, because the energy itself is cheap and only decrease matters).
+pub const ACCEPTED_SHARE: f64 = 1e-4;
+
+/// Below this share of the predicted decrease the trust region shrinks [1] (Conn, Gould & Toint, section 17.1).
+pub const POOR_SHARE: f64 = 0.25;
+
+/// Above this share a step that reached the boundary widens the trust region [1] (same source).
+pub const GOOD_SHARE: f64 = 0.75;
+
+/// Factors by which the trust region shrinks and widens [1] (same source).
+pub const SHRINK: f64 = 0.25;
+/// See [`SHRINK`].
+pub const WIDEN: f64 = 2.0;
+
+/// Trust-region radius, relative to the first, at which a configuration is given up [1]: the energy of a step scales with
+/// the radius, so below 1e-12 nothing measurable can be gained any more.
+pub const GIVE_UP_RADIUS: f64 = 1e-12;
+
+/// Largest relative residual at which the inner conjugate gradients stop [1]; nearer the solution they stop at the outer
+/// residual itself, which keeps Newton's convergence quadratic (Dembo, Eisenstat & Steihaug 1982).
+pub const INNER_TOLERANCE: f64 = 1e-2;
+
+/// Least relative residual the inner conjugate gradients are asked for [1]: eps times the about 1e3 by which rounding
+/// grows over some tens of iterations.
+pub const INNER_TOLERANCE_FLOOR: f64 = 1e-13;
+
+/// Inner conjugate-gradient iterations at most, per unknown [1]: exact arithmetic needs one per unknown, rounding at
+/// stiff contact a few times as many.
+pub const INNER_ITERATIONS_PER_UNKNOWN: usize = 4;
+
+/// Relative change of forces and displacements at which the paper's iteration has stopped changing is the scene's
+/// tolerance; its inner solve of equation (2) must be better than that by this factor [1].
+pub const PAPER_INNER_SHARE: f64 = 1e-3;

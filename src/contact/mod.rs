@@ -1,7 +1,24 @@
 //! Equilibrium of one configuration, equation (2), in f64 on the CPU.
+//!
+//! Prepare a [`Model`] once, give each thread a [`Solver`], and solve configuration after configuration.
 
 use crate::JointVector;
 use glam::DVec3;
+
+mod bounding_volumes;
+mod closest_point;
+mod depth;
+mod detection;
+mod energy;
+mod model;
+mod paper;
+mod solver;
+mod support;
+mod surface;
+mod trust_region;
+
+pub use model::Model;
+pub use solver::Solver;
 
 /// What became of one configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,0 +1,138 @@
+//! Depth of a proxy node below the deformed surface, with its first and second derivative in the object's nodes.
+//!
+//! `depth = r + s`, `s = N . (p - x)`: x the proxy node, r its radius, p the closest surface point, N the outward unit
+//! direction, s positive inside. p = sum_j w_j n_j over the nodes of the touched feature.
+//!
+//! First derivative, by the envelope theorem (p is a minimiser, so its sliding along the feature has no effect):
+//! `d depth / d n_j = w_j N`, `d depth / d x = -N`. With the energy 1/2 kc depth^2 the proxy node is pushed by lambda N
+//! and object node j by -lambda w_j N, lambda = kc depth.
+//!
+//! Second derivative along node displacements v_j, with dp = sum_j w_j v_j and sg = sum_j g_j (N . v_j), the turn of the
+//! feature about itself:
+//! `d2s = -s |sg|^2 - 2 sg . dp + (1/s) dp . P dp`
+//! - face: g_j the in-plane gradients of the barycentric weights, P = 0;
+//! - edge ab of unit direction e and length l: g_a = -e/l, g_b = e/l, P = T T^T with T = N x e;
+//! - vertex: g = 0, P = I - N N^T.
+//!
+//! One form for all three, so that a product needs no branch: P dp = dp - N (N . dp) - e (e . dp), with 1/s = 0 on faces and
+//! e = 0 at vertices. It is needed because contact points creep over flat facets when it is left out.
+
+use super::closest_point::Feature;
+use crate::tolerances::{MINIMUM_CURVATURE_RADIUS, MINIMUM_SQUARE};
+use glam::DVec3;
+
+/// One proxy node and the surface feature closest to it.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact {
+    /// Number of the proxy node.
+    pub proxy_node: u32,
+    /// Object nodes of the closest triangle.
+    pub nodes: [u32; 3],
+    /// Barycentric weights of p; exactly zero for nodes that the feature does not touch.
+    pub weights: [f64; 3],
+    /// Outward unit direction N.
+    pub normal: DVec3,
+    /// r + s, positive in contact [m].
+    pub depth: f64,
+    /// Second derivative of s.
+    pub curvature: Curvature,
+}
+
+/// How s bends under displacements of the object's nodes; see the file's head.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Curvature {
+    /// s [m].
+    pub distance: f64,
+    /// 1/s on edges and at vertices, zero on faces [1/m].
+    pub inverse_distance: f64,
+    /// g_j [1/m].
+    pub gradients: [DVec3; 3],
+    /// Unit direction e of the edge, else zero.
+    pub along: DVec3,
+}
+
+/// Depth of the node at `x` with `radius`, from the closest feature of the triangle `corners` with barycentric `weights`.
+///
+/// `pseudonormal` decides the side, and stands in for N where x lies on the edge or vertex itself.
+#[must_use]
+pub fn measure(
+    x: DVec3,
+    radius: f64,
+    corners: [DVec3; 3],
+    weights: [f64; 3],
+    feature: Feature,
+    pseudonormal: DVec3,
+) -> (DVec3, f64, Curvature) {
+    let p = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+    let offset = p - x;
+    let mut curvature = Curvature::default();
+    let normal;
+    if feature == Feature::Face {
+        normal = pseudonormal;
+        curvature.distance = normal.dot(corners[0] - x);
+        curvature.gradients = face_gradients(corners);
+    } else {
+        let length = offset.length();
+        let inside = offset.dot(pseudonormal) >= 0.0;
+        curvature.distance = if inside { length } else { -length };
+        let divisor = curvature.distance.abs().max(MINIMUM_CURVATURE_RADIUS);
+        curvature.inverse_distance = if inside { 1.0 / divisor } else { -1.0 / divisor };
+        normal = if length > MINIMUM_CURVATURE_RADIUS {
+            offset / curvature.distance
+        } else {
+            pseudonormal / pseudonormal.length_squared().max(MINIMUM_SQUARE).sqrt()
+        };
+        if let Feature::Edge(k) = feature {
+            let edge = corners[(k + 1) % 3] - corners[k];
+            let square = edge.length_squared().max(MINIMUM_SQUARE);
+            curvature.along = edge / square.sqrt();
+            curvature.gradients[k] = -edge / square;
+            curvature.gradients[(k + 1) % 3] = edge / square;
+        }
+    }
+    (normal, radius + curvature.distance, curvature)
+}
+
+/// In-plane gradients of the three barycentric weights [1/m].
+fn face_gradients(corners: [DVec3; 3]) -> [DVec3; 3] {
+    let [a, b, c] = corners;
+    let area_vector = (b - a).cross(c - a);
+    let square = area_vector.length_squared().max(MINIMUM_SQUARE);
+    [area_vector.cross(c - b) / square, area_vector.cross(a - c) / square, area_vector.cross(b - a) / square]
+}
+
+/// Second variation of the depth along node displacements `v` [m]: one vector per node, so that d2s(v, v') is the sum of
+/// their inner products with v'_j.
+#[must_use]
+pub fn second_variation(contact: &Contact, v: [DVec3; 3]) -> [DVec3; 3] {
+    let Contact { weights, normal, curvature, .. } = contact;
+    let mut dp = DVec3::ZERO;
+    let mut turn = DVec3::ZERO;
+    for j in 0..3 {
+        dp += v[j] * weights[j];
+        turn += curvature.gradients[j] * normal.dot(v[j]);
+    }
+    let across = dp - *normal * normal.dot(dp) - curvature.along * curvature.along.dot(dp);
+    let carried = across * curvature.inverse_distance - turn;
+    let tilting = turn * curvature.distance + dp;
+    let mut product = [DVec3::ZERO; 3];
+    for j in 0..3 {
+        product[j] = carried * weights[j] - *normal * curvature.gradients[j].dot(tilting);
+    }
+    product
+}
+
+/// Product of the Hessian of 1/2 kc depth^2 with node displacements `v` [m]: one vector per node [N].
+#[must_use]
+pub fn hessian_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3] {
+    let Contact { weights, normal, depth, .. } = contact;
+    let mut deepening = 0.0;
+    for j in 0..3 {
+        deepening += weights[j] * normal.dot(v[j]);
+    }
+    let mut product = second_variation(contact, v);
+    for j in 0..3 {
+        product[j] = (*normal * (deepening * weights[j]) + product[j] * *depth) * kc;
+    }
+    product
+}

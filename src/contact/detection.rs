@@ -1,0 +1,269 @@
+//! Which proxy nodes touch the object, at rest and deformed.
+//!
+//! The closest feature is found exactly; culling only skips what cannot be closest, so results equal those of a search
+//! over all triangles. Two facts carry it, with |u| <= m everywhere on the surface:
+//! - a node outside at rest, farther than m from the surface, is outside still;
+//! - a triangle whose corners move by at most m_t has a distance within m_t of its distance at rest. With D the node's
+//!   distance at rest, a triangle farther than D + 2 m at rest is not the closest one.
+//!
+//! Triangles within D + 2 margin at rest are listed once per configuration and node, and again only when m outgrows the
+//! margin. Ties go to the lower triangle number.
+
+use super::closest_point::{ClosestPoint, Feature, closest_point, point_at};
+use super::depth::{Contact, measure};
+use super::model::Model;
+use super::surface;
+use glam::DVec3;
+
+/// A triangle that may be closest, with the squared distance to its box at rest [m^2].
+#[derive(Clone, Copy)]
+struct Candidate {
+    triangle: u32,
+    rest_distance: f64,
+}
+
+/// Where a proxy node stands at rest, and its candidates.
+#[derive(Clone, Copy, Default)]
+struct Standing {
+    /// Unsigned distance to the surface at rest, or a lower bound of it [m].
+    distance: f64,
+    /// False while `distance` is only a bound.
+    exact: bool,
+    /// Inside at rest.
+    inside: bool,
+    /// Largest displacement for which the candidates hold [m]; negative when there are none yet.
+    margin: f64,
+    /// Candidates: from, to.
+    from: usize,
+    to: usize,
+    /// Triangle that was closest last: tried first, which makes the search short.
+    last: u32,
+}
+
+/// The closest feature of the surface.
+#[derive(Clone, Copy)]
+pub struct Closest {
+    /// Squared distance [m^2].
+    pub distance_squared: f64,
+    /// Triangle.
+    pub triangle: u32,
+    /// Point and feature on it.
+    pub point: ClosestPoint,
+}
+
+impl Closest {
+    /// None yet.
+    #[must_use]
+    pub fn none() -> Self {
+        let point = ClosestPoint { weights: [0.0; 3], feature: Feature::Face };
+        Self { distance_squared: f64::MAX, triangle: u32::MAX, point }
+    }
+
+    /// Takes triangle `t` instead if it is nearer to `x`, or as near with a lower number.
+    pub fn consider(&mut self, x: DVec3, positions: &[DVec3], triangles: &[[u32; 3]], t: u32) {
+        let corners = surface::corners(positions, triangles[t as usize]);
+        let point = closest_point(x, corners);
+        let distance_squared = x.distance_squared(point_at(corners, point.weights));
+        if distance_squared < self.distance_squared
+            || (distance_squared == self.distance_squared && t < self.triangle)
+        {
+            *self = Self { distance_squared, triangle: t, point };
+        }
+    }
+}
+
+/// Detection for one thread: node positions of the current configuration and reusable lists.
+pub struct Detection {
+    /// Proxy nodes relative to the model's centre [m].
+    nodes: Vec<DVec3>,
+    standings: Vec<Standing>,
+    candidates: Vec<Candidate>,
+    /// |u_j| of each surface node [m].
+    moved: Vec<f64>,
+    /// Depth of the deepest node at rest, which the surface is expected to move by [m].
+    expected: f64,
+}
+
+impl Detection {
+    /// Room for the proxy of `model`.
+    #[must_use]
+    pub fn new(model: &Model) -> Self {
+        let count = model.chain.nodes.len();
+        Self {
+            nodes: vec![DVec3::ZERO; count],
+            standings: vec![Standing::default(); count],
+            candidates: Vec::new(),
+            moved: vec![0.0; model.rest.len()],
+            expected: 0.0,
+        }
+    }
+
+    /// Proxy nodes relative to the model's centre [m].
+    #[must_use]
+    pub fn nodes(&self) -> &[DVec3] {
+        &self.nodes
+    }
+
+    /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns its gap: the smallest signed
+    /// distance of a proxy node to the surface at rest, less its radius [m].
+    pub fn take_up(&mut self, model: &Model, nodes: &[DVec3]) -> f64 {
+        self.candidates.clear();
+        let mut gap = f64::MAX;
+        for (i, &node) in nodes.iter().enumerate() {
+            let x = node - model.centre;
+            self.nodes[i] = x;
+            let radius = model.chain.nodes[i].radius;
+            let standing = &mut self.standings[i];
+            standing.margin = -1.0;
+            // Outside the surface's box the node is outside the surface, and the box bounds its distance.
+            let to_box = model.bounds.distance_squared(x);
+            standing.distance = to_box.sqrt();
+            standing.exact = false;
+            standing.inside = false;
+            if to_box > model.bounds.slack(x) && standing.distance - radius > gap {
+                continue;
+            }
+            find_standing(model, x, standing);
+            let signed = if standing.inside { -standing.distance } else { standing.distance };
+            gap = gap.min(signed - radius);
+        }
+        self.expected = (-gap).max(0.0);
+        gap
+    }
+
+    /// Contacts with the surface displaced by `displacement`, i.e. at `positions` relative to the model's centre [m], in
+    /// ascending order of proxy nodes.
+    pub fn deformed(
+        &mut self,
+        model: &Model,
+        displacement: &[f64],
+        positions: &[DVec3],
+        contacts: &mut Vec<Contact>,
+    ) {
+        contacts.clear();
+        let mut moved = 0.0f64;
+        for (node, length) in self.moved.iter_mut().enumerate() {
+            *length = DVec3::from_slice(&displacement[3 * node..]).length();
+            moved = moved.max(*length);
+        }
+        for i in 0..self.nodes.len() {
+            let x = self.nodes[i];
+            let radius = model.chain.nodes[i].radius;
+            let standing = &mut self.standings[i];
+            if !standing.inside && standing.distance - radius > moved * (1.0 + 1e3 * f64::EPSILON) {
+                continue;
+            }
+            if !standing.exact {
+                find_standing(model, x, standing);
+                if !standing.inside && standing.distance - radius > moved * (1.0 + 1e3 * f64::EPSILON) {
+                    continue;
+                }
+            }
+            if standing.margin < moved {
+                standing.margin = (2.0 * moved).max(self.expected);
+                standing.from = self.candidates.len();
+                let reach = standing.distance + 2.0 * standing.margin;
+                let candidates = &mut self.candidates;
+                model.bounds.search(x, reach * reach, |triangle, square| {
+                    candidates.push(Candidate { triangle, rest_distance: square.sqrt() });
+                    reach * reach
+                });
+                standing.to = self.candidates.len();
+            }
+            let closest = closest_deformed(model, x, standing, &self.candidates, &self.moved, positions);
+            standing.last = closest.triangle;
+            if let Some(contact) = contact_at(model, i, x, radius, positions, &closest)
+                && contact.depth > 0.0
+            {
+                contacts.push(contact);
+            }
+        }
+    }
+
+    /// Rows of the problem with geometry frozen at rest: every proxy node within `reach` of the surface, with its depth at
+    /// rest (negative outside) and no curvature.
+    pub fn frozen(&mut self, model: &Model, reach: f64, rows: &mut Vec<Contact>) {
+        rows.clear();
+        for i in 0..self.nodes.len() {
+            let x = self.nodes[i];
+            let radius = model.chain.nodes[i].radius;
+            let standing = &mut self.standings[i];
+            if !standing.inside && standing.distance - radius > reach {
+                continue;
+            }
+            let closest = find_standing(model, x, standing);
+            if let Some(mut contact) = contact_at(model, i, x, radius, &model.rest, &closest)
+                && contact.depth >= -reach
+            {
+                contact.curvature = Default::default();
+                rows.push(contact);
+            }
+        }
+    }
+}
+
+/// Closest feature at rest; notes distance and side.
+fn find_standing(model: &Model, x: DVec3, standing: &mut Standing) -> Closest {
+    let triangles = &model.object.triangles;
+    let mut closest = Closest::none();
+    if (standing.last as usize) < triangles.len() {
+        closest.consider(x, &model.rest, triangles, standing.last);
+    }
+    model.bounds.search(x, closest.distance_squared, |t, _| {
+        closest.consider(x, &model.rest, triangles, t);
+        closest.distance_squared
+    });
+    standing.exact = true;
+    standing.distance = closest.distance_squared.sqrt();
+    standing.last = closest.triangle;
+    standing.inside = false;
+    if closest.triangle != u32::MAX {
+        let t = closest.triangle as usize;
+        let offset = point_at(surface::corners(&model.rest, triangles[t]), closest.point.weights) - x;
+        standing.inside = offset.dot(model.rest_pseudonormal(t, closest.point.feature)) > 0.0;
+    }
+    closest
+}
+
+/// Closest feature of the deformed surface among the candidates.
+fn closest_deformed(
+    model: &Model,
+    x: DVec3,
+    standing: &Standing,
+    candidates: &[Candidate],
+    moved: &[f64],
+    positions: &[DVec3],
+) -> Closest {
+    let triangles = &model.object.triangles;
+    let slack = model.bounds.slack(x);
+    let mut closest = Closest::none();
+    if (standing.last as usize) < triangles.len() {
+        closest.consider(x, positions, triangles, standing.last);
+    }
+    for candidate in &candidates[standing.from..standing.to] {
+        let [a, b, c] = triangles[candidate.triangle as usize].map(|node| moved[node as usize]);
+        let nearest = (candidate.rest_distance - a.max(b).max(c)).max(0.0);
+        if nearest * nearest <= closest.distance_squared + slack {
+            closest.consider(x, positions, triangles, candidate.triangle);
+        }
+    }
+    closest
+}
+
+/// The contact (or near miss, with depth <= 0) of proxy node `i` with its closest feature.
+fn contact_at(
+    model: &Model,
+    i: usize,
+    x: DVec3,
+    radius: f64,
+    positions: &[DVec3],
+    closest: &Closest,
+) -> Option<Contact> {
+    let t = closest.triangle as usize;
+    let nodes = *model.object.triangles.get(t)?;
+    let ClosestPoint { weights, feature } = closest.point;
+    let pseudonormal = surface::pseudonormal(positions, &model.object.triangles, &model.object.topology, t, feature);
+    let (normal, depth, curvature) =
+        measure(x, radius, surface::corners(positions, nodes), weights, feature, pseudonormal);
+    Some(Contact { proxy_node: i as u32, nodes, weights, normal, depth, curvature })
+}

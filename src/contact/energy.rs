@@ -1,0 +1,253 @@
+//! The energy form: the minimum of `E(u; q) = 1/2 u^T K u + 1/2 kc sum_i depth_i(u, q)^2` over the displacement u.
+//!
+//! State: the surface forces f on the support A, with u = C f, so that the elastic energy is 1/2 f . u_A. A Newton step on
+//! the trust region ([`super::trust_region`]) is tried, contact is detected anew at the trial, and the step is taken if E
+//! decreases by a fair share of what the model promised: E never increases. Converged when the contact forces c(u)
+//! balance f: sqrt(r . C r) <= tolerance sqrt(c . C c), r = c - f.
+//!
+//! With the geometry frozen at rest (`linearised`) the same steps minimise the convex
+//! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`.
+
+use super::depth::Contact;
+use super::detection::Detection;
+use super::model::Model;
+use super::support::{Support, dot};
+use super::trust_region::{TrustRegion, add_contact_forces};
+use crate::tolerances::{
+    ACCEPTED_SHARE, ENERGY_ROUNDING, GIVE_UP_RADIUS, GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE,
+    RESIDUAL_FLOOR, SHRINK, WIDEN,
+};
+use glam::DVec3;
+
+/// Where depth comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Geometry {
+    /// The closest point of the deformed surface, found anew at every displacement.
+    Deformed,
+    /// The closest points at rest.
+    Frozen,
+}
+
+/// One state of the search.
+#[derive(Default)]
+pub struct State {
+    /// Forces on the support [N].
+    pub forces: Vec<f64>,
+    /// Displacement of all surface nodes [m].
+    pub displacement: Vec<f64>,
+    /// Surface nodes relative to the model's centre [m].
+    pub positions: Vec<DVec3>,
+    /// Contacts at this displacement.
+    pub contacts: Vec<Contact>,
+    /// E [J].
+    pub energy: f64,
+}
+
+/// What became of a search.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// Whether the residual reached the tolerance.
+    pub converged: bool,
+    /// Steps tried.
+    pub iterations: u32,
+    /// Relative residual [1].
+    pub residual: f64,
+}
+
+/// Workspace of the energy form.
+pub struct EnergySearch {
+    /// The current state; the result when the search has ended.
+    pub state: State,
+    trial: State,
+    /// The object nodes that carry force.
+    pub support: Support,
+    slots: Vec<[usize; 3]>,
+    contact_forces: Vec<f64>,
+    residual: Vec<f64>,
+    preconditioned: Vec<f64>,
+    trust_region: TrustRegion,
+    /// Rows of the frozen problem, with their depths at rest.
+    frozen: Vec<Contact>,
+    /// E after each accepted step, the rest state's first [J].
+    pub history: Vec<f64>,
+}
+
+impl EnergySearch {
+    /// Room for the object of `model`.
+    #[must_use]
+    pub fn new(model: &Model) -> Self {
+        let state = || State {
+            displacement: vec![0.0; 3 * model.rest.len()],
+            positions: model.rest.clone(),
+            ..State::default()
+        };
+        Self {
+            state: state(),
+            trial: state(),
+            support: Support::new(model.rest.len()),
+            slots: Vec::new(),
+            contact_forces: Vec::new(),
+            residual: Vec::new(),
+            preconditioned: Vec::new(),
+            trust_region: TrustRegion::default(),
+            frozen: Vec::new(),
+            history: Vec::new(),
+        }
+    }
+
+    /// Searches from the rest state, for the configuration that `detection` has taken up.
+    pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> Outcome {
+        self.start(model, detection, geometry);
+        let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
+        // 1/2 |u|^2 in the energy norm never exceeds E, so no iterate leaves the ball of this radius.
+        let first_radius = (2.0 * self.state.energy).sqrt();
+        let mut radius = first_radius;
+        self.balance(model);
+        outcome.residual = self.relative_residual();
+        while outcome.residual.is_finite()
+            && outcome.residual > model.contact.tolerance
+            && outcome.iterations < model.contact.max_iterations
+            && radius > GIVE_UP_RADIUS * first_radius
+        {
+            outcome.iterations += 1;
+            let step = self.trust_region.step(
+                &self.support,
+                &self.state.contacts,
+                &self.slots,
+                model.kc,
+                &self.residual,
+                &self.preconditioned,
+                radius,
+                outcome.residual.clamp(INNER_TOLERANCE_FLOOR, INNER_TOLERANCE),
+            );
+            self.try_step(model, detection, geometry);
+            // Near the solution both decreases drown in rounding, which must not refuse a good step.
+            let rounding = self.energy_rounding(model.kc, detection.nodes());
+            let ratio = (self.state.energy - self.trial.energy + rounding) / (step.predicted + rounding);
+            if !(ratio >= POOR_SHARE) {
+                radius = SHRINK * step.length;
+            } else if ratio > GOOD_SHARE && step.at_boundary {
+                radius *= WIDEN;
+            }
+            if ratio >= ACCEPTED_SHARE {
+                std::mem::swap(&mut self.state, &mut self.trial);
+                self.history.push(self.state.energy);
+                self.balance(model);
+                outcome.residual = self.relative_residual();
+            }
+        }
+        outcome.converged = outcome.residual <= model.contact.tolerance;
+        outcome
+    }
+
+    /// The rest state.
+    fn start(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
+        self.support.clear();
+        self.history.clear();
+        self.state.forces.clear();
+        self.state.displacement.fill(0.0);
+        self.state.positions.copy_from_slice(&model.rest);
+        detection.deformed(model, &self.state.displacement, &self.state.positions, &mut self.state.contacts);
+        self.state.energy = contact_energy(&self.state.contacts, model.kc);
+        if geometry == Geometry::Frozen {
+            // 1/2 |u|^2 <= E <= E(0) in the energy norm and |u_j|^2 <= trace(C_jj) |u|^2, all along the search: nodes
+            // farther from the surface than this can never touch.
+            let reach = (2.0 * self.state.energy * model.softest).sqrt();
+            detection.frozen(model, reach, &mut self.frozen);
+            frozen_contacts(&self.frozen, &self.state.displacement, &mut self.state.contacts);
+        }
+        self.history.push(self.state.energy);
+    }
+
+    /// Brings the support, the contact forces and the residual up to date with the current state.
+    fn balance(&mut self, model: &Model) {
+        let Self { state, support, slots, contact_forces, residual, preconditioned, .. } = self;
+        slots.clear();
+        for contact in &state.contacts {
+            let mut contact_slots = [0; 3];
+            for (slot, (&node, &weight)) in contact_slots.iter_mut().zip(contact.nodes.iter().zip(&contact.weights)) {
+                // Nodes without weight take no force; their entries are multiplied by zero in any slot.
+                if weight != 0.0 {
+                    *slot = support.add(node);
+                }
+            }
+            slots.push(contact_slots);
+        }
+        support.gather(&model.object.compliance);
+        let order = support.order();
+        state.forces.resize(order, 0.0);
+        contact_forces.clear();
+        contact_forces.resize(order, 0.0);
+        add_contact_forces(&state.contacts, slots, model.kc, contact_forces);
+        residual.clear();
+        residual.extend(contact_forces.iter().zip(&state.forces).map(|(c, f)| c - f));
+        preconditioned.resize(order, 0.0);
+        support.multiply(residual, preconditioned);
+    }
+
+    /// sqrt(r . C r) / sqrt(c . C c), r the residual force and c the contact forces.
+    fn relative_residual(&mut self) -> f64 {
+        let square = dot(&self.residual, &self.preconditioned).max(0.0);
+        let scratch = &mut self.trial.forces;
+        scratch.resize(self.contact_forces.len(), 0.0);
+        self.support.multiply(&self.contact_forces, scratch);
+        let scale = dot(&self.contact_forces, scratch).max(0.0);
+        square.sqrt() / scale.sqrt().max(RESIDUAL_FLOOR)
+    }
+
+    /// The state that the last trust-region step leads to.
+    fn try_step(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
+        let Self { state, trial, support, trust_region, .. } = self;
+        trial.forces.clear();
+        trial.forces.extend(state.forces.iter().zip(&trust_region.force).map(|(f, df)| f + df));
+        support.displace(&model.object.compliance, &trial.forces, &mut trial.displacement);
+        match geometry {
+            Geometry::Deformed => {
+                for (node, position) in trial.positions.iter_mut().enumerate() {
+                    *position = model.rest[node] + DVec3::from_slice(&trial.displacement[3 * node..]);
+                }
+                detection.deformed(model, &trial.displacement, &trial.positions, &mut trial.contacts);
+            }
+            Geometry::Frozen => frozen_contacts(&self.frozen, &trial.displacement, &mut trial.contacts),
+        }
+        let mut elastic = 0.0;
+        for (slot, &node) in support.nodes().iter().enumerate() {
+            let at = 3 * node as usize;
+            elastic += dot(&trial.forces[3 * slot..3 * slot + 3], &trial.displacement[at..at + 3]);
+        }
+        trial.energy = 0.5 * elastic + contact_energy(&trial.contacts, model.kc);
+    }
+
+    /// What E is rounded by: each depth is rounded by a few eps of the coordinates, E's part by lambda times that [J].
+    fn energy_rounding(&self, kc: f64, nodes: &[DVec3]) -> f64 {
+        let mut size = self.state.energy;
+        for contact in &self.state.contacts {
+            size += kc * contact.depth * nodes[contact.proxy_node as usize].length();
+        }
+        ENERGY_ROUNDING * size
+    }
+}
+
+/// 1/2 kc sum_i depth_i^2 [J].
+#[must_use]
+pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
+    let mut sum = 0.0;
+    for contact in contacts {
+        sum += contact.depth * contact.depth;
+    }
+    0.5 * kc * sum
+}
+
+/// Rows of the frozen problem that touch at `displacement`, with their depth there.
+fn frozen_contacts(rows: &[Contact], displacement: &[f64], contacts: &mut Vec<Contact>) {
+    contacts.clear();
+    for row in rows {
+        let mut depth = row.depth;
+        for (&node, weight) in row.nodes.iter().zip(row.weights) {
+            depth += weight * row.normal.dot(DVec3::from_slice(&displacement[3 * node as usize..]));
+        }
+        if depth > 0.0 {
+            contacts.push(Contact { depth, ..*row });
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! What contact needs to know of object and proxy, computed once and shared by all threads.
+
+use super::bounding_volumes::BoundingVolumes;
+use super::closest_point::Feature;
+use super::surface;
+use crate::object::Object;
+use crate::proxy::Chain;
+use crate::scene::ContactSpec;
+use glam::DVec3;
+
+/// An object and a proxy, prepared for contact.
+pub struct Model<'a> {
+    /// The object.
+    pub object: &'a Object,
+    /// The proxy.
+    pub chain: &'a Chain,
+    /// How equation (2) is solved.
+    pub contact: ContactSpec,
+    /// Stiffness kc = 3 Kc at a contact point of the energy form: three springs Kc on the nodes of a triangle act along the
+    /// normal like one spring of this stiffness at the contact point [N/m].
+    pub kc: f64,
+    /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
+    /// loses no digits.
+    pub centre: DVec3,
+    /// Rest positions of the surface nodes, relative to the centre [m].
+    pub rest: Vec<DVec3>,
+    /// Largest trace of a node's own block C_jj: no node moves farther than sqrt(softest) times |u| in the energy norm [m/N].
+    pub softest: f64,
+    /// The triangles at rest, for closest-point queries.
+    pub bounds: BoundingVolumes,
+    /// Unit normals of the triangles at rest.
+    pub rest_normals: Vec<DVec3>,
+    /// Angle-weighted pseudonormals of the surface nodes at rest, not of length one.
+    pub rest_pseudonormals: Vec<DVec3>,
+}
+
+impl<'a> Model<'a> {
+    /// Prepares `object` and `chain` for contact as `contact` says.
+    #[must_use]
+    pub fn new(object: &'a Object, chain: &'a Chain, contact: ContactSpec) -> Self {
+        let surface_rest = &object.rest[..object.surface_nodes];
+        let low = surface_rest.iter().copied().fold(DVec3::MAX, DVec3::min);
+        let high = surface_rest.iter().copied().fold(DVec3::MIN, DVec3::max);
+        let centre = low.midpoint(high);
+        let rest: Vec<DVec3> = surface_rest.iter().map(|&position| position - centre).collect();
+        let triangles = &object.triangles;
+        let rest_normals = (0..triangles.len())
+            .map(|t| surface::pseudonormal(&rest, triangles, &object.topology, t, Feature::Face))
+            .collect();
+        let mut rest_pseudonormals = vec![DVec3::ZERO; rest.len()];
+        for (t, triangle) in triangles.iter().enumerate() {
+            for (k, &node) in triangle.iter().enumerate() {
+                rest_pseudonormals[node as usize] =
+                    surface::pseudonormal(&rest, triangles, &object.topology, t, Feature::Vertex(k));
+            }
+        }
+        let compliance = &object.compliance;
+        let diagonal = |k: usize| compliance.entries[k * compliance.order + k];
+        let softest = (0..rest.len()).map(|j| (3 * j..3 * j + 3).map(diagonal).sum::<f64>()).fold(0.0, f64::max);
+        let bounds = BoundingVolumes::new(&rest, triangles);
+        Self {
+            object,
+            chain,
+            contact,
+            kc: 3.0 * contact.stiffness,
+            centre,
+            rest,
+            softest,
+            bounds,
+            rest_normals,
+            rest_pseudonormals,
+        }
+    }
+
+    /// Pseudonormal of a feature of triangle `t` at rest, outward, not of length one.
+    #[must_use]
+    pub fn rest_pseudonormal(&self, t: usize, feature: Feature) -> DVec3 {
+        match feature {
+            Feature::Face => self.rest_normals[t],
+            Feature::Edge(k) => self.rest_normals[t] + self.rest_normals[self.object.topology.across[t][k] as usize],
+            Feature::Vertex(k) => self.rest_pseudonormals[self.object.triangles[t][k] as usize],
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! The paper's iteration for equation (2), section 2.1, step by step:
+//!
+//! 1. Cvp: the proxy nodes inside the deformed surface; for each, its three closest object nodes, S_i.
+//! 2. Solve (2) for n. With forces on the tied nodes A only, u = C f, this is the small system
+//!    `(C_AA + D^-1) f_A = (xbar - n0)_A`: D = Kc times the number of proxy nodes tied to a node, xbar their mean.
+//! 3. f_j^i = -Kc (n_j - x_i); tensional ones (not pushing into the object) are dropped, the others projected on the
+//!    surface normal, which here is the outward area-weighted vertex normal of the surface as deformed by step 2.
+//! 4. Solve K (n - n0) = sum f_j^i. Repeat from 1 until n, f, S stop changing.
+//!
+//! Then tau = sum_i J_i^T (-sum_j f_j^i).
+//!
+//! The iteration is faithful, and so is its failure: at stiff contact step 4 pushes the surface past the proxy node, and the
+//! next pass finds nothing inside. A configuration that started in contact and lost it is not converged, never free; one
+//! that cycles runs into the cap. A node with a radius, which the paper does not have, acts through its deepest
+//! point x_i - r_i N_i.
+
+use super::depth::Contact;
+use super::detection::Detection;
+use super::energy::Outcome;
+use super::model::Model;
+use super::support::{Support, dot};
+use super::surface;
+use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MINIMUM_SQUARE, PAPER_INNER_SHARE, RESIDUAL_FLOOR};
+use glam::DVec3;
+
+/// A proxy node tied to its three closest object nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct Tie {
+    /// Number of the proxy node.
+    pub proxy_node: u32,
+    /// Its position x_i, or its deepest point if it has a radius, relative to the model's centre [m].
+    pub target: DVec3,
+    /// Object nodes, ascending.
+    pub nodes: [u32; 3],
+    /// Their slots on the support.
+    pub slots: [usize; 3],
+    /// f_j^i after step 3, zero where dropped [N].
+    pub forces: [DVec3; 3],
+}
+
+/// Workspace of the paper's iteration.
+pub struct PaperIteration {
+    /// Ties of the last pass: S, and the forces f_j^i.
+    pub ties: Vec<Tie>,
+    previous_ties: Vec<Tie>,
+    /// Tied object nodes A.
+    pub support: Support,
+    /// Forces on A after step 4 [N].
+    pub forces: Vec<f64>,
+    previous_forces: Vec<f64>,
+    /// Displacement of all surface nodes after step 4 [m].
+    pub displacement: Vec<f64>,
+    positions: Vec<DVec3>,
+    contacts: Vec<Contact>,
+    /// Of step 2: the diagonal D^-1 [m/N], the right-hand side [m], the forces [N] and the vectors of its solver.
+    softness: Vec<f64>,
+    wanted: Vec<f64>,
+    tied_forces: Vec<f64>,
+    residual: Vec<f64>,
+    direction: Vec<f64>,
+    image: Vec<f64>,
+}
+
+impl PaperIteration {
+    /// Room for the object of `model`.
+    #[must_use]
+    pub fn new(model: &Model) -> Self {
+        Self {
+            ties: Vec::new(),
+            previous_ties: Vec::new(),
+            support: Support::new(model.rest.len()),
+            forces: Vec::new(),
+            previous_forces: Vec::new(),
+            displacement: vec![0.0; 3 * model.rest.len()],
+            positions: model.rest.clone(),
+            contacts: Vec::new(),
+            softness: Vec::new(),
+            wanted: Vec::new(),
+            tied_forces: Vec::new(),
+            residual: Vec::new(),
+            direction: Vec::new(),
+            image: Vec::new(),
+        }
+    }
+
+    /// Iterates from the rest state, for the configuration that `detection` has taken up.
+    pub fn iterate(&mut self, model: &Model, detection: &mut Detection) -> Outcome {
+        let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
+        self.displacement.fill(0.0);
+        self.ties.clear();
+        self.forces.clear();
+        while !outcome.converged && outcome.iterations < model.contact.max_iterations {
+            outcome.iterations += 1;
+            std::mem::swap(&mut self.forces, &mut self.previous_forces);
+            std::mem::swap(&mut self.ties, &mut self.previous_ties);
+            self.tie(model, detection);
+            self.solve_tied(model);
+            self.project(model);
+            self.apply(model);
+            outcome.residual = self.relative_change();
+            if !outcome.residual.is_finite() || self.forces.iter().all(|&f| f == 0.0) {
+                // Contact was lost: nothing inside, or no force left that compresses.
+                outcome.residual = 1.0;
+                return outcome;
+            }
+            outcome.converged = outcome.residual <= model.contact.tolerance;
+        }
+        outcome
+    }
+
+    /// Step 1: proxy nodes inside, each tied to the three closest object nodes.
+    fn tie(&mut self, model: &Model, detection: &mut Detection) {
+        self.place(model);
+        detection.deformed(model, &self.displacement, &self.positions, &mut self.contacts);
+        self.support.clear();
+        self.ties.clear();
+        for contact in &self.contacts {
+            let radius = model.chain.nodes[contact.proxy_node as usize].radius;
+            let x = detection.nodes()[contact.proxy_node as usize];
+            let target = x - contact.normal * radius;
+            let mut nodes = three_closest(target, &self.positions);
+            nodes.sort_unstable();
+            let slots = nodes.map(|node| self.support.add(node));
+            let forces = [DVec3::ZERO; 3];
+            self.ties.push(Tie { proxy_node: contact.proxy_node, target, nodes, slots, forces });
+        }
+        self.support.gather(&model.object.compliance);
+    }
+
+    /// Step 2: n from equation (2), all ties being springs Kc.
+    fn solve_tied(&mut self, model: &Model) {
+        let order = self.support.order();
+        // `softness` first counts ties, `wanted` first sums their targets.
+        self.softness.clear();
+        self.softness.resize(order, 0.0);
+        self.wanted.clear();
+        self.wanted.resize(order, 0.0);
+        for tie in &self.ties {
+            for slot in tie.slots {
+                for (a, target) in tie.target.to_array().into_iter().enumerate() {
+                    self.softness[3 * slot + a] += 1.0;
+                    self.wanted[3 * slot + a] += target;
+                }
+            }
+        }
+        for (slot, &node) in self.support.nodes().iter().enumerate() {
+            for (a, rest) in model.rest[node as usize].to_array().into_iter().enumerate() {
+                let k = 3 * slot + a;
+                self.wanted[k] = self.wanted[k] / self.softness[k] - rest;
+                self.softness[k] = 1.0 / (model.contact.stiffness * self.softness[k]);
+            }
+        }
+        self.conjugate_gradients(PAPER_INNER_SHARE * model.contact.tolerance);
+        self.support.displace(&model.object.compliance, &self.tied_forces, &mut self.displacement);
+        self.place(model);
+    }
+
+    /// Step 3: compressive tie forces, projected on the surface normal.
+    fn project(&mut self, model: &Model) {
+        let (triangles, topology) = (&model.object.triangles, &model.object.topology);
+        for tie in &mut self.ties {
+            for (force, &node) in tie.forces.iter_mut().zip(&tie.nodes) {
+                let pull = (tie.target - self.positions[node as usize]) * model.contact.stiffness;
+                let normal = surface::vertex_normal(&self.positions, triangles, topology, node);
+                *force = normal * pull.dot(normal).min(0.0);
+            }
+        }
+    }
+
+    /// Step 4: n under the projected forces.
+    fn apply(&mut self, model: &Model) {
+        self.forces.clear();
+        self.forces.resize(self.support.order(), 0.0);
+        for tie in &self.ties {
+            for (force, slot) in tie.forces.into_iter().zip(tie.slots) {
+                for (a, component) in force.to_array().into_iter().enumerate() {
+                    self.forces[3 * slot + a] += component;
+                }
+            }
+        }
+        self.support.displace(&model.object.compliance, &self.forces, &mut self.displacement);
+    }
+
+    /// Relative change of the forces (and so of n = n0 + C f) since the last pass, in the energy norm; one when S changed [1].
+    fn relative_change(&mut self) -> f64 {
+        let same = |a: &Tie, b: &Tie| a.proxy_node == b.proxy_node && a.nodes == b.nodes;
+        if self.ties.len() != self.previous_ties.len()
+            || !self.ties.iter().zip(&self.previous_ties).all(|(a, b)| same(a, b))
+        {
+            return 1.0;
+        }
+        let order = self.support.order();
+        self.residual.clear();
+        self.residual.extend(self.forces.iter().zip(&self.previous_forces).map(|(f, previous)| f - previous));
+        self.image.resize(order, 0.0);
+        self.support.multiply(&self.residual, &mut self.image);
+        let change = dot(&self.residual, &self.image).max(0.0);
+        self.support.multiply(&self.forces, &mut self.image);
+        let scale = dot(&self.forces, &self.image).max(0.0);
+        change.sqrt() / scale.sqrt().max(RESIDUAL_FLOOR)
+    }
+
+    /// Positions from displacement.
+    fn place(&mut self, model: &Model) {
+        for (node, position) in self.positions.iter_mut().enumerate() {
+            *position = model.rest[node] + DVec3::from_slice(&self.displacement[3 * node..]);
+        }
+    }
+
+    /// `tied_forces` with (C_AA + D^-1) tied_forces = wanted, by conjugate gradients to a residual `tolerance` times the
+    /// right-hand side.
+    fn conjugate_gradients(&mut self, tolerance: f64) {
+        let order = self.support.order();
+        let Self { support, softness, wanted, tied_forces, residual, direction, image, .. } = self;
+        tied_forces.clear();
+        tied_forces.resize(order, 0.0);
+        residual.clear();
+        residual.extend_from_slice(wanted);
+        direction.clear();
+        direction.extend_from_slice(wanted);
+        image.resize(order, 0.0);
+        let mut square = dot(residual, residual);
+        let stop = (tolerance * tolerance * square).max(MINIMUM_SQUARE);
+        for _ in 0..INNER_ITERATIONS_PER_UNKNOWN * order {
+            if square <= stop {
+                break;
+            }
+            support.multiply(direction, image);
+            for k in 0..order {
+                image[k] += softness[k] * direction[k];
+            }
+            let share = square / dot(direction, image);
+            for k in 0..order {
+                tied_forces[k] += share * direction[k];
+                residual[k] -= share * image[k];
+            }
+            let next = dot(residual, residual);
+            let ratio = next / square;
+            square = next;
+            for k in 0..order {
+                direction[k] = residual[k] + ratio * direction[k];
+            }
+        }
+    }
+}
+
+/// The three nodes closest to `x`, nearest first; ties go to the lower number.
+#[must_use]
+pub fn three_closest(x: DVec3, positions: &[DVec3]) -> [u32; 3] {
+    let mut nodes = [0; 3];
+    let mut squares = [f64::MAX; 3];
+    for (node, position) in positions.iter().enumerate() {
+        let mut entry = (position.distance_squared(x), node as u32);
+        for (square, node) in squares.iter_mut().zip(&mut nodes) {
+            if entry.0 < *square {
+                std::mem::swap(square, &mut entry.0);
+                std::mem::swap(node, &mut entry.1);
+            }
+        }
+    }
+    nodes
+}

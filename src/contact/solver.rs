@@ -1,0 +1,201 @@
+//! Equilibrium of one configuration: dispatch to the scene's algorithm and the account of its result.
+
+use super::detection::Detection;
+use super::energy::{EnergySearch, Geometry, Outcome};
+use super::model::Model;
+use super::paper::PaperIteration;
+use super::support::dot;
+use super::{Equilibrium, NodeForce, Status, Touch};
+use crate::JointVector;
+use crate::proxy::Pose;
+use crate::scene::Algorithm;
+use crate::tolerances::MINIMUM_SQUARE;
+use glam::DVec3;
+
+/// Solves configurations one after another with memory of its own; one per thread.
+///
+/// The start is always the rest state, so a result depends on its configuration only, never on what was solved before.
+pub struct Solver<'a> {
+    model: &'a Model<'a>,
+    pose: Pose,
+    detection: Detection,
+    energy: EnergySearch,
+    paper: PaperIteration,
+    /// Of the last configuration [m].
+    displacement: Vec<f64>,
+    /// Sum of the forces on each surface node [N], and whether it is among `touched`.
+    node_forces: Vec<DVec3>,
+    marked: Vec<bool>,
+    touched: Vec<u32>,
+}
+
+impl<'a> Solver<'a> {
+    /// A solver for `model`.
+    #[must_use]
+    pub fn new(model: &'a Model<'a>) -> Self {
+        let surface_nodes = model.rest.len();
+        Self {
+            model,
+            pose: model.chain.new_pose(),
+            detection: Detection::new(model),
+            energy: EnergySearch::new(model),
+            paper: PaperIteration::new(model),
+            displacement: vec![0.0; 3 * surface_nodes],
+            node_forces: vec![DVec3::ZERO; surface_nodes],
+            marked: vec![false; surface_nodes],
+            touched: Vec::new(),
+        }
+    }
+
+    /// Equilibrium at the joint coordinates `q`, one per joint [rad or m].
+    ///
+    /// Numbers that are not finite, or fewer than there are joints, give [`Status::Unconverged`] with zeros.
+    #[must_use]
+    pub fn solve(&mut self, q: &[f64]) -> Equilibrium {
+        let model = self.model;
+        self.displacement.fill(0.0);
+        let joints = model.chain.joints.len();
+        if q.len() != joints || !q.iter().all(|x| x.is_finite()) {
+            return nothing(Status::Unconverged, joints);
+        }
+        model.chain.pose(q, &mut self.pose);
+        let gap = self.detection.take_up(model, &self.pose.nodes);
+        if !gap.is_finite() {
+            return nothing(Status::Unconverged, joints);
+        }
+        let mut equilibrium = nothing(Status::Free, joints);
+        equilibrium.gap = gap;
+        if gap >= 0.0 {
+            return equilibrium;
+        }
+        let outcome = match model.contact.algorithm {
+            Algorithm::Energy => self.minimise(Geometry::Deformed, &mut equilibrium),
+            Algorithm::Linearised => self.minimise(Geometry::Frozen, &mut equilibrium),
+            Algorithm::Paper => self.iterate(&mut equilibrium),
+        };
+        equilibrium.iterations = outcome.iterations;
+        equilibrium.residual = outcome.residual;
+        equilibrium.status = if outcome.converged { Status::Contact } else { Status::Unconverged };
+        self.account(&mut equilibrium);
+        if is_finite(&equilibrium) && self.displacement.iter().all(|u| u.is_finite()) {
+            return equilibrium;
+        }
+        self.displacement.fill(0.0);
+        Equilibrium { gap, iterations: outcome.iterations, ..nothing(Status::Unconverged, joints) }
+    }
+
+    /// Displacement u of the surface nodes at the last configuration solved, three numbers a node [m].
+    #[must_use]
+    pub fn displacement(&self) -> &[f64] {
+        &self.displacement
+    }
+
+    /// The proxy's pose at the last configuration solved.
+    #[must_use]
+    pub fn pose(&self) -> &Pose {
+        &self.pose
+    }
+
+    /// Stored energy at rest and after each accepted step of the last search of the energy form [J].
+    #[must_use]
+    pub fn energy_history(&self) -> &[f64] {
+        &self.energy.history
+    }
+
+    /// The energy form: touches, displacement and U.
+    fn minimise(&mut self, geometry: Geometry, equilibrium: &mut Equilibrium) -> Outcome {
+        let outcome = self.energy.search(self.model, &mut self.detection, geometry);
+        let state = &self.energy.state;
+        self.displacement.copy_from_slice(&state.displacement);
+        equilibrium.energy = state.energy;
+        equilibrium.touches.extend(state.contacts.iter().map(|contact| Touch {
+            proxy_node: contact.proxy_node,
+            nodes: contact.nodes,
+            weights: contact.weights,
+            force: contact.normal * (self.model.kc * contact.depth),
+        }));
+        for touch in &equilibrium.touches {
+            for (&node, weight) in touch.nodes.iter().zip(touch.weights) {
+                if weight != 0.0 {
+                    push(&mut self.node_forces, &mut self.marked, &mut self.touched, node, -touch.force * weight);
+                }
+            }
+        }
+        outcome
+    }
+
+    /// The paper's iteration: touches, displacement and U.
+    ///
+    /// Its three forces on the nodes of a tie need not be parallel; the weights of a touch are their shares along the whole.
+    fn iterate(&mut self, equilibrium: &mut Equilibrium) -> Outcome {
+        let outcome = self.paper.iterate(self.model, &mut self.detection);
+        self.displacement.copy_from_slice(&self.paper.displacement);
+        for (slot, &node) in self.paper.support.nodes().iter().enumerate() {
+            let at = 3 * node as usize;
+            let forces = &self.paper.forces[3 * slot..3 * slot + 3];
+            equilibrium.energy += 0.5 * dot(forces, &self.displacement[at..at + 3]);
+        }
+        for tie in &self.paper.ties {
+            let force = -(tie.forces[0] + tie.forces[1] + tie.forces[2]);
+            if force == DVec3::ZERO {
+                continue;
+            }
+            let square = force.length_squared().max(MINIMUM_SQUARE);
+            let weights = tie.forces.map(|part| -part.dot(force) / square);
+            equilibrium.touches.push(Touch { proxy_node: tie.proxy_node, nodes: tie.nodes, weights, force });
+            for (part, node) in tie.forces.into_iter().zip(tie.nodes) {
+                // A spring Kc stretched to this force stores |f|^2 / (2 Kc).
+                equilibrium.energy += part.length_squared() / (2.0 * self.model.contact.stiffness);
+                if part != DVec3::ZERO {
+                    push(&mut self.node_forces, &mut self.marked, &mut self.touched, node, part);
+                }
+            }
+        }
+        outcome
+    }
+
+    /// Torque from the touches, and the forces on the object's nodes, ascending.
+    fn account(&mut self, equilibrium: &mut Equilibrium) {
+        for touch in &equilibrium.touches {
+            self.model.chain.add_torque(&self.pose, touch.proxy_node as usize, touch.force, &mut equilibrium.torque);
+        }
+        self.touched.sort_unstable();
+        for &node in &self.touched {
+            let force = std::mem::replace(&mut self.node_forces[node as usize], DVec3::ZERO);
+            self.marked[node as usize] = false;
+            equilibrium.forces.push(NodeForce { node, force });
+        }
+        self.touched.clear();
+    }
+}
+
+/// Adds `force` on `node`.
+fn push(sums: &mut [DVec3], marked: &mut [bool], touched: &mut Vec<u32>, node: u32, force: DVec3) {
+    if !std::mem::replace(&mut marked[node as usize], true) {
+        touched.push(node);
+    }
+    sums[node as usize] += force;
+}
+
+/// An equilibrium without contact.
+fn nothing(status: Status, joints: usize) -> Equilibrium {
+    Equilibrium {
+        status,
+        iterations: 0,
+        residual: 0.0,
+        energy: 0.0,
+        gap: 0.0,
+        torque: JointVector::zeros(joints),
+        forces: Vec::new(),
+        touches: Vec::new(),
+    }
+}
+
+/// True when every number is finite.
+fn is_finite(equilibrium: &Equilibrium) -> bool {
+    equilibrium.energy.is_finite()
+        && equilibrium.residual.is_finite()
+        && equilibrium.torque.is_finite()
+        && equilibrium.forces.iter().all(|force| force.force.is_finite())
+        && equilibrium.touches.iter().all(|touch| touch.force.is_finite() && touch.weights.iter().all(|w| w.is_finite()))
+}
