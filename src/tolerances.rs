@@ -18,6 +18,7 @@ pub const MIN_RECIPROCAL_CONDITION: f64 = f64::EPSILON / 1e-6;
 /// Shift, relative to the norm of K, under which the free motion of a singular K is sought [1]: the square root of
 /// machine precision is far above the rounding of a factorisation and far below the stiffness of any spring that counts.
 pub const MECHANISM_SHIFT: f64 = 1.5e-8;
+
 // --- contact ---
 
 /// Least squared length, area or distance that is divided by [m^2, m^4]: far below any mesh of this world (edges over

@@ -108,9 +108,9 @@ mod tests {
         let mut next = sequence(1);
         let mut point = || DVec3::new(next(), next(), next());
         let mut seen = [0usize; 3];
-        for _ in 0..300 {
+        for _ in 0..600 {
             let corners = [point(), point(), point()];
-            let x = point() * 2.0;
+            let x = point();
             let found = closest_point(x, corners);
             seen[match found.feature {
                 Feature::Vertex(_) => 0,

@@ -64,8 +64,7 @@ impl Closest {
         let corners = surface::corners(positions, triangles[t as usize]);
         let point = closest_point(x, corners);
         let distance_squared = x.distance_squared(point_at(corners, point.weights));
-        if distance_squared < self.distance_squared
-            || (distance_squared == self.distance_squared && t < self.triangle)
+        if distance_squared < self.distance_squared || (distance_squared == self.distance_squared && t < self.triangle)
         {
             *self = Self { distance_squared, triangle: t, point };
         }
@@ -133,13 +132,7 @@ impl Detection {
 
     /// Contacts with the surface displaced by `displacement`, i.e. at `positions` relative to the model's centre [m], in
     /// ascending order of proxy nodes.
-    pub fn deformed(
-        &mut self,
-        model: &Model,
-        displacement: &[f64],
-        positions: &[DVec3],
-        contacts: &mut Vec<Contact>,
-    ) {
+    pub fn deformed(&mut self, model: &Model, displacement: &[f64], positions: &[DVec3], contacts: &mut Vec<Contact>) {
         contacts.clear();
         let mut moved = 0.0f64;
         for (node, length) in self.moved.iter_mut().enumerate() {

@@ -124,7 +124,7 @@ impl EnergySearch {
             // Near the solution both decreases drown in rounding, which must not refuse a good step.
             let rounding = self.energy_rounding(model.kc, detection.nodes());
             let ratio = (self.state.energy - self.trial.energy + rounding) / (step.predicted + rounding);
-            if !(ratio >= POOR_SHARE) {
+            if ratio < POOR_SHARE || ratio.is_nan() {
                 radius = SHRINK * step.length;
             } else if ratio > GOOD_SHARE && step.at_boundary {
                 radius *= WIDEN;

@@ -47,7 +47,9 @@ impl Status {
 /// Equilibrium of the object with the proxy at one configuration.
 #[derive(Clone, Debug)]
 pub struct Equilibrium {
+    /// What became of it.
     pub status: Status,
+    /// Steps tried (`energy`, `linearised`) or passes (`paper`).
     pub iterations: u32,
     /// Relative residual of the force balance, in the energy norm [1].
     pub residual: f64,
@@ -66,6 +68,7 @@ pub struct Equilibrium {
 /// Contact force f_j on one node of the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NodeForce {
+    /// Number of the object's node.
     pub node: u32,
     /// [N]
     pub force: DVec3,
@@ -74,9 +77,11 @@ pub struct NodeForce {
 /// One proxy node in contact: pushed by `force` at x_i, pushing back on three object nodes.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
+    /// Number of the proxy's node.
     pub proxy_node: u32,
-    /// The three object nodes and the weight with which each carries the reaction.
+    /// The three object nodes.
     pub nodes: [u32; 3],
+    /// The weight with which each carries the reaction.
     pub weights: [f64; 3],
     /// Force on the proxy node [N].
     pub force: DVec3,

@@ -197,5 +197,8 @@ fn is_finite(equilibrium: &Equilibrium) -> bool {
         && equilibrium.residual.is_finite()
         && equilibrium.torque.is_finite()
         && equilibrium.forces.iter().all(|force| force.force.is_finite())
-        && equilibrium.touches.iter().all(|touch| touch.force.is_finite() && touch.weights.iter().all(|w| w.is_finite()))
+        && equilibrium
+            .touches
+            .iter()
+            .all(|touch| touch.force.is_finite() && touch.weights.iter().all(|w| w.is_finite()))
 }

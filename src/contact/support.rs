@@ -89,12 +89,6 @@ impl Support {
         }
     }
 
-    /// Entry of C_AA [m/N].
-    #[must_use]
-    pub fn entry(&self, row: usize, column: usize) -> f64 {
-        self.compliance[row * self.order() + column]
-    }
-
     /// `displacement = C forces` on all surface nodes, `forces` being on A.
     pub fn displace(&self, compliance: &Compliance, forces: &[f64], displacement: &mut [f64]) {
         displacement.fill(0.0);
