@@ -11,6 +11,8 @@
 //! Exit codes: 0 the work is whole, 1 it failed or is not whole, 2 the command line itself is wrong (given by clap).
 
 mod doctor;
+mod export;
+mod info;
 
 use clap::{Parser, Subcommand};
 use std::{
@@ -34,12 +36,18 @@ struct CommandLine {
 enum Command {
     /// Say what this machine offers: threads, graphics adapters, real-time rights.
     Doctor(doctor::Arguments),
+    /// Write a dataset for other programs.
+    Export(export::Arguments),
+    /// Say what a dataset holds, after checking all of it.
+    Info(info::Arguments),
 }
 
 impl Command {
     fn run(&self) -> Result<Report, Failure> {
         match self {
             Self::Doctor(arguments) => doctor::run(arguments),
+            Self::Export(arguments) => export::run(arguments),
+            Self::Info(arguments) => info::run(arguments),
         }
     }
 }

@@ -31,6 +31,12 @@ impl Axis {
     pub fn coordinate(&self, k: usize) -> f64 {
         self.start + k as f64 * self.step
     }
+
+    /// Unit of what acts along the axis: a torque, or a force where the joint is prismatic.
+    #[must_use]
+    pub fn effort_unit(&self) -> &'static str {
+        if self.unit == "m" { "N" } else { "N m" }
+    }
 }
 
 impl Grid {

@@ -79,8 +79,8 @@ fn write_contacts(dataset: &Dataset, writer: &mut impl Write) -> io::Result<()> 
 
 /// Header of a joint's torque or, of a prismatic joint, force.
 fn effort(axis: &Axis) -> String {
-    let (quantity, unit) = if axis.unit == "m" { ("force", "N") } else { ("torque", "N m") };
-    quoted(&format!("{quantity} {} [{unit}]", axis.name))
+    let unit = axis.effort_unit();
+    quoted(&format!("{} {} [{unit}]", if unit == "N" { "force" } else { "torque" }, axis.name))
 }
 
 /// A text as one field (RFC 4180): joints may be named anything.

@@ -1,0 +1,31 @@
+//! `haptize export`: a dataset for other programs.
+
+use super::{Failure, Report};
+use haptize::dataset::{Dataset, Format};
+use std::path::PathBuf;
+
+/// What to export, and where to.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The dataset's file.
+    dataset: PathBuf,
+    /// What to write.
+    #[arg(long)]
+    format: Format,
+    /// The file to write; by default beside the dataset, with the format's extension.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+}
+
+/// Opens and checks the dataset, and writes it anew.
+pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    let dataset = Dataset::open(&arguments.dataset)?;
+    let beside = || arguments.dataset.with_extension(arguments.format.extension());
+    let files = dataset.export(&arguments.output.clone().unwrap_or_else(beside), arguments.format)?;
+    let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    Ok(Report {
+        text: names.iter().map(|name| format!("{name}\n")).collect(),
+        json: serde_json::json!({ "files": names }),
+        whole: true,
+    })
+}

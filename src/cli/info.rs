@@ -1,0 +1,71 @@
+//! `haptize info`: what a dataset holds. The whole file is checked first.
+
+use super::{Failure, Report};
+use haptize::dataset::{Axis, Dataset, Summary};
+use std::{
+    fmt::{self, Write},
+    path::PathBuf,
+};
+
+/// What to look at.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The dataset's file.
+    dataset: PathBuf,
+}
+
+/// Opens and checks the file, and sums it up.
+pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    let path = &arguments.dataset;
+    let dataset = Dataset::open(path)?;
+    let summary = dataset.summary();
+    let file_bytes = std::fs::metadata(path)?.len();
+    let mut json = serde_json::to_value(&summary)?;
+    json["file"] = path.display().to_string().into();
+    json["file_bytes"] = file_bytes.into();
+    let mut text = String::new();
+    writeln!(text, "{}: {} points, {:.1} MB, sound", path.display(), summary.points, file_bytes as f64 / 1e6)?;
+    describe(&mut text, &summary)?;
+    Ok(Report { text, json, whole: true })
+}
+
+fn describe(text: &mut String, summary: &Summary) -> fmt::Result {
+    for (axis, [least, greatest]) in summary.axes.iter().zip(&summary.torque) {
+        let Axis { name, unit, start, step, count } = axis;
+        let last = axis.coordinate(count - 1);
+        let effort = axis.effort_unit();
+        writeln!(text, "  {name:<12} {count} lines, {start:.4} to {last:.4} {unit} by {step:.4}")?;
+        writeln!(text, "  {:<12} {least:.4} to {greatest:.4} {effort}", "")?;
+    }
+    let counts = &summary.statuses;
+    write!(text, "  status       {} free, {} in contact", counts.free, counts.contact)?;
+    for (count, word) in
+        [(counts.unconverged, "unconverged"), (counts.overflow, "overflowed"), (counts.outside, "outside")]
+    {
+        if count > 0 {
+            write!(text, ", {count} {word}")?;
+        }
+    }
+    writeln!(text)?;
+    if let (Some(contacts), Some(most), Some(force)) = (summary.contacts, summary.max_contacts, summary.max_force) {
+        writeln!(text, "  contacts     {contacts} forces, at most {most} at a point and {force:.4} N on a node")?;
+    }
+    if let Some(depth) = summary.max_depth {
+        writeln!(text, "  depth        at most {:.3} mm below the surface at rest", depth * 1e3)?;
+    }
+    if let Some(energy) = summary.max_energy {
+        writeln!(text, "  energy       at most {energy:.5} J")?;
+    }
+    if let Some(residual) = summary.max_residual {
+        writeln!(text, "  residual     at most {residual:.1e} where converged")?;
+    }
+    if let Some([nodes, triangles]) = summary.surface {
+        writeln!(text, "  surface      {nodes} nodes, {triangles} triangles")?;
+    }
+    let from = &summary.provenance;
+    writeln!(
+        text,
+        "  made         {} by haptize {}: {} to {:.0e} on {} ({})",
+        from.date, from.version, from.algorithm, from.tolerance, from.backend, from.adapter
+    )
+}
