@@ -1,10 +1,12 @@
 //! Sweeps: a virtual object haptized over a grid in C-space.
 
 mod columns;
+mod cpu;
 mod part;
 mod report;
 mod sweep;
 
+pub use cpu::CpuBackend;
 pub use report::{Iterations, SweepReport};
 pub use sweep::{Progress, Run, Sweep, SweepError};
 
