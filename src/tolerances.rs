@@ -76,3 +76,6 @@ pub const INNER_ITERATIONS_PER_UNKNOWN: usize = 4;
 /// Relative change of forces and displacements at which the paper's iteration has stopped changing is the scene's
 /// tolerance; its inner solve of equation (2) must be better than that by this factor [1].
 pub const PAPER_INNER_SHARE: f64 = 1e-3;
+/// How far beyond an end a grid line may lie and still count, in steps [1]: spacings such as pi/60 are written with a
+/// handful of digits, and 1e-6 of a step changes no torque that is interpolated between lines.
+pub const GRID_STEP_SLACK: f64 = 1e-6;

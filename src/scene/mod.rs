@@ -3,14 +3,21 @@
 //! A scene is TOML. [`Scene::load`] parses it, fills defaults and validates every number; an error points at the
 //! file, the line and the remedy. All quantities are SI: metres, radians, newtons, kilograms, seconds.
 
+mod check;
+mod convert;
+mod error;
+mod file;
 mod spec;
 
+pub use error::{Diagnostic, SceneError};
 pub use spec::{
     Algorithm, AxisSpec, ContactSpec, GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticsSpec,
     JointKind, JointSpec, MotionSpec, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec, Waypoint,
 };
 
-use std::path::PathBuf;
+use check::Checker;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 /// A whole scene, validated.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,4 +42,50 @@ pub struct Scene {
     pub graphics: Option<GraphicsSpec>,
     /// Motions to play.
     pub motion: MotionSpec,
+}
+
+/// Longest scene file that is read [B]: a scene is a page or two, and its text goes into every dataset.
+const MAX_BYTES: u64 = 1 << 24;
+
+impl Scene {
+    /// Reads and validates the scene file at `path`, and checks that the mesh file it names is there.
+    ///
+    /// # Errors
+    /// When a file cannot be read, or the scene is not valid; the message names the line and the remedy.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let path = path.as_ref();
+        let unreadable = |reason: String| SceneError::Unreadable { path: path.to_owned(), reason };
+        let stream = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
+        let mut text = String::new();
+        stream.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(|error| unreadable(error.to_string()))?;
+        if text.len() as u64 > MAX_BYTES {
+            return Err(unreadable(format!("it is longer than {MAX_BYTES} bytes, which no scene is")));
+        }
+        let (scene, table) = read(&text, path)?;
+        if let (Shape::Mesh { file, .. }, Some(mesh)) = (&scene.object.shape, &table.object.get_ref().mesh)
+            && let Err(error) = std::fs::metadata(file)
+        {
+            let message = format!("the mesh file {} cannot be opened: {error}", file.display());
+            return Err(Checker { path, text: &text }.error(mesh.file.span(), message));
+        }
+        Ok(scene)
+    }
+
+    /// Validates the text of a scene. `path` is where it came from: messages name it, and relative paths in the scene are
+    /// relative to its folder. No file is opened.
+    ///
+    /// # Errors
+    /// When the scene is not valid; the message names the line and the remedy.
+    pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        read(text, path.as_ref()).map(|(scene, _)| scene)
+    }
+}
+
+fn read(text: &str, path: &Path) -> Result<(Scene, file::SceneTable), SceneError> {
+    let checker = Checker { path, text };
+    let table: file::SceneTable = toml::from_str(text).map_err(|error| {
+        let place = error.span().unwrap_or(0..0);
+        checker.error(place, error.message())
+    })?;
+    Ok((convert::scene(&checker, &table)?, table))
 }

@@ -1,0 +1,60 @@
+//! From the tables of a scene file to a validated [`Scene`]: defaults filled, every number checked, one file per table.
+
+mod grid;
+mod haptics;
+mod motion;
+mod object;
+mod proxy;
+
+use super::check::Checker;
+use super::error::SceneError;
+use super::file::{ContactTable, GraphicsTable, SceneTable};
+use super::{Algorithm, ContactSpec, GraphicsSpec, Scene};
+
+/// Default relative residual of the contact solver: what the stored equilibria promise [1].
+const CONTACT_TOLERANCE: f64 = 1e-6;
+/// Default cap on the contact solver's iterations [1].
+const CONTACT_ITERATIONS: u32 = 100;
+/// Default frame rate [Hz].
+const GRAPHICS_RATE: f64 = 60.0;
+
+/// Validates `table`, read from the checker's text.
+pub(super) fn scene(checker: &Checker<'_>, table: &SceneTable) -> Result<Scene, SceneError> {
+    let proxy = proxy::convert(checker, &table.proxy)?;
+    let joints = &proxy.joints;
+    let file_stem = checker.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    Ok(Scene {
+        path: checker.path.to_owned(),
+        text: checker.text.to_owned(),
+        name: table.name.clone().or(file_stem).unwrap_or_default(),
+        object: object::convert(checker, &table.object)?,
+        contact: contact(checker, &table.contact)?,
+        grid: grid::convert(checker, &table.grid, joints)?,
+        haptics: haptics::convert(checker, &table.haptics, joints)?,
+        graphics: table.graphics.as_ref().map(|table| graphics(checker, table)).transpose()?,
+        motion: motion::convert(checker, &table.motion, joints)?,
+        proxy,
+    })
+}
+
+fn contact(checker: &Checker<'_>, table: &ContactTable) -> Result<ContactSpec, SceneError> {
+    let tolerance = table.tolerance.as_ref().map(|value| checker.between("tolerance", value, 0.0, 1.0));
+    let max_iterations = match &table.max_iterations {
+        Some(value) if *value.get_ref() == 0 => {
+            return Err(checker.error(value.span(), "max_iterations is 0: it must be at least 1"));
+        }
+        Some(value) => *value.get_ref(),
+        None => CONTACT_ITERATIONS,
+    };
+    Ok(ContactSpec {
+        stiffness: checker.positive("stiffness", &table.stiffness)?,
+        algorithm: table.algorithm.unwrap_or(Algorithm::Energy),
+        tolerance: tolerance.unwrap_or(Ok(CONTACT_TOLERANCE))?,
+        max_iterations,
+    })
+}
+
+fn graphics(checker: &Checker<'_>, table: &GraphicsTable) -> Result<GraphicsSpec, SceneError> {
+    let rate = table.rate.as_ref().map(|value| checker.between("rate", value, 0.0, 1e4));
+    Ok(GraphicsSpec { rate: rate.unwrap_or(Ok(GRAPHICS_RATE))? })
+}

@@ -1,0 +1,120 @@
+//! `[[proxy.joint]]`: the chain, link by link.
+
+use super::super::check::Checker;
+use super::super::error::SceneError;
+use super::super::file::{JointTable, NodesTable, ProxyTable};
+use super::super::{JointKind, JointSpec, ProxyNodeSpec, ProxySpec};
+use crate::MAX_JOINTS;
+use toml::Spanned;
+
+/// Default reflected inertia of the actuator of a revolute joint, that of a desktop device [kg m^2].
+const ROTOR_INERTIA: f64 = 1e-3;
+/// The same of a prismatic joint [kg].
+const ROTOR_MASS: f64 = 0.05;
+/// Most contact nodes of a chain: far more than a chain of six links needs, few enough for one per thread on a GPU.
+const MAX_NODES: usize = 4096;
+/// Longest name, in characters, that still fits a figure's legend.
+const MAX_NAME: usize = 40;
+
+pub(super) fn convert(checker: &Checker<'_>, table: &ProxyTable) -> Result<ProxySpec, SceneError> {
+    let tables = table.joint.get_ref();
+    if tables.is_empty() || tables.len() > MAX_JOINTS {
+        let message = format!("the proxy has {} joints: it must have 1 to {MAX_JOINTS}", tables.len());
+        return Err(checker.error(table.joint.span(), message));
+    }
+    let mut joints: Vec<JointSpec> = Vec::new();
+    for table in tables {
+        let spec = joint(checker, table, joints.len())?;
+        if joints.iter().any(|earlier| earlier.name == spec.name) {
+            let span = table.name.as_ref().map_or(table.axis.span(), Spanned::span);
+            return Err(checker.error(span, format!("two joints are called {:?}: give each its own name", spec.name)));
+        }
+        joints.push(spec);
+    }
+    let nodes: usize = joints.iter().map(|joint| joint.nodes.len()).sum();
+    if nodes == 0 {
+        return Err(checker.error(table.joint.span(), "no link has contact nodes: give one of the joints a nodes list"));
+    }
+    if nodes > MAX_NODES {
+        let message = format!("the proxy has {nodes} contact nodes: it may have at most {MAX_NODES}");
+        return Err(checker.error(table.joint.span(), message));
+    }
+    Ok(ProxySpec { joints })
+}
+
+fn joint(checker: &Checker<'_>, table: &JointTable, index: usize) -> Result<JointSpec, SceneError> {
+    let axis = checker
+        .vector("axis", Some(&table.axis))?
+        .try_normalize()
+        .ok_or_else(|| checker.error(table.axis.span(), "axis is zero: it must have a direction"))?;
+    let limits = *table.limits.get_ref();
+    checker.all_finite("limits", &limits, table.limits.span())?;
+    if limits[0] >= limits[1] {
+        let message = format!("limits are [{}, {}]: the first must be less than the second", limits[0], limits[1]);
+        return Err(checker.error(table.limits.span(), message));
+    }
+    let rotor_inertia = table.rotor_inertia.as_ref().map(|value| checker.positive("rotor_inertia", value));
+    let default_rotor_inertia = match table.kind {
+        JointKind::Revolute => ROTOR_INERTIA,
+        JointKind::Prismatic => ROTOR_MASS,
+    };
+    let inertia = checker.vector("inertia", table.inertia.as_ref())?;
+    if let Some(table) = table.inertia.as_ref().filter(|_| inertia.min_element() < 0.0) {
+        return Err(checker.error(table.span(), "inertia has a negative moment: moments are zero or positive"));
+    }
+    let mut nodes = Vec::new();
+    for table in &table.nodes {
+        add_nodes(checker, table, &mut nodes)?;
+    }
+    Ok(JointSpec {
+        name: name(checker, table.name.as_ref(), index)?,
+        kind: table.kind,
+        origin: checker.vector("origin", table.origin.as_ref())?,
+        axis,
+        limits,
+        mass: table.mass.as_ref().map_or(Ok(0.0), |value| checker.not_negative("mass", value))?,
+        centre_of_mass: checker.vector("centre_of_mass", table.centre_of_mass.as_ref())?,
+        inertia,
+        rotor_inertia: rotor_inertia.unwrap_or(Ok(default_rotor_inertia))?,
+        nodes,
+    })
+}
+
+/// Names become columns of tables and legends of figures.
+fn name(checker: &Checker<'_>, name: Option<&Spanned<String>>, index: usize) -> Result<String, SceneError> {
+    let Some(name) = name else { return Ok(format!("q{}", index + 1)) };
+    let fits = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '_' | '-');
+    let text = name.get_ref();
+    if text.trim().is_empty() || text.chars().count() > MAX_NAME || !text.chars().all(fits) {
+        let message = format!("name must be 1 to {MAX_NAME} letters, digits, spaces, _ or -");
+        return Err(checker.error(name.span(), message));
+    }
+    Ok(text.clone())
+}
+
+fn add_nodes(
+    checker: &Checker<'_>,
+    table: &Spanned<NodesTable>,
+    nodes: &mut Vec<ProxyNodeSpec>,
+) -> Result<(), SceneError> {
+    let span = table.span();
+    let table = table.get_ref();
+    let radius = table.radius.as_ref().map_or(Ok(0.0), |value| checker.not_negative("radius", value))?;
+    match (&table.at, &table.from, &table.to, &table.count) {
+        (Some(at), None, None, None) => {
+            nodes.push(ProxyNodeSpec { position: checker.vector("at", Some(at))?, radius });
+        }
+        (None, Some(from), Some(to), Some(count)) => {
+            let (from, to) = (checker.vector("from", Some(from))?, checker.vector("to", Some(to))?);
+            let count = checker.count("count", count, 2, MAX_NODES)?;
+            let position = |k: usize| from.lerp(to, k as f64 / (count - 1) as f64);
+            nodes.extend((0..count).map(|k| ProxyNodeSpec { position: position(k), radius }));
+        }
+        _ => {
+            let message = "nodes need either { at = [x, y, z] } or { from = [x, y, z], to = [x, y, z], count = n }, \
+                           and may have a radius";
+            return Err(checker.error(span, message));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,89 @@
+//! Errors of the scene file: where, what, and what to do, with the line and a caret under the place.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Why a scene file is refused.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The file cannot be read at all.
+    #[error("{}: cannot read the scene: {reason}", .path.display())]
+    Unreadable {
+        /// The scene file.
+        path: PathBuf,
+        /// What the system says.
+        reason: String,
+    },
+    /// The text is not TOML, lacks a key or has an unknown one, or a value is out of range.
+    #[error(transparent)]
+    Invalid(Box<Diagnostic>),
+}
+
+/// A message about a place in a text file. Displays as `path:line:column: message`, then the line and a caret.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// The file.
+    pub path: PathBuf,
+    /// From 1.
+    pub line: usize,
+    /// In characters, from 1.
+    pub column: usize,
+    /// What is wrong and what to do.
+    pub message: String,
+    /// The line, as far as it fits.
+    excerpt: String,
+    /// Characters of the excerpt before the place, and in it.
+    caret: (usize, usize),
+}
+
+/// Most characters of a line that a message shows, and how many of them before the place.
+const EXCERPT_WIDTH: usize = 110;
+const EXCERPT_LEAD: usize = 60;
+
+impl Diagnostic {
+    /// A message about the bytes `span` of `text`, the content of the file at `path`. A span beyond the text means its
+    /// end.
+    #[must_use]
+    pub fn new(path: &Path, text: &str, span: Range<usize>, message: impl Into<String>) -> Self {
+        let start = text.floor_char_boundary(span.start);
+        let before = &text[..start];
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let line_text = text[line_start..].lines().next().unwrap_or("");
+        let column = text[line_start..start].chars().count();
+        let inside = text[start..text.floor_char_boundary(span.end.max(start))].lines().next().unwrap_or("");
+        let skipped = column.saturating_sub(EXCERPT_LEAD);
+        // Control characters would act on the terminal, and tabs would move the caret.
+        let printable = |c: char| if c.is_control() { ' ' } else { c };
+        let excerpt: String = line_text.chars().skip(skipped).take(EXCERPT_WIDTH).map(printable).collect();
+        let lead = column - skipped;
+        let width = inside.chars().count().min(EXCERPT_WIDTH.saturating_sub(lead)).max(1);
+        Self {
+            path: path.to_owned(),
+            line: before.matches('\n').count() + 1,
+            column: column + 1,
+            message: message.into(),
+            excerpt,
+            caret: (lead, width),
+        }
+    }
+}
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let number = self.line.to_string();
+        let gutter = number.len();
+        writeln!(f, "{}:{}:{}: {}", self.path.display(), self.line, self.column, self.message)?;
+        writeln!(f, "{:gutter$} |", "")?;
+        writeln!(f, "{number} | {}", self.excerpt)?;
+        write!(f, "{:gutter$} | {:lead$}{}", "", "", "^".repeat(self.caret.1), lead = self.caret.0)
+    }
+}
+
+impl std::error::Error for Diagnostic {}
+
+impl From<Diagnostic> for SceneError {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self::Invalid(Box::new(diagnostic))
+    }
+}
