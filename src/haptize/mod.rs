@@ -1,13 +1,11 @@
 //! Sweeps: a virtual object haptized over a grid in C-space.
 
-mod choice;
 mod columns;
 mod cpu;
 mod part;
 mod report;
 mod sweep;
 
-pub use choice::{BackendChoice, BackendError, ChosenBackend};
 pub use cpu::CpuBackend;
 pub use report::{Iterations, SweepReport};
 pub use sweep::{Progress, Run, Sweep, SweepError};

@@ -1,1 +1,111 @@
-//! Placeholder.
+//! What a bake and a press look like: figures drawn without a display, a GPU or a system font.
+//!
+//! [`canvas`] is the paper sheet (SVG, and the same sheet rasterised to PNG), [`plot`] draws charts and heat maps on
+//! it, [`raster`] draws solid bodies. The figures themselves are functions of the library's types; none of them knows
+//! how the data came about.
+
+pub mod canvas;
+pub mod chart;
+pub mod colour;
+mod font;
+pub mod jitter;
+pub mod object;
+pub mod plot;
+pub mod press;
+pub mod raster;
+pub mod slices;
+pub mod space;
+mod ticks;
+
+use crate::{dataset::Dataset, proxy::Chain, render::trace::Trace};
+use canvas::Canvas;
+use std::path::{Path, PathBuf};
+
+/// Pixels a point in PNG files: sharp on dense screens and in print.
+pub const PIXELS: f64 = 2.0;
+
+/// Why a figure could not be drawn or written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The figure's file or folder could not be written.
+    #[error("cannot write {}: {source}; check that the folder exists, is writable and has room", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The sheet could not be rasterised.
+    #[error("cannot rasterise a figure of {width} x {height} pixels: {reason}; ask for a smaller scale")]
+    Rasterise {
+        /// Pixels across.
+        width: u32,
+        /// Pixels down.
+        height: u32,
+        /// What the rasteriser said.
+        reason: String,
+    },
+    /// The data cannot be drawn at all: their parts contradict each other.
+    #[error("cannot draw {figure}: {reason}")]
+    Data {
+        /// Which figure.
+        figure: &'static str,
+        /// What does not fit, and what to do.
+        reason: String,
+    },
+}
+
+/// Instants shown of the deforming object.
+const INSTANTS: usize = 6;
+
+/// Writes all figures that the data allow into `folder`, which is made if it is missing, and returns their paths.
+///
+/// `cspace.png` (Fig. 3) and `torque.{svg,png}` show the dataset; with a recording of the proxy `chain` also
+/// `press.{svg,png}` (Fig. 5), `energy.{svg,png}` and, where it has frames and the dataset a surface, `object.png`
+/// (Fig. 6).
+///
+/// # Errors
+/// [`ReportError::Write`] when a file cannot be written, [`ReportError::Data`] when recording, chain and dataset do not
+/// belong together.
+pub fn write_figures(
+    folder: &Path,
+    dataset: &Dataset,
+    recording: Option<(&Chain, &Trace)>,
+) -> Result<Vec<PathBuf>, ReportError> {
+    let mut written = vec![write_png(folder, "cspace", &space::space(dataset))?];
+    written.extend(write_both(folder, "torque", &slices::slices(dataset))?);
+    if let Some((chain, trace)) = recording {
+        written.extend(write_both(folder, "press", &press::press(trace))?);
+        written.extend(write_both(folder, "energy", &press::energy(trace))?);
+        if !trace.frames.is_empty() && dataset.surface.is_some() {
+            let instants = object::instants(dataset, chain, trace, INSTANTS)?;
+            written.push(write_png(folder, "object", &object::object(dataset, chain, &instants)?)?);
+        }
+    }
+    Ok(written)
+}
+
+/// Writes `NAME.svg` and `NAME.png` into `folder`, which is made if it is missing.
+///
+/// # Errors
+/// [`ReportError::Write`] when a file cannot be written.
+pub fn write_both(folder: &Path, name: &str, canvas: &Canvas) -> Result<[PathBuf; 2], ReportError> {
+    let svg = write(folder.join(name).with_extension("svg"), canvas.svg().as_bytes())?;
+    Ok([svg, write_png(folder, name, canvas)?])
+}
+
+/// Writes `NAME.png` into `folder`, which is made if it is missing.
+///
+/// # Errors
+/// [`ReportError::Write`] when the file cannot be written.
+pub fn write_png(folder: &Path, name: &str, canvas: &Canvas) -> Result<PathBuf, ReportError> {
+    write(folder.join(name).with_extension("png"), &canvas.pixels(PIXELS)?.png()?)
+}
+
+fn write(path: PathBuf, bytes: &[u8]) -> Result<PathBuf, ReportError> {
+    let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+    match made.and_then(|()| std::fs::write(&path, bytes)) {
+        Ok(()) => Ok(path),
+        Err(source) => Err(ReportError::Write { path, source }),
+    }
+}

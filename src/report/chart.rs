@@ -1,0 +1,193 @@
+//! Whole charts: curves in panels stacked over one horizontal axis, and histograms.
+
+use super::{
+    canvas::{Area, Canvas},
+    colour::{self, Colour},
+    plot::{self, Entry, Mark, Panel, Scale},
+    ticks,
+};
+
+/// Width of a chart's sheet, in points.
+const WIDTH: f64 = 760.0;
+/// Margin of every sheet.
+pub(super) const MARGIN: f64 = 24.0;
+/// Left end of headlines.
+pub(super) const TITLE_LEFT: f64 = MARGIN;
+/// Room for the tick labels left of a panel.
+const LEFT: f64 = 40.0;
+/// Room for the title and legend above a panel.
+const ABOVE: f64 = 40.0;
+/// Room for the tick labels and the title below the lowest panel.
+const BELOW: f64 = 52.0;
+
+/// A curve of a panel.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// In the legend; curves without a name are not listed.
+    pub name: String,
+    /// Its colour.
+    pub colour: Colour,
+    /// Whether it is dashed.
+    pub dashed: bool,
+    /// Data points; those that are no numbers interrupt the curve.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// One panel of a stack.
+#[derive(Clone, Debug)]
+pub struct Lane {
+    /// Name and unit of the vertical axis.
+    pub title: String,
+    /// Its curves.
+    pub curves: Vec<Curve>,
+    /// Height in points.
+    pub height: f64,
+    /// Whether the axis begins at zero: counts and magnitudes.
+    pub from_zero: bool,
+}
+
+/// Panels over one horizontal axis.
+#[derive(Clone, Debug)]
+pub struct Stack {
+    /// Title of the figure.
+    pub headline: String,
+    /// Name and unit of the horizontal axis.
+    pub across: String,
+    /// From the top.
+    pub lanes: Vec<Lane>,
+    /// Intervals of the horizontal axis shaded in all panels.
+    pub shaded: Vec<[f64; 2]>,
+    /// What the shade means.
+    pub shade_name: String,
+}
+
+impl Stack {
+    /// The chart on a sheet. Panels without a single finite point say so.
+    #[must_use]
+    pub fn draw(&self) -> Canvas {
+        let top = MARGIN + 16.0;
+        let height: f64 = self.lanes.iter().map(|lane| lane.height + ABOVE).sum();
+        let mut canvas = Canvas::new(WIDTH, top + height + BELOW + MARGIN / 2.0);
+        headline(&mut canvas, &self.headline);
+        if !self.shaded.is_empty() {
+            let shade = Entry { name: self.shade_name.clone(), colour: SHADE, mark: Mark::Box };
+            plot::legend(&mut canvas, (WIDTH - MARGIN, MARGIN + 12.0), &[shade]);
+        }
+        let times =
+            self.lanes.iter().flat_map(|lane| &lane.curves).flat_map(|curve| &curve.points).map(|point| point.0);
+        let across = Scale::linear(ticks::snapped(ticks::range(times, 0.0)), &self.across);
+        let mut y = top;
+        for (number, lane) in self.lanes.iter().enumerate() {
+            let area = Area { x: MARGIN + LEFT, y: y + ABOVE, width: WIDTH - 2.0 * MARGIN - LEFT, height: lane.height };
+            lane.draw(&mut canvas, area, &across, &self.shaded, number + 1 == self.lanes.len());
+            y = area.bottom();
+        }
+        canvas
+    }
+}
+
+/// Shade of intervals: darker than the grid's white, lighter than its lines.
+const SHADE: Colour = colour::SHADE;
+
+impl Lane {
+    /// A panel without curves.
+    pub(super) fn empty(title: &str) -> Self {
+        Self { title: title.to_owned(), curves: Vec::new(), height: 130.0, from_zero: false }
+    }
+
+    fn draw(&self, canvas: &mut Canvas, area: Area, across: &Scale, shaded: &[[f64; 2]], lowest: bool) {
+        let values = || self.curves.iter().flat_map(|curve| &curve.points).map(|point| point.1);
+        let [mut low, high] = ticks::range(values(), 0.06);
+        if self.from_zero && low < high {
+            low = low.min(0.0).max(values().fold(0.0, f64::min));
+        }
+        let panel = Panel { area, across: across.clone(), up: Scale::linear([low, high], &self.title) };
+        for &interval in shaded {
+            panel.shade(canvas, interval, SHADE);
+        }
+        panel.grid(canvas, lowest);
+        panel.zero_line(canvas);
+        for curve in &self.curves {
+            let width = if curve.dashed { 1.5 } else { 1.9 };
+            panel.curve(canvas, &curve.points, curve.colour, width, curve.dashed);
+        }
+        if !values().any(f64::is_finite) {
+            panel.note(canvas, "no data");
+        }
+        let mark = |curve: &Curve| if curve.dashed { Mark::Dashes } else { Mark::Line };
+        let entries: Vec<Entry> = self
+            .curves
+            .iter()
+            .filter(|curve| !curve.name.is_empty())
+            .map(|curve| Entry { name: curve.name.clone(), colour: curve.colour, mark: mark(curve) })
+            .collect();
+        panel.legend(canvas, &entries);
+    }
+}
+
+/// Counts over bins, both axes logarithmic: what happens rarely matters as much as what happens always.
+#[derive(Clone, Debug)]
+pub struct Histogram {
+    /// Title of the figure.
+    pub headline: String,
+    /// Name and unit of the horizontal axis.
+    pub across: String,
+    /// Name of the vertical axis.
+    pub up: String,
+    /// Lower end, upper end and count of each bin, ascending.
+    pub bins: Vec<([f64; 2], u64)>,
+    /// Values to point out, each with its text.
+    pub marks: Vec<(f64, String)>,
+}
+
+impl Histogram {
+    /// The histogram on a sheet; empty bins leave gaps.
+    #[must_use]
+    pub fn draw(&self) -> Canvas {
+        let area =
+            Area { x: MARGIN + LEFT, y: MARGIN + 16.0 + ABOVE, width: WIDTH - 2.0 * MARGIN - LEFT, height: 250.0 };
+        let mut canvas = Canvas::new(WIDTH, area.bottom() + BELOW + MARGIN / 2.0);
+        headline(&mut canvas, &self.headline);
+        let filled = || self.bins.iter().filter(|([from, to], count)| *count > 0 && from < to && *from > 0.0);
+        let ends = filled().flat_map(|(ends, _)| *ends).chain(self.marks.iter().map(|mark| mark.0));
+        let [low, high] = ticks::range(ends.filter(|&end| end > 0.0), 0.0);
+        let most = filled().map(|(_, count)| *count).max().unwrap_or(1);
+        let panel = Panel {
+            area,
+            across: Scale::logarithmic([low * 0.9, high * 1.1], &self.across),
+            // Half a count below one, so that a bin of one has a bar.
+            up: Scale::logarithmic([0.5, most as f64 * 2.0], &self.up),
+        };
+        panel.grid(&mut canvas, true);
+        for ([from, to], count) in filled() {
+            let ((left, top), (right, bottom)) = (panel.place((*from, *count as f64)), panel.place((*to, 0.5)));
+            // A hairline between neighbours, as far as the bins are wide enough.
+            let gap = (0.15 * (right - left)).min(1.0);
+            let bar = Area { x: left, y: top, width: right - left - gap, height: bottom - top };
+            canvas.rectangle(bar, colour::series(0).with_opacity(0.85));
+        }
+        if filled().next().is_none() {
+            panel.note(&mut canvas, "no data");
+        }
+        let shown: Vec<&(f64, String)> =
+            self.marks.iter().filter(|(value, _)| *value > 0.0 && value.is_finite()).collect();
+        for (value, _) in &shown {
+            let (x, _) = panel.place((*value, 1.0));
+            canvas.polyline(&[(x, area.y), (x, area.bottom())], colour::series(1), 1.4, Some(plot::DASHES));
+        }
+        // The texts stand above the panel in the order of the lines: beside them they would run into each other.
+        let texts: Vec<&str> = shown.iter().map(|(_, text)| text.as_str()).collect();
+        if !texts.is_empty() {
+            panel.legend(
+                &mut canvas,
+                &[Entry { name: texts.join("  ·  "), colour: colour::series(1), mark: Mark::Dashes }],
+            );
+        }
+        canvas
+    }
+}
+
+/// The figure's title, top left.
+pub(super) fn headline(canvas: &mut Canvas, text: &str) {
+    canvas.text((TITLE_LEFT, MARGIN + 12.0), text, plot::HEADLINE);
+}

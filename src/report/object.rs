@@ -1,0 +1,238 @@
+//! The deformed object with the proxy at a few instants (paper's Fig. 6), coloured by displacement, with the contact
+//! forces as arrows.
+
+use super::{
+    PIXELS, ReportError,
+    canvas::{Area, Canvas, Picture},
+    chart,
+    colour::{Colour, ColourMap, INK},
+    plot::{self, Entry, Mark},
+    raster::{Camera, Raster},
+    ticks,
+};
+use crate::{
+    contact::NodeForce,
+    dataset::Dataset,
+    proxy::{Chain, Pose},
+    render::{stencil::Lattice, trace::Trace},
+};
+use glam::DVec3;
+
+/// The object and the proxy at one instant.
+pub struct Instant {
+    /// [s]
+    pub time: f64,
+    /// Positions n of the surface nodes [m].
+    pub nodes: Vec<DVec3>,
+    /// Contact forces on them [N].
+    pub forces: Vec<NodeForce>,
+    /// The proxy.
+    pub pose: Pose,
+}
+
+const LINK: Colour = Colour::hex(0x8d_97_a5);
+const PROXY_NODE: Colour = Colour::hex(0x2b_34_40);
+const FORCE: Colour = Colour::hex(0xd5_5e_00);
+const EDGE: Colour = INK.with_opacity(0.28);
+
+const WIDTH: f64 = 800.0;
+const COLUMNS: usize = 3;
+const CELL: [f64; 2] = [226.0, 200.0];
+
+/// Instants of a recording worth looking at: from just before the first contact to just after the last, evenly.
+///
+/// # Errors
+/// [`ReportError::Data`] when frames, dataset and chain do not belong together.
+pub fn instants(dataset: &Dataset, chain: &Chain, trace: &Trace, count: usize) -> Result<Vec<Instant>, ReportError> {
+    let refused = |reason: String| ReportError::Data { figure: "the deformed object", reason };
+    if chain.joints.len() != dataset.grid.joints() {
+        let (joints, axes) = (chain.joints.len(), dataset.grid.joints());
+        return Err(refused(format!("the chain has {joints} joints, the dataset {axes}; load both from one scene")));
+    }
+    let lattice = Lattice::new(&dataset.grid).map_err(|error| refused(error.to_string()))?;
+    let frames = &trace.frames;
+    let touched = |time: f64| trace.ticks.iter().any(|tick| tick.contact && (tick.time - time).abs() < NEAR);
+    let first = frames.iter().position(|frame| touched(frame.time)).unwrap_or(0).saturating_sub(1);
+    let last = frames.iter().rposition(|frame| touched(frame.time)).unwrap_or(frames.len().saturating_sub(1));
+    let chosen = (0..count).filter_map(|k| frames.get(first + k * (last - first) / count.saturating_sub(1).max(1)));
+    let mut pose = chain.new_pose();
+    chosen
+        .map(|frame| {
+            if frame.proxy.len() != chain.joints.len() {
+                return Err(refused(format!("the frame at {} s has {} joints", frame.time, frame.proxy.len())));
+            }
+            chain.pose(&frame.proxy, &mut pose);
+            let forces = forces_at(dataset, &lattice, &frame.proxy, frame.nodes.len());
+            Ok(Instant { time: frame.time, nodes: frame.nodes.clone(), forces, pose: pose.clone() })
+        })
+        .collect()
+}
+
+/// Ticks within this of a frame belong to it: less than a frame, more than a tick [s].
+const NEAR: f64 = 4e-3;
+
+/// Contact forces interpolated over the grid cell (section 3.2, f_ex), those that are not zero.
+fn forces_at(dataset: &Dataset, lattice: &Lattice, q: &[f64], nodes: usize) -> Vec<NodeForce> {
+    let mut sum = vec![DVec3::ZERO; nodes];
+    for (point, weight) in lattice.locate(q).corners() {
+        for NodeForce { node, force } in dataset.forces(point) {
+            if let Some(sum) = sum.get_mut(node as usize) {
+                *sum += weight * force;
+            }
+        }
+    }
+    let acting = sum.into_iter().enumerate().filter(|(_, force)| *force != DVec3::ZERO);
+    acting.map(|(node, force)| NodeForce { node: node as u32, force }).collect()
+}
+
+/// The object at all `instants`, in rows of three, one camera and one colour map for all.
+///
+/// # Errors
+/// [`ReportError::Data`] when there is no surface or an instant has another number of nodes.
+pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<Canvas, ReportError> {
+    let refused = |reason: String| ReportError::Data { figure: "the deformed object", reason };
+    let surface = dataset
+        .surface
+        .as_ref()
+        .ok_or_else(|| refused("the dataset has no surface (it was scanned); there is nothing to draw".to_owned()))?;
+    let rest: Vec<DVec3> = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
+    let triangles: Vec<[u32; 3]> = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    if let Some(instant) = instants.iter().find(|instant| instant.nodes.len() < rest.len()) {
+        let (time, nodes, surface) = (instant.time, instant.nodes.len(), rest.len());
+        return Err(refused(format!("the frame at {time} s has {nodes} nodes, the dataset's surface {surface}")));
+    }
+    if instants.is_empty() {
+        return Err(refused("the recording has no frames; give the scene a [graphics] table".to_owned()));
+    }
+    let scene = Scene::new(chain, &rest, &triangles, instants);
+    let rows = instants.len().div_ceil(COLUMNS);
+    let top = chart::MARGIN + 52.0;
+    let mut canvas = Canvas::new(WIDTH, top + rows as f64 * (CELL[1] + 34.0) + 8.0);
+    chart::headline(&mut canvas, "The object deforms under the haptized contact forces");
+    let entries = [
+        Entry { name: "proxy node".to_owned(), colour: PROXY_NODE, mark: Mark::Dot },
+        Entry {
+            name: format!("contact force, longest {} N", ticks::number(scene.greatest_force, 2)),
+            colour: FORCE,
+            mark: Mark::Line,
+        },
+    ];
+    plot::legend(&mut canvas, (WIDTH - chart::MARGIN, chart::MARGIN + 12.0), &entries);
+    for (number, instant) in instants.iter().enumerate() {
+        let x = chart::MARGIN + (number % COLUMNS) as f64 * (CELL[0] + 6.0);
+        let y = top + (number / COLUMNS) as f64 * (CELL[1] + 34.0);
+        let total: DVec3 = instant.forces.iter().map(|force| force.force).sum();
+        let time = format!("{} s", ticks::number(instant.time, 2));
+        canvas.text((x, y), &time, plot::TITLE);
+        let what = match instant.forces.len() {
+            0 => "free".to_owned(),
+            nodes => format!("{nodes} nodes, {} N", ticks::number(total.length(), 2)),
+        };
+        canvas.text((x + plot::TITLE.width(&time) + 10.0, y), &what, plot::NOTE);
+        canvas.picture((x, y + 8.0), scene.picture(instant));
+    }
+    let bar = Area { x: WIDTH - 76.0, y: top + 40.0, width: 12.0, height: 160.0 };
+    plot::colour_bar(&mut canvas, bar, scene.map, "|u| [mm]");
+    Ok(canvas)
+}
+
+/// What all instants share.
+struct Scene<'a> {
+    chain: &'a Chain,
+    rest: &'a [DVec3],
+    triangles: &'a [[u32; 3]],
+    camera: Camera,
+    map: ColourMap,
+    /// Half the diagonal of the object at rest [m].
+    radius: f64,
+    /// Longest arrow's force [N].
+    greatest_force: f64,
+}
+
+impl<'a> Scene<'a> {
+    fn new(chain: &'a Chain, rest: &'a [DVec3], triangles: &'a [[u32; 3]], instants: &[Instant]) -> Self {
+        let (low, high) =
+            rest.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &n| (low.min(n), high.max(n)));
+        let radius = ((high - low).length() / 2.0).max(f64::MIN_POSITIVE);
+        let displacements =
+            instants.iter().flat_map(|instant| rest.iter().zip(&instant.nodes)).map(|(n0, n)| (*n - *n0).length());
+        let greatest = displacements.filter(|u| u.is_finite()).fold(0.0, f64::max);
+        let forces = || instants.iter().flat_map(|instant| &instant.forces).map(|force| force.force);
+        let greatest_force = forces().map(|force| force.length()).filter(|force| force.is_finite()).fold(0.0, f64::max);
+        let mut scene = Self {
+            chain,
+            rest,
+            triangles,
+            camera: Camera::framing(&[], DVec3::NEG_Y, [1, 1]),
+            map: ColourMap::Pale { low: 0.0, high: if greatest > 0.0 { 1e3 * greatest } else { 1.0 } },
+            radius,
+            greatest_force,
+        };
+        let mut framed: Vec<DVec3> =
+            instants.iter().flat_map(|instant| instant.nodes.iter().take(rest.len())).copied().collect();
+        for instant in instants {
+            framed.extend(scene.arrows(instant).into_iter().map(|(tail, _)| tail));
+        }
+        let centre = (low + high) / 2.0;
+        let direction = view(centre, instants, forces().sum());
+        scene.camera = Camera::framing(&framed, direction, CELL.map(|side| (side * PIXELS) as usize));
+        scene
+    }
+
+    /// Tail and tip of each force arrow: the tip pushes on the node.
+    fn arrows(&self, instant: &Instant) -> Vec<(DVec3, DVec3)> {
+        // The greatest force is a little shorter than the object's radius; those under a fiftieth of it would be specks.
+        let scale = 0.7 * self.radius / self.greatest_force.max(f64::MIN_POSITIVE);
+        let visible = instant.forces.iter().filter(|force| force.force.length() > 0.02 * self.greatest_force);
+        visible
+            .filter_map(|force| {
+                let tip = *instant.nodes.get(force.node as usize)?;
+                Some((tip - scale * force.force, tip))
+            })
+            .collect()
+    }
+
+    fn picture(&self, instant: &Instant) -> Picture {
+        let mut raster = Raster::new(self.camera);
+        let displacement = |(n0, n): (&DVec3, &DVec3)| 1e3 * (*n - *n0).length();
+        let colours: Vec<Colour> =
+            self.rest.iter().zip(&instant.nodes).map(|pair| self.map.colour(displacement(pair))).collect();
+        let nodes = &instant.nodes[..self.rest.len()];
+        raster.mesh(nodes, self.triangles, &colours);
+        self.draw_proxy(&mut raster, &instant.pose);
+        for (tail, tip) in self.arrows(instant) {
+            raster.arrow(tail, tip, 0.022 * self.radius, FORCE);
+        }
+        raster.edges(nodes, self.triangles, 1.2, EDGE);
+        raster.picture()
+    }
+
+    /// Links from joint to joint, the last one to its farthest node, and the contact nodes on them.
+    fn draw_proxy(&self, raster: &mut Raster, pose: &Pose) {
+        let thickness = 0.045 * self.radius;
+        for (link, &from) in pose.origins.iter().enumerate() {
+            let own =
+                || self.chain.nodes.iter().zip(&pose.nodes).filter(|(node, _)| node.link == link).map(|(_, &x)| x);
+            let to = match pose.origins.get(link + 1) {
+                Some(&next) => next,
+                None => own().max_by(|a, b| a.distance(from).total_cmp(&b.distance(from))).unwrap_or(from),
+            };
+            raster.capsule([from, to], thickness, LINK);
+            raster.sphere(from, 2.0 * thickness, LINK);
+        }
+        for (node, &x) in self.chain.nodes.iter().zip(&pose.nodes) {
+            raster.sphere(x, node.radius.max(1.4 * thickness), PROXY_NODE);
+        }
+    }
+}
+
+/// From the side of the arm and a little from where it pushes, above: the dent is seen in profile.
+fn view(centre: DVec3, instants: &[Instant], force: DVec3) -> DVec3 {
+    let flat = |v: DVec3| DVec3::new(v.x, v.y, 0.0).normalize_or_zero();
+    let base = instants.first().and_then(|instant| instant.pose.origins.first()).copied().unwrap_or(centre - DVec3::Y);
+    let arm = flat(centre - base);
+    let side = if arm == DVec3::ZERO { DVec3::NEG_Y } else { arm.cross(DVec3::Z) };
+    let outward = flat(-force);
+    let side = if side.dot(outward) < 0.0 { -side } else { side };
+    side + 0.55 * outward + 0.45 * DVec3::Z
+}

@@ -1,0 +1,129 @@
+//! The press as time curves (paper's Fig. 5): contact torque, configuration, number of contacting nodes, and the
+//! energy accounts of proxy and coupling.
+
+use super::{
+    canvas::Canvas,
+    chart::{Curve, Lane, Stack},
+    colour,
+};
+use crate::{
+    JointVector,
+    render::{
+        accounts::Accounts,
+        trace::{Tick, Trace},
+    },
+};
+
+/// Joint contact torque, configuration and number of contacting object nodes against time, contact shaded (Fig. 5).
+#[must_use]
+pub fn press(trace: &Trace) -> Canvas {
+    let mut lanes = per_joint(trace, "Contact torque on the proxy", true, |tick| &tick.contact_torque);
+    lanes.extend(per_joint(trace, "Torque on the device", true, |tick| &tick.device_torque));
+    lanes.extend(per_joint(trace, "Proxy configuration", false, |tick| &tick.proxy));
+    let nodes = curve(trace, "", colour::series(0), |tick| f64::from(tick.contact_nodes));
+    lanes.push(Lane {
+        title: "Contacting object nodes [1]".to_owned(),
+        curves: vec![nodes],
+        height: 90.0,
+        from_zero: true,
+    });
+    stack("Multi-point contact felt through the 1 kHz loop".to_owned(), trace, lanes)
+}
+
+/// Where the energy of proxy and coupling comes from, is kept and goes, and what the balance leaves unexplained.
+#[must_use]
+pub fn energy(trace: &Trace) -> Canvas {
+    type Account = (&'static str, fn(&Accounts) -> f64);
+    let lane = |title: &str, from_zero: bool, accounts: &[Account]| Lane {
+        title: title.to_owned(),
+        curves: accounts
+            .iter()
+            .enumerate()
+            .map(|(number, (name, account))| {
+                curve(trace, name, colour::series(number), |tick| 1e3 * account(&tick.accounts))
+            })
+            .collect(),
+        height: 130.0,
+        from_zero,
+    };
+    let lanes = vec![
+        lane(
+            "Kept [mJ]",
+            true,
+            &[
+                ("stored in the object, U", |accounts| accounts.stored),
+                ("coupling spring", |accounts| accounts.spring),
+                ("kinetic", |accounts| accounts.kinetic),
+            ],
+        ),
+        lane(
+            "Exchanged [mJ]",
+            false,
+            &[
+                ("by the coupling", |accounts| accounts.coupling_work),
+                ("by the contact torque", |accounts| accounts.field_work),
+                ("lost in the coupling", |accounts| accounts.coupling_dissipation),
+                ("lost in the proxy", |accounts| accounts.proxy_dissipation),
+            ],
+        ),
+        lane("Created by interpolating the torque [mJ]", false, &[("", |accounts| accounts.leak)]),
+        Lane { height: 70.0, ..lane("Unexplained in the balance [mJ]", false, &[("", Accounts::residual)]) },
+    ];
+    stack("Energy accounts of proxy and coupling".to_owned(), trace, lanes)
+}
+
+fn stack(headline: String, trace: &Trace, lanes: Vec<Lane>) -> Canvas {
+    Stack {
+        headline,
+        across: "Time [s]".to_owned(),
+        lanes,
+        shaded: contact_intervals(&trace.ticks),
+        shade_name: "in contact".to_owned(),
+    }
+    .draw()
+}
+
+/// A panel for each unit that occurs among the joints, with a curve for each joint of that unit.
+fn per_joint(trace: &Trace, what: &str, torque: bool, value: impl Fn(&Tick) -> &JointVector) -> Vec<Lane> {
+    let units = ["rad", "m"].into_iter().filter(|unit| trace.joints.iter().any(|joint| joint.unit == *unit));
+    let lanes = units.map(|unit| {
+        let of_unit = trace.joints.iter().enumerate().filter(|(_, joint)| joint.unit == unit);
+        let symbol = if torque { "τ" } else { "q" };
+        let curves = of_unit.map(|(number, joint)| {
+            let name = format!("{symbol}{} {}", subscript(number + 1), joint.name);
+            curve(trace, &name, colour::series(number), |tick| value(tick).get(number).copied().unwrap_or(f64::NAN))
+        });
+        let unit = if torque { torque_unit(unit) } else { unit };
+        Lane { title: format!("{what} [{unit}]"), curves: curves.collect(), height: 130.0, from_zero: false }
+    });
+    let lanes: Vec<Lane> = lanes.collect();
+    if lanes.is_empty() {
+        return vec![Lane::empty(what)];
+    }
+    lanes
+}
+
+fn curve(trace: &Trace, name: &str, colour: colour::Colour, value: impl Fn(&Tick) -> f64) -> Curve {
+    let points = trace.ticks.iter().map(|tick| (tick.time, value(tick))).collect();
+    Curve { name: name.to_owned(), colour, dashed: false, points }
+}
+
+/// Begin and end of each uninterrupted contact [s].
+fn contact_intervals(ticks: &[Tick]) -> Vec<[f64; 2]> {
+    ticks
+        .chunk_by(|a, b| a.contact == b.contact)
+        .filter(|run| run[0].contact)
+        .map(|run| [run[0].time, run[run.len() - 1].time])
+        .collect()
+}
+
+/// `number` as subscript digits.
+pub(super) fn subscript(number: usize) -> String {
+    const DIGITS: [char; 10] = ['₀', '₁', '₂', '₃', '₄', '₅', '₆', '₇', '₈', '₉'];
+    number.to_string().bytes().map(|byte| DIGITS[usize::from(byte - b'0')]).collect()
+}
+
+/// Unit of the generalised force that belongs to a joint coordinate in `unit`.
+pub(super) fn torque_unit(unit: &str) -> &'static str {
+    if unit == "m" { "N" } else { "N m" }
+}

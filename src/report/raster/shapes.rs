@@ -1,0 +1,156 @@
+//! Bodies of revolution and meshes, made of triangles.
+
+use super::{Finish, Raster, Vertex};
+use crate::report::colour::Colour;
+use glam::DVec3;
+
+/// Facets around an axis: with interpolated normals the rim looks round.
+const FACETS: usize = 28;
+
+impl Raster {
+    /// A closed triangle mesh with normals averaged over the triangles around each node, weighted by area; `colours` has
+    /// one colour a node. Triangles that name nodes beyond either list are left out.
+    pub fn mesh(&mut self, nodes: &[DVec3], triangles: &[[u32; 3]], colours: &[Colour]) {
+        let known =
+            |triangle: &&[u32; 3]| triangle.iter().all(|&node| (node as usize) < nodes.len().min(colours.len()));
+        let mut normals = vec![DVec3::ZERO; nodes.len()];
+        for triangle in triangles.iter().filter(known) {
+            let [a, b, c] = triangle.map(|node| nodes[node as usize]);
+            let area = (b - a).cross(c - a);
+            triangle.iter().for_each(|&node| normals[node as usize] += area);
+        }
+        for triangle in triangles.iter().filter(known) {
+            let corners = triangle.map(|node| {
+                let node = node as usize;
+                Vertex { position: nodes[node], normal: normals[node].normalize_or_zero(), colour: colours[node] }
+            });
+            self.triangle(corners, Finish::Solid);
+        }
+    }
+
+    /// The edges of a mesh, each once.
+    pub fn edges(&mut self, nodes: &[DVec3], triangles: &[[u32; 3]], width: f64, colour: Colour) {
+        // Edges lie on the surface: one part in two hundred of the distance keeps them above it and below all else.
+        const LIFT: f64 = 5e-3;
+        for triangle in triangles {
+            for side in 0..3 {
+                let (from, to) = (triangle[side], triangle[(side + 1) % 3]);
+                // The neighbour across names the same edge the other way round.
+                if from < to {
+                    if let (Some(&a), Some(&b)) = (nodes.get(from as usize), nodes.get(to as usize)) {
+                        self.line([a, b], width, colour, LIFT);
+                    }
+                }
+            }
+        }
+    }
+
+    /// A rod with round ends. It is made of short pieces: one that leads past the camera is cut off there, not left out.
+    pub fn capsule(&mut self, ends: [DVec3; 2], radius: f64, colour: Colour) {
+        const PIECES: usize = 24;
+        let at = |piece: usize| ends[0].lerp(ends[1], piece as f64 / PIECES as f64);
+        for piece in 0..PIECES {
+            self.frustum([at(piece), at(piece + 1)], [radius, radius], colour);
+        }
+        ends.into_iter().for_each(|end| self.sphere(end, radius, colour));
+    }
+
+    /// An arrow whose tip touches `tip`; its head is two fifths of its length, but never wider than long.
+    pub fn arrow(&mut self, tail: DVec3, tip: DVec3, radius: f64, colour: Colour) {
+        let length = (tip - tail).length();
+        let head = (5.0 * radius).min(0.4 * length);
+        let Some(direction) = (tip - tail).try_normalize() else { return };
+        let neck = tip - head * direction;
+        let shaft = radius.min(0.2 * head);
+        let shaft = if head < 5.0 * radius { shaft } else { radius };
+        self.frustum([tail, neck], [shaft, shaft], colour);
+        self.frustum([neck, tip], [0.5 * head, 0.0], colour);
+        self.disc(tail, -direction, shaft, colour);
+        self.disc(neck, -direction, 0.5 * head, colour);
+    }
+
+    /// The side of a cone cut off at both ends.
+    fn frustum(&mut self, [from, to]: [DVec3; 2], radii: [f64; 2], colour: Colour) {
+        let Some(axis) = (to - from).try_normalize() else { return };
+        let length = (to - from).length();
+        // The normal leans along the axis by the taper.
+        let lean = (radii[0] - radii[1]) / length;
+        let ring = ring(axis);
+        let corner = |index: usize, end: usize| {
+            let outward = ring[index % FACETS];
+            Vertex {
+                position: [from, to][end] + radii[end] * outward,
+                normal: (outward + lean * axis).normalize(),
+                colour,
+            }
+        };
+        for index in 0..FACETS {
+            let quad = [corner(index, 0), corner(index + 1, 0), corner(index + 1, 1), corner(index, 1)];
+            self.triangle([quad[0], quad[1], quad[2]], Finish::Solid);
+            self.triangle([quad[0], quad[2], quad[3]], Finish::Solid);
+        }
+    }
+
+    /// A flat round face.
+    fn disc(&mut self, centre: DVec3, normal: DVec3, radius: f64, colour: Colour) {
+        let ring = ring(normal);
+        let vertex = |position: DVec3| Vertex { position, normal, colour };
+        for index in 0..FACETS {
+            let rim = |index: usize| vertex(centre + radius * ring[index % FACETS]);
+            self.triangle([vertex(centre), rim(index), rim(index + 1)], Finish::Solid);
+        }
+    }
+}
+
+/// Unit vectors around `axis`.
+fn ring(axis: DVec3) -> [DVec3; FACETS] {
+    let first = axis.any_orthonormal_vector();
+    let second = axis.cross(first);
+    std::array::from_fn(|index| {
+        let (sine, cosine) = (std::f64::consts::TAU * index as f64 / FACETS as f64).sin_cos();
+        cosine * first + sine * second
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::raster::Camera;
+
+    const BLUE: Colour = Colour::hex(0x20_50_c0);
+
+    /// Share of the picture that is not white.
+    fn covered(draw: impl FnOnce(&mut Raster)) -> f64 {
+        let camera = Camera::framing(&[DVec3::splat(-1.0), DVec3::splat(1.0)], DVec3::new(1.0, -2.0, 0.8), [120, 120]);
+        let mut raster = Raster::new(camera);
+        draw(&mut raster);
+        let picture = raster.picture();
+        picture.pixels.iter().filter(|&&pixel| pixel != [255; 3]).count() as f64 / picture.pixels.len() as f64
+    }
+
+    #[test]
+    fn a_capsule_is_a_sphere_and_its_length_more() {
+        let sphere = covered(|raster| raster.sphere(DVec3::ZERO, 0.3, BLUE));
+        let capsule = covered(|raster| raster.capsule([DVec3::NEG_Z * 0.5, DVec3::Z * 0.5], 0.3, BLUE));
+        // Side view: 2 r times the length, seen at an angle; between one and the full length.
+        let band = sphere * (2.0 * 0.3) / (std::f64::consts::PI * 0.3 * 0.3);
+        assert!(capsule > sphere + 0.8 * band && capsule < sphere + 1.1 * band, "{capsule} {sphere} {band}");
+    }
+
+    #[test]
+    fn meshes_with_wrong_numbers_are_drawn_as_far_as_they_are_right() {
+        let nodes = [DVec3::ZERO, DVec3::X, DVec3::Z];
+        let one = covered(|raster| raster.mesh(&nodes, &[[0, 1, 2]], &[BLUE; 3]));
+        let both = covered(|raster| raster.mesh(&nodes, &[[0, 1, 2], [0, 1, 9]], &[BLUE; 3]));
+        assert!(one > 0.01);
+        assert_eq!(one, both);
+        assert_eq!(covered(|raster| raster.mesh(&nodes, &[[0, 1, 2]], &[])), 0.0);
+        assert!(covered(|raster| raster.edges(&nodes, &[[0, 1, 2], [0, 9, 1]], 1.0, BLUE)) > 0.0);
+    }
+
+    #[test]
+    fn arrows_without_length_are_not_drawn() {
+        assert_eq!(covered(|raster| raster.arrow(DVec3::X, DVec3::X, 0.1, BLUE)), 0.0);
+        assert!(covered(|raster| raster.arrow(DVec3::ZERO, DVec3::Z, 0.05, BLUE)) > 0.01);
+    }
+}

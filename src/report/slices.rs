@@ -1,0 +1,264 @@
+//! The torque field on a plane of C-space: one heat map a joint, with the contact boundary.
+//!
+//! Of all planes along two joints the one with most grid points in contact is shown; the other joints stay at that
+//! plane's values. The boundary is the zero line of the gap, or, where no gap is stored, the line on which the
+//! contact index, interpolated, is one half (section 3.1).
+
+use super::{
+    canvas::{Anchor, Area, Canvas},
+    chart::{self, Curve, Lane, Stack},
+    colour::{self, ColourMap},
+    plot::{self, Entry, Mark, Panel, Scale},
+    press::{subscript, torque_unit},
+    ticks,
+};
+use crate::{contact::Status, dataset::Dataset};
+use std::collections::HashMap;
+
+/// Most cells drawn along a side: finer than the eye sees, and a bound on the file's size.
+const MOST_CELLS: usize = 160;
+
+/// Heat maps of all joint torques over two joints; curves for a single joint.
+#[must_use]
+pub fn slices(dataset: &Dataset) -> Canvas {
+    if dataset.grid.joints() < 2 {
+        return line(dataset);
+    }
+    let slice = Slice::with_most_contact(dataset);
+    let columns = dataset.grid.joints().min(3);
+    let rows = dataset.grid.joints().div_ceil(columns);
+    let (cell_width, cell_height) = (WIDTH / columns as f64, 260.0);
+    let mut canvas = Canvas::new(WIDTH + chart::MARGIN, TOP + rows as f64 * cell_height + 12.0);
+    chart::headline(&mut canvas, "Joint contact torque on a plane of C-space");
+    canvas.text((chart::TITLE_LEFT, chart::MARGIN + 32.0), &slice.caption(dataset), plot::NOTE);
+    slice.legend(&mut canvas, dataset);
+    for joint in 0..dataset.grid.joints() {
+        let corner =
+            (chart::MARGIN + (joint % columns) as f64 * cell_width, TOP + (joint / columns) as f64 * cell_height);
+        let area =
+            Area { x: corner.0 + 40.0, y: corner.1 + 30.0, width: cell_width - 122.0, height: cell_height - 88.0 };
+        slice.draw(&mut canvas, dataset, joint, area);
+    }
+    canvas
+}
+
+const WIDTH: f64 = 860.0;
+const TOP: f64 = 72.0;
+
+/// A plane through the grid along two axes.
+struct Slice {
+    /// The axes across and up.
+    axes: [usize; 2],
+    /// Its grid point with index zero on both axes.
+    origin: usize,
+    /// Every how many grid lines a cell is drawn, on both axes.
+    strides: [usize; 2],
+}
+
+impl Slice {
+    fn with_most_contact(dataset: &Dataset) -> Self {
+        let grid = &dataset.grid;
+        let joints = grid.joints();
+        let mut best = (0, [0, 1], 0);
+        for across in 0..joints {
+            for up in across + 1..joints {
+                let mut contacts: HashMap<usize, usize> = HashMap::new();
+                for point in 0..grid.points() {
+                    if touching(dataset.status(point)) {
+                        *contacts.entry(Self::origin(dataset, [across, up], point)).or_default() += 1;
+                    }
+                }
+                // The lowest origin of equals: the order of a hash map is not the same twice.
+                let most = contacts.into_iter().max_by_key(|&(origin, count)| (count, usize::MAX - origin));
+                if let Some((origin, count)) = most.filter(|&(_, count)| count > best.0) {
+                    best = (count, [across, up], origin);
+                }
+            }
+        }
+        let (_, axes, origin) = best;
+        Self { axes, origin, strides: axes.map(|axis| grid.axes[axis].count.div_ceil(MOST_CELLS).max(1)) }
+    }
+
+    /// `point` moved to index zero on both axes.
+    fn origin(dataset: &Dataset, axes: [usize; 2], point: usize) -> usize {
+        axes.iter().fold(point, |point, &axis| {
+            let pitch = pitch(dataset, axis);
+            point - point / pitch % dataset.grid.axes[axis].count * pitch
+        })
+    }
+
+    /// Cells drawn across and up.
+    fn cells(&self, dataset: &Dataset) -> [usize; 2] {
+        [0, 1].map(|side| dataset.grid.axes[self.axes[side]].count.div_ceil(self.strides[side]))
+    }
+
+    /// Grid point of a cell.
+    fn point(&self, dataset: &Dataset, cell: [usize; 2]) -> usize {
+        let steps = [0, 1].map(|side| cell[side] * self.strides[side] * pitch(dataset, self.axes[side]));
+        self.origin + steps[0] + steps[1]
+    }
+
+    fn draw(&self, canvas: &mut Canvas, dataset: &Dataset, joint: usize, area: Area) {
+        let cells = self.cells(dataset);
+        let torque = |cell| {
+            let point = self.point(dataset, cell);
+            if dataset.status(point) == Status::Outside { f64::NAN } else { dataset.torque(point)[joint] }
+        };
+        let all = || (0..cells[0]).flat_map(|x| (0..cells[1]).map(move |y| [x, y]));
+        let bound =
+            all().map(torque).filter(|value| value.is_finite()).fold(0.0, |bound: f64, value| bound.max(value.abs()));
+        let map = ColourMap::Diverging { bound: if bound > 0.0 { bound } else { 1.0 } };
+        let panel = Panel { area, across: self.scale(dataset, 0), up: self.scale(dataset, 1) };
+        panel.grid(canvas, true);
+        canvas.rectangle(area, colour::ABSENT);
+        let corner = |x: f64, y: f64| panel.place((self.coordinate(dataset, 0, x), self.coordinate(dataset, 1, y)));
+        canvas.clipped(area, |canvas| {
+            for [x, y] in all() {
+                let value = torque([x, y]);
+                let (left, bottom) = corner(x as f64 - 0.5, y as f64 - 0.5);
+                let (right, top) = corner(x as f64 + 0.5, y as f64 + 0.5);
+                // Neighbours overlap by a little, lest the sheet shine through between them.
+                let cell = Area { x: left, y: top, width: right - left + 0.4, height: bottom - top + 0.4 };
+                let status = dataset.status(self.point(dataset, [x, y]));
+                if value.is_finite() {
+                    canvas.rectangle(cell, if status == Status::Free { colour::WHITE } else { map.colour(value) });
+                }
+                if status == Status::Unconverged {
+                    let radius = (0.18 * (right - left).min(bottom - top)).min(2.2);
+                    canvas.disc(((left + right) / 2.0, (top + bottom) / 2.0), radius, colour::INK);
+                }
+            }
+            for segment in self.boundary(dataset, cells) {
+                let ends = segment.map(|(x, y)| corner(x, y));
+                canvas.polyline(&ends, colour::INK, 1.6, None);
+            }
+        });
+        canvas.frame(area, colour::FRAME, 0.8);
+        let bar = Area { x: area.right() + 12.0, width: 10.0, ..area };
+        let title = format!(
+            "τ{} {} [{}]",
+            subscript(joint + 1),
+            dataset.grid.axes[joint].name,
+            torque_unit(&dataset.grid.axes[joint].unit)
+        );
+        plot::colour_bar(canvas, bar, map, "");
+        canvas.text((bar.right() + 34.0, area.y - 9.0), &title, plot::TITLE.anchored(Anchor::End));
+    }
+
+    /// Segments of the contact boundary, in cells.
+    fn boundary(&self, dataset: &Dataset, cells: [usize; 2]) -> Vec<[(f64, f64); 2]> {
+        let value = |point: usize| match (&dataset.gap, dataset.status(point)) {
+            (_, Status::Outside) => f64::NAN,
+            (Some(gap), _) => f64::from(gap[point]),
+            (None, status) => {
+                if touching(status) {
+                    -0.5
+                } else {
+                    0.5
+                }
+            }
+        };
+        let values: Vec<f64> = (0..cells[1])
+            .flat_map(|y| (0..cells[0]).map(move |x| [x, y]))
+            .map(|cell| value(self.point(dataset, cell)))
+            .collect();
+        plot::level_lines(&values, cells[0], 0.0)
+    }
+
+    /// Joint coordinate at a place along one side, in cells.
+    fn coordinate(&self, dataset: &Dataset, side: usize, cell: f64) -> f64 {
+        let axis = &dataset.grid.axes[self.axes[side]];
+        axis.start + cell * self.strides[side] as f64 * axis.step
+    }
+
+    fn scale(&self, dataset: &Dataset, side: usize) -> Scale {
+        let axis = &dataset.grid.axes[self.axes[side]];
+        let cells = self.cells(dataset)[side] as f64;
+        let ends = [self.coordinate(dataset, side, -0.5), self.coordinate(dataset, side, cells - 0.5)];
+        let range = if ends.iter().all(|end| end.is_finite()) && ends[0] < ends[1] {
+            ends
+        } else {
+            ticks::range(ends.into_iter(), 0.5)
+        };
+        Scale::linear(range, format!("q{} {} [{}]", subscript(self.axes[side] + 1), axis.name, axis.unit))
+    }
+
+    /// Where the plane lies, and how much of it is in contact.
+    fn caption(&self, dataset: &Dataset) -> String {
+        let q = dataset.grid.configuration(self.origin);
+        let fixed: Vec<String> = (0..dataset.grid.joints())
+            .filter(|joint| !self.axes.contains(joint))
+            .map(|joint| {
+                let axis = &dataset.grid.axes[joint];
+                format!("q{} {} = {} {}", subscript(joint + 1), axis.name, ticks::number(q[joint], 3), axis.unit)
+            })
+            .collect();
+        if fixed.is_empty() { "the whole grid".to_owned() } else { format!("at {}", fixed.join(", ")) }
+    }
+
+    fn legend(&self, canvas: &mut Canvas, dataset: &Dataset) {
+        let entry = |name: &str, colour, mark| Entry { name: name.to_owned(), colour, mark };
+        let statuses = || (0..dataset.grid.points()).map(|point| dataset.status(point));
+        let mut entries = Vec::new();
+        if statuses().any(touching) {
+            entries.push(entry("contact boundary", colour::INK, Mark::Line));
+        } else {
+            entries.push(entry("no grid point is in contact", colour::WHITE, Mark::Box));
+        }
+        if statuses().any(|status| status == Status::Unconverged) {
+            entries.push(entry("not converged", colour::INK, Mark::Dot));
+        }
+        if statuses().any(|status| status == Status::Outside) {
+            entries.push(entry("no data", colour::ABSENT, Mark::Box));
+        }
+        plot::legend(canvas, (WIDTH - 4.0, chart::MARGIN + 32.0), &entries);
+    }
+}
+
+/// Distance between neighbours along an axis, in point numbers.
+fn pitch(dataset: &Dataset, axis: usize) -> usize {
+    dataset.grid.axes[axis + 1..].iter().map(|axis| axis.count).product()
+}
+
+/// Whether the proxy touches the object, solved for or not.
+pub(super) fn touching(status: Status) -> bool {
+    matches!(status, Status::Contact | Status::Unconverged | Status::Overflow)
+}
+
+/// Torque of a single joint against its coordinate.
+fn line(dataset: &Dataset) -> Canvas {
+    let Some(axis) = dataset.grid.axes.first() else {
+        return Stack {
+            headline: "Joint contact torque".to_owned(),
+            across: String::new(),
+            lanes: vec![Lane::empty("no joints")],
+            shaded: vec![],
+            shade_name: String::new(),
+        }
+        .draw();
+    };
+    let points = (0..axis.count).map(|k| {
+        let known = dataset.status(k) != Status::Outside;
+        (axis.coordinate(k), if known { dataset.torque(k)[0] } else { f64::NAN })
+    });
+    let curve = Curve { name: String::new(), colour: colour::series(0), dashed: false, points: points.collect() };
+    let numbers: Vec<usize> = (0..axis.count).collect();
+    let shaded = numbers
+        .chunk_by(|&a, &b| touching(dataset.status(a)) == touching(dataset.status(b)))
+        .filter(|run| touching(dataset.status(run[0])))
+        .map(|run| [axis.coordinate(run[0]), axis.coordinate(run[run.len() - 1])])
+        .collect();
+    Stack {
+        headline: "Joint contact torque over C-space".to_owned(),
+        across: format!("q₁ {} [{}]", axis.name, axis.unit),
+        lanes: vec![Lane {
+            title: format!("τ₁ {} [{}]", axis.name, torque_unit(&axis.unit)),
+            curves: vec![curve],
+            height: 240.0,
+            from_zero: false,
+        }],
+        shaded,
+        shade_name: "in contact".to_owned(),
+    }
+    .draw()
+}

@@ -1,0 +1,173 @@
+//! Round numbers along an axis, and how they are written.
+//!
+//! Steps are 1, 2, 2.5 or 5 times a power of ten, the finest that gives no more than the wanted number of intervals.
+//! Numbers below a hundredth or from ten thousand on are written with a common factor 10^(3k), which goes into the
+//! axis title; the rest as they are, all with the same number of decimals.
+
+/// Ticks of one axis.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Ticks {
+    /// Where, in data units, and what is written there.
+    pub marks: Vec<(f64, String)>,
+    /// Common factor as text, `×10⁻³`; empty when it is one.
+    pub factor: String,
+}
+
+/// Ends of an axis that holds all finite `values` and `margin` of their extent on both sides; never empty.
+pub(super) fn range(values: impl Iterator<Item = f64>, margin: f64) -> [f64; 2] {
+    let (low, high) = values
+        .filter(|value| value.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    if low > high {
+        return [0.0, 1.0];
+    }
+    // A constant has no extent of its own: show it in the middle of a range of its own size.
+    let spare = if high > low { margin * (high - low) } else { 0.5 * low.abs().max(1.0) };
+    // Ranges near the largest number must stay finite; an axis that wide is of no use, but it must not fail.
+    [(low - spare).max(f64::MIN / 4.0), (high + spare).min(f64::MAX / 4.0)]
+}
+
+/// The same range, its ends moved to the next hundredth of a power of ten if that is nearer than half a percent of the
+/// extent: a recording that ends one sample before 3 s shows its tick at 3 s.
+pub(super) fn snapped([low, high]: [f64; 2]) -> [f64; 2] {
+    let grain = 10_f64.powf((high - low).log10().floor() - 1.0);
+    let snap = |end: f64| {
+        let round = (end / grain).round() * grain;
+        if (round - end).abs() < 0.005 * (high - low) { round } else { end }
+    };
+    [snap(low), snap(high)]
+}
+
+/// Ticks inside `range`, at most `intervals` of them and one.
+pub(super) fn ticks(range: [f64; 2], intervals: usize) -> Ticks {
+    let [low, high] = range;
+    let none = Ticks { marks: Vec::new(), factor: String::new() };
+    let extent = high - low;
+    if !(extent > 0.0 && extent.is_finite()) {
+        return none;
+    }
+    let coarsest = extent / intervals.max(1) as f64;
+    let power = 10_f64.powf(coarsest.log10().floor());
+    // The relative slack keeps a step that fits exactly, whatever the rounding of the division.
+    let fits = |multiple: &f64| multiple * power * (1.0 + 1e-9) >= coarsest;
+    let step = power * [1.0, 2.0, 2.5, 5.0].into_iter().find(fits).unwrap_or(10.0);
+    let largest = low.abs().max(high.abs());
+    let exponent = if (1e-2..1e4).contains(&largest) { 0 } else { 3 * (largest.log10() / 3.0).floor() as i32 };
+    let unit = 10_f64.powi(exponent);
+    if !(step.is_normal() && unit.is_normal()) {
+        return none;
+    }
+    let decimals = (0..=6).find(|&decimals| is_whole(step / unit * 10_f64.powi(decimals))).unwrap_or(6);
+    let first = (low / step - 1e-6).ceil();
+    let marks = (0..=intervals)
+        .map(|index| (first + index as f64) * step)
+        .take_while(|&value| value <= high + 1e-6 * step)
+        .map(|value| (value, number(value / unit, decimals as usize)))
+        .collect();
+    Ticks { marks, factor: if exponent == 0 { String::new() } else { format!("×10{}", superscript(exponent)) } }
+}
+
+/// The powers of ten inside `range`, both ends positive.
+pub(super) fn decades([low, high]: [f64; 2]) -> Ticks {
+    // The slack keeps ends that are powers of ten themselves.
+    let [first, last] = [(low.log10() - 1e-9).ceil() as i32, (high.log10() + 1e-9).floor() as i32];
+    let marks = (first..=last)
+        .map(|exponent| {
+            let label = match exponent {
+                -3..0 => format!("{:.*}", -exponent as usize, 10_f64.powi(exponent)),
+                0..4 => format!("{:.0}", 10_f64.powi(exponent)),
+                _ => format!("10{}", superscript(exponent)),
+            };
+            (10_f64.powi(exponent), label)
+        })
+        .collect();
+    Ticks { marks, factor: String::new() }
+}
+
+/// `value` with `decimals` digits after the point and a typographic minus.
+pub(super) fn number(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(magnitude) if magnitude.bytes().all(|byte| matches!(byte, b'0' | b'.')) => magnitude.to_owned(),
+        Some(magnitude) => format!("−{magnitude}"),
+        None => text,
+    }
+}
+
+fn is_whole(value: f64) -> bool {
+    (value - value.round()).abs() < 1e-6
+}
+
+fn superscript(exponent: i32) -> String {
+    exponent
+        .to_string()
+        .chars()
+        .map(|character| match character.to_digit(10) {
+            Some(digit) => ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][digit as usize],
+            None => '⁻',
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(range: [f64; 2], intervals: usize) -> Vec<String> {
+        ticks(range, intervals).marks.into_iter().map(|(_, label)| label).collect()
+    }
+
+    #[test]
+    fn steps_are_round_and_labels_exact() {
+        assert_eq!(labels([0.0, 1.0], 5), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(labels([-0.75, 0.9], 4), ["−0.5", "0.0", "0.5"]);
+        assert_eq!(labels([0.0, 17.0], 4), ["0", "5", "10", "15"]);
+    }
+
+    #[test]
+    fn small_and_large_numbers_share_a_factor() {
+        let small = ticks([0.0, 2e-4], 4);
+        assert_eq!((small.factor.as_str(), small.marks[1].1.as_str()), ("×10⁻⁶", "50"));
+        let large = ticks([0.0, 3e7], 3);
+        assert_eq!((large.factor.as_str(), large.marks[3].1.as_str()), ("×10⁶", "30"));
+    }
+
+    #[test]
+    fn ticks_lie_inside_and_never_exceed_the_wanted_number() {
+        let mut low = -3.7e-3;
+        for round in 0..200 {
+            let range = [low, low + 1.37_f64.powi(round - 100)];
+            for intervals in 1..8 {
+                let ticks = ticks(range, intervals);
+                assert!(ticks.marks.len() <= intervals + 1, "{range:?} {intervals}: {ticks:?}");
+                let slack = 1e-5 * (range[1] - range[0]);
+                assert!(ticks.marks.iter().all(|(at, _)| *at >= range[0] - slack && *at <= range[1] + slack));
+            }
+            low = -1.1 * low;
+        }
+    }
+
+    #[test]
+    fn decades_are_the_powers_of_ten() {
+        let labels: Vec<String> = decades([0.01, 20_000.0]).marks.into_iter().map(|(_, label)| label).collect();
+        assert_eq!(labels, ["0.01", "0.1", "1", "10", "100", "1000", "10⁴"]);
+    }
+
+    #[test]
+    fn hostile_ranges_have_no_ticks_and_do_not_hang() {
+        for range in [[f64::NAN, 1.0], [1.0, 1.0], [2.0, 1.0], [0.0, f64::INFINITY], [f64::MIN, f64::MAX]] {
+            assert!(ticks(range, 5).marks.is_empty());
+        }
+        assert!(labels([0.0, f64::MIN_POSITIVE], 5).len() <= 6);
+        assert!(labels([1e300, 1e300 * (1.0 + 1e-12)], 5).len() <= 6);
+    }
+
+    #[test]
+    fn ranges_hold_their_values_and_have_extent() {
+        assert_eq!(range([1.0, f64::NAN, 3.0].into_iter(), 0.0), [1.0, 3.0]);
+        for values in [vec![], vec![f64::NAN], vec![0.0], vec![-7.0], vec![f64::MAX, f64::MIN]] {
+            let [low, high] = range(values.iter().copied(), 0.05);
+            assert!(low < high && (high - low).is_finite(), "{values:?}");
+        }
+    }
+}
