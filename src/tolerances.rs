@@ -6,6 +6,7 @@ pub const GPU_FAR_AWAY: f32 = 1e18;
 /// Least divisor in f32 kernels: a hundred times the least normal number (1.2e-38), below which a device may flush to
 /// zero. Squared edge lengths stay above it down to 1e-18 m.
 pub const GPU_LEAST_DIVISOR: f32 = 1e-36;
+
 /// Smallest height of a triangle over its longest edge, and of a closed surface's volume over its area times its extent
 /// [1]. Coordinates in single precision, as STL files and the GPU hold them, round at 6e-8 of their size: below this
 /// bound the triangle's normal would be uncertain by more than about 6 %, and its side a matter of luck.
@@ -54,6 +55,7 @@ pub const GOOD_SHARE: f64 = 0.75;
 
 /// Factors by which the trust region shrinks and widens [1] (same source).
 pub const SHRINK: f64 = 0.25;
+
 /// See [`SHRINK`].
 pub const WIDEN: f64 = 2.0;
 
@@ -76,6 +78,7 @@ pub const INNER_ITERATIONS_PER_UNKNOWN: usize = 4;
 /// Relative change of forces and displacements at which the paper's iteration has stopped changing is the scene's
 /// tolerance; its inner solve of equation (2) must be better than that by this factor [1].
 pub const PAPER_INNER_SHARE: f64 = 1e-3;
+
 /// How far beyond an end a grid line may lie and still count, in steps [1]: spacings such as pi/60 are written with a
 /// handful of digits, and 1e-6 of a step changes no torque that is interpolated between lines.
 pub const GRID_STEP_SLACK: f64 = 1e-6;
