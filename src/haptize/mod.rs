@@ -1,11 +1,13 @@
 //! Sweeps: a virtual object haptized over a grid in C-space.
 
+mod bake;
 mod columns;
 mod cpu;
 mod part;
 mod report;
 mod sweep;
 
+pub use bake::{Bake, BakeError};
 pub use cpu::CpuBackend;
 pub use report::{Iterations, SweepReport};
 pub use sweep::{Progress, Run, Sweep, SweepError};

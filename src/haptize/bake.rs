@@ -1,0 +1,76 @@
+//! From a scene to its dataset: object and proxy are built, a backend is chosen, and the grid is swept.
+
+use super::{CpuBackend, Progress, Run, Sweep, SweepError, SweepReport};
+use crate::{
+    contact::Model,
+    dataset::Dataset,
+    object::{Object, ObjectError},
+    proxy::Chain,
+    scene::Scene,
+};
+use std::{path::Path, sync::atomic::AtomicBool};
+
+/// A scene could not be haptized.
+#[derive(Debug, thiserror::Error)]
+pub enum BakeError {
+    /// The object cannot be built.
+    #[error(transparent)]
+    Object(#[from] ObjectError),
+    /// The system gives no threads.
+    #[error("the CPU backend cannot start its threads: {0}; allow this user more processes")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The sweep failed or was stopped.
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
+}
+
+/// How a scene is haptized.
+pub struct Bake<'a> {
+    /// What is haptized.
+    pub scene: &'a Scene,
+    /// Date that the dataset bears, ISO 8601, UTC.
+    pub date: &'a str,
+    /// When this becomes true the sweep stops soon.
+    pub stop: &'a AtomicBool,
+    /// Called at the start and several times a second.
+    pub progress: &'a mut dyn FnMut(Progress),
+}
+
+/// Where the dataset goes.
+#[derive(Clone, Copy)]
+enum Destination<'a> {
+    Memory,
+    File { output: &'a Path, resume: bool },
+}
+
+impl Bake<'_> {
+    /// Haptizes into the file `output`; see [`Sweep::bake`].
+    ///
+    /// # Errors
+    /// Any [`BakeError`].
+    pub fn to_file(self, output: &Path, resume: bool) -> Result<(Dataset, SweepReport), BakeError> {
+        self.run(Destination::File { output, resume })
+    }
+
+    /// Haptizes in memory.
+    ///
+    /// # Errors
+    /// Any [`BakeError`].
+    pub fn in_memory(self) -> Result<(Dataset, SweepReport), BakeError> {
+        self.run(Destination::Memory)
+    }
+
+    fn run(self, destination: Destination<'_>) -> Result<(Dataset, SweepReport), BakeError> {
+        let Self { scene, date, stop, progress } = self;
+        let object = Object::build(&scene.object)?;
+        let chain = Chain::new(&scene.proxy);
+        let model = Model::new(&object, &chain, scene.contact);
+        let mut backend = CpuBackend::new(&model, 0)?;
+        let sweep = Sweep::new(scene, &object, "cpu", &CpuBackend::adapter(), date)?;
+        let run = Run { chunk: backend.chunk(), stop, progress };
+        Ok(match destination {
+            Destination::Memory => sweep.run(&mut backend, run),
+            Destination::File { output, resume } => sweep.bake(&mut backend, output, resume, run),
+        }?)
+    }
+}
