@@ -1,0 +1,416 @@
+//! Sweeps: the dataset depends on nothing but scene and backend, and an interruption leaves no trace in it.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use glam::DVec3;
+use haptize::{
+    JointVector,
+    contact::{Equilibrium, Model, NodeForce, Status},
+    dataset::Dataset,
+    haptize::{Backend, CpuBackend, Progress, Run, Sweep, SweepError, SweepReport},
+    object::Object,
+    proxy::Chain,
+    scene::Scene,
+};
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicBool, Ordering},
+};
+
+const SCENE: &str = r#"
+name = "small sphere"
+graphics = {}
+[object]
+sphere = { radius = 0.05, rings = 4, segments = 5 }
+springs = { kind = "isotropic", stiffness = 300.0 }
+ground = { stiffness = 100.0 }
+[contact]
+stiffness = 1000.0
+[grid]
+axes = [{ start = -0.3, step = 0.1, count = 7 }, { start = 0.01, step = 0.004, count = 9 }]
+[[proxy.joint]]
+name = "turn"
+kind = "revolute"
+axis = [0, 0, 1]
+limits = [-1, 1]
+[[proxy.joint]]
+name = "slide"
+kind = "prismatic"
+axis = [-1, 0, 0]
+limits = [0, 0.1]
+nodes = [{ from = [0.08, -0.01, 0.002], to = [0.08, 0.01, 0.002], count = 3 }]
+"#;
+const POINTS: usize = 7 * 9;
+
+fn scene() -> Scene {
+    Scene::parse(SCENE, "small.toml").unwrap()
+}
+
+fn sweep_of(scene: &Scene, adapter: &str, date: &str) -> Sweep {
+    Sweep::new(scene, &Object::build(&scene.object).unwrap(), "cpu", adapter, date).unwrap()
+}
+
+fn sweep() -> Sweep {
+    sweep_of(&scene(), "none", "2012-03-04T00:00:00Z")
+}
+
+/// Answers with made-up numbers that depend on the configuration alone; breaks down after some configurations.
+struct MadeUp {
+    solved: usize,
+    breaks_after: usize,
+    answer: fn(&[f64]) -> Equilibrium,
+}
+
+#[derive(Debug, thiserror::Error)]
+#[error("device lost")]
+struct DeviceLost;
+
+impl Default for MadeUp {
+    fn default() -> Self {
+        Self { solved: 0, breaks_after: usize::MAX, answer }
+    }
+}
+
+impl Backend for MadeUp {
+    type Error = DeviceLost;
+    fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, DeviceLost> {
+        self.solved += configurations.len();
+        if self.solved > self.breaks_after {
+            return Err(DeviceLost);
+        }
+        Ok(configurations.iter().map(|q| (self.answer)(q)).collect())
+    }
+}
+
+fn answer(q: &[f64]) -> Equilibrium {
+    let seed = (q[0] * 10.0 + q[1] * 1e3).round() as i64;
+    let status = [Status::Free, Status::Contact, Status::Contact, Status::Unconverged, Status::Overflow]
+        [seed.rem_euclid(5) as usize];
+    let touched = if status == Status::Free { 0 } else { seed.rem_euclid(4) as u32 };
+    Equilibrium {
+        status,
+        iterations: touched * 3 + 1,
+        residual: 1e-9 * f64::from(touched),
+        energy: q[0].sin() / 3.0,
+        gap: q[1].cos() - 1.0,
+        torque: JointVector::from_slice(&[q[1] / 7.0, q[0] / 3.0]),
+        forces: (0..touched).map(|node| NodeForce { node, force: DVec3::new(q[0], q[1], f64::from(node)) }).collect(),
+        touches: Vec::new(),
+    }
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+    fn output(&self) -> PathBuf {
+        self.0.path().join("a.haptize")
+    }
+    fn part(&self) -> PathBuf {
+        Sweep::part_of(&self.output())
+    }
+    fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.0.path()).unwrap();
+        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+}
+
+/// Bakes in chunks of `chunk`, stopping once `stop_at` points are done.
+fn bake(
+    sweep: &Sweep,
+    backend: &mut impl Backend,
+    output: &Path,
+    resume: bool,
+    chunk: usize,
+    stop_at: usize,
+) -> Result<SweepReport, SweepError> {
+    let stop = AtomicBool::new(false);
+    let mut progress = |progress: Progress| stop.store(progress.done >= stop_at, Ordering::Relaxed);
+    sweep.bake(backend, output, resume, Run { chunk, stop: &stop, progress: &mut progress }).map(|(_, report)| report)
+}
+
+/// The whole file, baked without interruption.
+fn uninterrupted() -> Vec<u8> {
+    let folder = Folder::new();
+    bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 10, usize::MAX).unwrap();
+    assert_eq!(folder.names(), ["a.haptize"], "the part is gone");
+    std::fs::read(folder.output()).unwrap()
+}
+
+/// A folder with the part of a sweep that was stopped after `done` points.
+fn stopped_after(done: usize) -> Folder {
+    let folder = Folder::new();
+    let stopped = bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 1, done);
+    let error = stopped.unwrap_err();
+    assert!(error.to_string().contains("--resume"), "{error}");
+    assert!(matches!(error, SweepError::Stopped { done: found, points: POINTS, .. } if found == done));
+    assert_eq!(folder.names(), ["a.haptize.part"]);
+    folder
+}
+
+#[test]
+fn the_dataset_is_what_the_backend_answered_at_every_grid_point() {
+    let folder = Folder::new();
+    let report = bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 10, usize::MAX).unwrap();
+    let dataset = Dataset::open(&folder.output()).unwrap();
+    assert_eq!(dataset.grid.points(), POINTS);
+    assert_eq!([&*dataset.grid.axes[0].unit, &*dataset.grid.axes[1].unit], ["rad", "m"]);
+    for point in 0..POINTS {
+        let (turn, slide) = (point / 9, point % 9);
+        let q = [-0.3 + turn as f64 * 0.1, 0.01 + slide as f64 * 0.004];
+        assert_eq!(dataset.grid.configuration(point)[..], q);
+        let expected = answer(&q);
+        assert_eq!(dataset.torque(point), &expected.torque[..]);
+        assert_eq!(dataset.status(point), expected.status);
+        assert_eq!(dataset.energy.as_ref().unwrap()[point], expected.energy);
+        assert_eq!(dataset.gap.as_ref().unwrap()[point], expected.gap as f32);
+        assert_eq!(dataset.residual.as_ref().unwrap()[point], expected.residual as f32);
+        assert_eq!(dataset.iterations.as_ref().unwrap()[point], expected.iterations);
+        let forces: Vec<_> = dataset.forces(point).map(|contact| (contact.node, contact.force.as_vec3())).collect();
+        let expected: Vec<_> = expected.forces.iter().map(|contact| (contact.node, contact.force.as_vec3())).collect();
+        assert_eq!(forces, expected);
+    }
+    assert_eq!(dataset.scene, SCENE);
+    assert_eq!(dataset.provenance.algorithm, "energy");
+
+    let answers: Vec<_> = (0..POINTS).map(|point| answer(&dataset.grid.configuration(point))).collect();
+    let count = |status| answers.iter().filter(|answer| answer.status == status).count();
+    let in_contact: Vec<_> = answers.iter().filter(|answer| answer.status != Status::Free).collect();
+    assert_eq!(report.points, POINTS);
+    assert_eq!(report.contact_points, in_contact.len());
+    assert_eq!(report.unconverged, count(Status::Unconverged));
+    assert_eq!(report.overflowed, count(Status::Overflow));
+    assert!(report.unconverged > 0 && report.overflowed > 0);
+    assert_eq!(report.iterations.max, in_contact.iter().map(|answer| answer.iterations).max().unwrap());
+    let sum: u32 = in_contact.iter().map(|answer| answer.iterations).sum();
+    assert_eq!(report.iterations.mean, f64::from(sum) / in_contact.len() as f64);
+    assert_eq!(report.max_residual, f64::from(3e-9_f32));
+    let json = serde_json::to_value(&report).unwrap();
+    for key in [
+        "points",
+        "contact_points",
+        "unconverged",
+        "overflowed",
+        "max_residual",
+        "iterations",
+        "seconds",
+        "configurations_per_second",
+        "backend",
+        "adapter",
+        "algorithm",
+    ] {
+        assert!(!json[key].is_null(), "{key}");
+    }
+    assert!(json["iterations"]["mean"].is_number() && json["iterations"]["max"].is_number());
+}
+
+#[test]
+fn chunk_size_leaves_no_trace() {
+    let whole = uninterrupted();
+    for chunk in [0, 1, 7, POINTS, 1000] {
+        let folder = Folder::new();
+        bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, chunk, usize::MAX).unwrap();
+        assert!(std::fs::read(folder.output()).unwrap() == whole, "chunk {chunk}");
+    }
+    let mut other =
+        MadeUp { answer: |q| Equilibrium { energy: answer(q).energy + 1e-16, ..answer(q) }, ..MadeUp::default() };
+    let folder = Folder::new();
+    bake(&sweep(), &mut other, &folder.output(), false, 10, usize::MAX).unwrap();
+    assert!(std::fs::read(folder.output()).unwrap() != whole, "the comparison sees the last bit");
+}
+
+#[test]
+fn a_stopped_sweep_continues_to_the_same_file() {
+    let whole = uninterrupted();
+    for done in [0, 1, 30, POINTS - 1] {
+        let folder = stopped_after(done);
+        let mut backend = MadeUp::default();
+        // Another date, as on another day, and another chunk.
+        let later = sweep_of(&scene(), "none", "2013-01-01T00:00:00Z");
+        let report = bake(&later, &mut backend, &folder.output(), true, 5, usize::MAX).unwrap();
+        assert_eq!((report.resumed_points, backend.solved), (done, POINTS - done));
+        assert!(std::fs::read(folder.output()).unwrap() == whole, "stopped after {done}");
+        assert_eq!(folder.names(), ["a.haptize"]);
+    }
+}
+
+#[test]
+fn a_part_cut_or_altered_anywhere_costs_work_but_never_a_wrong_number() {
+    let whole = uninterrupted();
+    let folder = stopped_after(6);
+    let part = std::fs::read(folder.part()).unwrap();
+    let resumed = |bytes: &[u8]| {
+        std::fs::write(folder.part(), bytes).unwrap();
+        bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, POINTS, usize::MAX)
+    };
+    let mut resumed_points = std::collections::BTreeSet::new();
+    for length in (0..part.len()).step_by(3) {
+        resumed_points.insert(resumed(&part[..length]).unwrap().resumed_points);
+        assert!(std::fs::read(folder.output()).unwrap() == whole, "cut to {length} bytes");
+    }
+    assert_eq!(resumed_points, (0..6).collect(), "cutting loses one point after the other");
+    for at in (0..part.len()).step_by(3) {
+        let mut altered = part.clone();
+        altered[at] ^= 1 << (at % 8);
+        match resumed(&altered) {
+            Ok(_) => assert!(std::fs::read(folder.output()).unwrap() == whole, "byte {at} altered"),
+            Err(error) => assert!(matches!(error, SweepError::ForeignPart { .. }), "byte {at}: {error}"),
+        }
+    }
+    assert_eq!(resumed(&part).unwrap().resumed_points, 6);
+    // Rubbish behind the last whole frame, with a length that no memory holds.
+    let hostile = [&part[..], &(u64::MAX - 3).to_le_bytes(), &[0; 40]].concat();
+    assert_eq!(resumed(&hostile).unwrap().resumed_points, 6);
+    assert!(std::fs::read(folder.output()).unwrap() == whole);
+}
+
+#[test]
+fn a_part_of_another_sweep_is_refused_with_the_difference() {
+    let folder = stopped_after(3);
+    let refused = |sweep: &Sweep| {
+        let error = bake(sweep, &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX).unwrap_err();
+        assert!(error.to_string().contains("a.haptize.part"), "{error}");
+        match error {
+            SweepError::OtherPart { difference, .. } => difference,
+            other => panic!("{other}"),
+        }
+    };
+    let date = "2012-03-04T00:00:00Z";
+    let changed = |from: &str, to: &str| Scene::parse(&SCENE.replace(from, to), "small.toml").unwrap();
+    assert_eq!(refused(&sweep_of(&scene(), "other", date)), "another adapter");
+    assert_eq!(
+        refused(&sweep_of(&changed("stiffness = 300.0", "stiffness = 300.1"), "none", date)),
+        "another text of the scene"
+    );
+    assert_eq!(refused(&sweep_of(&changed("count = 7", "count = 6"), "none", date)), "another grid");
+    assert_eq!(refused(&sweep_of(&changed("radius = 0.05", "radius = 0.051"), "none", date)), "another mesh");
+    let mut paper = scene();
+    paper.contact.algorithm = haptize::scene::Algorithm::Paper;
+    assert_eq!(refused(&sweep_of(&paper, "none", date)), "another algorithm");
+    // A refusal changes nothing; baking anew replaces.
+    assert_eq!(
+        bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 9, usize::MAX).unwrap().resumed_points,
+        3
+    );
+    let folder = stopped_after(3);
+    let anew = sweep_of(&scene(), "other", date);
+    assert_eq!(bake(&anew, &mut MadeUp::default(), &folder.output(), false, 9, usize::MAX).unwrap().resumed_points, 0);
+}
+
+#[test]
+fn a_failing_backend_leaves_a_part_and_the_earlier_file() {
+    let whole = uninterrupted();
+    let folder = Folder::new();
+    std::fs::write(folder.output(), "earlier").unwrap();
+    let mut broken = MadeUp { breaks_after: 25, ..MadeUp::default() };
+    let error = bake(&sweep(), &mut broken, &folder.output(), false, 10, usize::MAX).unwrap_err();
+    assert_eq!(error.to_string(), "the backend failed at grid points 20 to 29: device lost");
+    assert_eq!(std::fs::read(folder.output()).unwrap(), b"earlier");
+    let report = bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX).unwrap();
+    assert_eq!(report.resumed_points, 20);
+    assert!(std::fs::read(folder.output()).unwrap() == whole);
+}
+
+#[test]
+fn results_that_no_file_may_hold_become_unconverged_points() {
+    let sick: [fn(&[f64]) -> Equilibrium; 5] = [
+        |q| Equilibrium { torque: JointVector::from_slice(&[f64::NAN, 0.0]), status: Status::Contact, ..answer(q) },
+        |q| Equilibrium { torque: JointVector::zeros(1), status: Status::Contact, ..answer(q) },
+        |q| Equilibrium { energy: f64::INFINITY, status: Status::Contact, ..answer(q) },
+        |q| Equilibrium { gap: f64::NAN, status: Status::Free, ..answer(q) },
+        |q| Equilibrium {
+            forces: vec![NodeForce { node: 0, force: DVec3::splat(1e39) }],
+            status: Status::Contact,
+            ..answer(q)
+        },
+    ];
+    for answer in sick {
+        let folder = Folder::new();
+        let mut backend = MadeUp { answer, ..MadeUp::default() };
+        let report = bake(&sweep(), &mut backend, &folder.output(), false, 10, usize::MAX).unwrap();
+        assert_eq!(report.unconverged, POINTS);
+        let dataset = Dataset::open(&folder.output()).unwrap();
+        assert!(dataset.torque.iter().all(|&tau| tau == 0.0));
+        assert!(dataset.contacts.as_ref().unwrap().nodes.is_empty());
+    }
+}
+
+#[test]
+fn forces_are_stored_only_for_a_scene_with_graphics() {
+    let run = |scene: &Scene| {
+        let stop = AtomicBool::new(false);
+        let run = Run { chunk: 10, stop: &stop, progress: &mut |_| () };
+        sweep_of(scene, "none", "").run(&mut MadeUp::default(), run).unwrap().0
+    };
+    let blind = Scene::parse(&SCENE.replace("graphics = {}", ""), "small.toml").unwrap();
+    assert!(run(&scene()).contacts.is_some());
+    assert!(run(&blind).contacts.is_none());
+    assert!(sweep_of(&blind, "none", "").memory_needed(9) < sweep().memory_needed(9));
+}
+
+#[test]
+fn the_memory_stated_is_the_memory_of_the_columns() {
+    let stop = AtomicBool::new(false);
+    let run = Run { chunk: 10, stop: &stop, progress: &mut |_| () };
+    let sweep = sweep();
+    let (dataset, _) = sweep.run(&mut MadeUp::default(), run).unwrap();
+    let summary = dataset.summary();
+    let surface = dataset.surface.as_ref().unwrap();
+    let fixed = size_of_val(&*surface.nodes) + size_of_val(&*surface.triangles) + 8;
+    assert_eq!(sweep.memory_needed(0) + 16 * summary.contacts.unwrap() + fixed, summary.bytes);
+}
+
+#[test]
+fn a_grid_that_no_memory_holds_is_refused_at_once() {
+    let mut scene = scene();
+    scene.grid.axes[0].count = 1 << 30;
+    scene.grid.axes[0].step = 1e-9;
+    scene.grid.axes[1].count = 1 << 20;
+    scene.grid.axes[1].step = 1e-9;
+    let folder = Folder::new();
+    let error = bake(&sweep_of(&scene, "none", ""), &mut MadeUp::default(), &folder.output(), false, 10, usize::MAX)
+        .unwrap_err();
+    assert!(matches!(error, SweepError::Memory { .. }), "{error}");
+    assert!(folder.names().is_empty());
+}
+
+#[cfg(unix)]
+#[test]
+fn two_bakes_into_one_file_do_not_mix() {
+    let folder = Folder::new();
+    let mut tried = false;
+    let stop = AtomicBool::new(false);
+    let sweep = sweep();
+    let mut progress = |_| {
+        if !std::mem::replace(&mut tried, true) {
+            let second = bake(&sweep, &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX);
+            assert!(matches!(second, Err(SweepError::Busy { .. })));
+        }
+    };
+    sweep
+        .bake(&mut MadeUp::default(), &folder.output(), false, Run { chunk: 10, stop: &stop, progress: &mut progress })
+        .unwrap();
+    assert!(tried);
+}
+
+#[test]
+fn the_number_of_threads_leaves_no_trace() {
+    let scene = scene();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, scene.contact);
+    let baked = |threads, chunk| {
+        let folder = Folder::new();
+        let mut backend = CpuBackend::new(&model, threads).unwrap();
+        let report = bake(&sweep(), &mut backend, &folder.output(), false, chunk, usize::MAX).unwrap();
+        assert!(report.contact_points > 5 && report.contact_points < POINTS, "{report:?}");
+        std::fs::read(folder.output()).unwrap()
+    };
+    let one = baked(1, POINTS);
+    for (threads, chunk) in [(2, POINTS), (3, 17), (5, 1)] {
+        assert!(baked(threads, chunk) == one, "{threads} threads, chunks of {chunk}");
+    }
+}
