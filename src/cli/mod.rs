@@ -10,6 +10,7 @@
 //!
 //! Exit codes: 0 the work is whole, 1 it failed or is not whole, 2 the command line itself is wrong (given by clap).
 
+mod bake;
 mod doctor;
 mod export;
 mod info;
@@ -34,6 +35,8 @@ struct CommandLine {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Haptize a scene: solve contact at every point of its grid.
+    Bake(bake::Arguments),
     /// Say what this machine offers: threads, graphics adapters, real-time rights.
     Doctor(doctor::Arguments),
     /// Write a dataset for other programs.
@@ -45,6 +48,7 @@ enum Command {
 impl Command {
     fn run(&self) -> Result<Report, Failure> {
         match self {
+            Self::Bake(arguments) => bake::run(arguments),
             Self::Doctor(arguments) => doctor::run(arguments),
             Self::Export(arguments) => export::run(arguments),
             Self::Info(arguments) => info::run(arguments),
