@@ -2,7 +2,7 @@
 
 use super::{Failure, Report};
 use haptize::{
-    haptize::{Bake, Progress},
+    haptize::{BackendChoice, Bake, Progress},
     scene::{Algorithm, Scene},
 };
 use indicatif::{ProgressBar, ProgressStyle};
@@ -21,6 +21,9 @@ pub struct Arguments {
     /// The dataset to write; by default the scene's name in the current folder, ending in .haptize.
     #[arg(short, long)]
     output: Option<PathBuf>,
+    /// What solves.
+    #[arg(long, default_value = "auto")]
+    backend: BackendChoice,
     /// How contact is solved, instead of what the scene says.
     #[arg(long)]
     algorithm: Option<Algorithm>,
@@ -46,7 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let bar = progress_bar();
     let mut progress = |progress: Progress| show(&bar, progress);
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
-    let bake = Bake { scene: &scene, date: &date, stop: &stop, progress: &mut progress };
+    let bake = Bake { scene: &scene, backend: arguments.backend, date: &date, stop: &stop, progress: &mut progress };
     let result = bake.to_file(&output, arguments.resume);
     bar.finish_and_clear();
     let (_, report) = result?;

@@ -1,6 +1,6 @@
 //! From a scene to its dataset: object and proxy are built, a backend is chosen, and the grid is swept.
 
-use super::{CpuBackend, Progress, Run, Sweep, SweepError, SweepReport};
+use super::{BackendChoice, BackendError, ChosenBackend, Progress, Run, Sweep, SweepError, SweepReport};
 use crate::{
     contact::Model,
     dataset::Dataset,
@@ -16,9 +16,9 @@ pub enum BakeError {
     /// The object cannot be built.
     #[error(transparent)]
     Object(#[from] ObjectError),
-    /// The system gives no threads.
-    #[error("the CPU backend cannot start its threads: {0}; allow this user more processes")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// No backend.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
     /// The sweep failed or was stopped.
     #[error(transparent)]
     Sweep(#[from] SweepError),
@@ -28,6 +28,8 @@ pub enum BakeError {
 pub struct Bake<'a> {
     /// What is haptized.
     pub scene: &'a Scene,
+    /// What solves.
+    pub backend: BackendChoice,
     /// Date that the dataset bears, ISO 8601, UTC.
     pub date: &'a str,
     /// When this becomes true the sweep stops soon.
@@ -61,12 +63,12 @@ impl Bake<'_> {
     }
 
     fn run(self, destination: Destination<'_>) -> Result<(Dataset, SweepReport), BakeError> {
-        let Self { scene, date, stop, progress } = self;
+        let Self { scene, backend, date, stop, progress } = self;
         let object = Object::build(&scene.object)?;
         let chain = Chain::new(&scene.proxy);
         let model = Model::new(&object, &chain, scene.contact);
-        let mut backend = CpuBackend::new(&model, 0)?;
-        let sweep = Sweep::new(scene, &object, "cpu", &CpuBackend::adapter(), date)?;
+        let mut backend = ChosenBackend::open(backend, &model)?;
+        let sweep = Sweep::new(scene, &object, backend.name(), &backend.adapter(), date)?;
         let run = Run { chunk: backend.chunk(), stop, progress };
         Ok(match destination {
             Destination::Memory => sweep.run(&mut backend, run),

@@ -1,6 +1,7 @@
 //! Sweeps: a virtual object haptized over a grid in C-space.
 
 mod bake;
+mod choice;
 mod columns;
 mod cpu;
 mod part;
@@ -8,6 +9,7 @@ mod report;
 mod sweep;
 
 pub use bake::{Bake, BakeError};
+pub use choice::{BackendChoice, BackendError, ChosenBackend};
 pub use cpu::CpuBackend;
 pub use report::{Iterations, SweepReport};
 pub use sweep::{Progress, Run, Sweep, SweepError};
