@@ -82,3 +82,7 @@ pub const PAPER_INNER_SHARE: f64 = 1e-3;
 /// How far beyond an end a grid line may lie and still count, in steps [1]: spacings such as pi/60 are written with a
 /// handful of digits, and 1e-6 of a step changes no torque that is interpolated between lines.
 pub const GRID_STEP_SLACK: f64 = 1e-6;
+
+/// Pull of a joint stop, relative to the terms that balance it, that is taken for rounding [1]: the balance is a sum of
+/// eight terms of a solution whose residual is a few times the order of the matrix, six, in machine precision.
+pub const STOP_ROUNDING: f64 = 64.0 * f64::EPSILON;

@@ -4,6 +4,7 @@ pub mod accounts;
 pub mod boundary;
 pub mod field;
 pub mod flags;
+pub mod npmi;
 pub mod stencil;
 pub mod trace;
 
