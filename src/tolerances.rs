@@ -86,3 +86,20 @@ pub const GRID_STEP_SLACK: f64 = 1e-6;
 /// Pull of a joint stop, relative to the terms that balance it, that is taken for rounding [1]: the balance is a sum of
 /// eight terms of a solution whose residual is a few times the order of the matrix, six, in machine precision.
 pub const STOP_ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// Greatest number in SI units that a device or a dataset may give for a position [rad or m], a torque [N m] or an energy
+/// [J]. Nothing that is haptized comes near it, and its square times any gain is still far from overflow, so that no
+/// account or torque of the haptic loop can become infinite.
+pub const GREATEST_INPUT: f64 = 1e9;
+
+/// Greatest age of a device's position on which a torque may rest [s]: ten ticks at 1 kHz. A hand, which moves at below
+/// 10 Hz, has gone on by no more than half a radian of its phase.
+pub const GREATEST_POSITION_AGE: f64 = 0.01;
+
+/// Least time between two ticks [s]: a device's encoder steps, of 1e-5 rad or so, divided by less would give velocities of
+/// tens of rad/s to a device at rest.
+pub const LEAST_INTERVAL: f64 = 1e-6;
+
+/// Greatest time between two ticks [s]: a whole period of a hand's fastest motion, 10 Hz. After more, the position before
+/// says nothing about the velocity.
+pub const GREATEST_INTERVAL: f64 = 0.1;

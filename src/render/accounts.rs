@@ -5,6 +5,13 @@
 //! so that `coupling_work + field_work >= 0` from rest: it never gives more than was put in (sections 3, 3.1).
 //! What the loop can still create lies outside this balance and is booked beside it: `leak`, by a torque field that
 //! is not exactly a gradient, and [`Accounts::hold_gain`], by holding the torque on the device between two ticks.
+//!
+//! The device's end of the coupling moves in two ways. When y jumps from y_{k-1} to y_k with the proxy at x_k, the spring
+//! takes in `Kvc ((y_{k-1} + y_k)/2 - x_k) . (y_k - y_{k-1})`; during the step it is the damper's end that moves, at w_k,
+//! and takes in `T Bvc (w_k - v_hat_k) . w_k`, of which `T Bvc |w_k - v_hat_k|^2` becomes heat.
+
+use super::{coupling::Coupling, npmi::Step};
+use crate::JointVector;
 
 /// The accounts at the beginning of a tick, from the first tick on; all in joules.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -55,5 +62,49 @@ impl Accounts {
     #[must_use]
     pub fn hold_gain(&self) -> f64 {
         self.coupling_work - self.port_work
+    }
+
+    /// Books the device's move from y_{k-1} to y_k: the proxy is at `proxy` x_k, the device was under `held` torque.
+    pub(super) fn device_moved(
+        &mut self,
+        coupling: &Coupling,
+        from: &JointVector,
+        to: &JointVector,
+        proxy: &JointVector,
+        held: &JointVector,
+    ) {
+        for a in 0..from.len() {
+            let moved = to[a] - from[a];
+            let work = coupling.stiffness[a] * (0.5 * (from[a] + to[a]) - proxy[a]) * moved;
+            self.coupling_work += work;
+            self.port_work -= held[a] * moved;
+            self.turnover += work.abs();
+        }
+    }
+
+    /// Books a step of the proxy over `interval` T, the device's end of the damper moving at `velocity` w_k, under the
+    /// `contact` torque tau_bar.
+    pub(super) fn stepped(
+        &mut self,
+        coupling: &Coupling,
+        interval: f64,
+        velocity: &JointVector,
+        contact: &JointVector,
+        step: &Step,
+    ) {
+        for a in 0..velocity.len() {
+            let slip = velocity[a] - step.velocity[a];
+            let damper = interval * coupling.damping[a] * slip * velocity[a];
+            let heat = interval * coupling.damping[a] * slip * slip;
+            let drag = interval * coupling.proxy_damping[a] * step.velocity[a] * step.velocity[a];
+            let field = interval * contact[a] * step.velocity[a];
+            self.coupling_work += damper;
+            self.coupling_dissipation += heat;
+            self.proxy_dissipation += drag;
+            self.field_work += field;
+            self.turnover += damper.abs() + heat + drag + field.abs();
+        }
+        self.stop_work += step.stop_work;
+        self.turnover += step.stop_work.abs();
     }
 }

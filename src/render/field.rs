@@ -6,22 +6,22 @@
 //! torque, so that the torque fades out over the cells towards them; their index and energy are those of the nearest
 //! point that was, lest a missing measurement be taken for a boundary of the object.
 //!
-//! A field owns a copy of what it needs, interleaved point by point: `tau_0 .. tau_{d-1}, moves, U`. The real-time
+//! A field owns a copy of what it needs, interleaved point by point: `tau_0 .. tau_{d-1}, level, U`. The real-time
 //! thread thus never touches a mapped file, which would end the process when somebody else truncates it.
 
 use super::{
-    boundary::{BoundaryLayer, moves_to_free},
+    boundary::BoundaryLayer,
     flags::Flags,
     stencil::{Lattice, LatticeError},
 };
-use crate::{JointVector, MAX_JOINTS, contact::Status, dataset::Dataset};
+use crate::{JointVector, MAX_JOINTS, contact::Status, dataset::Dataset, tolerances::GREATEST_INPUT};
 use std::collections::VecDeque;
 
 /// The contact torque around one object.
 pub struct TorqueField {
     lattice: Lattice,
     layer: BoundaryLayer,
-    /// `joints + 2` numbers a grid point: torque, king's moves to a free point, energy.
+    /// `joints + 2` numbers a grid point: torque, level (see `boundary.rs`), energy.
     records: Vec<f64>,
     points: Vec<Point>,
     has_energy: bool,
@@ -71,13 +71,15 @@ pub enum FieldError {
         /// Entries found.
         found: usize,
     },
-    /// A torque or an energy is not finite.
-    #[error("the dataset's {column} at grid point {point} is not a finite number: bake it again")]
-    NotFinite {
+    /// A torque or an energy is not a number, or beyond anything physical.
+    #[error("the dataset's {column} at grid point {point} is {value}: bake it again")]
+    Value {
         /// Name of the column.
         column: &'static str,
         /// Number of the grid point.
         point: usize,
+        /// What is there.
+        value: f64,
     },
     /// Not a single grid point was computed.
     #[error("no grid point of the dataset was computed: finish the bake first")]
@@ -116,23 +118,22 @@ impl TorqueField {
         let points: Vec<Point> = (0..count).map(|point| Point::of(dataset, point)).collect();
         let nearest = nearest_present(&lattice, &points).ok_or(FieldError::Empty)?;
         let free: Vec<bool> = nearest.iter().map(|&source| !points[source].in_contact).collect();
-        let moves = moves_to_free(&lattice, &free);
-
-        let mut records = Vec::with_capacity(count * (joints + 2));
-        for point in 0..count {
-            let absent = points[point].flags.contains(Flags::ABSENT);
-            let torque = dataset.torque(point);
-            if !absent && torque.iter().any(|tau| !tau.is_finite()) {
-                return Err(FieldError::NotFinite { column: "torque", point });
-            }
-            records.extend(torque.iter().map(|&tau| if points[point].in_contact { tau } else { 0.0 }));
-            let energy = dataset.energy.as_ref().map_or(0.0, |energy| energy[nearest[point]]);
-            if !energy.is_finite() {
-                return Err(FieldError::NotFinite { column: "energy", point: nearest[point] });
-            }
-            records.extend([moves[point], energy]);
-        }
         let layer = BoundaryLayer::new(&lattice, threshold, slope);
+        let mut records = Vec::with_capacity(count * (joints + 2));
+        let mut greatest: f64 = 0.0;
+        for (point, state) in points.iter().enumerate() {
+            let zeros = JointVector::zeros(joints);
+            let torque = if state.in_contact { dataset.torque(point) } else { &zeros };
+            torque.iter().try_for_each(|&tau| plausible("torque", point, tau))?;
+            greatest = greatest.max(layer.size(torque));
+            let energy = dataset.energy.as_ref().map_or(0.0, |energy| energy[nearest[point]]);
+            plausible("energy", nearest[point], energy)?;
+            records.extend_from_slice(torque);
+            records.extend([0.0, energy]);
+        }
+        for (record, level) in records.chunks_exact_mut(joints + 2).zip(layer.levels(&lattice, &free, greatest)) {
+            record[joints] = level;
+        }
         Ok(Self { lattice, layer, records, points, has_energy: dataset.energy.is_some() })
     }
 
@@ -196,7 +197,7 @@ impl TorqueField {
     fn sample_joints<const D: usize>(&self, q: &[f64]) -> Sample {
         let stencil = self.lattice.locate(q);
         let mut torque = [0.0; D];
-        let (mut moves, mut energy, mut index) = (0.0, 0.0, 0.0);
+        let (mut level, mut energy, mut index) = (0.0, 0.0, 0.0);
         let mut flags = Flags::default();
         let mut present = false;
         let (mut contact_nodes, mut heaviest) = (0, 0.0);
@@ -205,7 +206,7 @@ impl TorqueField {
             for (sum, tau) in torque.iter_mut().zip(record) {
                 *sum += weight * tau;
             }
-            moves += weight * record[D];
+            level += weight * record[D];
             index += weight * record[D].min(1.0);
             energy += weight * record[D + 1];
             if weight > 0.0 {
@@ -218,7 +219,7 @@ impl TorqueField {
             }
         }
         let mut torque = JointVector::from_slice(&torque);
-        let held = self.layer.share(&torque, moves);
+        let held = self.layer.share(&torque, level);
         if held < 1.0 {
             flags |= Flags::LAYER;
         }
@@ -251,6 +252,11 @@ impl Point {
 
 fn expect(column: &'static str, expected: usize, found: usize) -> Result<(), FieldError> {
     if expected == found { Ok(()) } else { Err(FieldError::Length { column, expected, found }) }
+}
+
+fn plausible(column: &'static str, point: usize, value: f64) -> Result<(), FieldError> {
+    // False for what is not a number.
+    if value.abs() <= GREATEST_INPUT { Ok(()) } else { Err(FieldError::Value { column, point, value }) }
 }
 
 /// For each grid point the nearest one that was computed, in steps along the axes; itself if it was. `None` if none was.
@@ -480,7 +486,7 @@ mod tests {
         assert_eq!(new(short, 0.5, &[1.0, 1.0]), Some(expected));
         let mut wild = good();
         wild.torque = vec![f64::NAN; 30].into();
-        assert!(matches!(new(wild, 0.5, &[1.0, 1.0]), Some(FieldError::NotFinite { column: "torque", .. })));
+        assert!(matches!(new(wild, 0.5, &[1.0, 1.0]), Some(FieldError::Value { column: "torque", .. })));
         let mut nothing = good();
         nothing.status = vec![Status::Outside as u8; 15].into();
         assert_eq!(new(nothing, 0.5, &[1.0, 1.0]), Some(FieldError::Empty));

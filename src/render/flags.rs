@@ -26,8 +26,8 @@ bitflags! {
 /// Why the torque on the device is being brought to zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Fault {
-    /// The device reports a position that is not a finite number.
-    #[error("the device reports a position that is not a finite number")]
+    /// The device reports a position that is not a number, or beyond anything that is a position.
+    #[error("the device reports a position that is not a number or beyond any reach")]
     NotFinite,
     /// The device reports another number of joints than the dataset has.
     #[error("the device reports another number of joints than the dataset has")]
@@ -35,7 +35,7 @@ pub enum Fault {
     /// The device's position is too old.
     #[error("the device's position is too old")]
     Stale,
-    /// The time since the last tick is not a positive finite number.
-    #[error("the time between two ticks is not a positive finite number")]
+    /// The time between two ticks is too long, or not a positive number.
+    #[error("the time between two ticks is too long or not a positive number")]
     Interval,
 }

@@ -2,10 +2,18 @@
 
 pub mod accounts;
 pub mod boundary;
+mod clock;
+pub mod coupling;
 pub mod field;
 pub mod flags;
+pub mod graphics;
+pub mod haptic;
 pub mod npmi;
+pub mod passivity;
+pub mod realtime;
+pub mod session;
 pub mod stencil;
+pub mod timing;
 pub mod trace;
 
 #[cfg(test)]

@@ -218,7 +218,7 @@ fn minimise_in_box(matrix: &JointMatrix, right: &JointVector, low: &JointVector,
             } else {
                 continue;
             };
-            let share = if reach == 0.0 { 0.0 } else { ((limit - point[a]) / reach).max(0.0).min(1.0) };
+            let share = if reach == 0.0 { 0.0 } else { ((limit - point[a]) / reach).clamp(0.0, 1.0) };
             if first.is_none() || share < fraction {
                 (fraction, first) = (share, Some((a, limit, at)));
             }
@@ -410,11 +410,11 @@ mod tests {
         let (load, interval) = (noise.load(4), 3e-3);
         let mut end = start;
         let step = npmi.step(&mut end, interval, &load);
-        for a in 0..4 {
-            let acceleration: f64 = (0..4).map(|b| inertia[a][b] * (end.velocity[b] - start.velocity[b])).sum();
+        for (a, row) in inertia.iter().enumerate().take(4) {
+            let acceleration: f64 = (0..4).map(|b| row[b] * (end.velocity[b] - start.velocity[b])).sum();
             let midpoint = 0.5 * (start.position[a] + end.position[a]);
-            let torque = load.torque[a] - load.damping[a] * step.velocity[a]
-                - load.stiffness[a] * (midpoint - load.target[a]);
+            let torque =
+                load.torque[a] - load.damping[a] * step.velocity[a] - load.stiffness[a] * (midpoint - load.target[a]);
             assert!((acceleration / interval - torque).abs() < 1e-10);
         }
     }

@@ -32,6 +32,8 @@ pub struct Tick {
     pub index: f64,
     /// Whether the index exceeds its threshold.
     pub contact: bool,
+    /// Factor that boundary layer and fade put on the interpolated torque and contact forces, 0 to 1.
+    pub share: f64,
     /// Object nodes in contact at the heaviest grid corner in contact; 0 out of contact or where none are stored.
     pub contact_nodes: u32,
     /// Remarks on the tick.
@@ -94,7 +96,7 @@ pub struct Summary {
     pub max_device_torque_step: f64,
     /// Largest residual of the energy accounts [J].
     pub max_account_residual: f64,
-    /// The same over the accounts' turnover [1].
+    /// The same over the whole session's turnover [1].
     pub max_relative_account_residual: f64,
     /// Least that proxy and coupling had absorbed at any tick [J]: not below zero but for rounding.
     pub min_absorbed: f64,
@@ -133,10 +135,6 @@ impl Trace {
             s.max_device_torque = s.max_device_torque.max(tick.device_torque.norm());
             let residual = tick.accounts.residual().abs();
             s.max_account_residual = s.max_account_residual.max(residual);
-            if tick.accounts.turnover > 0.0 {
-                s.max_relative_account_residual =
-                    s.max_relative_account_residual.max(residual / tick.accounts.turnover);
-            }
             s.min_absorbed = s.min_absorbed.min(tick.accounts.absorbed());
         }
         for pair in self.ticks.windows(2) {
@@ -152,6 +150,9 @@ impl Trace {
         if let (Some(first), Some(last)) = (self.ticks.first(), self.ticks.last()) {
             s.seconds = last.time - first.time;
             s.contact_share = self.ticks.iter().filter(|tick| tick.contact).count() as f64 / self.ticks.len() as f64;
+            if last.accounts.turnover > 0.0 {
+                s.max_relative_account_residual = s.max_account_residual / last.accounts.turnover;
+            }
             s.leak = last.accounts.leak;
             s.hold_gain = last.accounts.hold_gain();
             s.port_work = last.accounts.port_work;
@@ -178,7 +179,7 @@ impl Trace {
                 write!(out, ",{what} {} [{unit}]", plain(&joint.name))?;
             }
         }
-        write!(out, ",contact index,contact,contact nodes,flags,fault")?;
+        write!(out, ",contact index,contact,contact share,contact nodes,flags,fault")?;
         for name in [
             "kinetic",
             "spring",
@@ -203,8 +204,8 @@ impl Trace {
                 }
             }
             let fault = tick.fault.map(|fault| fault.to_string()).unwrap_or_default();
-            let (index, contact, nodes) = (tick.index, u8::from(tick.contact), tick.contact_nodes);
-            write!(out, ",{index},{contact},{nodes},{},{fault}", tick.flags.bits())?;
+            let (index, contact, share, nodes) = (tick.index, u8::from(tick.contact), tick.share, tick.contact_nodes);
+            write!(out, ",{index},{contact},{share},{nodes},{},{fault}", tick.flags.bits())?;
             let a = &tick.accounts;
             for value in [
                 a.kinetic,
@@ -266,6 +267,7 @@ mod tests {
             contact_torque: one,
             index: 1.0,
             contact: torque != 0.0,
+            share: 1.0,
             contact_nodes: 3,
             flags: Flags::default(),
             fault: None,

@@ -1,0 +1,96 @@
+//! A simulated device in a simulated hand: a mass, a spring and a damper of a human arm at each joint, pulling along a
+//! motion.
+//!
+//! At each joint `(m_hand + m_device) yddot = -bd ydot + tau + Kh (r - y) + Bh (rdot - ydot)`, r the motion, tau the torque
+//! held since the last tick. Stepped by the midpoint rule, passive for any step as the proxy is; the torque is constant
+//! over a step, so that its work tau . (y_{k+1} - y_k) is exact.
+
+use super::{Device, Motion, Reading};
+use crate::{JointVector, scene::HapticsSpec};
+
+/// The device in the hand.
+#[derive(Clone, Debug)]
+pub struct SimulatedHand {
+    motion: Motion,
+    /// Hand and device together [kg m^2].
+    inertia: JointVector,
+    /// Kh [N m/rad], Bh [N m s/rad].
+    stiffness: JointVector,
+    damping: JointVector,
+    /// bd [N m s/rad].
+    device_damping: JointVector,
+    time: f64,
+    position: JointVector,
+    velocity: JointVector,
+    torque: JointVector,
+}
+
+/// A hand cannot be simulated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum HandError {
+    /// The scene's haptics have another number of joints than the motion.
+    #[error("the motion has {motion} joints and the haptic device {device}")]
+    Joints {
+        /// Of the motion.
+        motion: usize,
+        /// Of the scene's device.
+        device: usize,
+    },
+    /// Hand and device have no inertia at a joint.
+    #[error("hand and device have no inertia at joint {0}: give the device or the hand a positive one")]
+    Inertia(usize),
+}
+
+impl SimulatedHand {
+    /// The hand and device of `spec`, at rest at the beginning of `motion`.
+    ///
+    /// # Errors
+    /// When the joints do not fit, or hand and device have no inertia.
+    pub fn new(spec: &HapticsSpec, motion: Motion) -> Result<Self, HandError> {
+        let mut inertia = spec.device_inertia;
+        if motion.joints() != inertia.len() {
+            return Err(HandError::Joints { motion: motion.joints(), device: inertia.len() });
+        }
+        for (a, (inertia, hand)) in inertia.iter_mut().zip(spec.hand.inertia.iter()).enumerate() {
+            *inertia += hand;
+            if !inertia.is_finite() || *inertia <= 0.0 {
+                return Err(HandError::Inertia(a));
+            }
+        }
+        let position = motion.at(0.0).0;
+        let zero = JointVector::zeros(position.len());
+        Ok(Self {
+            motion,
+            inertia,
+            stiffness: spec.hand.stiffness,
+            damping: spec.hand.damping,
+            device_damping: spec.device_damping,
+            time: 0.0,
+            position,
+            velocity: zero,
+            torque: zero,
+        })
+    }
+}
+
+impl Device for SimulatedHand {
+    fn read(&mut self, elapsed: f64) -> Reading {
+        let half = 0.5 * elapsed;
+        let (goal, goal_velocity) = self.motion.at(self.time + half);
+        for a in 0..self.position.len() {
+            let torque = self.torque[a] + self.damping[a] * goal_velocity[a];
+            let spring = self.stiffness[a] * (goal[a] - self.position[a]);
+            let resistance =
+                self.inertia[a] + half * (self.damping[a] + self.device_damping[a]) + half * half * self.stiffness[a];
+            let midpoint = (self.inertia[a] * self.velocity[a] + half * (torque + spring)) / resistance;
+            self.position[a] += elapsed * midpoint;
+            self.velocity[a] = 2.0 * midpoint - self.velocity[a];
+        }
+        self.time += elapsed;
+        Reading { position: self.position, age: 0.0, hand: self.motion.at(self.time).0 }
+    }
+
+    fn apply(&mut self, torque: &JointVector) {
+        self.torque = *torque;
+    }
+}

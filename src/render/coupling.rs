@@ -1,0 +1,64 @@
+//! The spring-damper virtual coupling between device and proxy (section 3.1).
+//!
+//! Device position y_k is read at t_k; `w_k = (y_k - y_{k-1})/T_{k-1}`. With `v_hat_{k-1} = (x_k - x_{k-1})/T_{k-1}`,
+//! `tau(t) = -bd ydot - Bvc (w_k - v_hat_{k-1}) - Kvc (y_k - x_k)`        on the device, held until t_{k+1};
+//! `tau_k  = -bv v_hat_k - Bvc (v_hat_k - w_k) - Kvc (x_hat_k - y_k)`     on the proxy, implicit in v_hat_k, x_hat_k.
+//! `bd ydot` is the damping that the device has of itself: it is no part of what the motors are told.
+
+use super::npmi::Load;
+use crate::{JointVector, scene::HapticsSpec};
+
+/// The coupling's gains, one per joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coupling {
+    /// Kvc [N m/rad].
+    pub stiffness: JointVector,
+    /// Bvc [N m s/rad].
+    pub damping: JointVector,
+    /// bv, between the proxy and the ground [N m s/rad].
+    pub proxy_damping: JointVector,
+}
+
+impl Coupling {
+    /// The gains of a scene.
+    #[must_use]
+    pub fn new(spec: &HapticsSpec) -> Self {
+        Self { stiffness: spec.coupling_stiffness, damping: spec.coupling_damping, proxy_damping: spec.proxy_damping }
+    }
+
+    /// Torque for the device at `position` y_k moving at `velocity` w_k, the proxy at `proxy` x_k having moved at
+    /// `proxy_velocity` v_hat_{k-1} [N m or N].
+    #[must_use]
+    pub fn device_torque(
+        &self,
+        position: &JointVector,
+        velocity: &JointVector,
+        proxy: &JointVector,
+        proxy_velocity: &JointVector,
+    ) -> JointVector {
+        let mut torque = JointVector::zeros(position.len());
+        for (a, torque) in torque.iter_mut().enumerate() {
+            *torque =
+                -self.damping[a] * (velocity[a] - proxy_velocity[a]) - self.stiffness[a] * (position[a] - proxy[a]);
+        }
+        torque
+    }
+
+    /// What acts on the proxy: coupling, damping bv, and the `contact` torque tau_bar.
+    #[must_use]
+    pub fn proxy_load(&self, position: &JointVector, velocity: &JointVector, contact: &JointVector) -> Load {
+        let (mut damping, mut torque) = (self.proxy_damping, *contact);
+        for a in 0..position.len() {
+            damping[a] += self.damping[a];
+            torque[a] += self.damping[a] * velocity[a];
+        }
+        Load { stiffness: self.stiffness, target: *position, damping, torque }
+    }
+
+    /// 1/2 Kvc |x - y|^2 [J].
+    #[must_use]
+    pub fn spring_energy(&self, proxy: &JointVector, device: &JointVector) -> f64 {
+        let stretch = proxy.iter().zip(device.iter()).map(|(x, y)| (x - y) * (x - y));
+        0.5 * self.stiffness.iter().zip(stretch).map(|(k, square)| k * square).sum::<f64>()
+    }
+}

@@ -1,0 +1,200 @@
+//! A session against the clock: a haptic thread with absolute deadlines, a graphics thread, and the caller as recorder.
+//!
+//! The haptic thread never waits for anybody: graphics takes the latest tick from a triple buffer, the recorder takes all
+//! ticks from a ring. When the ring is full, ticks go unrecorded, and are counted. A deadline that has passed before its
+//! tick could begin is left out, and counted; the proxy then steps by the longer time, which its integration allows.
+
+use super::{
+    clock,
+    graphics::Graphics,
+    haptic::Haptics,
+    session::{Driver, Frames, Latest, Plan, SessionError},
+    timing::{Durations, Timing},
+    trace::{Frame, Tick, Trace},
+};
+use crate::device::Device;
+use std::{
+    sync::atomic::{AtomicBool, Ordering},
+    thread,
+    time::Duration,
+};
+
+/// Ticks that the ring to the recorder holds: four seconds at 1 kHz.
+const RING: usize = 4096;
+
+/// How often the recorder empties the ring.
+const RECORDER_PERIOD: Duration = Duration::from_millis(5);
+
+/// The haptic thread's body: everything that a tick touches, allocated beforehand.
+pub struct HapticLoop<'session> {
+    driver: Driver<'session>,
+    recorder: rtrb::Producer<Tick>,
+    latest: triple_buffer::Input<Latest>,
+    lateness: Durations,
+    cost: Durations,
+    period: Duration,
+    began: Duration,
+    /// When the last tick began; none before the first.
+    last: Option<Duration>,
+    /// Number of the next deadline.
+    next: u32,
+    missed: u64,
+    unrecorded: u64,
+}
+
+/// The other ends of a [`HapticLoop`].
+pub struct Ends {
+    /// All ticks.
+    pub ticks: rtrb::Consumer<Tick>,
+    /// The latest tick.
+    pub latest: triple_buffer::Output<Latest>,
+}
+
+impl<'session> HapticLoop<'session> {
+    /// A loop with its first deadline now.
+    ///
+    /// # Errors
+    /// When the device reports no position, or there is no memory.
+    pub fn new(haptics: &'session Haptics, device: &'session mut dyn Device) -> Result<(Self, Ends), SessionError> {
+        let driver = Driver::new(haptics, device)?;
+        let (recorder, ticks) = rtrb::RingBuffer::new(RING);
+        let start = crate::JointVector::zeros(haptics.joints());
+        let (latest, reader) =
+            triple_buffer::triple_buffer(&Latest { time: 0.0, proxy: start, device: start, share: 0.0 });
+        let histogram = || Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()));
+        let this = Self {
+            driver,
+            recorder,
+            latest,
+            lateness: histogram()?,
+            cost: histogram()?,
+            period: Duration::from_secs_f64(haptics.period()),
+            began: clock::now(),
+            last: None,
+            next: 0,
+            missed: 0,
+            unrecorded: 0,
+        };
+        Ok((this, Ends { ticks, latest: reader }))
+    }
+
+    /// Waits for the next deadline and does its tick. Allocates, locks and prints nothing.
+    pub fn tick(&mut self) {
+        let deadline = self.began + self.period * self.next;
+        let now = clock::wait_until(deadline);
+        self.lateness.record(now - deadline);
+        // The next deadline that is at least half a period away.
+        let mut skipped = 0;
+        while self.began + self.period * (self.next + 1 + skipped) < now + self.period / 2 {
+            skipped += 1;
+        }
+        self.missed += u64::from(skipped);
+        self.next += 1 + skipped;
+        let elapsed = self.last.map_or(self.period, |last| now - last);
+        let interval = (self.began + self.period * self.next).saturating_sub(now);
+        self.last = Some(now);
+        let tick = self.driver.tick(elapsed.as_secs_f64(), interval.as_secs_f64());
+        self.cost.record(clock::now() - now);
+        self.latest.write(Latest::from(&tick));
+        if self.recorder.push(tick).is_err() {
+            self.unrecorded += 1;
+        }
+    }
+
+    /// Whether `ticks` deadlines have come.
+    fn is_over(&self, ticks: usize) -> bool {
+        self.next as usize >= ticks
+    }
+}
+
+/// Runs a session against the clock, as long as `plan` says. Graphics, where there is any, runs in a thread of its own.
+///
+/// # Errors
+/// When the device reports no position, or the system gives no threads or memory.
+pub fn run(
+    haptics: &Haptics,
+    device: &mut dyn Device,
+    graphics: Option<&mut Graphics<'_>>,
+    plan: &Plan,
+) -> Result<(Trace, Timing), SessionError> {
+    let (mut body, Ends { mut ticks, latest }) = HapticLoop::new(haptics, device)?;
+    let frame_cost = Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()))?;
+    let mut recorded = plan.new_ticks()?;
+    let over = AtomicBool::new(false);
+    let resources = |error: std::io::Error| SessionError::Resources(error.to_string());
+    thread::scope(|scope| {
+        let drawing = graphics.map(|graphics| {
+            let frames = Frames::new(graphics, plan);
+            let over = &over;
+            thread::Builder::new()
+                .name("graphics".into())
+                .spawn_scoped(scope, move || draw(frames, latest, frame_cost, over))
+        });
+        let drawing = drawing.transpose().map_err(resources)?;
+        let feeling = thread::Builder::new().name("haptic".into()).spawn_scoped(scope, move || {
+            let refused = clock::ask_for_real_time();
+            body.began = clock::now();
+            while !body.is_over(plan.ticks) {
+                body.tick();
+            }
+            (refused, body.lateness, body.cost, body.missed, body.unrecorded)
+        });
+        let feeling = match feeling {
+            Ok(thread) => thread,
+            Err(error) => {
+                over.store(true, Ordering::Release);
+                return Err(resources(error));
+            }
+        };
+        loop {
+            let last = feeling.is_finished();
+            while let Ok(tick) = ticks.pop() {
+                recorded.push(tick);
+            }
+            if last {
+                break;
+            }
+            thread::sleep(RECORDER_PERIOD);
+        }
+        over.store(true, Ordering::Release);
+        let felt = feeling.join().map_err(|_| SessionError::Thread("haptic"))?;
+        let drawn = drawing.map(|thread| thread.join().map_err(|_| SessionError::Thread("graphics"))).transpose()?;
+        clock::unlock_memory();
+        let (refused, lateness, cost, missed_deadlines, unrecorded) = felt;
+        let (frames, frame_cost, missed_frames) = drawn.unwrap_or_default();
+        let timing = Timing {
+            refused,
+            lateness: lateness.percentiles(),
+            tick_cost: cost.percentiles(),
+            frame_cost,
+            missed_deadlines,
+            missed_frames,
+            unrecorded,
+        };
+        Ok((Trace { joints: plan.joints.clone(), ticks: recorded, frames }, timing))
+    })
+}
+
+/// The graphics thread: a frame whenever one is due, until the session is over. When it falls behind by more than a frame
+/// it draws the frames that it owes, without waiting: the object's time must not slow down.
+fn draw(
+    mut frames: Frames<'_, '_>,
+    mut latest: triple_buffer::Output<Latest>,
+    mut cost: Durations,
+    over: &AtomicBool,
+) -> (Vec<Frame>, super::timing::Percentiles, u64) {
+    let began = clock::now();
+    let mut missed = 0;
+    while !over.load(Ordering::Acquire) {
+        let due = began + Duration::from_secs_f64(frames.due());
+        clock::sleep_until(due);
+        let now = clock::now();
+        let before = frames.due();
+        frames.draw(latest.read());
+        cost.record(clock::now() - now);
+        if (now.saturating_sub(due)).as_secs_f64() > frames.due() - before {
+            missed += 1;
+        }
+    }
+    (frames.kept(), cost.percentiles(), missed)
+}

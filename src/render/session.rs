@@ -1,0 +1,194 @@
+//! A rendering session: device, haptic loop and graphics loop, recorded. Offline, as fast as it goes and deterministic;
+//! `realtime.rs` runs the same ticks and frames against the clock.
+//!
+//! Two loops at two rates (section 3.2): a tick every T, and a frame of the object every T_g. Frame j is drawn at the first
+//! tick at or after `j T_g`, from the proxy's configuration then.
+
+use super::{
+    flags::Fault,
+    graphics::{Graphics, GraphicsError},
+    haptic::{Haptics, Inputs, State},
+    trace::{Frame, JointLabel, Tick, Trace},
+};
+use crate::{JointVector, dataset::Dataset, device::Device};
+
+/// How long, and what to keep of the object's shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Names and units of the joints.
+    pub joints: Vec<JointLabel>,
+    /// Number of ticks.
+    pub ticks: usize,
+    /// Instants [s], ascending, of which the first frame at or after is kept.
+    pub snapshots: Vec<f64>,
+}
+
+/// A session cannot run.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SessionError {
+    /// The device's first position is none.
+    #[error("the session cannot start: {0}")]
+    Start(#[from] Fault),
+    /// The object cannot be drawn.
+    #[error(transparent)]
+    Graphics(#[from] GraphicsError),
+    /// The system gives no thread or memory.
+    #[error("the session cannot start: {0}")]
+    Resources(String),
+    /// A thread ended by a panic.
+    #[error("the {0} thread ended unexpectedly")]
+    Thread(&'static str),
+}
+
+/// What graphics needs to know of a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Latest {
+    /// Time of the tick [s].
+    pub time: f64,
+    /// Proxy x [rad or m].
+    pub proxy: JointVector,
+    /// Device y [rad or m].
+    pub device: JointVector,
+    /// Factor on the dataset's contact forces; zero out of contact.
+    pub share: f64,
+}
+
+/// The haptic loop with its device: one call a tick.
+pub struct Driver<'session> {
+    haptics: &'session Haptics,
+    device: &'session mut dyn Device,
+    state: State,
+    time: f64,
+    ticks: usize,
+}
+
+impl Plan {
+    /// A session of `seconds` at `haptics`'s rate over `dataset`'s joints, with `snapshots` instants spread evenly.
+    #[must_use]
+    pub fn new(dataset: &Dataset, haptics: &Haptics, seconds: f64, snapshots: usize) -> Self {
+        let label = |axis: &crate::dataset::Axis| JointLabel { name: axis.name.clone(), unit: axis.unit.clone() };
+        Self {
+            joints: dataset.grid.axes.iter().map(label).collect(),
+            ticks: (seconds.max(0.0) / haptics.period()).round() as usize,
+            snapshots: (0..snapshots).map(|k| k as f64 * seconds / snapshots as f64).collect(),
+        }
+    }
+
+    /// Room for all ticks.
+    pub(super) fn new_ticks(&self) -> Result<Vec<Tick>, SessionError> {
+        let mut ticks = Vec::new();
+        ticks.try_reserve_exact(self.ticks).map_err(|error| SessionError::Resources(error.to_string()))?;
+        Ok(ticks)
+    }
+}
+
+impl<'session> Driver<'session> {
+    /// Reads the device and puts the proxy there, at rest.
+    ///
+    /// # Errors
+    /// When the device reports no position.
+    pub fn new(haptics: &'session Haptics, device: &'session mut dyn Device) -> Result<Self, Fault> {
+        let position = device.read(0.0).position;
+        let state = haptics.start(&position)?;
+        Ok(Self { haptics, device, state, time: 0.0, ticks: 0 })
+    }
+
+    /// One tick, `elapsed` after the one before and `interval` before the next [s]: read, compute, apply. Never
+    /// allocates.
+    pub fn tick(&mut self, elapsed: f64, interval: f64) -> Tick {
+        // The first tick follows the reading in `new` at once.
+        let since = if self.ticks == 0 { 0.0 } else { elapsed };
+        self.ticks += 1;
+        self.time += since;
+        let reading = self.device.read(since);
+        let inputs = Inputs { position: reading.position, age: reading.age, elapsed, interval };
+        let output = self.haptics.tick(&mut self.state, &inputs);
+        self.device.apply(&output.torque);
+        Tick {
+            time: self.time,
+            hand: reading.hand,
+            device: output.device,
+            proxy: output.proxy,
+            device_torque: output.torque,
+            contact_torque: output.sample.torque,
+            index: output.sample.index,
+            contact: output.sample.contact,
+            share: output.sample.share,
+            contact_nodes: output.sample.contact_nodes,
+            flags: output.flags,
+            fault: output.fault,
+            accounts: output.accounts,
+        }
+    }
+}
+
+impl From<&Tick> for Latest {
+    fn from(tick: &Tick) -> Self {
+        let share = if tick.contact { tick.share } else { 0.0 };
+        Self { time: tick.time, proxy: tick.proxy, device: tick.device, share }
+    }
+}
+
+/// The graphics loop: frames as they become due, some of them kept.
+pub(super) struct Frames<'session, 'object> {
+    graphics: &'session mut Graphics<'object>,
+    snapshots: std::iter::Peekable<std::vec::IntoIter<f64>>,
+    drawn: usize,
+    kept: Vec<Frame>,
+}
+
+impl<'session, 'object> Frames<'session, 'object> {
+    pub(super) fn new(graphics: &'session mut Graphics<'object>, plan: &Plan) -> Self {
+        let snapshots = plan.snapshots.clone().into_iter().peekable();
+        Self { graphics, snapshots, drawn: 0, kept: Vec::with_capacity(plan.snapshots.len()) }
+    }
+
+    /// When the next frame is due [s].
+    pub(super) fn due(&self) -> f64 {
+        self.drawn as f64 * self.graphics.motion().period()
+    }
+
+    /// Draws the next frame.
+    pub(super) fn draw(&mut self, latest: &Latest) {
+        let time = self.due();
+        self.graphics.frame(&latest.proxy, latest.share);
+        self.drawn += 1;
+        let mut wanted = false;
+        while self.snapshots.next_if(|&instant| instant <= time).is_some() {
+            wanted = true;
+        }
+        if wanted {
+            let nodes = self.graphics.motion().nodes().collect();
+            self.kept.push(Frame { time, proxy: latest.proxy, nodes });
+        }
+    }
+
+    pub(super) fn kept(self) -> Vec<Frame> {
+        self.kept
+    }
+}
+
+/// Runs a session as fast as it goes. The same inputs give the same numbers, bit for bit.
+///
+/// # Errors
+/// When the device reports no first position.
+pub fn run(
+    haptics: &Haptics,
+    device: &mut dyn Device,
+    graphics: Option<&mut Graphics<'_>>,
+    plan: &Plan,
+) -> Result<Trace, SessionError> {
+    let mut driver = Driver::new(haptics, device)?;
+    let mut frames = graphics.map(|graphics| Frames::new(graphics, plan));
+    let mut ticks = plan.new_ticks()?;
+    for _ in 0..plan.ticks {
+        let tick = driver.tick(haptics.period(), haptics.period());
+        if let Some(frames) = &mut frames {
+            while frames.due() <= tick.time {
+                frames.draw(&Latest::from(&tick));
+            }
+        }
+        ticks.push(tick);
+    }
+    Ok(Trace { joints: plan.joints.clone(), ticks, frames: frames.map(Frames::kept).unwrap_or_default() })
+}

@@ -1,0 +1,97 @@
+//! The real-time loop: it allocates nothing, and does every tick that it does not report as missed.
+
+#![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
+
+mod desktop;
+mod synthetic;
+
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use desktop::{haptics, proxy};
+use haptize as engine;
+use haptize::{
+    JointVector, MAX_JOINTS,
+    dataset::Dataset,
+    device::{Motion, SimulatedHand},
+    render::{
+        field::TorqueField,
+        haptic::{Haptics, Inputs},
+        realtime::{self, Ends, HapticLoop},
+        session::Plan,
+    },
+    scene::Waypoint,
+};
+use synthetic::{grid, half_space};
+
+// In debug builds the process is aborted when it allocates within `assert_no_alloc`.
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+fn object(joints: usize) -> Dataset {
+    half_space(grid(&vec![(-0.6, 0.3, 5); joints]), 5.0)
+}
+
+fn build(data: &Dataset) -> Haptics {
+    let joints = data.grid.joints();
+    let spec = haptics(joints);
+    let field = TorqueField::new(data, spec.threshold, &spec.boundary_slope).unwrap();
+    Haptics::new(field, proxy(joints), &spec)
+}
+
+fn hand(joints: usize) -> SimulatedHand {
+    let waypoint = |time, x| Waypoint { time, q: JointVector::from_slice(&vec![x; joints]) };
+    let motion = Motion::through(&[waypoint(0.0, -0.2), waypoint(0.1, 0.3), waypoint(0.3, -0.2)], joints).unwrap();
+    SimulatedHand::new(&haptics(joints), motion).unwrap()
+}
+
+#[test]
+fn a_tick_allocates_nothing_whatever_it_is_told() {
+    for joints in 1..=MAX_JOINTS {
+        let haptics = build(&object(joints));
+        let all = |x: f64| JointVector::from_slice(&vec![x; joints]);
+        let mut state = haptics.start(&all(0.0)).unwrap();
+        // Free, in contact, outside the grid, at a stop, and what no device should say.
+        for x in [0.0, 0.3, 0.7, 50.0, f64::NAN, f64::INFINITY, -0.3] {
+            let inputs = Inputs { position: all(x), age: 0.0, elapsed: 1e-3, interval: 1e-3 };
+            assert_no_alloc(|| {
+                for _ in 0..200 {
+                    haptics.tick(&mut state, &inputs);
+                }
+            });
+        }
+    }
+}
+
+#[test]
+fn the_real_time_loop_allocates_nothing() {
+    let data = object(3);
+    let haptics = build(&data);
+    let mut hand = hand(3);
+    let (mut body, Ends { mut ticks, mut latest }) = HapticLoop::new(&haptics, &mut hand).unwrap();
+    assert_no_alloc(|| {
+        for _ in 0..300 {
+            body.tick();
+        }
+    });
+    let mut last = None;
+    while let Ok(tick) = ticks.pop() {
+        last = Some(tick);
+    }
+    assert_eq!(latest.read().proxy, last.unwrap().proxy);
+}
+
+#[test]
+fn a_session_against_the_clock_does_every_tick_that_it_does_not_report() {
+    let data = object(3);
+    let haptics = build(&data);
+    let mut hand = hand(3);
+    let plan = Plan::new(&data, &haptics, 0.4, 0);
+    let (trace, timing) = realtime::run(&haptics, &mut hand, None, &plan).unwrap();
+    let done = trace.ticks.len() as u64 + timing.unrecorded;
+    // The last tick may leave out deadlines beyond the end of the plan.
+    assert!(done + timing.missed_deadlines >= 400, "{done} ticks, {timing:?}");
+    assert_eq!(timing.lateness.count, done);
+    assert_eq!(timing.tick_cost.count, done);
+    let summary = trace.summary();
+    assert!(summary.contact_share > 0.0 && summary.max_relative_account_residual < 1e-11, "{summary:?}");
+    assert!(trace.ticks.windows(2).all(|pair| pair[0].time < pair[1].time));
+}

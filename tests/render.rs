@@ -1,0 +1,404 @@
+//! The haptic and the graphics loop, driven from outside: energy accounts, limits, faults, repeatability.
+
+#![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
+
+mod desktop;
+mod synthetic;
+
+use desktop::{haptics, proxy};
+use glam::DVec3;
+use haptize as engine;
+use haptize::{
+    JointVector,
+    contact::Status,
+    dataset::{Contacts, Dataset},
+    device::{Device, Motion, Reading, Recorded, SimulatedHand},
+    object::Object,
+    render::{
+        field::TorqueField,
+        flags::{Fault, Flags},
+        graphics::{ContactForces, Graphics, GraphicsError, ObjectMotion},
+        haptic::{Haptics, Inputs},
+        passivity,
+        session::{self, Plan},
+        trace::{JointLabel, Trace},
+    },
+    scene::{GroundNodes, GroundSpec, HapticsSpec, ObjectSpec, Shape, SpringKind, SpringSpec, Waypoint},
+};
+use synthetic::{dataset, grid, half_space};
+
+fn vector(values: &[f64]) -> JointVector {
+    JointVector::from_slice(values)
+}
+
+fn all(joints: usize, value: f64) -> JointVector {
+    vector(&vec![value; joints])
+}
+
+/// A half space of 5 N m/rad in `joints` joints, on a grid from -0.6 to 0.6 rad.
+fn object(joints: usize) -> Dataset {
+    let count = if joints > 3 { 5 } else { 13 };
+    half_space(grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]), 5.0)
+}
+
+fn build(data: &Dataset, spec: &HapticsSpec) -> Haptics {
+    let field = TorqueField::new(data, spec.threshold, &spec.boundary_slope).unwrap();
+    Haptics::new(field, proxy(data.grid.joints()), spec)
+}
+
+/// Into the object, along it, and out again, in two seconds.
+fn press(joints: usize) -> Motion {
+    let mut along = all(joints, 0.25);
+    along[0] = 0.35;
+    let way = [(0.0, all(joints, -0.2)), (0.7, all(joints, 0.25)), (1.3, along), (2.0, all(joints, -0.2))];
+    Motion::through(&way.map(|(time, q)| Waypoint { time, q }), joints).unwrap()
+}
+
+fn pressed(joints: usize, spec: &HapticsSpec) -> Trace {
+    let data = object(joints);
+    let haptics = build(&data, spec);
+    let mut hand = SimulatedHand::new(spec, press(joints)).unwrap();
+    session::run(&haptics, &mut hand, None, &Plan::new(&data, &haptics, 2.0, 0)).unwrap()
+}
+
+fn labels(joints: usize) -> Vec<JointLabel> {
+    (0..joints).map(|a| JointLabel { name: format!("joint {a}"), unit: "rad".into() }).collect()
+}
+
+/// A device that reports what it is told.
+struct Scripted(Vec<Reading>, usize);
+
+impl Scripted {
+    fn new(positions: impl IntoIterator<Item = JointVector>) -> Self {
+        let reading = |position| Reading { position, age: 0.0, hand: position };
+        Self(positions.into_iter().map(reading).collect(), 0)
+    }
+}
+
+impl Device for Scripted {
+    fn read(&mut self, _: f64) -> Reading {
+        let reading = self.0[self.1.min(self.0.len() - 1)];
+        self.1 += 1;
+        reading
+    }
+
+    fn apply(&mut self, _: &JointVector) {}
+}
+
+#[test]
+fn accounts_close_to_rounding_and_the_proxy_never_gives_more_than_was_put_in() {
+    for joints in [1, 2, 3, 6] {
+        let trace = pressed(joints, &haptics(joints));
+        let summary = trace.summary();
+        assert!(summary.contact_share > 0.3, "{summary:?}");
+        assert!(summary.max_relative_account_residual < 1e-11, "{summary:?}");
+        assert!(summary.min_absorbed > -1e-15, "{summary:?}");
+        let last = trace.ticks.last().unwrap().accounts;
+        assert!(last.turnover > 1e-3 && last.proxy_dissipation > 0.0 && last.coupling_dissipation > 0.0);
+    }
+}
+
+#[test]
+fn accounts_notice_energy_from_nowhere() {
+    let mut accounts = pressed(2, &haptics(2)).ticks.last().unwrap().accounts;
+    accounts.field_work += 1e-6;
+    assert!(accounts.residual().abs() / accounts.turnover > 1e-8);
+}
+
+#[test]
+fn accounts_close_when_ticks_jitter_from_a_fifth_of_a_millisecond_to_twenty() {
+    let (data, spec) = (object(3), haptics(3));
+    let haptics = build(&data, &spec);
+    let mut state = haptics.start(&all(3, -0.1)).unwrap();
+    let (mut time, mut elapsed) = (0.0, 1e-3);
+    for k in 0..20_000_u32 {
+        let interval = 2e-3 * 10_f64.powf((f64::from(k) * 1.7).sin());
+        let position = all(3, 0.1 + 0.25 * (3.0_f64 * time).sin() + 0.001 * (f64::from(k) * 2.9).sin());
+        let output = haptics.tick(&mut state, &Inputs { position, age: 0.0, elapsed, interval });
+        let accounts = output.accounts;
+        assert!(accounts.residual().abs() <= 1e-10 * accounts.turnover, "tick {k}: {accounts:?}");
+        assert!(accounts.absorbed() >= -1e-10 * accounts.turnover, "tick {k}: {accounts:?}");
+        assert!(output.torque.is_finite() && output.proxy.is_finite());
+        time += interval;
+        elapsed = interval;
+    }
+}
+
+#[test]
+fn without_input_the_proxy_comes_to_rest_and_the_device_feels_the_contact_torque() {
+    // The device held still, inside the object: at rest Kvc (y - x) = -tau(x), and that is what the hand feels.
+    let (data, spec) = (object(3), haptics(3));
+    let haptics = build(&data, &spec);
+    let mut device = Scripted::new([all(3, 0.3)]);
+    let trace = session::run(&haptics, &mut device, None, &Plan::new(&data, &haptics, 3.0, 0)).unwrap();
+    let last = trace.ticks.last().unwrap();
+    assert!(last.accounts.kinetic < 1e-20, "{:?}", last.accounts);
+    // Springs in series: 5 of the object along the diagonal, 15 of the coupling.
+    for (tau, contact) in last.device_torque.iter().zip(last.contact_torque.iter()) {
+        assert!((tau - contact).abs() < 1e-9, "{tau} felt, {contact} rendered");
+        assert!((tau + 0.3 * 15.0 * 5.0 / 20.0).abs() < 1e-9, "{tau}");
+    }
+}
+
+#[test]
+fn a_press_is_continuous() {
+    let trace = pressed(3, &haptics(3));
+    let summary = trace.summary();
+    // The torque of the object and its layer changes by no more than 10 N m/rad at the hand's speed of about 2 rad/s.
+    assert!(summary.max_contact_torque > 1.0, "{summary:?}");
+    assert!(summary.max_contact_torque_step < 0.03, "{summary:?}");
+    assert!(summary.max_device_torque_step < 0.06, "{summary:?}");
+    assert_eq!((summary.faults, summary.outside, summary.limited), (0, 0, 0));
+}
+
+#[test]
+fn the_same_session_gives_the_same_numbers_twice() {
+    assert_eq!(pressed(3, &haptics(3)), pressed(3, &haptics(3)));
+}
+
+#[test]
+fn a_recorded_session_replays_bit_for_bit() {
+    let (data, spec) = (object(2), haptics(2));
+    let trace = pressed(2, &spec);
+    let mut file = tempfile::NamedTempFile::new().unwrap();
+    for tick in &trace.ticks {
+        use std::io::Write;
+        writeln!(file, "{},{},{}", tick.time, tick.device[0], tick.device[1]).unwrap();
+    }
+    let mut device = Recorded::new(Motion::from_csv(file.path(), 2).unwrap());
+    let haptics = build(&data, &spec);
+    let again = session::run(&haptics, &mut device, None, &Plan::new(&data, &haptics, 2.0, 0)).unwrap();
+    assert_eq!(again.ticks.len(), trace.ticks.len());
+    for (a, b) in again.ticks.iter().zip(&trace.ticks) {
+        assert_eq!((a.device_torque, a.proxy, a.accounts), (b.device_torque, b.proxy, b.accounts), "at {} s", a.time);
+    }
+}
+
+#[test]
+fn torque_is_limited_in_size_and_rate() {
+    let mut spec = haptics(2);
+    spec.torque_limit = all(2, 0.4);
+    spec.torque_rate_limit = all(2, 20.0);
+    // The device leaps by a radian.
+    let positions = (0..400).map(|k| all(2, if k < 100 { -0.5 } else { 0.5 }));
+    let data = object(2);
+    let haptics = build(&data, &spec);
+    let trace =
+        session::run(&haptics, &mut Scripted::new(positions), None, &Plan::new(&data, &haptics, 0.4, 0)).unwrap();
+    let mut before = all(2, 0.0);
+    for tick in &trace.ticks {
+        for (tau, before) in tick.device_torque.iter().zip(before.iter()) {
+            assert!(tau.abs() <= 0.4 && (tau - before).abs() <= 0.02 + 1e-15, "{tau} after {before}");
+        }
+        before = tick.device_torque;
+    }
+    assert!(trace.ticks.iter().any(|tick| tick.flags.contains(Flags::SIZE_LIMITED)));
+    assert!(trace.ticks.iter().any(|tick| tick.flags.contains(Flags::RATE_LIMITED)));
+    assert!(trace.summary().max_relative_account_residual < 1e-11);
+}
+
+#[test]
+fn a_device_that_fails_is_let_go_smoothly_with_the_reason() {
+    let (data, spec) = (object(2), haptics(2));
+    let haptics = build(&data, &spec);
+    let good = Inputs { position: all(2, 0.3), age: 0.0, elapsed: 1e-3, interval: 1e-3 };
+    let failures = [
+        (Inputs { position: all(2, f64::NAN), ..good }, Fault::NotFinite),
+        (Inputs { position: all(2, f64::INFINITY), ..good }, Fault::NotFinite),
+        (Inputs { position: all(2, -1e300), ..good }, Fault::NotFinite),
+        (Inputs { position: all(3, 0.3), ..good }, Fault::Joints),
+        (Inputs { position: all(0, 0.3), ..good }, Fault::Joints),
+        (Inputs { age: 1.0, ..good }, Fault::Stale),
+        (Inputs { age: f64::NAN, ..good }, Fault::Stale),
+        (Inputs { elapsed: 0.0, ..good }, Fault::Interval),
+        (Inputs { elapsed: f64::NAN, ..good }, Fault::Interval),
+        (Inputs { interval: -1e-3, ..good }, Fault::Interval),
+        (Inputs { interval: f64::INFINITY, ..good }, Fault::Interval),
+    ];
+    for (bad, reason) in failures {
+        let mut state = haptics.start(&good.position).unwrap();
+        for _ in 0..500 {
+            assert_eq!(haptics.tick(&mut state, &good).fault, None);
+        }
+        let mut before = haptics.tick(&mut state, &good).torque;
+        assert!(before.norm() > 0.5);
+        let mut ticks = 0;
+        while before.norm() > 0.0 {
+            let output = haptics.tick(&mut state, &bad);
+            assert_eq!(output.fault, Some(reason), "{bad:?}");
+            // 500 N m/s.
+            assert!(output.torque.iter().zip(before.iter()).all(|(tau, b)| (tau - b).abs() <= 0.5 + 1e-12));
+            assert!(
+                output.torque.norm() < before.norm()
+                    && output.proxy.is_finite()
+                    && output.accounts.residual().is_finite()
+            );
+            before = output.torque;
+            ticks += 1;
+            assert!(ticks < 10);
+        }
+        // The device comes back: so does the torque, without a blow.
+        let mut output = haptics.tick(&mut state, &good);
+        assert_eq!(output.fault, None);
+        for _ in 0..500 {
+            output = haptics.tick(&mut state, &good);
+        }
+        assert!(output.torque.norm() > 0.5 && output.accounts.residual().abs() < 1e-11 * output.accounts.turnover);
+    }
+    assert_eq!(haptics.start(&all(2, f64::NAN)).err(), Some(Fault::NotFinite));
+    assert_eq!(haptics.start(&all(1, 0.0)).err(), Some(Fault::Joints));
+}
+
+#[test]
+fn gains_beyond_their_bound_are_named_with_the_safe_value() {
+    let (data, mut spec) = (object(2), haptics(2));
+    let field = |spec: &HapticsSpec| TorqueField::new(&data, 0.5, &spec.boundary_slope).unwrap();
+    assert_eq!(passivity::exceeded(&spec, &field(&spec), &labels(2)), []);
+    spec.boundary_slope[1] = 50.0;
+    spec.coupling_stiffness[0] = 30.0;
+    let found = passivity::exceeded(&spec, &field(&spec), &labels(2));
+    let safe: Vec<(f64, f64)> = found.iter().map(|bound| (bound.value, bound.safe)).collect();
+    assert_eq!(safe, [(30.0, 20.0), (50.0, 40.0)]);
+    assert!(found[1].to_string().contains("boundary slope Ks of joint joint 1 is 50.0000, beyond the passive 40.0000"));
+    // The values that it names are safe.
+    spec.boundary_slope[1] = safe[1].1;
+    spec.coupling_stiffness[0] = safe[0].1;
+    assert_eq!(passivity::exceeded(&spec, &field(&spec), &labels(2)), []);
+    spec.proxy_damping = all(2, 1e-3);
+    assert!(passivity::exceeded(&spec, &field(&spec), &labels(2)).iter().any(|b| b.what.starts_with("stiffness")));
+}
+
+/// The paper's sphere: 102 nodes.
+fn sphere(stiffness: f64, damping: f64) -> Object {
+    Object::build(&ObjectSpec {
+        shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings: 10, segments: 10 },
+        springs: SpringSpec { kind: SpringKind::Isotropic, stiffness },
+        ground: GroundSpec { stiffness: 0.3 * stiffness, nodes: GroundNodes::All },
+        node_mass: 1e-3,
+        node_damping: damping,
+    })
+    .unwrap()
+}
+
+/// Kinetic and elastic energy of the object [J].
+fn energy(object: &Object, motion: &ObjectMotion<'_>) -> f64 {
+    let mut force = vec![DVec3::ZERO; object.rest.len()];
+    object.stiffness.apply(motion.displacement(), &mut force);
+    let elastic: f64 = force.iter().zip(motion.displacement()).map(|(f, u)| f.dot(*u)).sum();
+    let kinetic: f64 = object.mass.iter().zip(motion.velocity()).map(|(m, v)| m * v.length_squared()).sum();
+    0.5 * (elastic + kinetic)
+}
+
+#[test]
+fn the_object_never_gains_energy_without_input_and_balances_with_it() {
+    for stiffness in [300.0, 3e7] {
+        let object = sphere(stiffness, 0.05);
+        for period in [1e-3, 1.0 / 60.0, 1.0] {
+            let mut motion = ObjectMotion::new(&object, period).unwrap();
+            let mut before = 0.0;
+            for frame in 0..200 {
+                let pushed = frame < 20;
+                let force =
+                    |k: usize| if pushed { DVec3::new(0.0, 0.1, -(((k + frame) % 7) as f64)) } else { DVec3::ZERO };
+                let forces: Vec<DVec3> = (0..object.rest.len()).map(force).collect();
+                let v_hat = motion.step(&forces);
+                let work: f64 = period * v_hat.iter().zip(&forces).map(|(v, f)| v.dot(*f)).sum::<f64>();
+                let loss: f64 =
+                    period * v_hat.iter().zip(&object.damping).map(|(v, b)| b * v.length_squared()).sum::<f64>();
+                let after = energy(&object, &motion);
+                let scale = before + after + work.abs() + loss;
+                assert!(
+                    (after - before - work + loss).abs() < 1e-11 * scale,
+                    "{stiffness} N/m, {period} s, frame {frame}"
+                );
+                assert!(pushed || after <= before * (1.0 + 1e-12), "{stiffness} N/m, {period} s, frame {frame}");
+                before = after;
+            }
+            assert!(before > 0.0);
+        }
+    }
+}
+
+#[test]
+fn under_constant_forces_the_object_settles_where_its_springs_balance_them() {
+    let object = sphere(300.0, 2.0);
+    let mut motion = ObjectMotion::new(&object, 1.0 / 60.0).unwrap();
+    let mut forces = vec![DVec3::ZERO; object.rest.len()];
+    forces[0] = DVec3::new(0.1, 0.0, -0.8);
+    for _ in 0..4000 {
+        motion.step(&forces);
+    }
+    let mut spring = vec![DVec3::ZERO; object.rest.len()];
+    object.stiffness.apply(motion.displacement(), &mut spring);
+    let error = spring.iter().zip(&forces).map(|(k, f)| (*k - *f).length()).fold(0.0, f64::max);
+    assert!(error < 1e-6, "{error}");
+    assert_eq!(motion.nodes().len(), 102);
+}
+
+/// A dataset in one joint over a sphere: node 3 is pushed from 0.2 rad on, node 7 with it from 0.4 rad on.
+fn pushed() -> Dataset {
+    let mut data = dataset(grid(&[(0.0, 0.2, 4)]), |q| {
+        (vector(&[-q[0]]), 0.0, if q[0] > 0.1 { Status::Contact } else { Status::Free })
+    });
+    let forces: Vec<f32> = vec![0.0, 0.0, -1.0, 0.0, 0.0, -2.0, 1.0, 0.0, 0.0, 0.0, 0.0, -3.0, 2.0, 0.0, 0.0];
+    let contacts = Contacts {
+        offsets: vec![0_u64, 0, 1, 3, 5].into(),
+        nodes: vec![3_u32, 3, 7, 3, 7].into(),
+        forces: forces.into(),
+    };
+    data.contacts = Some(contacts);
+    data
+}
+
+#[test]
+fn contact_forces_are_interpolated_over_the_nodes_of_all_corners() {
+    let contact = ContactForces::new(&pushed(), 102).unwrap();
+    let mut forces = vec![DVec3::ONE; 102];
+    contact.interpolate(&[0.25], 0.5, &mut forces);
+    // Three quarters of the point at 0.2 rad and a quarter of that at 0.4 rad, times the share.
+    assert!((forces[3] - DVec3::new(0.0, 0.0, -0.625)).length() < 1e-12, "{}", forces[3]);
+    assert!((forces[7] - DVec3::new(0.125, 0.0, 0.0)).length() < 1e-12, "{}", forces[7]);
+    assert_eq!(forces.iter().filter(|f| **f != DVec3::ZERO).count(), 2);
+    contact.interpolate(&[0.25], 0.0, &mut forces);
+    assert!(forces.iter().all(|f| *f == DVec3::ZERO));
+}
+
+#[test]
+fn contact_forces_that_do_not_fit_are_refused() {
+    assert_eq!(ContactForces::new(&object(1), 102).err(), Some(GraphicsError::NoForces));
+    assert_eq!(ContactForces::new(&pushed(), 7).err(), Some(GraphicsError::Rows { nodes: 7 }));
+    for offsets in [[0, 0, 1, 3, 6], [0, 3, 1, 3, 5], [0, 0, 1, 3, u64::MAX]] {
+        let mut data = pushed();
+        data.contacts.as_mut().unwrap().offsets = offsets.to_vec().into();
+        assert_eq!(ContactForces::new(&data, 102).err(), Some(GraphicsError::Rows { nodes: 102 }), "{offsets:?}");
+    }
+    assert_eq!(
+        ObjectMotion::new(&sphere(300.0, 0.05), f64::NAN).err().map(|e| e.to_string().contains("NaN")),
+        Some(true)
+    );
+}
+
+#[test]
+fn two_loops_run_at_two_rates_and_repeat_bit_for_bit() {
+    let (data, spec, object) = (pushed(), haptics(1), sphere(300.0, 0.05));
+    let haptics = build(&data, &spec);
+    let way = [(0.0, 0.0), (0.5, 0.5), (1.0, 0.5), (1.5, 0.0)];
+    let run = || {
+        let motion = Motion::through(&way.map(|(time, q)| Waypoint { time, q: vector(&[q]) }), 1).unwrap();
+        let mut hand = SimulatedHand::new(&spec, motion).unwrap();
+        let mut graphics = Graphics::new(&data, &object, 60.0).unwrap();
+        let plan = Plan { snapshots: vec![0.0, 0.8, 0.8001, 1.45], ..Plan::new(&data, &haptics, 1.5, 0) };
+        session::run(&haptics, &mut hand, Some(&mut graphics), &plan).unwrap()
+    };
+    let trace = run();
+    assert_eq!(trace, run());
+    assert_eq!(trace.ticks.len(), 1500);
+    // The first frame at or after each instant, each once.
+    let times: Vec<f64> = trace.frames.iter().map(|frame| frame.time).collect();
+    let expected = [0.0, 48.0 / 60.0, 49.0 / 60.0, 87.0 / 60.0];
+    assert!(times.len() == 4 && times.iter().zip(expected).all(|(t, e)| (t - e).abs() < 1e-12), "{times:?}");
+    assert_eq!(trace.summary().max_contact_nodes, 2);
+    let moved = |frame: usize| trace.frames[frame].nodes[3] - object.rest[3];
+    assert_eq!(moved(0), DVec3::ZERO);
+    assert!(moved(1).z < -1e-4, "{}", moved(1));
+}
