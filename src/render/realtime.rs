@@ -93,9 +93,9 @@ impl<'session> HapticLoop<'session> {
         let elapsed = self.last.map_or(self.period, |last| now - last);
         let interval = (self.began + self.period * self.next).saturating_sub(now);
         self.last = Some(now);
-        let tick = self.driver.tick(elapsed.as_secs_f64(), interval.as_secs_f64());
+        let (tick, latest) = self.driver.tick(elapsed.as_secs_f64(), interval.as_secs_f64());
         self.cost.record(clock::now() - now);
-        self.latest.write(Latest::from(&tick));
+        self.latest.write(latest);
         if self.recorder.push(tick).is_err() {
             self.unrecorded += 1;
         }

@@ -93,9 +93,10 @@ impl<'session> Driver<'session> {
         Ok(Self { haptics, device, state, time: 0.0, ticks: 0 })
     }
 
-    /// One tick, `elapsed` after the one before and `interval` before the next [s]: read, compute, apply. Never
+    /// One tick, `elapsed` after the one before and `interval` before the next [s]: read, compute, apply. Answers with the
+    /// record and what graphics needs of it. Never
     /// allocates.
-    pub fn tick(&mut self, elapsed: f64, interval: f64) -> Tick {
+    pub fn tick(&mut self, elapsed: f64, interval: f64) -> (Tick, Latest) {
         // The first tick follows the reading in `new` at once.
         let since = if self.ticks == 0 { 0.0 } else { elapsed };
         self.ticks += 1;
@@ -104,7 +105,9 @@ impl<'session> Driver<'session> {
         let inputs = Inputs { position: reading.position, age: reading.age, elapsed, interval };
         let output = self.haptics.tick(&mut self.state, &inputs);
         self.device.apply(&output.torque);
-        Tick {
+        let share = if output.sample.contact { output.sample.share } else { 0.0 };
+        let latest = Latest { time: self.time, proxy: output.proxy, device: output.device, share };
+        let tick = Tick {
             time: self.time,
             hand: reading.hand,
             device: output.device,
@@ -113,19 +116,12 @@ impl<'session> Driver<'session> {
             contact_torque: output.sample.torque,
             index: output.sample.index,
             contact: output.sample.contact,
-            share: output.sample.share,
             contact_nodes: output.sample.contact_nodes,
             flags: output.flags,
             fault: output.fault,
             accounts: output.accounts,
-        }
-    }
-}
-
-impl From<&Tick> for Latest {
-    fn from(tick: &Tick) -> Self {
-        let share = if tick.contact { tick.share } else { 0.0 };
-        Self { time: tick.time, proxy: tick.proxy, device: tick.device, share }
+        };
+        (tick, latest)
     }
 }
 
@@ -182,10 +178,10 @@ pub fn run(
     let mut frames = graphics.map(|graphics| Frames::new(graphics, plan));
     let mut ticks = plan.new_ticks()?;
     for _ in 0..plan.ticks {
-        let tick = driver.tick(haptics.period(), haptics.period());
+        let (tick, latest) = driver.tick(haptics.period(), haptics.period());
         if let Some(frames) = &mut frames {
             while frames.due() <= tick.time {
-                frames.draw(&Latest::from(&tick));
+                frames.draw(&latest);
             }
         }
         ticks.push(tick);

@@ -32,8 +32,6 @@ pub struct Tick {
     pub index: f64,
     /// Whether the index exceeds its threshold.
     pub contact: bool,
-    /// Factor that boundary layer and fade put on the interpolated torque and contact forces, 0 to 1.
-    pub share: f64,
     /// Object nodes in contact at the heaviest grid corner in contact; 0 out of contact or where none are stored.
     pub contact_nodes: u32,
     /// Remarks on the tick.
@@ -179,7 +177,7 @@ impl Trace {
                 write!(out, ",{what} {} [{unit}]", plain(&joint.name))?;
             }
         }
-        write!(out, ",contact index,contact,contact share,contact nodes,flags,fault")?;
+        write!(out, ",contact index,contact,contact nodes,flags,fault")?;
         for name in [
             "kinetic",
             "spring",
@@ -204,8 +202,8 @@ impl Trace {
                 }
             }
             let fault = tick.fault.map(|fault| fault.to_string()).unwrap_or_default();
-            let (index, contact, share, nodes) = (tick.index, u8::from(tick.contact), tick.share, tick.contact_nodes);
-            write!(out, ",{index},{contact},{share},{nodes},{},{fault}", tick.flags.bits())?;
+            let (index, contact, nodes) = (tick.index, u8::from(tick.contact), tick.contact_nodes);
+            write!(out, ",{index},{contact},{nodes},{},{fault}", tick.flags.bits())?;
             let a = &tick.accounts;
             for value in [
                 a.kinetic,
@@ -267,7 +265,6 @@ mod tests {
             contact_torque: one,
             index: 1.0,
             contact: torque != 0.0,
-            share: 1.0,
             contact_nodes: 3,
             flags: Flags::default(),
             fault: None,
