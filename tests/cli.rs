@@ -49,3 +49,125 @@ fn an_unknown_command_is_a_usage_error() {
         assert!(output.stdout.is_empty());
     }
 }
+
+/// A finger of one joint above a ball, at eight angles.
+const FINGER: &str = r#"name = "finger"
+[object]
+node_mass = 0.005
+sphere = { radius = 0.05, rings = 10, segments = 10 }
+springs = { kind = "isotropic", stiffness = 300.0 }
+[object.ground]
+stiffness = 100.0
+[[proxy.joint]]
+kind = "revolute"
+origin = [-0.1, 0.0, 0.06]
+axis = [0.0, 1.0, 0.0]
+limits = [-0.5, 0.5]
+nodes = [{ at = [0.1, 0.0, 0.0] }]
+[contact]
+stiffness = 1000.0
+[grid]
+axes = [{ start = 0.0, stop = 0.28, count = 8 }]
+[graphics]
+rate = 60.0
+"#;
+
+/// A tetrahedron without its last face.
+const OPEN_MESH: &str = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n";
+
+/// The scene with `old` replaced by `new`.
+fn changed(old: &str, new: &str) -> String {
+    assert_eq!(FINGER.matches(old).count(), 1, "{old} stands once in the scene");
+    FINGER.replace(old, new)
+}
+
+#[test]
+fn broken_scenes_are_refused_with_place_and_remedy() {
+    let sphere = "sphere = { radius = 0.05, rings = 10, segments = 10 }";
+    let joint = &FINGER[FINGER.find("[[proxy").unwrap()..FINGER.find("[contact]").unwrap()];
+    let axis = "{ start = 0.0, stop = 0.28, count = 8 }";
+    let large = "{ start = 0.0, stop = 0.28, count = 10000 }, ".repeat(3);
+    let cases = [
+        // What is wrong, the scene, the line at fault (empty: the file as a whole), and what the message has to name.
+        ("an unknown key", changed("rate = 60.0", "rating = 60.0"), "rating = 60.0", "rating"),
+        ("negative stiffness", changed("stiffness = 300.0", "stiffness = -300.0"), "-300.0", "positive"),
+        ("a NaN", changed("node_mass = 0.005", "node_mass = nan"), "node_mass = nan", "node_mass"),
+        ("no TOML", changed("name = \"finger\"", "name = finger"), "name = finger", "expected"),
+        ("a missing mesh", changed(sphere, "mesh = { file = \"none.obj\" }"), "none.obj", "cannot be opened"),
+        ("an open mesh", changed(sphere, "mesh = { file = \"open.obj\" }"), "", "open.obj"),
+        ("no ground", changed("stiffness = 100.0", "stiffness = 100.0\nbelow = -1.0"), "", "ground"),
+        ("10^12 points", changed(joint, &joint.repeat(3)).replace(axis, &large), "count = 10000", "1.000e12 points"),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("open.obj"), OPEN_MESH).unwrap();
+    for (what, scene, line, word) in cases {
+        std::fs::write(folder.path().join("broken.toml"), &scene).unwrap();
+        let output = haptize(folder.path(), &["bake", "broken.toml", "-o", "broken.haptize", "--json"]);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{what}: {message}");
+        assert!(output.stdout.is_empty(), "{what}: a failure prints no result");
+        assert!(message.starts_with("haptize: ") && message.contains(word), "{what}: {message}");
+        if !line.is_empty() {
+            let found = scene.lines().position(|candidate| candidate.contains(line)).unwrap();
+            // The span of a missing or doubtful entry may begin at its table's header, one line above.
+            let places = [found, found + 1].map(|number| format!("broken.toml:{number}:"));
+            assert!(places.iter().any(|place| message.contains(place)), "{what} near line {}: {message}", found + 1);
+        }
+        let left = std::fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(left, 2, "{what} leaves nothing behind");
+    }
+}
+
+#[test]
+fn a_missing_or_broken_file_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("finger.toml"), FINGER).unwrap();
+    let report = json(folder.path(), &["bake", "finger.toml", "--json"]);
+    assert_eq!(report["points"], 8);
+    let whole = std::fs::read(folder.path().join("finger.haptize")).unwrap();
+    std::fs::write(folder.path().join("cut.haptize"), &whole[..whole.len() - 1]).unwrap();
+    let mut altered = whole.clone();
+    altered[whole.len() / 2] ^= 1;
+    std::fs::write(folder.path().join("altered.haptize"), altered).unwrap();
+    std::fs::write(folder.path().join("empty.haptize"), "").unwrap();
+    for file in ["none.haptize", "cut.haptize", "altered.haptize", "empty.haptize", "finger.toml", "."] {
+        for command in [&["info", file][..], &["export", file, "--format", "csv"]] {
+            let output = haptize(folder.path(), command);
+            let message = text(&output.stderr);
+            assert_eq!(output.status.code(), Some(1), "{command:?}: {message}");
+            assert!(message.starts_with(&format!("haptize: {file}: ")), "{command:?}: {message}");
+            assert!(message.contains("; "), "{command:?} says what to do: {message}");
+        }
+    }
+    assert!(!folder.path().join("cut.csv").exists(), "nothing is exported from a broken file");
+}
+
+#[test]
+fn bake_info_and_export_tell_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("finger.toml"), FINGER).unwrap();
+    let baked = json(folder.path(), &["bake", "finger.toml", "-o", "f.haptize", "--backend", "cpu", "--json"]);
+    for key in [
+        "points",
+        "contact_points",
+        "unconverged",
+        "overflowed",
+        "max_residual",
+        "iterations",
+        "seconds",
+        "configurations_per_second",
+        "backend",
+        "adapter",
+        "algorithm",
+    ] {
+        assert!(!baked[key].is_null(), "{key} in {baked}");
+    }
+    assert_eq!((&baked["backend"], &baked["algorithm"]), (&"cpu".into(), &"energy".into()));
+    let held = json(folder.path(), &["info", "f.haptize", "--json"]);
+    assert_eq!(held["points"], baked["points"]);
+    assert_eq!(held["contact"], baked["contact_points"]);
+    let exported = json(folder.path(), &["export", "f.haptize", "--format", "csv", "--json"]);
+    let files = exported["files"].as_array().unwrap();
+    let rows = std::fs::read_to_string(folder.path().join(files[0].as_str().unwrap())).unwrap();
+    assert_eq!(rows.lines().filter(|line| !line.starts_with('#')).count(), 1 + 8, "{rows}");
+}
