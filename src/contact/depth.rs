@@ -34,6 +34,8 @@ pub struct Contact {
     pub normal: DVec3,
     /// r + s, positive in contact [m].
     pub depth: f64,
+    /// Force lambda by which the curvature counts; kc depth at the solution [N].
+    pub multiplier: f64,
     /// Second derivative of s.
     pub curvature: Curvature,
 }
@@ -122,17 +124,18 @@ pub fn second_variation(contact: &Contact, v: [DVec3; 3]) -> [DVec3; 3] {
     product
 }
 
-/// Product of the Hessian of 1/2 kc depth^2 with node displacements `v` [m]: one vector per node [N].
+/// Product of the Hessian of 1/2 kc depth^2 with node displacements `v` [m]: one vector per node [N]. The force kc depth that
+/// weighs the curvature is the contact's multiplier.
 #[must_use]
 pub fn hessian_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3] {
-    let Contact { weights, normal, depth, .. } = contact;
+    let Contact { weights, normal, .. } = contact;
     let mut deepening = 0.0;
     for j in 0..3 {
         deepening += weights[j] * normal.dot(v[j]);
     }
     let mut product = second_variation(contact, v);
     for j in 0..3 {
-        product[j] = (*normal * (deepening * weights[j]) + product[j] * *depth) * kc;
+        product[j] = *normal * (kc * deepening * weights[j]) + product[j] * contact.multiplier;
     }
     product
 }
@@ -157,7 +160,18 @@ mod tests {
         let face = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
         let pseudonormal = if point.feature == Feature::Face { face } else { outward };
         let (normal, depth, curvature) = measure(x, radius, corners, point.weights, point.feature, pseudonormal);
-        (point.feature, Contact { proxy_node: 0, nodes: [0, 1, 2], weights: point.weights, normal, depth, curvature })
+        (
+            point.feature,
+            Contact {
+                proxy_node: 0,
+                nodes: [0, 1, 2],
+                weights: point.weights,
+                normal,
+                depth,
+                curvature,
+                multiplier: 3.0 * depth,
+            },
+        )
     }
 
     fn inner(a: [DVec3; 3], b: [DVec3; 3]) -> f64 {

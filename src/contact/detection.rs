@@ -36,6 +36,8 @@ struct Standing {
     /// Candidates: from, to.
     from: usize,
     to: usize,
+    /// Has touched since the configuration was taken up, and is reported as a near miss from then on.
+    watched: bool,
     /// Triangle that was closest last: tried first, which makes the search short.
     last: u32,
 }
@@ -114,6 +116,7 @@ impl Detection {
             let radius = model.chain.nodes[i].radius;
             let standing = &mut self.standings[i];
             standing.margin = -1.0;
+            standing.watched = false;
             // Outside the surface's box the node is outside the surface, and the box bounds its distance.
             let to_box = model.bounds.distance_squared(x);
             standing.distance = to_box.sqrt();
@@ -131,7 +134,8 @@ impl Detection {
     }
 
     /// Contacts with the surface displaced by `displacement`, i.e. at `positions` relative to the model's centre [m], in
-    /// ascending order of proxy nodes.
+    /// ascending order of proxy nodes. Nodes that touched before in this configuration are included with a depth below zero
+    /// when they do not touch now, because they are the ones that may touch again.
     pub fn deformed(&mut self, model: &Model, displacement: &[f64], positions: &[DVec3], contacts: &mut Vec<Contact>) {
         contacts.clear();
         let mut moved = 0.0f64;
@@ -166,8 +170,9 @@ impl Detection {
             let closest = closest_deformed(model, x, standing, &self.candidates, &self.moved, positions);
             standing.last = closest.triangle;
             if let Some(contact) = contact_at(model, i, x, radius, positions, &closest)
-                && contact.depth > 0.0
+                && (contact.depth > 0.0 || standing.watched)
             {
+                standing.watched = true;
                 contacts.push(contact);
             }
         }
@@ -258,5 +263,5 @@ fn contact_at(
     let pseudonormal = surface::pseudonormal(positions, &model.object.triangles, &model.object.topology, t, feature);
     let (normal, depth, curvature) =
         measure(x, radius, surface::corners(positions, nodes), weights, feature, pseudonormal);
-    Some(Contact { proxy_node: i as u32, nodes, weights, normal, depth, curvature })
+    Some(Contact { proxy_node: i as u32, nodes, weights, normal, depth, curvature, multiplier: 0.0 })
 }

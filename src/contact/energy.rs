@@ -5,6 +5,10 @@
 //! decreases by a fair share of what the model promised: E never increases. Converged when the contact forces c(u)
 //! balance f: sqrt(r . C r) <= tolerance sqrt(c . C c), r = c - f.
 //!
+//! Stiff contact is reached in stages of growing kc, each from the state before: E has then the shape of a steep and bent
+//! valley, whose floor soft contact finds and stiffer contact only corrects. A stage's end never lies above the rest
+//! state in E at the final kc: E_s(u_s) <= E_s(0) bounds both its elastic energy and its depths by those at rest.
+//!
 //! With the geometry frozen at rest (`linearised`) the same steps minimise the convex
 //! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`.
 
@@ -12,10 +16,10 @@ use super::depth::Contact;
 use super::detection::Detection;
 use super::model::Model;
 use super::support::{Support, dot};
-use super::trust_region::{TrustRegion, add_contact_forces};
+use super::trust_region::{Springs, TrustRegion, add_contact_forces};
 use crate::tolerances::{
-    ACCEPTED_SHARE, ENERGY_ROUNDING, GIVE_UP_RADIUS, GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE,
-    RESIDUAL_FLOOR, SHRINK, WIDEN,
+    ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, ENERGY_ROUNDING, GIVE_UP_RADIUS, GOOD_SHARE,
+    INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, SHRINK, STAGE_TOLERANCE, WIDEN,
 };
 use glam::DVec3;
 
@@ -41,6 +45,8 @@ pub struct State {
     pub contacts: Vec<Contact>,
     /// E [J].
     pub energy: f64,
+    /// Its elastic part [J].
+    pub elastic: f64,
 }
 
 /// What became of a search.
@@ -61,14 +67,18 @@ pub struct EnergySearch {
     trial: State,
     /// The object nodes that carry force.
     pub support: Support,
+    /// Contact stiffness of the current stage [N/m].
+    kc: f64,
+    /// Predicted multiplier of each proxy node [N].
+    multipliers: Vec<f64>,
     slots: Vec<[usize; 3]>,
     contact_forces: Vec<f64>,
     residual: Vec<f64>,
-    preconditioned: Vec<f64>,
+    product: Vec<f64>,
     trust_region: TrustRegion,
     /// Rows of the frozen problem, with their depths at rest.
     frozen: Vec<Contact>,
-    /// E after each accepted step, the rest state's first [J].
+    /// E at the start of the last stage and after each step taken since [J].
     pub history: Vec<f64>,
 }
 
@@ -86,9 +96,11 @@ impl EnergySearch {
             trial: state(),
             support: Support::new(model.rest.len()),
             slots: Vec::new(),
+            kc: 0.0,
+            multipliers: vec![0.0; model.chain.nodes.len()],
             contact_forces: Vec::new(),
             residual: Vec::new(),
-            preconditioned: Vec::new(),
+            product: Vec::new(),
             trust_region: TrustRegion::default(),
             frozen: Vec::new(),
             history: Vec::new(),
@@ -97,32 +109,39 @@ impl EnergySearch {
 
     /// Searches from the rest state, for the configuration that `detection` has taken up.
     pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> Outcome {
+        self.kc = match geometry {
+            Geometry::Deformed => model.kc.min(CONTINUATION_START / model.softest),
+            Geometry::Frozen => model.kc,
+        };
         self.start(model, detection, geometry);
         let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
-        // 1/2 |u|^2 in the energy norm never exceeds E, so no iterate leaves the ball of this radius.
-        let first_radius = (2.0 * self.state.energy).sqrt();
+        let mut first_radius = self.begin_stage(model, &mut outcome);
         let mut radius = first_radius;
-        self.balance(model);
-        outcome.residual = self.relative_residual();
-        while outcome.residual.is_finite()
-            && outcome.residual > model.contact.tolerance
-            && outcome.iterations < model.contact.max_iterations
-            && radius > GIVE_UP_RADIUS * first_radius
-        {
+        while outcome.residual.is_finite() {
+            if self.kc < model.kc && outcome.residual <= STAGE_TOLERANCE {
+                self.kc = model.kc.min(CONTINUATION_FACTOR * self.kc);
+                first_radius = self.begin_stage(model, &mut outcome);
+                radius = first_radius;
+                continue;
+            }
+            outcome.converged = self.kc == model.kc && outcome.residual <= model.contact.tolerance;
+            if outcome.converged
+                || outcome.iterations >= model.contact.max_iterations
+                || radius < GIVE_UP_RADIUS * first_radius
+            {
+                break;
+            }
             outcome.iterations += 1;
             let step = self.trust_region.step(
                 &self.support,
-                &self.state.contacts,
-                &self.slots,
-                model.kc,
+                Springs { contacts: &self.state.contacts, slots: &self.slots, kc: self.kc },
                 &self.residual,
-                &self.preconditioned,
                 radius,
                 outcome.residual.clamp(INNER_TOLERANCE_FLOOR, INNER_TOLERANCE),
             );
             self.try_step(model, detection, geometry);
             // Near the solution both decreases drown in rounding, which must not refuse a good step.
-            let rounding = self.energy_rounding(model.kc, detection.nodes());
+            let rounding = self.energy_rounding(detection.nodes());
             let ratio = (self.state.energy - self.trial.energy + rounding) / (step.predicted + rounding);
             if ratio < POOR_SHARE || ratio.is_nan() {
                 radius = SHRINK * step.length;
@@ -132,36 +151,44 @@ impl EnergySearch {
             if ratio >= ACCEPTED_SHARE {
                 std::mem::swap(&mut self.state, &mut self.trial);
                 self.history.push(self.state.energy);
-                self.balance(model);
-                outcome.residual = self.relative_residual();
+                outcome.residual = self.balance(model);
             }
         }
-        outcome.converged = outcome.residual <= model.contact.tolerance;
         outcome
+    }
+
+    /// Takes up a new contact stiffness at the current state; returns the first radius: 1/2 |u|^2 in the energy norm
+    /// never exceeds E, so no iterate leaves a ball of this radius.
+    fn begin_stage(&mut self, model: &Model, outcome: &mut Outcome) -> f64 {
+        self.state.energy = self.state.elastic + contact_energy(&self.state.contacts, self.kc);
+        self.history.clear();
+        self.history.push(self.state.energy);
+        outcome.residual = self.balance(model);
+        (2.0 * self.state.energy).sqrt()
     }
 
     /// The rest state.
     fn start(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
         self.support.clear();
-        self.history.clear();
         self.state.forces.clear();
+        self.state.elastic = 0.0;
         self.state.displacement.fill(0.0);
         self.state.positions.copy_from_slice(&model.rest);
         detection.deformed(model, &self.state.displacement, &self.state.positions, &mut self.state.contacts);
-        self.state.energy = contact_energy(&self.state.contacts, model.kc);
         if geometry == Geometry::Frozen {
             // 1/2 |u|^2 <= E <= E(0) in the energy norm and |u_j|^2 <= trace(C_jj) |u|^2, all along the search: nodes
             // farther from the surface than this can never touch.
-            let reach = (2.0 * self.state.energy * model.softest).sqrt();
+            let energy = contact_energy(&self.state.contacts, self.kc);
+            let reach = (2.0 * energy * model.softest).sqrt();
             detection.frozen(model, reach, &mut self.frozen);
             frozen_contacts(&self.frozen, &self.state.displacement, &mut self.state.contacts);
         }
-        self.history.push(self.state.energy);
     }
 
-    /// Brings the support, the contact forces and the residual up to date with the current state.
-    fn balance(&mut self, model: &Model) {
-        let Self { state, support, slots, contact_forces, residual, preconditioned, .. } = self;
+    /// Brings the support, the contact forces and the residual force r = c - f up to date with the current state; returns
+    /// the relative residual sqrt(r . C r) / sqrt(c . C c).
+    fn balance(&mut self, model: &Model) -> f64 {
+        let Self { state, support, slots, contact_forces, residual, product, .. } = self;
         slots.clear();
         for contact in &state.contacts {
             let mut contact_slots = [0; 3];
@@ -178,26 +205,20 @@ impl EnergySearch {
         state.forces.resize(order, 0.0);
         contact_forces.clear();
         contact_forces.resize(order, 0.0);
-        add_contact_forces(&state.contacts, slots, model.kc, contact_forces);
+        add_contact_forces(Springs { contacts: &state.contacts, slots, kc: self.kc }, contact_forces);
         residual.clear();
         residual.extend(contact_forces.iter().zip(&state.forces).map(|(c, f)| c - f));
-        preconditioned.resize(order, 0.0);
-        support.multiply(residual, preconditioned);
-    }
-
-    /// sqrt(r . C r) / sqrt(c . C c), r the residual force and c the contact forces.
-    fn relative_residual(&mut self) -> f64 {
-        let square = dot(&self.residual, &self.preconditioned).max(0.0);
-        let scratch = &mut self.trial.forces;
-        scratch.resize(self.contact_forces.len(), 0.0);
-        self.support.multiply(&self.contact_forces, scratch);
-        let scale = dot(&self.contact_forces, scratch).max(0.0);
-        square.sqrt() / scale.sqrt().max(RESIDUAL_FLOOR)
+        product.resize(order, 0.0);
+        support.multiply(residual, product);
+        let out_of_balance = dot(residual, product).max(0.0);
+        support.multiply(contact_forces, product);
+        let scale = dot(contact_forces, product).max(0.0);
+        out_of_balance.sqrt() / scale.sqrt().max(RESIDUAL_FLOOR)
     }
 
     /// The state that the last trust-region step leads to.
     fn try_step(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
-        let Self { state, trial, support, trust_region, .. } = self;
+        let Self { state, trial, support, trust_region, multipliers, .. } = self;
         trial.forces.clear();
         trial.forces.extend(state.forces.iter().zip(&trust_region.force).map(|(f, df)| f + df));
         support.displace(&model.object.compliance, &trial.forces, &mut trial.displacement);
@@ -210,19 +231,28 @@ impl EnergySearch {
             }
             Geometry::Frozen => frozen_contacts(&self.frozen, &trial.displacement, &mut trial.contacts),
         }
-        let mut elastic = 0.0;
+        // Multipliers as the step predicted them; zero for a node that it did not know of.
+        multipliers.fill(0.0);
+        for (contact, deepening) in state.contacts.iter().zip(&trust_region.deepening) {
+            multipliers[contact.proxy_node as usize] = self.kc * (contact.depth + deepening).max(0.0);
+        }
+        for contact in &mut trial.contacts {
+            contact.multiplier = multipliers[contact.proxy_node as usize];
+        }
+        let mut work = 0.0;
         for (slot, &node) in support.nodes().iter().enumerate() {
             let at = 3 * node as usize;
-            elastic += dot(&trial.forces[3 * slot..3 * slot + 3], &trial.displacement[at..at + 3]);
+            work += dot(&trial.forces[3 * slot..3 * slot + 3], &trial.displacement[at..at + 3]);
         }
-        trial.energy = 0.5 * elastic + contact_energy(&trial.contacts, model.kc);
+        trial.elastic = 0.5 * work;
+        trial.energy = trial.elastic + contact_energy(&trial.contacts, self.kc);
     }
 
     /// What E is rounded by: each depth is rounded by a few eps of the coordinates, E's part by lambda times that [J].
-    fn energy_rounding(&self, kc: f64, nodes: &[DVec3]) -> f64 {
+    fn energy_rounding(&self, nodes: &[DVec3]) -> f64 {
         let mut size = self.state.energy;
         for contact in &self.state.contacts {
-            size += kc * contact.depth * nodes[contact.proxy_node as usize].length();
+            size += self.kc * contact.depth.max(0.0) * nodes[contact.proxy_node as usize].length();
         }
         ENERGY_ROUNDING * size
     }
@@ -233,7 +263,8 @@ impl EnergySearch {
 pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
     let mut sum = 0.0;
     for contact in contacts {
-        sum += contact.depth * contact.depth;
+        let depth = contact.depth.max(0.0);
+        sum += depth * depth;
     }
     0.5 * kc * sum
 }
@@ -246,8 +277,6 @@ fn frozen_contacts(rows: &[Contact], displacement: &[f64], contacts: &mut Vec<Co
         for (&node, weight) in row.nodes.iter().zip(row.weights) {
             depth += weight * row.normal.dot(DVec3::from_slice(&displacement[3 * node as usize..]));
         }
-        if depth > 0.0 {
-            contacts.push(Contact { depth, ..*row });
-        }
+        contacts.push(Contact { depth, ..*row });
     }
 }

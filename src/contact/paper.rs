@@ -114,7 +114,7 @@ impl PaperIteration {
         detection.deformed(model, &self.displacement, &self.positions, &mut self.contacts);
         self.support.clear();
         self.ties.clear();
-        for contact in &self.contacts {
+        for contact in self.contacts.iter().filter(|contact| contact.depth > 0.0) {
             let radius = model.chain.nodes[contact.proxy_node as usize].radius;
             let x = detection.nodes()[contact.proxy_node as usize];
             let target = x - contact.normal * radius;

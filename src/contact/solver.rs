@@ -108,7 +108,7 @@ impl<'a> Solver<'a> {
         let state = &self.energy.state;
         self.displacement.copy_from_slice(&state.displacement);
         equilibrium.energy = state.energy;
-        equilibrium.touches.extend(state.contacts.iter().map(|contact| Touch {
+        equilibrium.touches.extend(state.contacts.iter().filter(|c| c.depth > 0.0).map(|contact| Touch {
             proxy_node: contact.proxy_node,
             nodes: contact.nodes,
             weights: contact.weights,

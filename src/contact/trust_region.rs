@@ -1,18 +1,39 @@
 //! One trust-region Newton step of the energy form, by truncated conjugate gradients (Steihaug 1983, Toint 1981).
 //!
-//! The model of the energy along a displacement du = C df, with residual force r = c(u) - f (c the contact forces, f the
-//! forces that hold the displacement u = C f) and B the Hessian of the contact springs:
-//! `m(df) = -r . C df + 1/2 df . C df + 1/2 (C df) . B (C df)`, on the ball df . C df <= radius^2.
+//! The energy along a displacement du = C df of the object, f being the forces that hold the displacement u = C f:
+//! `m(df) = u . df + 1/2 df . C df + 1/2 kc sum_i max(0, depth_i + g_i . du)^2 + 1/2 sum_i lambda_i d2s_i(du, du)`,
+//! on the ball df . C df <= radius^2, with g_i the depth's gradient. Two things make it a better model than the plain second
+//! derivative of the energy, and neither costs a detection:
+//! - the maximum is kept, so contacts may come and go within a step: a pass of conjugate gradients for the contacts that
+//!   touch is followed by another where the step has changed which do;
+//! - curvature is weighted by the multiplier lambda_i that the step before predicted, not by kc depth_i, which at stiff contact
+//!   is far too large until the depth has settled (as in sequential quadratic programming). Both agree in the end,
+//!   so convergence stays quadratic.
 //!
-//! Conjugate gradients on H = K + B preconditioned by C keep each search direction twice, as a force pi and as the
-//! displacement p = C pi, so that H p = pi + B p needs no K. One product with C_AA is spent per iteration, that of the
-//! preconditioner, and p = z + beta p follows from pi = r + beta pi. B has a rank of at most five per contact, so few iterations
-//! are needed whatever the object's size. Negative curvature and long steps go to the ball's boundary.
+//! Conjugate gradients on H = K + B, B the Hessian of the contact terms, preconditioned by C, keep each search direction
+//! twice, as a force pi and as the displacement p = C pi, so that H p = pi + B p needs no K. One product with C_AA is
+//! spent per iteration, that of the preconditioner; p = z + beta p follows from pi = r + beta pi. B has a rank of at most five per
+//! contact, so few iterations are needed whatever the object's size. Negative curvature and long steps go to the
+//! ball's boundary.
 
-use super::depth::{Contact, hessian_product};
+// Indexed loops as in the kernel of the same name.
+#![allow(clippy::needless_range_loop)]
+
+use super::depth::{Contact, hessian_product, second_variation};
 use super::support::{Support, dot};
-use crate::tolerances::INNER_ITERATIONS_PER_UNKNOWN;
+use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES};
 use glam::DVec3;
+
+/// Contacts, where their nodes are on the support, and their stiffness.
+#[derive(Clone, Copy)]
+pub struct Springs<'a> {
+    /// The contacts and near misses.
+    pub contacts: &'a [Contact],
+    /// Slots of each contact's three nodes.
+    pub slots: &'a [[usize; 3]],
+    /// kc [N/m].
+    pub kc: f64,
+}
 
 /// What a step promises.
 #[derive(Clone, Copy, Debug)]
@@ -28,9 +49,17 @@ pub struct Step {
 /// Vectors on the support, reused from step to step.
 #[derive(Default)]
 pub struct TrustRegion {
-    /// The step: force df [N] and displacement du = C df on the support [m].
+    /// The step df [N].
     pub force: Vec<f64>,
+    /// What the step deepens each contact by, to first order [m].
+    pub deepening: Vec<f64>,
+    /// The step du = C df on the support [m].
     displacement: Vec<f64>,
+    /// The step of the pass before.
+    previous_force: Vec<f64>,
+    previous_displacement: Vec<f64>,
+    /// Which contacts touch, in this pass.
+    touching: Vec<bool>,
     residual: Vec<f64>,
     preconditioned: Vec<f64>,
     direction_force: Vec<f64>,
@@ -39,43 +68,87 @@ pub struct TrustRegion {
 }
 
 impl TrustRegion {
-    /// Step for the residual force `residual` with `preconditioned = C_AA residual`, within `radius`, solved to `tolerance`
-    /// relative to the residual; the step is left in `self.force`.
-    #[allow(clippy::too_many_arguments)]
-    pub fn step(
-        &mut self,
-        support: &Support,
-        contacts: &[Contact],
-        slots: &[[usize; 3]],
-        kc: f64,
-        residual: &[f64],
-        preconditioned: &[f64],
-        radius: f64,
-        tolerance: f64,
-    ) -> Step {
-        let order = support.order();
-        self.reset(residual, preconditioned);
-        let mut square = dot(&self.residual, &self.preconditioned);
-        let stop = tolerance * tolerance * square;
+    /// Step for the residual force `residual`, r = c(u) - f, within `radius`, solved to `tolerance` relative to it in the
+    /// energy norm. The step is left in `self.force`, its effect on the contacts in `self.deepening`.
+    pub fn step(&mut self, support: &Support, springs: Springs, residual: &[f64], radius: f64, tolerance: f64) -> Step {
+        self.reset(support.order(), springs.contacts, residual);
+        support.multiply(&self.residual, &mut self.preconditioned);
+        let stop = tolerance * tolerance * dot(&self.residual, &self.preconditioned);
+        let mut predicted = 0.0;
         let mut at_boundary = false;
+        for pass in 0..MODEL_PASSES {
+            self.previous_force.copy_from_slice(&self.force);
+            self.previous_displacement.copy_from_slice(&self.displacement);
+            let stopped = self.conjugate_gradients(support, springs, radius, stop);
+            self.deepen(springs);
+            let decrease = self.decrease(springs, residual);
+            if pass > 0 && (decrease <= predicted || decrease.is_nan()) {
+                // Contacts came and went to no avail: the pass before was better.
+                std::mem::swap(&mut self.force, &mut self.previous_force);
+                std::mem::swap(&mut self.displacement, &mut self.previous_displacement);
+                self.deepen(springs);
+                break;
+            }
+            predicted = decrease;
+            at_boundary = stopped;
+            if !self.retouch(springs.contacts) {
+                break;
+            }
+            self.balance(springs, residual);
+            support.multiply(&self.residual, &mut self.preconditioned);
+        }
+        let length = dot(&self.force, &self.displacement).max(0.0).sqrt();
+        Step { predicted, length, at_boundary }
+    }
+
+    /// The zero step.
+    fn reset(&mut self, order: usize, contacts: &[Contact], residual: &[f64]) {
+        for vector in [
+            &mut self.force,
+            &mut self.displacement,
+            &mut self.previous_force,
+            &mut self.previous_displacement,
+            &mut self.preconditioned,
+            &mut self.direction_force,
+            &mut self.direction,
+            &mut self.image,
+        ] {
+            vector.clear();
+            vector.resize(order, 0.0);
+        }
+        self.residual.clear();
+        self.residual.extend_from_slice(residual);
+        self.deepening.clear();
+        self.deepening.resize(contacts.len(), 0.0);
+        self.touching.clear();
+        self.touching.extend(contacts.iter().map(|contact| contact.depth > 0.0));
+    }
+
+    /// Goes on from the current step for the contacts that touch, until the residual's squared energy norm is at most
+    /// `stop`; true when the boundary stopped it.
+    fn conjugate_gradients(&mut self, support: &Support, springs: Springs, radius: f64, stop: f64) -> bool {
+        let order = support.order();
+        self.direction_force.copy_from_slice(&self.residual);
+        self.direction.copy_from_slice(&self.preconditioned);
+        let mut square = dot(&self.residual, &self.preconditioned);
         for _ in 0..INNER_ITERATIONS_PER_UNKNOWN * order {
             if square <= stop {
                 break;
             }
             self.image.copy_from_slice(&self.direction_force);
-            add_contact_hessian(contacts, slots, kc, &self.direction, &mut self.image);
+            add_contact_hessian(springs, &self.touching, &self.direction, &mut self.image);
             let curvature = dot(&self.direction, &self.image);
             let to_boundary = self.share_to_boundary(radius);
             let share = square / curvature;
-            at_boundary = !(curvature > 0.0 && share < to_boundary);
-            let share = if at_boundary { to_boundary } else { share };
+            let inside = curvature > 0.0 && share < to_boundary;
+            let share = if inside { share } else { to_boundary };
             for k in 0..order {
                 self.force[k] += share * self.direction_force[k];
                 self.displacement[k] += share * self.direction[k];
                 self.residual[k] -= share * self.image[k];
             }
-            if at_boundary {
-                break;
+            if !inside {
+                return true;
             }
             support.multiply(&self.residual, &mut self.preconditioned);
             let next = dot(&self.residual, &self.preconditioned);
@@ -86,28 +159,7 @@ impl TrustRegion {
                 self.direction[k] = self.preconditioned[k] + ratio * self.direction[k];
             }
         }
-        // m(0) - m(df) = 1/2 du . (r + (r - H du)): the residual left over is r - H du.
-        let predicted = 0.5 * (dot(&self.displacement, residual) + dot(&self.displacement, &self.residual));
-        let length = dot(&self.force, &self.displacement).max(0.0).sqrt();
-        Step { predicted, length, at_boundary }
-    }
-
-    /// Starts from the zero step, along the preconditioned residual.
-    fn reset(&mut self, residual: &[f64], preconditioned: &[f64]) {
-        for (vector, start) in [
-            (&mut self.residual, residual),
-            (&mut self.preconditioned, preconditioned),
-            (&mut self.direction_force, residual),
-            (&mut self.direction, preconditioned),
-            (&mut self.image, residual),
-        ] {
-            vector.clear();
-            vector.extend_from_slice(start);
-        }
-        for vector in [&mut self.force, &mut self.displacement] {
-            vector.clear();
-            vector.resize(residual.len(), 0.0);
-        }
+        false
     }
 
     /// The share of the direction that leads from the current step to the boundary: the positive root t of
@@ -124,34 +176,98 @@ impl TrustRegion {
         let root = (mixed * mixed + direction_square * left).sqrt();
         if mixed > 0.0 { left / (mixed + root) } else { (root - mixed) / direction_square }
     }
+
+    /// What the step deepens each contact by: g_i . du.
+    fn deepen(&mut self, springs: Springs) {
+        for (k, contact) in springs.contacts.iter().enumerate() {
+            let v = nodes_of(&self.displacement, springs.slots[k]);
+            let mut deepening = 0.0;
+            for j in 0..3 {
+                deepening += contact.weights[j] * contact.normal.dot(v[j]);
+            }
+            self.deepening[k] = deepening;
+        }
+    }
+
+    /// m(0) - m(df), in differences that do not cancel near the solution [J].
+    fn decrease(&self, springs: Springs, residual: &[f64]) -> f64 {
+        let mut decrease = dot(&self.displacement, residual) - 0.5 * dot(&self.displacement, &self.force);
+        for (k, contact) in springs.contacts.iter().enumerate() {
+            let v = nodes_of(&self.displacement, springs.slots[k]);
+            let deepening = self.deepening[k];
+            let before = contact.depth.max(0.0);
+            let after = (contact.depth + deepening).max(0.0);
+            // The part of 1/2 kc depth^2 that is of first order is in the residual.
+            let stretch = if before > 0.0 && after > 0.0 {
+                deepening * deepening
+            } else {
+                after * after - before * (before + 2.0 * deepening)
+            };
+            let mut bending = 0.0;
+            for (v, bend) in v.into_iter().zip(second_variation(contact, v)) {
+                bending += v.dot(bend);
+            }
+            decrease -= 0.5 * (springs.kc * stretch + contact.multiplier * bending);
+        }
+        decrease
+    }
+
+    /// Notes which contacts touch at the step; true when that has changed.
+    fn retouch(&mut self, contacts: &[Contact]) -> bool {
+        let mut changed = false;
+        for (k, contact) in contacts.iter().enumerate() {
+            let touches = contact.depth + self.deepening[k] > 0.0;
+            changed |= touches != self.touching[k];
+            self.touching[k] = touches;
+        }
+        changed
+    }
+
+    /// Residual force of the model at the step.
+    fn balance(&mut self, springs: Springs, residual: &[f64]) {
+        for k in 0..residual.len() {
+            self.residual[k] = residual[k] - self.force[k];
+        }
+        for (k, contact) in springs.contacts.iter().enumerate() {
+            let v = nodes_of(&self.displacement, springs.slots[k]);
+            let push = springs.kc * ((contact.depth + self.deepening[k]).max(0.0) - contact.depth.max(0.0));
+            let mut force = second_variation(contact, v);
+            for j in 0..3 {
+                force[j] = -(contact.normal * (push * contact.weights[j]) + force[j] * contact.multiplier);
+            }
+            add_on_nodes(force, springs.slots[k], &mut self.residual);
+        }
+    }
 }
 
-/// Adds B p, the product of the contact springs' Hessian with the displacement `p` on the support, to `product`.
-pub fn add_contact_hessian(contacts: &[Contact], slots: &[[usize; 3]], kc: f64, p: &[f64], product: &mut [f64]) {
-    for (contact, slots) in contacts.iter().zip(slots) {
-        if contact.depth <= 0.0 {
-            continue;
-        }
-        let v = slots.map(|slot| DVec3::from_slice(&p[3 * slot..]));
-        for (h, slot) in hessian_product(contact, kc, v).into_iter().zip(slots) {
-            product[3 * slot] += h.x;
-            product[3 * slot + 1] += h.y;
-            product[3 * slot + 2] += h.z;
+/// Adds B p, the product of the Hessian of the contact terms with the displacement `p` on the support, to `product`.
+pub fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], product: &mut [f64]) {
+    for (k, contact) in springs.contacts.iter().enumerate() {
+        if touching[k] || contact.multiplier != 0.0 {
+            let kc = if touching[k] { springs.kc } else { 0.0 };
+            add_on_nodes(hessian_product(contact, kc, nodes_of(p, springs.slots[k])), springs.slots[k], product);
         }
     }
 }
 
 /// Adds the forces of the contact springs on the object's nodes, -kc depth_i w_ij N_i, to `forces` on the support.
-pub fn add_contact_forces(contacts: &[Contact], slots: &[[usize; 3]], kc: f64, forces: &mut [f64]) {
-    for (contact, slots) in contacts.iter().zip(slots) {
-        if contact.depth <= 0.0 {
-            continue;
-        }
-        for (weight, slot) in contact.weights.into_iter().zip(slots) {
-            let force = contact.normal * (-kc * contact.depth * weight);
-            forces[3 * slot] += force.x;
-            forces[3 * slot + 1] += force.y;
-            forces[3 * slot + 2] += force.z;
-        }
+pub fn add_contact_forces(springs: Springs, forces: &mut [f64]) {
+    for (k, contact) in springs.contacts.iter().enumerate() {
+        let push = contact.normal * (-springs.kc * contact.depth.max(0.0));
+        add_on_nodes(contact.weights.map(|weight| push * weight), springs.slots[k], forces);
+    }
+}
+
+/// The three nodes' parts of a vector on the support.
+fn nodes_of(vector: &[f64], slots: [usize; 3]) -> [DVec3; 3] {
+    slots.map(|slot| DVec3::from_slice(&vector[3 * slot..]))
+}
+
+/// Adds one vector for each of three nodes to a vector on the support.
+fn add_on_nodes(parts: [DVec3; 3], slots: [usize; 3], vector: &mut [f64]) {
+    for (part, slot) in parts.into_iter().zip(slots) {
+        vector[3 * slot] += part.x;
+        vector[3 * slot + 1] += part.y;
+        vector[3 * slot + 2] += part.z;
     }
 }
