@@ -1,12 +1,15 @@
-//! The deformable object: its surface, its stiffness and its compliance.
+//! The deformable object: its surface, its stiffness and its compliance; what is refused, and why.
 
 use glam::{DMat3, DVec3};
 use haptize::object::{Object, ObjectError, SurfaceDefect};
-use haptize::scene::{GroundNodes, GroundSpec, ObjectSpec, Shape, SpringKind, SpringSpec};
+use haptize::scene::{GroundNodes, GroundSpec, ObjectSpec, Scene, Shape, SpringKind, SpringSpec};
+use std::path::{Path, PathBuf};
+
+const CENTRE: DVec3 = DVec3::new(0.1, -0.2, 0.3);
 
 fn sphere_spec(kind: SpringKind, nodes: GroundNodes) -> ObjectSpec {
     ObjectSpec {
-        shape: Shape::Sphere { centre: DVec3::new(0.1, -0.2, 0.3), radius: 0.05, rings: 10, segments: 10 },
+        shape: Shape::Sphere { centre: CENTRE, radius: 0.05, rings: 10, segments: 10 },
         springs: SpringSpec { kind, stiffness: 300.0 },
         ground: GroundSpec { stiffness: 100.0, nodes },
         node_mass: 0.002,
@@ -14,46 +17,427 @@ fn sphere_spec(kind: SpringKind, nodes: GroundNodes) -> ObjectSpec {
     }
 }
 
+fn mesh_spec(file: impl Into<PathBuf>) -> ObjectSpec {
+    let shape = Shape::Mesh { file: file.into(), scale: 0.5, centre: CENTRE };
+    ObjectSpec { shape, ..sphere_spec(SpringKind::Isotropic, GroundNodes::All) }
+}
+
+fn dataset(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets").join(name)
+}
+
+fn sphere() -> Object {
+    Object::build(&sphere_spec(SpringKind::Isotropic, GroundNodes::All)).unwrap()
+}
+
+/// The defect for which the surface is refused.
+fn defect(nodes: &[DVec3], triangles: &[[u32; 3]]) -> SurfaceDefect {
+    let spec = sphere_spec(SpringKind::Isotropic, GroundNodes::All);
+    match Object::from_surface(&spec, nodes.to_vec(), triangles.to_vec()) {
+        Err(ObjectError::Surface { defect, .. }) => defect,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Six times the enclosed volume.
+fn six_volumes(object: &Object) -> f64 {
+    let corner = |node: u32| object.rest[node as usize] - CENTRE;
+    object.triangles.iter().map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2])))).sum()
+}
+
+fn apply(object: &Object, displacement: &[DVec3]) -> Vec<DVec3> {
+    let mut force = vec![DVec3::NAN; displacement.len()];
+    object.stiffness.apply(displacement, &mut force);
+    force
+}
+
+/// Numbers between -1 and 1, the same in every run.
+fn noise(count: usize, seed: u64) -> Vec<DVec3> {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    (0..count).map(|_| DVec3::new(next(), next(), next())).collect()
+}
+
+// ---- surface --------------------------------------------------------------------------------------------------------
+
 #[test]
 fn paper_sphere_has_102_nodes_and_200_outward_triangles() {
-    let object = Object::build(&sphere_spec(SpringKind::Isotropic, GroundNodes::All)).unwrap();
+    let object = sphere();
     assert_eq!((object.rest.len(), object.surface_nodes, object.triangles.len()), (102, 102, 200));
     assert!(object.warnings.is_empty(), "{:?}", object.warnings);
-    let centre = DVec3::new(0.1, -0.2, 0.3);
     for triangle in &object.triangles {
         let [a, b, c] = triangle.map(|node| object.rest[node as usize]);
-        assert!((b - a).cross(c - a).dot((a + b + c) / 3.0 - centre) > 0.0, "{triangle:?} faces inward");
+        assert!((b - a).cross(c - a).dot((a + b + c) / 3.0 - CENTRE) > 0.0, "{triangle:?} faces inward");
+    }
+    assert!(object.rest.iter().all(|node| (node.distance(CENTRE) - 0.05).abs() < 1e-15));
+}
+
+#[test]
+fn neighbours_share_the_edge_they_are_listed_under() {
+    for object in [sphere(), Object::build(&mesh_spec(dataset("bean.obj"))).unwrap()] {
+        let mut visits = vec![0; object.rest.len()];
+        for (t, triangle) in object.triangles.iter().enumerate() {
+            for k in 0..3 {
+                let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+                let across = object.topology.across[t][k] as usize;
+                let back = (0..3).find(|&m| object.topology.across[across][m] as usize == t).unwrap();
+                let other = object.triangles[across];
+                assert_eq!((other[back], other[(back + 1) % 3]), (b, a), "triangles {t} and {across}");
+                assert!(object.topology.triangles_around(a as usize).contains(&(t as u32)));
+                visits[a as usize] += 1;
+            }
+        }
+        for (node, visits) in visits.into_iter().enumerate() {
+            assert_eq!(object.topology.triangles_around(node).len(), visits);
+        }
+    }
+}
+
+#[test]
+fn inverted_surfaces_are_turned_with_a_warning() {
+    let whole = sphere();
+    let spec = sphere_spec(SpringKind::Isotropic, GroundNodes::All);
+    for (inverted, said) in [((0..200).collect::<Vec<_>>(), "200 of 200"), (vec![3, 77, 150], "3 of 200")] {
+        let mut triangles = whole.triangles.clone();
+        inverted.iter().for_each(|&t: &usize| triangles[t].swap(0, 1));
+        let object = Object::from_surface(&spec, whole.rest.clone(), triangles).unwrap();
+        assert!((six_volumes(&object) / six_volumes(&whole) - 1.0).abs() < 1e-12);
+        assert_eq!(object.warnings.len(), 1);
+        assert!(object.warnings[0].contains(said), "{:?}", object.warnings);
+    }
+}
+
+#[test]
+fn open_surfaces_are_refused_at_their_edge() {
+    let whole = sphere();
+    let mut triangles = whole.triangles.clone();
+    let removed = triangles.remove(17);
+    match defect(&whole.rest, &triangles) {
+        SurfaceDefect::Open { nodes, edges: 3, .. } => assert!(nodes.iter().all(|node| removed.contains(node))),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn sheets_that_meet_at_an_edge_or_a_node_are_refused() {
+    // Two tetrahedra on one edge, then on one node.
+    let corner = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    let tetrahedron = |n: [u32; 4]| [[n[0], n[2], n[1]], [n[0], n[1], n[3]], [n[1], n[2], n[3]], [n[2], n[0], n[3]]];
+    let first = tetrahedron([0, 1, 2, 3]);
+    let mut nodes = corner.to_vec();
+    nodes.extend([DVec3::new(0.0, -1.0, 0.0), DVec3::new(0.0, 0.0, -1.0)]);
+    let on_edge = [first, tetrahedron([0, 1, 4, 5])].concat();
+    assert_eq!(defect(&nodes, &on_edge), SurfaceDefect::NonManifoldEdge { nodes: [0, 1], triangles: 4 });
+    nodes.push(DVec3::new(-1.0, 0.0, 0.0));
+    let on_node = [first, tetrahedron([0, 6, 4, 5])].concat();
+    assert_eq!(defect(&nodes, &on_node), SurfaceDefect::PinchedNode { node: 0 });
+}
+
+#[test]
+fn one_sided_surfaces_are_refused() {
+    // The projective plane on six nodes: every edge has two triangles, and there is no inside.
+    let triangles =
+        [[0, 1, 4], [0, 1, 5], [0, 2, 3], [0, 2, 5], [0, 3, 4], [1, 2, 3], [1, 2, 4], [1, 3, 5], [2, 4, 5], [3, 4, 5]];
+    assert!(matches!(defect(&noise(6, 7), &triangles), SurfaceDefect::NonOrientable { .. }));
+}
+
+#[test]
+fn flat_and_broken_triangles_are_refused() {
+    let whole = sphere();
+    let altered = |alter: &dyn Fn(&mut Vec<DVec3>, &mut Vec<[u32; 3]>)| {
+        let (mut nodes, mut triangles) = (whole.rest.clone(), whole.triangles.clone());
+        alter(&mut nodes, &mut triangles);
+        defect(&nodes, &triangles)
+    };
+    assert_eq!(altered(&|_, triangles| triangles.clear()), SurfaceDefect::Empty);
+    assert_eq!(altered(&|nodes, _| nodes[5].y = f64::NAN), SurfaceDefect::NotFinite { node: 5 });
+    assert_eq!(altered(&|nodes, _| nodes[9] = nodes[40]), SurfaceDefect::CoincidentNodes { first: 9, second: 40 });
+    assert_eq!(altered(&|nodes, _| nodes.push(DVec3::ONE)), SurfaceDefect::UnusedNode { node: 102 });
+    let out_of_range = SurfaceDefect::NodeOutOfRange { triangle: 8, node: 102, count: 102 };
+    assert_eq!(altered(&|_, triangles| triangles[8][1] = 102), out_of_range);
+    assert!(matches!(altered(&|_, t| t[8][1] = t[8][0]), SurfaceDefect::DegenerateTriangle { triangle: 8, .. }));
+    let on_one_line =
+        altered(&|nodes, t| nodes[t[8][0] as usize] = nodes[t[8][1] as usize].lerp(nodes[t[8][2] as usize], 0.3));
+    assert!(matches!(on_one_line, SurfaceDefect::DegenerateTriangle { .. }), "{on_one_line:?}");
+    assert_eq!(altered(&|_, t| t.push(t[4])), SurfaceDefect::RepeatedTriangle { first: 4, second: 200 });
+    let folded = altered(&|nodes, _| nodes.iter_mut().for_each(|node| node.z = 0.1 * node.x));
+    assert!(matches!(folded, SurfaceDefect::NoVolume { .. } | SurfaceDefect::CoincidentNodes { .. }), "{folded:?}");
+}
+
+// ---- stiffness ------------------------------------------------------------------------------------------------------
+
+#[test]
+fn stored_energy_is_the_sum_over_the_springs() {
+    let displacement = noise(102, 42);
+    for kind in [SpringKind::Isotropic, SpringKind::Axial] {
+        let object = Object::build(&sphere_spec(kind, GroundNodes::Listed(vec![3, 50, 51, 52, 90]))).unwrap();
+        let force = apply(&object, &displacement);
+        let stored: f64 = 0.5 * force.iter().zip(&displacement).map(|(f, u)| f.dot(*u)).sum::<f64>();
+
+        let mut springs = 0.0;
+        for triangle in &object.triangles {
+            for k in 0..3 {
+                let (a, b) = (triangle[k] as usize, triangle[(k + 1) % 3] as usize);
+                let stretch = displacement[b] - displacement[a];
+                let length = match kind {
+                    SpringKind::Isotropic => stretch.length(),
+                    SpringKind::Axial => stretch.dot((object.rest[b] - object.rest[a]).normalize()),
+                };
+                // Each edge is met twice, once from either side.
+                springs += 0.5 * 0.5 * 300.0 * length * length;
+            }
+        }
+        let ground: f64 =
+            [3, 50, 51, 52, 90].map(|j: usize| 0.5 * 100.0 * displacement[j].length_squared()).iter().sum();
+        assert!((stored / (springs + ground) - 1.0).abs() < 1e-12, "{kind:?}: {stored} {springs} {ground}");
+    }
+}
+
+#[test]
+fn only_the_ground_resists_rigid_motions() {
+    let (shift, turn) = (DVec3::new(0.3, -0.1, 0.7), DVec3::new(-1.0, 2.0, 0.5));
+    for (kind, turn) in [(SpringKind::Isotropic, DVec3::ZERO), (SpringKind::Axial, turn)] {
+        let object = Object::build(&sphere_spec(kind, GroundNodes::All)).unwrap();
+        let motion: Vec<DVec3> = object.rest.iter().map(|node| shift + turn.cross(*node - CENTRE)).collect();
+        for (force, motion) in apply(&object, &motion).iter().zip(&motion) {
+            assert!((*force - 100.0 * *motion).length() < 1e-10 * motion.length() * 300.0, "{kind:?}");
+        }
     }
 }
 
 #[test]
 fn compliance_inverts_stiffness() {
-    for kind in [SpringKind::Isotropic, SpringKind::Axial] {
-        let object = Object::build(&sphere_spec(kind, GroundNodes::All)).unwrap();
+    let bean = Object::build(&mesh_spec(dataset("bean.obj"))).unwrap();
+    let patch = GroundNodes::Below(CENTRE.z - 0.03);
+    let spheres = [(SpringKind::Isotropic, GroundNodes::All), (SpringKind::Axial, GroundNodes::All)];
+    let patched = [(SpringKind::Isotropic, patch.clone()), (SpringKind::Axial, patch)];
+    let spheres =
+        spheres.into_iter().chain(patched).map(|(kind, nodes)| Object::build(&sphere_spec(kind, nodes)).unwrap());
+    for object in spheres.chain([bean]) {
         let count = object.rest.len();
-        for j in 0..count {
+        for j in (0..count).step_by(7) {
             for axis in DMat3::IDENTITY.to_cols_array_2d().map(DVec3::from_array) {
                 let displacement: Vec<DVec3> = (0..count).map(|i| object.compliance.block(i, j) * axis).collect();
-                let mut force = vec![DVec3::NAN; count];
-                object.stiffness.apply(&displacement, &mut force);
-                for (i, force) in force.iter().enumerate() {
+                for (i, force) in apply(&object, &displacement).iter().enumerate() {
                     let expected = if i == j { axis } else { DVec3::ZERO };
-                    assert!((*force - expected).abs().max_element() < 1e-12, "{kind:?} {i} {j}: {force}");
+                    assert!((*force - expected).abs().max_element() < 1e-9, "{i} {j}: {force}");
                 }
+            }
+        }
+        let order = object.compliance.order;
+        for i in 0..order {
+            for j in 0..i {
+                assert_eq!(object.compliance.row(i)[j], object.compliance.row(j)[i]);
             }
         }
     }
 }
 
 #[test]
-fn an_open_surface_is_refused_at_its_edge() {
-    let spec = sphere_spec(SpringKind::Isotropic, GroundNodes::All);
-    let whole = Object::build(&spec).unwrap();
-    let mut triangles = whole.triangles;
-    triangles.remove(17);
-    let refused = Object::from_surface(&spec, whole.rest, triangles);
+fn every_part_must_be_grounded() {
+    let one = sphere();
+    let shifted = one.rest.iter().map(|node| *node + DVec3::X);
+    let nodes: Vec<DVec3> = one.rest.iter().copied().chain(shifted).collect();
+    let triangles: Vec<[u32; 3]> =
+        one.triangles.iter().copied().chain(one.triangles.iter().map(|t| t.map(|node| node + 102))).collect();
+    let build =
+        |ground| Object::from_surface(&sphere_spec(SpringKind::Isotropic, ground), nodes.clone(), triangles.clone());
+
+    let both = build(GroundNodes::Listed(vec![0, 102])).unwrap();
+    assert_eq!(both.compliance.block(0, 150), DMat3::ZERO, "separate parts do not move each other");
+    match build(GroundNodes::Listed(vec![0, 5])) {
+        Err(ObjectError::Ungrounded { node, nodes: 102 }) => assert!(node >= 102),
+        other => panic!("{other:?}"),
+    }
+    assert!(matches!(build(GroundNodes::Listed(vec![204])), Err(ObjectError::GroundNode { node: 204, count: 204 })));
+    assert!(matches!(build(GroundNodes::Below(0.2)), Err(ObjectError::NothingBelow { .. })));
+}
+
+#[test]
+fn a_mechanism_is_refused_and_its_node_named() {
+    // Held at one node, axial springs leave the turning about it free; isotropic ones do not.
+    let held = GroundNodes::Listed(vec![0]);
+    assert!(Object::build(&sphere_spec(SpringKind::Isotropic, held.clone())).is_ok());
+    match Object::build(&sphere_spec(SpringKind::Axial, held)) {
+        Err(error @ ObjectError::Mechanism { node, direction, reciprocal_condition }) => {
+            assert!(node != 0 && (direction.length() - 1.0).abs() < 1e-12 && reciprocal_condition < 1e-9, "{error}");
+        }
+        other => panic!("{other:?}"),
+    }
+    // A cube's faces are flat: with its diagonals it is stiff, but a node in the middle of a flat face is not.
+    let cube = Object::build(&mesh_spec(dataset("cube.obj"))).unwrap();
+    let (mut nodes, mut triangles) = (cube.rest, cube.triangles);
+    let [a, b, c] = triangles.remove(0);
+    nodes.push((nodes[a as usize] + nodes[b as usize] + nodes[c as usize]) / 3.0);
+    triangles.extend([[a, b, 8], [b, c, 8], [c, a, 8]]);
+    let spec = sphere_spec(SpringKind::Axial, GroundNodes::Listed((0..8).collect()));
+    match Object::from_surface(&spec, nodes, triangles) {
+        Err(ObjectError::Mechanism { node: 8, .. }) => {}
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn numbers_out_of_range_are_refused_without_a_scene_file_as_well() {
+    let alterations: [fn(&mut ObjectSpec); 8] = [
+        |spec| spec.springs.stiffness = -1.0,
+        |spec| spec.springs.stiffness = f64::NAN,
+        |spec| spec.ground.stiffness = 0.0,
+        |spec| spec.node_mass = f64::INFINITY,
+        |spec| spec.node_damping = -0.1,
+        |spec| spec.shape = Shape::Sphere { centre: CENTRE, radius: -1.0, rings: 10, segments: 10 },
+        |spec| spec.shape = Shape::Sphere { centre: CENTRE, radius: 1.0, rings: 0, segments: 10 },
+        |spec| spec.shape = Shape::Sphere { centre: CENTRE, radius: 1.0, rings: 5, segments: 2 },
+    ];
+    for (index, alter) in alterations.iter().enumerate() {
+        let mut spec = sphere_spec(SpringKind::Isotropic, GroundNodes::All);
+        alter(&mut spec);
+        assert!(matches!(Object::build(&spec), Err(ObjectError::Parameter { .. })), "{index}");
+    }
+    let mut spec = sphere_spec(SpringKind::Isotropic, GroundNodes::All);
+    spec.shape = Shape::Sphere { centre: CENTRE, radius: 1.0, rings: usize::MAX, segments: 1000 };
+    assert!(matches!(Object::build(&spec), Err(ObjectError::TooLarge { .. })));
+}
+
+// ---- mesh files -----------------------------------------------------------------------------------------------------
+
+#[test]
+fn the_same_cube_comes_out_of_all_formats() {
+    for name in ["cube.obj", "cube.ply", "cube.stl"] {
+        let object = Object::build(&mesh_spec(dataset(name))).unwrap();
+        assert_eq!((object.rest.len(), object.triangles.len()), (8, 12), "{name}");
+        assert!(object.warnings.is_empty(), "{name}: {:?}", object.warnings);
+        assert!((six_volumes(&object) - 6.0).abs() < 1e-12, "{name}: a cube of side 2, scaled by 0.5");
+        assert!(object.rest.iter().all(|node| ((*node - CENTRE).abs() - 0.5).length() < 1e-12), "{name}");
+    }
+}
+
+/// Binary STL and PLY files of the cube.
+fn binary_cubes() -> [(&'static str, Vec<u8>); 2] {
+    let cube = Object::build(&mesh_spec(dataset("cube.obj"))).unwrap();
+    let corner = |node: u32| (2.0 * (cube.rest[node as usize] - CENTRE)).as_vec3().to_array();
+    let bytes = |point: [f32; 3]| point.map(f32::to_le_bytes).concat();
+    let mut stl = vec![0; 80];
+    stl.extend(12u32.to_le_bytes());
+    let mut ply = b"ply\nformat binary_little_endian 1.0\nelement vertex 8\nproperty float x\nproperty float y\n\
+        property float z\nelement face 12\nproperty list uchar int vertex_index\nend_header\n"
+        .to_vec();
+    (0..8).for_each(|node| ply.extend(bytes(corner(node))));
+    for triangle in &cube.triangles {
+        stl.extend([0; 12]);
+        triangle.iter().for_each(|&node| stl.extend(bytes(corner(node))));
+        stl.extend([0; 2]);
+        ply.push(3);
+        triangle.iter().for_each(|&node| ply.extend((node as i32).to_le_bytes()));
+    }
+    [("stl", stl), ("ply", ply)]
+}
+
+/// Builds the object of a file with this content.
+fn build_from(extension: &str, content: &[u8]) -> Result<Object, ObjectError> {
+    let file = tempfile::Builder::new().suffix(&format!(".{extension}")).tempfile().unwrap();
+    std::fs::write(file.path(), content).unwrap();
+    Object::build(&mesh_spec(file.path()))
+}
+
+#[test]
+fn binary_files_are_read() {
+    for (extension, content) in binary_cubes() {
+        let object = build_from(extension, &content).unwrap();
+        assert_eq!((object.rest.len(), object.triangles.len()), (8, 12), "{extension}");
+        assert!((six_volumes(&object) - 6.0).abs() < 1e-12, "{extension}");
+    }
+}
+
+#[test]
+fn groups_of_an_obj_file_are_joined_at_their_seams() {
+    let text = std::fs::read_to_string(dataset("cube.obj")).unwrap();
+    let (nodes, faces) = text.split_at(text.find("\nf ").unwrap() + 1);
+    let mut faces: Vec<&str> = faces.lines().collect();
+    faces.insert(3, "o other");
+    let object =
+        build_from("obj", format!("mtllib missing.mtl\n{nodes}o one\n{}\n", faces.join("\n")).as_bytes()).unwrap();
+    assert_eq!((object.rest.len(), object.triangles.len()), (8, 12));
+    assert_eq!(object.warnings.len(), 1, "{:?}", object.warnings);
+}
+
+#[test]
+fn missing_and_unknown_files_are_refused_by_name() {
+    let missing = Object::build(&mesh_spec("/nowhere/lost.obj")).unwrap_err();
     assert!(
-        matches!(refused, Err(ObjectError::Surface { defect: SurfaceDefect::Open { edges: 3, .. }, .. })),
-        "{refused:?}"
+        matches!(missing, ObjectError::File { .. }) && missing.to_string().contains("/nowhere/lost.obj"),
+        "{missing}"
     );
+    let unknown = build_from("xyz", b"0 0 0").unwrap_err();
+    assert!(unknown.to_string().contains(".obj, .stl or .ply"), "{unknown}");
+    assert!(matches!(Object::build(&mesh_spec("/dev/null.obj")), Err(ObjectError::File { .. })));
+}
+
+#[test]
+fn hostile_counts_are_refused_without_reserving_memory() {
+    let header = |vertices: &str, list: &str, format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n\
+             element face 1\nproperty list {list} int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
+        )
+    };
+    let binary = "binary_little_endian";
+    let files = [
+        header("18446744073709551615", "uchar", "ascii"),
+        header("4000000000", "uchar", binary),
+        header("3", "uchar", "ascii") + "9223372036854775807 0 1 2\n",
+        header("3", "uchar", "ascii") + "3 0 1\n",
+        header("1", "uint", binary) + "\u{7f}\u{7f}\u{7f}\u{7f}",
+        header("1", "char", binary) + "\u{7f}\u{7f}\u{7f}\u{7f}",
+        "ply\nformat ascii 1.0\nelement empty 9000000000000000000\nend_header\n".to_owned(),
+    ];
+    for content in files {
+        let refused = build_from("ply", content.as_bytes());
+        assert!(matches!(refused, Err(ObjectError::File { .. })), "{content}\n{refused:?}");
+    }
+    let mut stl = binary_cubes()[0].1.clone();
+    stl[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
+    assert!(matches!(build_from("stl", &stl), Err(ObjectError::File { .. })));
+}
+
+#[test]
+fn damaged_mesh_files_never_panic() {
+    let mut seeds: Vec<(&str, Vec<u8>)> = binary_cubes().to_vec();
+    for name in ["cube.obj", "cube.ply", "cube.stl"] {
+        seeds.push((&name[5..], std::fs::read(dataset(name)).unwrap()));
+    }
+    let (mut built, mut refused) = (0, 0);
+    for (kind, (extension, content)) in seeds.iter().enumerate() {
+        for (index, random) in noise(120, kind as u64).iter().enumerate() {
+            let mut damaged = content.clone();
+            let place = |x: f64| ((x + 1.0) / 2.0 * content.len() as f64) as usize;
+            match index % 4 {
+                0 => damaged.truncate(place(random.x)),
+                1 => damaged[place(random.x)] ^= 1 << (index / 4 % 8),
+                2 => damaged[place(random.x)] = b'0' + (index / 4 % 10) as u8,
+                _ => drop(damaged.drain(place(random.x.min(random.y))..place(random.x.max(random.y)))),
+            }
+            match build_from(extension, &damaged) {
+                Ok(object) => {
+                    built += 1;
+                    assert!(object.compliance.entries.iter().all(|entry| entry.is_finite()));
+                }
+                Err(_) => refused += 1,
+            }
+        }
+    }
+    assert!(refused > 200, "most damage is noticed: {built} built, {refused} refused");
+}
+
+#[test]
+fn the_bean_scene_is_an_object_held_at_its_underside() {
+    let scene = Scene::load(dataset("mesh.toml")).unwrap();
+    let object = Object::build(&scene.object).unwrap();
+    assert_eq!((object.rest.len(), object.triangles.len()), (252, 500));
+    assert!(object.warnings.is_empty(), "{:?}", object.warnings);
+    let whole = Object::from_surface(&scene.object, object.rest.clone(), object.triangles.clone()).unwrap();
+    assert_eq!(whole.compliance, object.compliance);
 }

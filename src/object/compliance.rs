@@ -71,3 +71,60 @@ fn symmetrise(entries: &mut [f64], order: usize) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::object::Stiffness;
+
+    /// Six nodes in a chain with a cross link, all held; the last two are interior.
+    fn stiffness() -> Stiffness {
+        let edges = [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [0, 5]];
+        let mut stiffness = Stiffness::with_pattern(6, &edges);
+        for (index, [a, b]) in edges.map(|edge| edge.map(|node| node as usize)).into_iter().enumerate() {
+            let e = DVec3::new(1.0, 0.3 * index as f64, -0.5);
+            let block = 10.0 * DMat3::from_cols(e * e.x, e * e.y, e * e.z) + DMat3::from_diagonal(DVec3::splat(2.0));
+            for (row, column, sign) in [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)] {
+                stiffness.add(row, column, sign * block);
+            }
+        }
+        (0..6).for_each(|node| stiffness.add(node, node, DMat3::from_diagonal(DVec3::splat(0.5))));
+        stiffness
+    }
+
+    #[test]
+    fn condensation_leaves_interior_nodes_without_force() {
+        let stiffness = stiffness();
+        let factor = Factor::of(&stiffness, 1.0, &[0.0; 6]).unwrap();
+        let compliance = Compliance::of(&factor, 6, 4);
+        assert_eq!((compliance.order, compliance.entries.len()), (12, 144));
+        // The displacement that the whole object takes under a force on node 2 is, on the surface, C's column; and its
+        // forces vanish everywhere else, interior nodes included.
+        let mut displacement = [DVec3::ZERO; 6];
+        displacement[2] = DVec3::new(1.0, -2.0, 0.5);
+        let force = displacement;
+        factor.solve(&mut displacement);
+        for (i, displacement) in displacement.iter().enumerate().take(4) {
+            assert!((compliance.block(i, 2) * force[2] - *displacement).length() < 1e-14, "node {i}");
+        }
+        let mut resisted = [DVec3::NAN; 6];
+        stiffness.apply(&displacement, &mut resisted);
+        assert!(resisted.iter().zip(&force).all(|(a, b)| (*a - *b).length() < 1e-13), "{resisted:?}");
+    }
+
+    #[test]
+    fn a_factor_covers_shifted_and_scaled_matrices() {
+        let stiffness = stiffness();
+        let diagonal = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        let solution: Vec<DVec3> = (0..6).map(|i| DVec3::new(i as f64, 1.0 - i as f64, 0.25)).collect();
+        let mut vectors = vec![DVec3::ZERO; 6];
+        stiffness.apply(&solution, &mut vectors);
+        for ((vector, u), d) in vectors.iter_mut().zip(&solution).zip(diagonal) {
+            *vector = 0.25 * *vector + d * *u;
+        }
+        Factor::of(&stiffness, 0.25, &diagonal).unwrap().solve(&mut vectors);
+        assert!(vectors.iter().zip(&solution).all(|(a, b)| (*a - *b).length() < 1e-13));
+        let indefinite = Factor::of(&stiffness, 1.0, &[-100.0; 6]);
+        assert_eq!(indefinite.unwrap_err(), crate::object::FactorError::NotPositiveDefinite);
+    }
+}

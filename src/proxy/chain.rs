@@ -122,3 +122,58 @@ impl Chain {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::random;
+    use super::*;
+
+    #[test]
+    fn a_pose_is_reused_without_leaving_a_trace() {
+        for (chain, q, rate) in random::chains() {
+            let mut reused = random::at(&chain, &q, &rate, 0.7);
+            let places = (reused.nodes.as_ptr(), reused.origins.as_ptr());
+            chain.pose(&q, &mut reused);
+            assert_eq!(reused, random::at(&chain, &q, &rate, 0.0));
+            assert_eq!(places, (reused.nodes.as_ptr(), reused.origins.as_ptr()), "the pose was allocated anew");
+        }
+    }
+
+    #[test]
+    fn links_are_rigid() {
+        for (chain, q, rate) in random::chains() {
+            let (before, after) = (chain.new_pose(), random::at(&chain, &q, &rate, 0.0));
+            for (i, a) in chain.nodes.iter().enumerate() {
+                for (j, b) in chain.nodes.iter().enumerate().filter(|(_, b)| b.link == a.link) {
+                    let lengths = [&before, &after].map(|pose| pose.nodes[i].distance(pose.nodes[j]));
+                    assert!((lengths[0] - lengths[1]).abs() < 1e-14);
+                    assert!((lengths[0] - a.position.distance(b.position)).abs() < 1e-14);
+                }
+            }
+            for rotation in &after.rotations {
+                assert!((rotation.determinant() - 1.0).abs() < 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn a_planar_arm_reaches_where_trigonometry_says() {
+        let joint = |x: f64| Joint {
+            name: String::new(),
+            kind: JointKind::Revolute,
+            origin: DVec3::new(x, 0.0, 0.0),
+            axis: DVec3::Z,
+            limits: [-4.0, 4.0],
+            mass: 1.0,
+            centre_of_mass: DVec3::ZERO,
+            inertia: DVec3::ZERO,
+            rotor_inertia: 1.0,
+        };
+        let tip = Node { link: 1, position: DVec3::new(0.3, 0.0, 0.0), radius: 0.0 };
+        let chain = Chain { joints: vec![joint(0.0), joint(0.5)], nodes: vec![tip] };
+        let (a, b) = (0.4_f64, 1.1_f64);
+        let pose = random::at(&chain, &[a, b], &[0.0, 0.0], 0.0);
+        let expected = DVec3::new(0.5 * a.cos() + 0.3 * (a + b).cos(), 0.5 * a.sin() + 0.3 * (a + b).sin(), 0.0);
+        assert!(pose.nodes[0].distance(expected) < 1e-15);
+    }
+}

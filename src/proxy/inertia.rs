@@ -48,3 +48,56 @@ impl Chain {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::random;
+    use super::*;
+
+    /// Twice the kinetic energy at `rate`.
+    fn twice_energy(inertia: &JointMatrix, rate: &[f64]) -> f64 {
+        rate.iter().enumerate().map(|(i, a)| a * rate.iter().zip(inertia[i]).map(|(b, m)| b * m).sum::<f64>()).sum()
+    }
+
+    #[test]
+    fn kinetic_energy_is_the_sum_over_the_links() {
+        const STEP: f64 = 1e-5;
+        for (chain, q, rate) in random::chains() {
+            let [before, pose, after] = [-STEP, 0.0, STEP].map(|t| random::at(&chain, &q, &rate, t));
+            let mut energy = 0.0;
+            for (link, joint) in chain.joints.iter().enumerate() {
+                // Velocities by central differences of the link's placement, and the spin from R^T dR/dt = [w] in its frame.
+                let centre = |pose: &Pose| pose.origins[link] + pose.rotations[link] * joint.centre_of_mass;
+                let velocity = (centre(&after) - centre(&before)) / (2.0 * STEP);
+                let turning = (after.rotations[link] - before.rotations[link]) * (0.5 / STEP);
+                let cross = pose.rotations[link].transpose() * turning;
+                let spin = DVec3::new(cross.y_axis.z, cross.z_axis.x, cross.x_axis.y);
+                energy += joint.mass * velocity.length_squared() + (joint.inertia * spin).dot(spin);
+                energy += joint.rotor_inertia * rate[link] * rate[link];
+            }
+            let product = twice_energy(&chain.inertia(&pose), &rate);
+            assert!((product / energy - 1.0).abs() < 1e-7, "{product} against {energy}");
+        }
+    }
+
+    #[test]
+    fn inertia_is_symmetric_and_positive_definite() {
+        for (chain, q, rate) in random::chains() {
+            let inertia = chain.inertia(&random::at(&chain, &q, &rate, 0.0));
+            let count = q.len();
+            let least_rotor = chain.joints.iter().map(|joint| joint.rotor_inertia).fold(f64::INFINITY, f64::min);
+            let mut random = random::Random::new(11);
+            for i in 0..MAX_JOINTS {
+                for j in 0..MAX_JOINTS {
+                    assert_eq!(inertia[i][j], inertia[j][i]);
+                    assert!((i < count && j < count) || inertia[i][j] == 0.0);
+                }
+            }
+            for _ in 0..50 {
+                let direction: Vec<f64> = (0..count).map(|_| random.next()).collect();
+                let squared: f64 = direction.iter().map(|x| x * x).sum();
+                assert!(twice_energy(&inertia, &direction) >= 0.999 * least_rotor * squared);
+            }
+        }
+    }
+}

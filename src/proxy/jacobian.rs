@@ -34,3 +34,45 @@ impl Chain {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::random;
+    use super::*;
+
+    /// Step of central differences: their error is a sixth of its square times third derivatives of order one.
+    const STEP: f64 = 1e-5;
+
+    #[test]
+    fn jacobian_is_the_derivative_of_the_node_s_position() {
+        for (chain, q, _) in random::chains() {
+            let pose = random::at(&chain, &q, &q, 0.0);
+            for joint in 0..chain.degrees_of_freedom() {
+                let mut unit = JointVector::zeros(q.len());
+                unit[joint] = 1.0;
+                let (after, before) = (random::at(&chain, &q, &unit, STEP), random::at(&chain, &q, &unit, -STEP));
+                for node in 0..chain.nodes.len() {
+                    let difference = (after.nodes[node] - before.nodes[node]) / (2.0 * STEP);
+                    let column = chain.jacobian_column(&pose, node, joint);
+                    assert!(difference.distance(column) < 1e-9, "{difference} against {column}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn torque_does_the_work_of_the_force() {
+        let mut random = random::Random::new(5);
+        for (chain, q, rate) in random::chains() {
+            let pose = random::at(&chain, &q, &rate, 0.0);
+            let (mut torque, mut power) = (JointVector::zeros(q.len()), 0.0);
+            for node in 0..chain.nodes.len() {
+                let force = random.vector();
+                chain.add_torque(&pose, node, force, &mut torque);
+                let columns = rate.iter().enumerate().map(|(j, rate)| *rate * chain.jacobian_column(&pose, node, j));
+                power += force.dot(columns.sum());
+            }
+            assert!((torque.dot(&rate) - power).abs() < 1e-12 * (1.0 + power.abs()));
+        }
+    }
+}

@@ -7,6 +7,8 @@
 mod chain;
 mod inertia;
 mod jacobian;
+#[cfg(test)]
+mod random;
 
 pub use chain::{Chain, Joint, Node, Pose};
 pub use inertia::JointMatrix;

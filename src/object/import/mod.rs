@@ -5,16 +5,20 @@
 //! numbered in the order in which triangles first name them, and nodes that no triangle names are dropped. Coordinates
 //! become `scale * coordinate + centre`.
 
+mod ply;
+
 use super::{ObjectError, topology::place};
 use glam::DVec3;
-use ply_rs_bw::ply::{Property, PropertyAccess};
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek};
+use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 /// Nodes and triangles as a reader finds them.
 type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
+
+/// Longest mesh file that is read [B]: an object whose compliance fits in memory has less than a hundredth of that.
+const MAX_BYTES: u64 = 1 << 28;
 
 /// Reads the surface in `file`; what is merged on the way is told in `warnings`.
 pub(super) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<String>) -> Result<Surface, ObjectError> {
@@ -26,10 +30,14 @@ pub(super) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<St
     let reader = match extension.as_str() {
         "obj" => read_obj,
         "stl" => read_stl,
-        "ply" => read_ply,
+        "ply" => ply::read,
         _ => return Err(ObjectError::Format { file: file.to_owned() }),
     };
     let stream = File::open(file).map_err(|error| unreadable(error.to_string()))?;
+    let attributes = stream.metadata().map_err(|error| unreadable(error.to_string()))?;
+    if !attributes.is_file() || attributes.len() > MAX_BYTES {
+        return Err(unreadable(format!("it is not a plain file of at most {MAX_BYTES} bytes")));
+    }
     let (nodes, mut triangles) = reader(&mut BufReader::new(stream)).map_err(unreadable)?;
     let count = nodes.len();
     let mut nodes = weld(nodes, &mut triangles);
@@ -61,89 +69,6 @@ fn read_stl(stream: &mut (impl Read + Seek)) -> Result<Surface, String> {
     let nodes = mesh.vertices.iter().map(|v| DVec3::from_array(v.0.map(f64::from))).collect();
     let triangles = mesh.faces.iter().map(|face| face.vertices.map(|node| node as u32)).collect();
     Ok((nodes, triangles))
-}
-
-fn read_ply(stream: &mut impl BufRead) -> Result<Surface, String> {
-    let vertices = ply_rs_bw::parser::Parser::<PlyVertex>::new();
-    let faces = ply_rs_bw::parser::Parser::<PlyFace>::new();
-    let header = vertices.read_header(stream).map_err(|error| error.to_string())?;
-    let (mut nodes, mut triangles) = (Vec::new(), Vec::new());
-    for (name, element) in &header.elements {
-        match name.as_str() {
-            "vertex" => {
-                for vertex in vertices.read_payload_for_element(stream, element, &header).map_err(|e| e.to_string())? {
-                    nodes.push(vertex.position);
-                }
-            }
-            "face" => {
-                for face in faces.read_payload_for_element(stream, element, &header).map_err(|e| e.to_string())? {
-                    let corners = face.corners.ok_or("a face has a negative or non-integer node number")?;
-                    if corners.len() < 3 {
-                        return Err(format!("a face has {} nodes", corners.len()));
-                    }
-                    triangles.extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]]));
-                }
-            }
-            _ => {
-                faces.read_payload_for_element(stream, element, &header).map_err(|error| error.to_string())?;
-            }
-        }
-    }
-    node_number(nodes.len())?;
-    Ok((nodes, triangles))
-}
-
-/// A vertex; a coordinate that the file lacks stays NaN, which the surface's check refuses.
-struct PlyVertex {
-    position: DVec3,
-}
-
-impl PropertyAccess for PlyVertex {
-    fn new() -> Self {
-        Self { position: DVec3::NAN }
-    }
-
-    fn set_property(&mut self, key: &String, property: Property) {
-        let axis = match key.as_str() {
-            "x" => 0,
-            "y" => 1,
-            "z" => 2,
-            _ => return,
-        };
-        match property {
-            Property::Float(value) => self.position[axis] = value.into(),
-            Property::Double(value) => self.position[axis] = value,
-            _ => {}
-        }
-    }
-}
-
-/// A face; `None` where a corner is not a node number.
-struct PlyFace {
-    corners: Option<Vec<u32>>,
-}
-
-impl PropertyAccess for PlyFace {
-    fn new() -> Self {
-        Self { corners: None }
-    }
-
-    fn set_property(&mut self, key: &String, property: Property) {
-        fn numbers<T: TryInto<u32>>(values: Vec<T>) -> Option<Vec<u32>> {
-            values.into_iter().map(|value| value.try_into().ok()).collect()
-        }
-        if key == "vertex_indices" || key == "vertex_index" {
-            self.corners = match property {
-                Property::ListChar(values) => numbers(values),
-                Property::ListUChar(values) => numbers(values),
-                Property::ListShort(values) => numbers(values),
-                Property::ListUShort(values) => numbers(values),
-                Property::ListInt(values) => numbers(values),
-                Property::ListUInt(values) => Some(values),
-                _ => None,
-            };
-        }
-    }
 }
 
 /// `count` as a node number: files with more nodes than that are refused.

@@ -1,0 +1,140 @@
+//! PLY files, by `ply-rs-bw`.
+//!
+//! That reader reserves memory for as many entries as a file announces. So what is announced is held against what can
+//! be there before it is called: element counts against the file's length, list lengths against the line (text) or by
+//! the type of their count (binary).
+
+use super::{Surface, node_number};
+use glam::DVec3;
+use ply_rs_bw::parser::Parser;
+use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyType, ScalarType};
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+
+/// Nodes and triangles of a PLY file.
+pub(super) fn read(stream: &mut BufReader<File>) -> Result<Surface, String> {
+    let length = stream.get_ref().metadata().map_err(|error| error.to_string())?.len();
+    let header = Parser::<PlyVertex>::new().read_header(stream).map_err(|error| error.to_string())?;
+    let (mut nodes, mut triangles) = (Vec::new(), Vec::new());
+    for (name, element) in &header.elements {
+        if element.count as u64 > length {
+            return Err(format!("it announces {} {name} elements, more than it has bytes", element.count));
+        }
+        match name.as_str() {
+            "vertex" => {
+                nodes
+                    .extend(elements::<PlyVertex>(stream, element, &header)?.into_iter().map(|vertex| vertex.position));
+            }
+            "face" => {
+                for face in elements::<PlyFace>(stream, element, &header)? {
+                    let corners = face.corners.ok_or("a face has no node numbers, or negative ones")?;
+                    if corners.len() < 3 {
+                        return Err(format!("a face has {} nodes", corners.len()));
+                    }
+                    triangles.extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]]));
+                }
+            }
+            // Other elements are read past.
+            _ => drop(elements::<PlyFace>(stream, element, &header)?),
+        }
+    }
+    node_number(nodes.len())?;
+    Ok((nodes, triangles))
+}
+
+/// All of one kind of element, lists checked before they are read.
+fn elements<E: PropertyAccess>(
+    stream: &mut BufReader<File>,
+    element: &ElementDef,
+    header: &Header,
+) -> Result<Vec<E>, String> {
+    let parser = Parser::<E>::new();
+    if header.encoding != Encoding::Ascii {
+        let bounded = |kind: &PropertyType| match kind {
+            PropertyType::Scalar(_) => true,
+            PropertyType::List(count, _) => matches!(count, ScalarType::UChar | ScalarType::UShort),
+        };
+        if !element.properties.values().all(|property| bounded(&property.data_type)) {
+            return Err("lists must have counts of type uchar or ushort".to_owned());
+        }
+        return parser.read_payload_for_element(stream, element, header).map_err(|error| error.to_string());
+    }
+    let mut elements = Vec::new();
+    let mut line = String::new();
+    for _ in 0..element.count {
+        line.clear();
+        stream.read_line(&mut line).map_err(|error| error.to_string())?;
+        if !lists_fit(&line, element) {
+            let start: String = line.chars().take(60).collect();
+            return Err(format!("a {} line is too short: {:?}", element.name, start.trim_end()));
+        }
+        elements.push(parser.read_ascii_element(&line, element).map_err(|error| error.to_string())?);
+    }
+    Ok(elements)
+}
+
+/// Does the line have an entry for each property, and for each entry that its lists announce?
+fn lists_fit(line: &str, element: &ElementDef) -> bool {
+    let mut entries = line.split_ascii_whitespace();
+    element.properties.values().all(|property| match (&property.data_type, entries.next()) {
+        (_, None) => false,
+        (PropertyType::Scalar(_), Some(_)) => true,
+        (PropertyType::List(..), Some(count)) => {
+            let count = count.parse::<usize>().unwrap_or(usize::MAX);
+            count == 0 || (count <= line.len() && entries.nth(count - 1).is_some())
+        }
+    })
+}
+
+/// A vertex; a coordinate that the file lacks stays NaN, which the surface's check refuses.
+struct PlyVertex {
+    position: DVec3,
+}
+
+impl PropertyAccess for PlyVertex {
+    fn new() -> Self {
+        Self { position: DVec3::NAN }
+    }
+
+    fn set_property(&mut self, key: &String, property: Property) {
+        let axis = match key.as_str() {
+            "x" => 0,
+            "y" => 1,
+            "z" => 2,
+            _ => return,
+        };
+        match property {
+            Property::Float(value) => self.position[axis] = value.into(),
+            Property::Double(value) => self.position[axis] = value,
+            _ => {}
+        }
+    }
+}
+
+/// A face; `None` where a corner is not a node number, or there are no corners.
+struct PlyFace {
+    corners: Option<Vec<u32>>,
+}
+
+impl PropertyAccess for PlyFace {
+    fn new() -> Self {
+        Self { corners: None }
+    }
+
+    fn set_property(&mut self, key: &String, property: Property) {
+        fn numbers<T: TryInto<u32>>(values: Vec<T>) -> Option<Vec<u32>> {
+            values.into_iter().map(|value| value.try_into().ok()).collect()
+        }
+        if key == "vertex_indices" || key == "vertex_index" {
+            self.corners = match property {
+                Property::ListChar(values) => numbers(values),
+                Property::ListUChar(values) => numbers(values),
+                Property::ListShort(values) => numbers(values),
+                Property::ListUShort(values) => numbers(values),
+                Property::ListInt(values) => numbers(values),
+                Property::ListUInt(values) => Some(values),
+                _ => None,
+            };
+        }
+    }
+}
