@@ -1,5 +1,8 @@
 //! The deformable object: its surface, its stiffness and its compliance; what is refused, and why.
 
+// Helpers outside test functions may fail the test too.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 use glam::{DMat3, DVec3};
 use haptize::object::{Object, ObjectError, SurfaceDefect};
 use haptize::scene::{GroundNodes, GroundSpec, ObjectSpec, Scene, Shape, SpringKind, SpringSpec};
@@ -144,10 +147,13 @@ fn one_sided_surfaces_are_refused() {
     assert!(matches!(defect(&noise(6, 7), &triangles), SurfaceDefect::NonOrientable { .. }));
 }
 
+/// What is done to the nodes and triangles of a surface.
+type Alteration<'a> = &'a dyn Fn(&mut Vec<DVec3>, &mut Vec<[u32; 3]>);
+
 #[test]
 fn flat_and_broken_triangles_are_refused() {
     let whole = sphere();
-    let altered = |alter: &dyn Fn(&mut Vec<DVec3>, &mut Vec<[u32; 3]>)| {
+    let altered = |alter: Alteration<'_>| {
         let (mut nodes, mut triangles) = (whole.rest.clone(), whole.triangles.clone());
         alter(&mut nodes, &mut triangles);
         defect(&nodes, &triangles)

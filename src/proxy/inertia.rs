@@ -87,10 +87,10 @@ mod tests {
             let count = q.len();
             let least_rotor = chain.joints.iter().map(|joint| joint.rotor_inertia).fold(f64::INFINITY, f64::min);
             let mut random = random::Random::new(11);
-            for i in 0..MAX_JOINTS {
-                for j in 0..MAX_JOINTS {
-                    assert_eq!(inertia[i][j], inertia[j][i]);
-                    assert!((i < count && j < count) || inertia[i][j] == 0.0);
+            for (i, row) in inertia.iter().enumerate() {
+                for (j, entry) in row.iter().enumerate() {
+                    assert_eq!(*entry, inertia[j][i]);
+                    assert!((i < count && j < count) || *entry == 0.0);
                 }
             }
             for _ in 0..50 {
