@@ -1,5 +1,7 @@
 //! Figures: complete, deterministic, and robust against broken data.
 
+#![allow(clippy::unwrap_used)]
+
 use glam::DVec3;
 use haptize::{
     JointVector,

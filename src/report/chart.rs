@@ -42,8 +42,8 @@ pub struct Lane {
     pub curves: Vec<Curve>,
     /// Height in points.
     pub height: f64,
-    /// Whether the axis begins at zero: counts and magnitudes.
-    pub from_zero: bool,
+    /// Whether the curves count something: whole numbers from zero.
+    pub counts: bool,
 }
 
 /// Panels over one horizontal axis.
@@ -92,16 +92,19 @@ const SHADE: Colour = colour::SHADE;
 impl Lane {
     /// A panel without curves.
     pub(super) fn empty(title: &str) -> Self {
-        Self { title: title.to_owned(), curves: Vec::new(), height: 130.0, from_zero: false }
+        Self { title: title.to_owned(), curves: Vec::new(), height: 130.0, counts: false }
     }
 
     fn draw(&self, canvas: &mut Canvas, area: Area, across: &Scale, shaded: &[[f64; 2]], lowest: bool) {
         let values = || self.curves.iter().flat_map(|curve| &curve.points).map(|point| point.1);
         let [mut low, high] = ticks::range(values(), 0.06);
-        if self.from_zero && low < high {
-            low = low.min(0.0).max(values().fold(0.0, f64::min));
+        // What is never negative begins at zero, not at the margin below it.
+        if low < 0.0 && values().all(|value| !(value < 0.0)) {
+            low = 0.0;
         }
-        let panel = Panel { area, across: across.clone(), up: Scale::linear([low, high], &self.title) };
+        let up =
+            if self.counts { Scale::whole([low, high], &self.title) } else { Scale::linear([low, high], &self.title) };
+        let panel = Panel { area, across: across.clone(), up };
         for &interval in shaded {
             panel.shade(canvas, interval, SHADE);
         }

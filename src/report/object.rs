@@ -5,7 +5,7 @@ use super::{
     PIXELS, ReportError,
     canvas::{Area, Canvas, Picture},
     chart,
-    colour::{Colour, ColourMap, INK},
+    colour::{Colour, ColourMap, GRID, INK},
     plot::{self, Entry, Mark},
     raster::{Camera, Raster},
     ticks,
@@ -130,8 +130,11 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
         };
         canvas.text((x + plot::TITLE.width(&time) + 10.0, y), &what, plot::NOTE);
         canvas.picture((x, y + 8.0), scene.picture(instant));
+        canvas.frame(Area { x, y: y + 8.0, width: CELL[0], height: CELL[1] }, GRID, 1.0);
     }
-    let bar = Area { x: WIDTH - 76.0, y: top + 40.0, width: 12.0, height: 160.0 };
+    let height = 180.0;
+    let middle = top + 8.0 + (rows as f64 * (CELL[1] + 34.0) - 34.0) / 2.0;
+    let bar = Area { x: WIDTH - 72.0, y: middle - height / 2.0, width: 12.0, height };
     plot::colour_bar(&mut canvas, bar, scene.map, "|u| [mm]");
     Ok(canvas)
 }
@@ -170,10 +173,12 @@ impl<'a> Scene<'a> {
         };
         let mut framed: Vec<DVec3> =
             instants.iter().flat_map(|instant| instant.nodes.iter().take(rest.len())).copied().collect();
+        let centre = (low + high) / 2.0;
         for instant in instants {
+            // Proxy nodes at the object, not the whole arm.
+            framed.extend(instant.pose.nodes.iter().filter(|x| x.distance(centre) < 1.3 * radius));
             framed.extend(scene.arrows(instant).into_iter().map(|(tail, _)| tail));
         }
-        let centre = (low + high) / 2.0;
         let direction = view(centre, instants, forces().sum());
         scene.camera = Camera::framing(&framed, direction, CELL.map(|side| (side * PIXELS) as usize));
         scene

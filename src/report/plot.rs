@@ -33,32 +33,61 @@ pub struct Scale {
     pub range: [f64; 2],
     /// `Time [s]`.
     pub title: String,
-    /// Whether equal lengths are equal ratios.
-    pub logarithmic: bool,
+    /// How its numbers follow each other.
+    pub steps: Steps,
+}
+
+/// How the numbers along an axis follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Steps {
+    /// Equal lengths are equal differences.
+    Linear,
+    /// The same, with whole numbers only at the ticks: counts.
+    Whole,
+    /// Equal lengths are equal ratios.
+    Logarithmic,
 }
 
 impl Scale {
     /// An axis of equal steps.
     #[must_use]
     pub fn linear(range: [f64; 2], title: impl Into<String>) -> Self {
-        Self { range, title: title.into(), logarithmic: false }
+        Self { range, title: title.into(), steps: Steps::Linear }
+    }
+
+    /// An axis of counts.
+    #[must_use]
+    pub fn whole(range: [f64; 2], title: impl Into<String>) -> Self {
+        Self { range, title: title.into(), steps: Steps::Whole }
     }
 
     /// An axis of equal ratios; `range` is cut to positive numbers.
     #[must_use]
     pub fn logarithmic([low, high]: [f64; 2], title: impl Into<String>) -> Self {
         let low = if low > 0.0 { low } else { f64::MIN_POSITIVE };
-        Self { range: [low, high.max(10.0 * low)], title: title.into(), logarithmic: true }
+        Self { range: [low, high.max(10.0 * low)], title: title.into(), steps: Steps::Logarithmic }
     }
 
     /// Where `value` lies between the ends, 0 to 1; beyond that outside.
     fn share(&self, value: f64) -> f64 {
         let [low, high] = self.range;
-        if self.logarithmic { (value / low).log10() / (high / low).log10() } else { (value - low) / (high - low) }
+        match self.steps {
+            Steps::Logarithmic => (value / low).log10() / (high / low).log10(),
+            Steps::Linear | Steps::Whole => (value - low) / (high - low),
+        }
     }
 
     fn ticks(&self, intervals: usize) -> Ticks {
-        if self.logarithmic { ticks::decades(self.range) } else { ticks::ticks(self.range, intervals) }
+        let is_whole = |ticks: &Ticks| ticks.marks.iter().all(|(value, _)| value.fract() == 0.0);
+        match self.steps {
+            Steps::Logarithmic => ticks::decades(self.range),
+            Steps::Linear => ticks::ticks(self.range, intervals),
+            Steps::Whole => (1..=intervals)
+                .rev()
+                .map(|intervals| ticks::ticks(self.range, intervals))
+                .find(is_whole)
+                .unwrap_or_else(|| ticks::ticks(self.range, 1)),
+        }
     }
 }
 

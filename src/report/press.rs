@@ -25,7 +25,7 @@ pub fn press(trace: &Trace) -> Canvas {
         title: "Contacting object nodes [1]".to_owned(),
         curves: vec![nodes],
         height: 90.0,
-        from_zero: true,
+        counts: true,
     });
     stack("Multi-point contact felt through the 1 kHz loop".to_owned(), trace, lanes)
 }
@@ -34,7 +34,7 @@ pub fn press(trace: &Trace) -> Canvas {
 #[must_use]
 pub fn energy(trace: &Trace) -> Canvas {
     type Account = (&'static str, fn(&Accounts) -> f64);
-    let lane = |title: &str, from_zero: bool, accounts: &[Account]| Lane {
+    let lane = |title: &str, accounts: &[Account]| Lane {
         title: title.to_owned(),
         curves: accounts
             .iter()
@@ -44,12 +44,11 @@ pub fn energy(trace: &Trace) -> Canvas {
             })
             .collect(),
         height: 130.0,
-        from_zero,
+        counts: false,
     };
     let lanes = vec![
         lane(
             "Kept [mJ]",
-            true,
             &[
                 ("stored in the object, U", |accounts| accounts.stored),
                 ("coupling spring", |accounts| accounts.spring),
@@ -58,7 +57,6 @@ pub fn energy(trace: &Trace) -> Canvas {
         ),
         lane(
             "Exchanged [mJ]",
-            false,
             &[
                 ("by the coupling", |accounts| accounts.coupling_work),
                 ("by the contact torque", |accounts| accounts.field_work),
@@ -66,8 +64,8 @@ pub fn energy(trace: &Trace) -> Canvas {
                 ("lost in the proxy", |accounts| accounts.proxy_dissipation),
             ],
         ),
-        lane("Created by interpolating the torque [mJ]", false, &[("", |accounts| accounts.leak)]),
-        Lane { height: 70.0, ..lane("Unexplained in the balance [mJ]", false, &[("", Accounts::residual)]) },
+        lane("Created by interpolating the torque [mJ]", &[("", |accounts| accounts.leak)]),
+        Lane { height: 70.0, ..lane("Unexplained in the balance [mJ]", &[("", Accounts::residual)]) },
     ];
     stack("Energy accounts of proxy and coupling".to_owned(), trace, lanes)
 }
@@ -94,7 +92,7 @@ fn per_joint(trace: &Trace, what: &str, torque: bool, value: impl Fn(&Tick) -> &
             curve(trace, &name, colour::series(number), |tick| value(tick).get(number).copied().unwrap_or(f64::NAN))
         });
         let unit = if torque { torque_unit(unit) } else { unit };
-        Lane { title: format!("{what} [{unit}]"), curves: curves.collect(), height: 130.0, from_zero: false }
+        Lane { title: format!("{what} [{unit}]"), curves: curves.collect(), height: 130.0, counts: false }
     });
     let lanes: Vec<Lane> = lanes.collect();
     if lanes.is_empty() {

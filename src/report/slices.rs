@@ -255,7 +255,7 @@ fn line(dataset: &Dataset) -> Canvas {
             title: format!("τ₁ {} [{}]", axis.name, torque_unit(&axis.unit)),
             curves: vec![curve],
             height: 240.0,
-            from_zero: false,
+            counts: false,
         }],
         shaded,
         shade_name: "in contact".to_owned(),

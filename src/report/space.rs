@@ -20,7 +20,7 @@ use glam::DVec3;
 use std::collections::HashMap;
 
 const WIDTH: f64 = 760.0;
-const PICTURE: Area = Area { x: 24.0, y: 64.0, width: 600.0, height: 500.0 };
+const PICTURE: Area = Area { x: 36.0, y: 60.0, width: 600.0, height: 480.0 };
 
 /// The cloud of configurations in contact. One or two joints lie on the box's floor.
 #[must_use]
@@ -48,7 +48,7 @@ pub fn space(dataset: &Dataset) -> Canvas {
         }
     }
 
-    let mut canvas = Canvas::new(WIDTH, PICTURE.bottom() + 16.0);
+    let mut canvas = Canvas::new(WIDTH, PICTURE.bottom() + 4.0);
     chart::headline(&mut canvas, "Haptized data in the C-space of the proxy");
     let untrusted = points.iter().filter(|point| !trusted(point)).count();
     canvas.text((chart::TITLE_LEFT, chart::MARGIN + 32.0), &caption(dataset, &points), plot::NOTE);
@@ -58,7 +58,7 @@ pub fn space(dataset: &Dataset) -> Canvas {
     }
     space_box.label(&mut canvas, raster.camera(), direction, dataset);
     canvas.picture((PICTURE.x, PICTURE.y), raster.picture());
-    let bar = Area { x: PICTURE.right() + 40.0, y: PICTURE.y + 110.0, width: 14.0, height: 260.0 };
+    let bar = Area { x: PICTURE.right() + 30.0, y: PICTURE.y + 110.0, width: 14.0, height: 260.0 };
     plot::colour_bar(&mut canvas, bar, map, &format!("‖τ‖ [{}]", units(dataset)));
     canvas
 }
@@ -108,7 +108,7 @@ fn thousands(number: usize) -> String {
     let digits = number.to_string();
     let mut text = String::new();
     for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index) % 3 == 0 {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
             text.push(',');
         }
         text.push(digit);
@@ -245,15 +245,19 @@ impl Box3 {
             }
             let axis_of = &dataset.grid.axes[axis];
             let title = format!("q{} {} [{}]", subscript(axis + 1), axis_of.name, axis_of.unit);
-            let position = if axis == 2 {
+            // The upright title ends a little right of its edge, where the wall behind does not reach it; the others
+            // begin or end beyond their tick labels.
+            let (position, anchor) = if axis == 2 {
                 let mut top = base;
                 top.z = 0.5 * self.sides.z;
-                on_sheet(top).map(|at| (at.0, at.1 - 14.0))
+                (on_sheet(top).map(|at| (at.0 + 16.0, at.1 - 16.0)), Anchor::End)
             } else {
-                on_sheet(base + 0.17 * outward).map(|at| (at.0, at.1 + 4.0))
+                let rightwards = camera.axes()[0].dot(outward) > 0.0;
+                let (shift, anchor) = if rightwards { (14.0, Anchor::Start) } else { (-14.0, Anchor::End) };
+                (on_sheet(base + 0.12 * outward).map(|at| (at.0 + shift, at.1 + 18.0)), anchor)
             };
             if let Some(position) = position {
-                canvas.text(position, &title, plot::TITLE.anchored(Anchor::Middle));
+                canvas.text(position, &title, plot::TITLE.anchored(anchor));
             }
         }
     }

@@ -143,7 +143,7 @@ mod tests {
                 let slack = 1e-5 * (range[1] - range[0]);
                 assert!(ticks.marks.iter().all(|(at, _)| *at >= range[0] - slack && *at <= range[1] + slack));
             }
-            low = -1.1 * low;
+            low *= -1.1;
         }
     }
 

@@ -36,10 +36,10 @@ impl Raster {
             for side in 0..3 {
                 let (from, to) = (triangle[side], triangle[(side + 1) % 3]);
                 // The neighbour across names the same edge the other way round.
-                if from < to {
-                    if let (Some(&a), Some(&b)) = (nodes.get(from as usize), nodes.get(to as usize)) {
-                        self.line([a, b], width, colour, LIFT);
-                    }
+                if from < to
+                    && let (Some(&a), Some(&b)) = (nodes.get(from as usize), nodes.get(to as usize))
+                {
+                    self.line([a, b], width, colour, LIFT);
                 }
             }
         }
