@@ -8,14 +8,21 @@ use haptize::{
     contact::Status,
     dataset::{Axis, Contacts, Dataset, Grid, Provenance, Surface},
     object::Object,
-    proxy::{Chain, Joint, Node},
+    proxy::{Chain, Joint, Node as ProxyNode},
     render::{
         accounts::Accounts,
         flags::Flags,
         trace::{Frame, JointLabel, Tick, Trace},
     },
-    report,
+    report::{
+        self,
+        canvas::{Anchor, Canvas, TextStyle, Weight},
+    },
     scene::{GroundNodes, GroundSpec, JointKind, ObjectSpec, Shape, SpringKind, SpringSpec},
+};
+use resvg::{
+    tiny_skia::Rect,
+    usvg::{Group, Node, Options, Tree},
 };
 use std::path::PathBuf;
 
@@ -52,7 +59,7 @@ fn arm(joints: usize) -> Chain {
         inertia: DVec3::splat(1e-4),
         rotor_inertia: 1e-4,
     };
-    let node = |link: usize, k: usize| Node { link, position: DVec3::X * length * k as f64 / 5.0, radius: 0.0 };
+    let node = |link: usize, k: usize| ProxyNode { link, position: DVec3::X * length * k as f64 / 5.0, radius: 0.0 };
     let nodes = (joints.saturating_sub(2)..joints).flat_map(|link| (1..=5).map(move |k| node(link, k)));
     Chain { joints: (0..joints).map(joint).collect(), nodes: nodes.collect() }
 }
@@ -185,11 +192,285 @@ fn folder(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name)
 }
 
+/// Every mark of an SVG, with the fonts that the figures are made for.
+fn parsed(svg: &str) -> Tree {
+    let mut options = Options::default();
+    let fonts = [
+        &include_bytes!("../src/report/fonts/Roboto-Regular.ttf")[..],
+        include_bytes!("../src/report/fonts/Roboto-Medium.ttf"),
+    ];
+    fonts.into_iter().for_each(|font| options.fontdb_mut().load_font_data(font.to_vec()));
+    Tree::from_str(svg, &options).unwrap()
+}
+
+/// Texts with the boxes of their glyphs.
+fn texts(group: &Group, found: &mut Vec<(String, Rect)>) {
+    for node in group.children() {
+        match node {
+            Node::Group(group) => texts(group, found),
+            Node::Text(text) => {
+                let characters = text.chunks().iter().map(|chunk| chunk.text()).collect();
+                found.push((characters, text.abs_bounding_box()));
+            }
+            Node::Path(_) | Node::Image(_) => {}
+        }
+    }
+}
+
+/// Complains about text that leaves the sheet or runs into other text.
+fn misplaced_text(canvas: &Canvas) -> Vec<String> {
+    let tree = parsed(&canvas.svg());
+    let mut found = Vec::new();
+    texts(tree.root(), &mut found);
+    assert!(!found.is_empty());
+    let mut complaints = Vec::new();
+    for (number, (text, area)) in found.iter().enumerate() {
+        let sheet = tree.size();
+        if area.left() < 0.0 || area.top() < 0.0 || area.right() > sheet.width() || area.bottom() > sheet.height() {
+            complaints.push(format!("{text:?} leaves the sheet: {area:?}"));
+        }
+        for (other, other_area) in &found[number + 1..] {
+            if area.left() < other_area.right()
+                && other_area.left() < area.right()
+                && area.top() < other_area.bottom()
+                && other_area.top() < area.bottom()
+            {
+                complaints.push(format!("{text:?} runs into {other:?}"));
+            }
+        }
+    }
+    complaints
+}
+
+/// Whether the sheet's texts include `wanted`.
+fn says(canvas: &Canvas, wanted: &str) -> bool {
+    canvas.svg().contains(wanted)
+}
+
+/// Share of the pixels that are not white.
+fn ink(canvas: &Canvas) -> f64 {
+    let picture = canvas.pixels(1.0).unwrap();
+    picture.pixels.iter().filter(|&&pixel| pixel != [255; 3]).count() as f64 / picture.pixels.len() as f64
+}
+
+/// Counts of grid points that keep chains of one to six joints small.
+fn counts(joints: usize) -> &'static [usize] {
+    [&[30][..], &[12, 30], &[7, 24, 5], &[5, 12, 4, 3], &[3, 9, 3, 2, 2], &[3, 8, 2, 2, 2, 2]][joints - 1]
+}
+
+/// All figures of a dataset and a recording.
+fn all(dataset: &Dataset, chain: &Chain, trace: &Trace) -> Vec<(&'static str, Canvas)> {
+    let mut figures = vec![
+        ("space", report::space::space(dataset)),
+        ("slices", report::slices::slices(dataset)),
+        ("press", report::press::press(trace)),
+        ("energy", report::press::energy(trace)),
+    ];
+    if !trace.frames.is_empty() {
+        let instants = report::object::instants(dataset, chain, trace, 6).unwrap();
+        figures.push(("object", report::object::object(dataset, chain, &instants).unwrap()));
+    }
+    figures
+}
+
+fn lateness(values: impl Iterator<Item = u64>) -> hdrhistogram::Histogram<u64> {
+    let mut histogram = hdrhistogram::Histogram::new(3).unwrap();
+    values.for_each(|value| histogram.record(value).unwrap());
+    histogram
+}
+
 #[test]
-fn all_figures() {
+fn files_are_complete_and_the_same_twice() {
     let (chain, object) = (arm(3), sphere());
-    let dataset = dataset(&chain, &object, &[21, 24, 16]);
+    let dataset = dataset(&chain, &object, counts(3));
+    let trace = recording(&chain, &object, 1000);
+    let write = |name: &str, trace: &Trace| -> Vec<(String, Vec<u8>)> {
+        let paths = report::write_figures(&folder(name), &dataset, Some((&chain, trace))).unwrap();
+        let name = |path: &PathBuf| path.file_name().unwrap().to_string_lossy().into_owned();
+        paths.iter().map(|path| (name(path), std::fs::read(path).unwrap())).collect()
+    };
+    let once = write("once", &trace);
+    let names: Vec<&str> = once.iter().map(|(name, _)| name.as_str()).collect();
+    let wanted =
+        ["cspace.png", "torque.svg", "torque.png", "press.svg", "press.png", "energy.svg", "energy.png", "object.png"];
+    assert_eq!(names, wanted);
+    assert!(once == write("twice", &trace), "the same data gave other bytes");
+
+    let mut other = trace.clone();
+    other.ticks[700].contact_torque[1] += 0.05;
+    let differing: Vec<String> =
+        once.into_iter().zip(write("other", &other)).filter(|(a, b)| a != b).map(|(a, _)| a.0).collect();
+    assert_eq!(differing, ["press.svg", "press.png"]);
+}
+
+#[test]
+fn pictures_have_two_pixels_a_point() {
+    let trace = recording(&arm(2), &sphere(), 100);
+    let canvas = report::press::press(&trace);
+    let png = report::write_png(&folder("size"), "press", &canvas).unwrap();
+    let (width, height) = image::image_dimensions(png).unwrap();
+    let area = canvas.area();
+    assert_eq!((f64::from(width), f64::from(height)), (2.0 * area.width, (2.0 * area.height).ceil()));
+}
+
+#[test]
+fn no_text_is_clipped_or_overlapped_for_one_to_six_joints() {
+    let object = sphere();
+    for joints in 1..=6 {
+        let chain = arm(joints);
+        let dataset = dataset(&chain, &object, counts(joints));
+        let trace = recording(&chain, &object, 1000);
+        for (name, canvas) in all(&dataset, &chain, &trace) {
+            let complaints = misplaced_text(&canvas);
+            assert!(complaints.is_empty(), "{name}, {joints} joints: {complaints:#?}");
+            assert!(ink(&canvas) > 0.01, "{name}, {joints} joints: nearly empty");
+        }
+    }
+}
+
+#[test]
+fn the_check_for_misplaced_text_finds_it() {
+    let style = TextStyle { size: 12.0, weight: Weight::Regular, colour: report::colour::INK, anchor: Anchor::Start };
+    let mut canvas = Canvas::new(200.0, 100.0);
+    canvas.text((10.0, 50.0), "fits", style);
+    assert!(misplaced_text(&canvas).is_empty());
+    canvas.text((25.0, 52.0), "overlaps", style);
+    assert_eq!(misplaced_text(&canvas).len(), 1);
+    canvas.text((190.0, 90.0), "leaves", style);
+    assert_eq!(misplaced_text(&canvas).len(), 2);
+}
+
+#[test]
+fn the_press_has_a_curve_for_every_joint_and_shades_every_contact() {
+    let (chain, object) = (arm(3), sphere());
     let trace = recording(&chain, &object, 3000);
-    let written = report::write_figures(&folder("figures"), &dataset, Some((&chain, &trace))).unwrap();
-    assert_eq!(written.len(), 8);
+    let svg = report::press::press(&trace).svg();
+    for joint in 0..3 {
+        // A curve and a legend entry in each of three panels; the first colour also draws the number of nodes.
+        let strokes = svg.matches(&format!(r#"stroke="{}""#, report::colour::series(joint))).count();
+        assert_eq!(strokes, 6 + usize::from(joint == 0));
+    }
+    let contacts = trace.ticks.windows(2).filter(|pair| !pair[0].contact && pair[1].contact).count();
+    let shades = svg.matches(&format!(r#"fill="{}""#, report::colour::SHADE)).count();
+    assert_eq!(contacts, 2);
+    assert_eq!(shades, 4 * contacts + 1, "four panels and the legend");
+    for title in
+        ["Contact torque on the proxy [N m]", "Proxy configuration [rad]", "Contacting object nodes [1]", "Time [s]"]
+    {
+        assert!(svg.contains(title), "{title}");
+    }
+}
+
+#[test]
+fn prismatic_joints_have_panels_of_their_own() {
+    let mut trace = recording(&arm(3), &sphere(), 200);
+    trace.joints[2].unit = "m".to_owned();
+    let canvas = report::press::press(&trace);
+    for title in ["Contact torque on the proxy [N m]", "Contact torque on the proxy [N]", "Proxy configuration [m]"] {
+        assert!(says(&canvas, title), "{title}");
+    }
+    assert!(misplaced_text(&canvas).is_empty());
+}
+
+#[test]
+fn the_cloud_has_a_ball_for_every_configuration_in_contact() {
+    let (chain, object) = (arm(3), sphere());
+    let mut dataset = dataset(&chain, &object, counts(3));
+    let contacts = dataset.status.iter().filter(|&&status| status == Status::Contact as u8).count();
+    let full = report::space::space(&dataset);
+    assert!(says(&full, &format!("{contacts} of 840 configurations in contact")));
+    let with_balls = ink(&full);
+    dataset.status = vec![Status::Free as u8; 840].into();
+    let empty = report::space::space(&dataset);
+    assert!(says(&empty, "none of 840 configurations in contact"));
+    assert!(with_balls > ink(&empty) + 0.005);
+}
+
+#[test]
+fn slices_show_the_boundary_and_mark_what_did_not_converge() {
+    let (chain, object) = (arm(3), sphere());
+    let mut dataset = dataset(&chain, &object, counts(3));
+    let sound = report::slices::slices(&dataset);
+    assert!(says(&sound, "contact boundary") && !says(&sound, "not converged") && !says(&sound, "no data"));
+    let cells = sound.svg().matches("<rect").count();
+    assert!(cells > 3 * 24 * 5, "{cells} rectangles");
+    let bad =
+        |status: &u8| if *status == Status::Contact as u8 { Status::Unconverged as u8 } else { Status::Outside as u8 };
+    dataset.status = dataset.status.iter().map(bad).collect::<Vec<u8>>().into();
+    let unsound = report::slices::slices(&dataset);
+    assert!(says(&unsound, "not converged") && says(&unsound, "no data"));
+    assert!(unsound.svg().matches("<circle").count() > 10);
+    assert!(says(&report::space::space(&dataset), "not converged"));
+}
+
+#[test]
+fn empty_and_broken_data_give_annotated_figures() {
+    let (chain, object) = (arm(3), sphere());
+    let trace = Trace::default();
+    for canvas in [report::press::press(&trace), report::press::energy(&trace)] {
+        assert!(says(&canvas, "no data") && misplaced_text(&canvas).is_empty());
+    }
+    let no_lateness = report::jitter::jitter(&lateness(std::iter::empty()));
+    assert!(says(&no_lateness, "no data"));
+    assert!(misplaced_text(&no_lateness).is_empty(), "{:?}", misplaced_text(&no_lateness));
+
+    let mut broken = recording(&chain, &object, 300);
+    for tick in &mut broken.ticks {
+        tick.contact_torque = JointVector::from_slice(&[f64::NAN, f64::INFINITY, 1e300]);
+        tick.proxy = JointVector::from_slice(&[f64::NAN]);
+        tick.accounts.leak = f64::NEG_INFINITY;
+    }
+    broken.ticks[7].time = f64::NAN;
+    for canvas in [report::press::press(&broken), report::press::energy(&broken)] {
+        assert!(says(&canvas, "no data"));
+        assert!(ink(&canvas) > 0.01);
+    }
+
+    for counts in [&[1, 1, 1][..], &[1], &[1, 1], &[2, 1, 1, 1]] {
+        let chain = arm(counts.len());
+        let mut dataset = dataset(&chain, &object, counts);
+        for (name, canvas) in all(&dataset, &chain, &Trace::default()) {
+            assert!(misplaced_text(&canvas).is_empty(), "{name} of {counts:?}: {:?}", misplaced_text(&canvas));
+        }
+        dataset.torque = vec![f64::NAN; dataset.torque.len()].into();
+        dataset.status = vec![Status::Contact as u8; dataset.status.len()].into();
+        dataset.gap = None;
+        dataset.grid.axes[0].step = f64::NAN;
+        for (name, canvas) in all(&dataset, &chain, &Trace::default()) {
+            assert!(ink(&canvas) > 0.001, "{name} of {counts:?}");
+        }
+    }
+}
+
+#[test]
+fn parts_that_do_not_belong_together_are_refused() {
+    let (chain, object) = (arm(3), sphere());
+    let mut dataset = dataset(&chain, &object, counts(3));
+    let mut trace = recording(&chain, &object, 100);
+    let refusal = |chain: &Chain, dataset: &Dataset, trace: &Trace| {
+        report::write_figures(&folder("refused"), dataset, Some((chain, trace))).unwrap_err().to_string()
+    };
+    assert!(refusal(&arm(2), &dataset, &trace).contains("the chain has 2 joints, the dataset 3"));
+    trace.frames[0].nodes.truncate(5);
+    assert!(refusal(&chain, &dataset, &trace).contains("has 5 nodes, the dataset's surface 102"));
+    trace.frames[0].proxy = JointVector::zeros(1);
+    assert!(refusal(&chain, &dataset, &trace).contains("has 1 joints"));
+    dataset.surface = None;
+    assert!(report::write_figures(&folder("scanned"), &dataset, Some((&chain, &trace))).is_ok());
+
+    let file = folder("refused").join("cspace.png");
+    let error = report::write_figures(&file, &dataset, None).unwrap_err().to_string();
+    assert!(error.contains("cannot write") && error.contains("cspace.png"), "{error}");
+}
+
+#[test]
+fn lateness_is_counted_in_logarithmic_bins_with_its_quantiles() {
+    let values = (0..20_000_u64).map(|k| 300 + k * k % 5_003 + if k == 9 { 400_000 } else { 0 });
+    let canvas = report::jitter::jitter(&lateness(values));
+    assert!(misplaced_text(&canvas).is_empty(), "{:?}", misplaced_text(&canvas));
+    for text in ["median", "99 %", "99.9 %", "latest 400 µs", "Lateness [µs]"] {
+        assert!(says(&canvas, text), "{text}");
+    }
+    let bars = canvas.svg().matches("<rect").count() - 1;
+    assert!((10..30).contains(&bars), "{bars} bars");
 }

@@ -153,7 +153,11 @@ impl Histogram {
         headline(&mut canvas, &self.headline);
         let filled = || self.bins.iter().filter(|([from, to], count)| *count > 0 && from < to && *from > 0.0);
         let ends = filled().flat_map(|(ends, _)| *ends).chain(self.marks.iter().map(|mark| mark.0));
-        let [low, high] = ticks::range(ends.filter(|&end| end > 0.0), 0.0);
+        // Without a single count any two decades show that there is none.
+        let ends = ends
+            .filter(|&end| end > 0.0)
+            .chain(filled().next().is_none().then_some([1.0, 100.0]).into_iter().flatten());
+        let [low, high] = ticks::range(ends, 0.0);
         let most = filled().map(|(_, count)| *count).max().unwrap_or(1);
         let panel = Panel {
             area,

@@ -69,6 +69,11 @@ pub enum ColourMap {
         /// Brightest end.
         high: f64,
     },
+    /// Viridis from zero to `high` by the square root: magnitudes of which most are small.
+    Root {
+        /// Brightest end.
+        high: f64,
+    },
     /// Warm grey over teal to deep blue: magnitudes on lit bodies, which a dark low end would turn into silhouettes.
     Pale {
         /// Palest end.
@@ -89,6 +94,7 @@ impl ColourMap {
     pub fn range(&self) -> [f64; 2] {
         let [low, high] = match *self {
             Self::Sequential { low, high } | Self::Pale { low, high } => [low, high],
+            Self::Root { high } => [0.0, high],
             Self::Diverging { bound } => [-bound.abs(), bound.abs()],
         };
         if !(low.is_finite() && high.is_finite()) {
@@ -106,10 +112,21 @@ impl ColourMap {
         if value.is_nan() {
             return ABSENT;
         }
+        self.at(self.share(value).clamp(0.0, 1.0))
+    }
+
+    /// Where `value` lies between the ends of the colour bar, 0 to 1; beyond that outside.
+    #[must_use]
+    pub fn share(&self, value: f64) -> f64 {
         let [low, high] = self.range();
-        let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
+        let share = (value - low) / (high - low);
+        if matches!(self, Self::Root { .. }) { share.max(0.0).sqrt() } else { share }
+    }
+
+    /// Colour at a place of the colour bar, 0 to 1.
+    pub(super) fn at(&self, share: f64) -> Colour {
         let colour = match self {
-            Self::Sequential { .. } => colorous::VIRIDIS.eval_continuous(share),
+            Self::Sequential { .. } | Self::Root { .. } => colorous::VIRIDIS.eval_continuous(share),
             Self::Pale { .. } => return pale(share),
             Self::Diverging { .. } => colorous::RED_BLUE.eval_continuous(1.0 - share),
         };

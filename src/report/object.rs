@@ -3,7 +3,7 @@
 
 use super::{
     PIXELS, ReportError,
-    canvas::{Area, Canvas, Picture},
+    canvas::{Anchor, Area, Canvas, Picture},
     chart,
     colour::{Colour, ColourMap, GRID, INK},
     plot::{self, Entry, Mark},
@@ -135,7 +135,7 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
     let height = 180.0;
     let middle = top + 8.0 + (rows as f64 * (CELL[1] + 34.0) - 34.0) / 2.0;
     let bar = Area { x: WIDTH - 72.0, y: middle - height / 2.0, width: 12.0, height };
-    plot::colour_bar(&mut canvas, bar, scene.map, "|u| [mm]");
+    plot::colour_bar(&mut canvas, bar, scene.map, "|u| [mm]", Anchor::Start);
     Ok(canvas)
 }
 
@@ -214,7 +214,7 @@ impl<'a> Scene<'a> {
 
     /// Links from joint to joint, the last one to its farthest node, and the contact nodes on them.
     fn draw_proxy(&self, raster: &mut Raster, pose: &Pose) {
-        let thickness = 0.045 * self.radius;
+        let thickness = 0.032 * self.radius;
         for (link, &from) in pose.origins.iter().enumerate() {
             let own =
                 || self.chain.nodes.iter().zip(&pose.nodes).filter(|(node, _)| node.link == link).map(|(_, &x)| x);
@@ -226,7 +226,7 @@ impl<'a> Scene<'a> {
             raster.sphere(from, 2.0 * thickness, LINK);
         }
         for (node, &x) in self.chain.nodes.iter().zip(&pose.nodes) {
-            raster.sphere(x, node.radius.max(1.4 * thickness), PROXY_NODE);
+            raster.sphere(x, node.radius.max(1.25 * thickness), PROXY_NODE);
         }
     }
 }
@@ -240,4 +240,80 @@ fn view(centre: DVec3, instants: &[Instant], force: DVec3) -> DVec3 {
     let outward = flat(-force);
     let side = if side.dot(outward) < 0.0 { -side } else { side };
     side + 0.55 * outward + 0.45 * DVec3::Z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An octahedron of radius 50 mm around (0.2, 0, 0).
+    fn octahedron() -> (Vec<DVec3>, Vec<[u32; 3]>) {
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+        let nodes = axes.into_iter().flat_map(|axis| [axis, -axis]).map(|n| DVec3::X * 0.2 + 0.05 * n).collect();
+        let upper = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4]];
+        let lower = [[2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+        (nodes, upper.into_iter().chain(lower).collect())
+    }
+
+    fn instant(nodes: &[DVec3], lowered: f64) -> Instant {
+        let mut nodes = nodes.to_vec();
+        nodes[4].z -= lowered;
+        let pose = Pose { origins: vec![DVec3::new(-0.5, 0.0, 0.4)], ..Pose::default() };
+        let force = NodeForce { node: 4, force: DVec3::NEG_Z * 20.0 * lowered };
+        let forces = if lowered > 0.0 { vec![force] } else { vec![] };
+        Instant { time: 0.0, nodes, forces, pose }
+    }
+
+    fn at(picture: &Picture, scene: &Scene, point: DVec3) -> [u8; 3] {
+        let seen = scene.camera.project(point).unwrap();
+        picture.pixels[seen.y as usize * picture.width + seen.x as usize]
+    }
+
+    #[test]
+    fn vertices_end_where_the_camera_projects_them() {
+        let (nodes, triangles) = octahedron();
+        let chain = Chain { joints: vec![], nodes: vec![] };
+        let instants = [instant(&nodes, 0.0)];
+        let scene = Scene::new(&chain, &nodes, &triangles, &instants);
+        let picture = scene.picture(&instants[0]);
+        let centre = DVec3::X * 0.2;
+        // Upper, lower and the two lateral vertices are on the silhouette of a view from the side.
+        for vertex in [4, 5] {
+            let beside = |share: f64| at(&picture, &scene, centre + share * (nodes[vertex] - centre));
+            assert_ne!(beside(0.93), [255; 3], "vertex {vertex} is missing");
+            assert_eq!(beside(1.05), [255; 3], "something beyond vertex {vertex}");
+        }
+    }
+
+    #[test]
+    fn a_pressed_vertex_moves_on_the_picture_and_takes_the_deepest_colour() {
+        let (nodes, triangles) = octahedron();
+        let chain = Chain { joints: vec![], nodes: vec![] };
+        let instants = [instant(&nodes, 0.0), instant(&nodes, 0.02)];
+        let scene = Scene::new(&chain, &nodes, &triangles, &instants);
+        let [free, pressed] = [0, 1].map(|number: usize| scene.picture(&instants[number]));
+        // Half way between the vertex's two places, beside the arrow: object before, nothing after.
+        let [right, ..] = scene.camera.axes();
+        let between = nodes[4] - DVec3::Z * 0.009 + 0.005 * right;
+        assert_ne!(at(&free, &scene, between), [255; 3]);
+        assert_eq!(at(&pressed, &scene, between), [255; 3]);
+        let tip = nodes[4] - DVec3::Z * 0.0215 + 0.001 * right;
+        let [red, _, blue] = at(&pressed, &scene, tip).map(f64::from);
+        assert!(blue > 1.4 * red, "deep blue where the displacement is greatest: {red} {blue}");
+        let [red, _, blue] = at(&free, &scene, tip).map(f64::from);
+        assert!(blue < 1.2 * red, "pale where nothing moved: {red} {blue}");
+    }
+
+    #[test]
+    fn the_arrow_of_a_force_ends_at_its_node() {
+        let (nodes, triangles) = octahedron();
+        let chain = Chain { joints: vec![], nodes: vec![] };
+        let instants = [instant(&nodes, 0.02)];
+        let scene = Scene::new(&chain, &nodes, &triangles, &instants);
+        let [(tail, tip)] = scene.arrows(&instants[0])[..] else { panic!("one arrow") };
+        assert_eq!(tip, instants[0].nodes[4]);
+        assert!((tail - tip).normalize().abs_diff_eq(DVec3::Z, 1e-12), "the force pushes down, from above");
+        let [red, _, blue] = at(&scene.picture(&instants[0]), &scene, tail.lerp(tip, 0.3)).map(f64::from);
+        assert!(red > 3.0 * blue, "an orange shaft: {red} {blue}");
+    }
 }

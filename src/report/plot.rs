@@ -80,7 +80,7 @@ impl Scale {
     fn ticks(&self, intervals: usize) -> Ticks {
         let is_whole = |ticks: &Ticks| ticks.marks.iter().all(|(value, _)| value.fract() == 0.0);
         match self.steps {
-            Steps::Logarithmic => ticks::decades(self.range),
+            Steps::Logarithmic => ticks::decades(self.range, intervals),
             Steps::Linear => ticks::ticks(self.range, intervals),
             Steps::Whole => (1..=intervals)
                 .rev()
@@ -138,7 +138,7 @@ impl Panel {
 
     /// Number of tick intervals that fit without crowding.
     fn intervals(&self) -> (usize, usize) {
-        ((self.area.width / 70.0).max(3.0) as usize, (self.area.height / 26.0).max(3.0) as usize)
+        ((self.area.width / 55.0).max(4.0) as usize, (self.area.height / 26.0).max(3.0) as usize)
     }
 
     /// Grid lines and tick labels; the horizontal axis is labelled only if `labelled` (the lowest of stacked panels).
@@ -242,26 +242,27 @@ pub(super) fn legend(canvas: &mut Canvas, right: (f64, f64), entries: &[Entry]) 
     }
 }
 
-/// A vertical colour bar in `area`, ticks on its right, its title above.
-pub(super) fn colour_bar(canvas: &mut Canvas, area: Area, map: ColourMap, title: &str) {
+/// A vertical colour bar in `area`, ticks on its right, its title above: beginning with the bar, or ending with the tick
+/// labels.
+pub(super) fn colour_bar(canvas: &mut Canvas, area: Area, map: ColourMap, title: &str, anchor: Anchor) {
     const STEPS: usize = 96;
     let [low, high] = map.range();
     let height = area.height / STEPS as f64;
     for step in 0..STEPS {
-        let value = low + (high - low) * (step as f64 + 0.5) / STEPS as f64;
         // Neighbours overlap by half a point, lest the sheet shine through between them.
         let overlap = if step == 0 { 0.0 } else { 0.5 };
         let y = area.bottom() - (step + 1) as f64 * height;
-        canvas.rectangle(Area { y, height: height + overlap, ..area }, map.colour(value));
+        canvas.rectangle(Area { y, height: height + overlap, ..area }, map.at((step as f64 + 0.5) / STEPS as f64));
     }
     canvas.frame(area, colour::FRAME, 0.8);
     let ticks = ticks::ticks([low, high], (area.height / 30.0).max(2.0) as usize);
     for (value, label) in &ticks.marks {
-        let y = area.bottom() - (value - low) / (high - low) * area.height;
+        let y = area.bottom() - map.share(*value) * area.height;
         canvas.polyline(&[(area.right(), y), (area.right() + 4.0, y)], colour::FRAME, 1.0, None);
         canvas.text((area.right() + 8.0, y + 0.36 * TICK_SIZE), label, TICK.anchored(Anchor::Start));
     }
-    canvas.text((area.x, area.y - 10.0), &titled(title, &ticks), TITLE);
+    let x = if anchor == Anchor::End { area.right() + 34.0 } else { area.x };
+    canvas.text((x, area.y - 13.0), &titled(title, &ticks), TITLE.anchored(anchor));
 }
 
 /// The axis title with the common factor of its labels: `Energy [J]` becomes `Energy [×10⁻³ J]`.

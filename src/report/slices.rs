@@ -1,7 +1,7 @@
 //! The torque field on a plane of C-space: one heat map a joint, with the contact boundary.
 //!
-//! Of all planes along two joints the one with most grid points in contact is shown; the other joints stay at that
-//! plane's values. The boundary is the zero line of the gap, or, where no gap is stored, the line on which the
+//! Of all planes along two joints that cross the contact boundary the one with the largest torques is shown; the other
+//! joints stay at that plane's values. The boundary is the zero line of the gap, or, where no gap is stored, the line on which the
 //! contact index, interpolated, is one half (section 3.1).
 
 use super::{
@@ -13,7 +13,7 @@ use super::{
     ticks,
 };
 use crate::{contact::Status, dataset::Dataset};
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 /// Most cells drawn along a side: finer than the eye sees, and a bound on the file's size.
 const MOST_CELLS: usize = 160;
@@ -24,7 +24,7 @@ pub fn slices(dataset: &Dataset) -> Canvas {
     if dataset.grid.joints() < 2 {
         return line(dataset);
     }
-    let slice = Slice::with_most_contact(dataset);
+    let slice = Slice::worth_showing(dataset);
     let columns = dataset.grid.joints().min(3);
     let rows = dataset.grid.joints().div_ceil(columns);
     let (cell_width, cell_height) = (WIDTH / columns as f64, 260.0);
@@ -55,23 +55,48 @@ struct Slice {
     strides: [usize; 2],
 }
 
+/// What lies on a plane.
+#[derive(Default)]
+struct Tally {
+    points: usize,
+    contacts: usize,
+    /// Sum of the torques' sizes [N m].
+    torque: f64,
+}
+
+/// First whether a plane shows both sides of the contact boundary, then how large its torques are.
+type Worth = (bool, f64);
+
+impl Tally {
+    fn count(&mut self, dataset: &Dataset, point: usize) {
+        self.points += 1;
+        self.contacts += usize::from(touching(dataset.status(point)));
+        let size = dataset.torque(point).iter().map(|torque| torque * torque).sum::<f64>().sqrt();
+        self.torque += if size.is_finite() { size } else { 0.0 };
+    }
+
+    fn worth(&self) -> Worth {
+        // A tenth of the plane is enough to see the boundary.
+        let free = self.points - self.contacts;
+        (self.contacts > 0 && 10 * free >= self.points, self.torque)
+    }
+}
+
 impl Slice {
-    fn with_most_contact(dataset: &Dataset) -> Self {
+    fn worth_showing(dataset: &Dataset) -> Self {
         let grid = &dataset.grid;
         let joints = grid.joints();
-        let mut best = (0, [0, 1], 0);
+        let mut best = (Worth::default(), [0, 1], 0);
         for across in 0..joints {
             for up in across + 1..joints {
-                let mut contacts: HashMap<usize, usize> = HashMap::new();
+                let mut planes: BTreeMap<usize, Tally> = BTreeMap::new();
                 for point in 0..grid.points() {
-                    if touching(dataset.status(point)) {
-                        *contacts.entry(Self::origin(dataset, [across, up], point)).or_default() += 1;
-                    }
+                    planes.entry(Self::origin(dataset, [across, up], point)).or_default().count(dataset, point);
                 }
-                // The lowest origin of equals: the order of a hash map is not the same twice.
-                let most = contacts.into_iter().max_by_key(|&(origin, count)| (count, usize::MAX - origin));
-                if let Some((origin, count)) = most.filter(|&(_, count)| count > best.0) {
-                    best = (count, [across, up], origin);
+                for (origin, tally) in planes {
+                    if tally.worth() > best.0 {
+                        best = (tally.worth(), [across, up], origin);
+                    }
                 }
             }
         }
@@ -141,8 +166,7 @@ impl Slice {
             dataset.grid.axes[joint].name,
             torque_unit(&dataset.grid.axes[joint].unit)
         );
-        plot::colour_bar(canvas, bar, map, "");
-        canvas.text((bar.right() + 34.0, area.y - 9.0), &title, plot::TITLE.anchored(Anchor::End));
+        plot::colour_bar(canvas, bar, map, &title, Anchor::End);
     }
 
     /// Segments of the contact boundary, in cells.
@@ -200,9 +224,10 @@ impl Slice {
         let entry = |name: &str, colour, mark| Entry { name: name.to_owned(), colour, mark };
         let statuses = || (0..dataset.grid.points()).map(|point| dataset.status(point));
         let mut entries = Vec::new();
-        if statuses().any(touching) {
+        if !self.boundary(dataset, self.cells(dataset)).is_empty() {
             entries.push(entry("contact boundary", colour::INK, Mark::Line));
-        } else {
+        }
+        if !statuses().any(touching) {
             entries.push(entry("no grid point is in contact", colour::WHITE, Mark::Box));
         }
         if statuses().any(|status| status == Status::Unconverged) {

@@ -29,7 +29,7 @@ pub fn space(dataset: &Dataset) -> Canvas {
     let magnitude = |point: usize| dataset.torque(point).iter().map(|torque| torque * torque).sum::<f64>().sqrt();
     let trusted = |&point: &usize| dataset.status(point) == Status::Contact && magnitude(point).is_finite();
     let greatest = points.iter().copied().filter(|point| trusted(point)).map(magnitude).fold(0.0, f64::max);
-    let map = ColourMap::Sequential { low: 0.0, high: if greatest > 0.0 { greatest } else { 1.0 } };
+    let map = ColourMap::Root { high: if greatest > 0.0 { greatest } else { 1.0 } };
     let space_box = Box3::of(dataset);
 
     let place = |point: usize| space_box.place(&dataset.grid.configuration(point));
@@ -40,9 +40,9 @@ pub fn space(dataset: &Dataset) -> Canvas {
     space_box.draw_walls(&mut raster, direction);
     for &point in &points {
         if trusted(&point) {
-            // Volume grows with the torque, from a third of the greatest radius on.
-            let share = (magnitude(point) / greatest).cbrt().max(0.33);
-            raster.sphere(place(point), 0.42 * space_box.cell * share, map.colour(magnitude(point)));
+            // Volume grows with the torque, from half of the greatest radius on.
+            let share = (magnitude(point) / greatest).cbrt().max(0.5);
+            raster.sphere(place(point), 0.46 * space_box.cell * share, map.colour(magnitude(point)));
         } else {
             raster.sphere(place(point), 0.2 * space_box.cell, UNTRUSTED);
         }
@@ -59,7 +59,7 @@ pub fn space(dataset: &Dataset) -> Canvas {
     space_box.label(&mut canvas, raster.camera(), direction, dataset);
     canvas.picture((PICTURE.x, PICTURE.y), raster.picture());
     let bar = Area { x: PICTURE.right() + 30.0, y: PICTURE.y + 110.0, width: 14.0, height: 260.0 };
-    plot::colour_bar(&mut canvas, bar, map, &format!("‖τ‖ [{}]", units(dataset)));
+    plot::colour_bar(&mut canvas, bar, map, &format!("‖τ‖ [{}]", units(dataset)), Anchor::Start);
     canvas
 }
 
@@ -137,7 +137,7 @@ struct Box3 {
     ranges: [[f64; 2]; 3],
     /// Extent of each side in space, the longest one.
     sides: DVec3,
-    /// Smallest distance of neighbouring grid points in space.
+    /// Distance of neighbouring grid points in space, geometric mean over the axes.
     cell: f64,
 }
 
@@ -154,8 +154,10 @@ impl Box3 {
         let extent = DVec3::from_array(ranges.map(|[low, high]| high - low));
         // Sides in proportion, but none so short that its labels crowd.
         let sides = (extent / extent.max_element()).clamp(DVec3::splat(0.55), DVec3::ONE);
-        let cells = (0..3).map(|number| sides[number] / axes.get(number).map_or(1.0, |axis| axis.count.max(1) as f64));
-        Self { ranges, sides, cell: cells.fold(f64::INFINITY, f64::min).min(0.12) }
+        let shown = axes.len().clamp(1, 3);
+        let cells = axes.iter().zip(sides.to_array()).map(|(axis, side)| side / axis.count.max(1) as f64);
+        // A handful of grid points need no balls as large as their distance.
+        Self { ranges, sides, cell: cells.product::<f64>().powf(1.0 / shown as f64).min(0.1) }
     }
 
     /// Where a configuration lies.
@@ -192,7 +194,7 @@ impl Box3 {
     /// Tick positions of an axis, as the coordinate in space, with their labels.
     fn ticks(&self, axis: usize) -> Vec<(f64, String)> {
         let [low, high] = self.ranges[axis];
-        let intervals = (6.0 * self.sides[axis]).round() as usize;
+        let intervals = (8.0 * self.sides[axis]).round() as usize;
         let place = |value: f64| ((value - low) / (high - low) - 0.5) * self.sides[axis];
         ticks::ticks([low, high], intervals).marks.into_iter().map(|(value, label)| (place(value), label)).collect()
     }
@@ -246,15 +248,15 @@ impl Box3 {
             let axis_of = &dataset.grid.axes[axis];
             let title = format!("q{} {} [{}]", subscript(axis + 1), axis_of.name, axis_of.unit);
             // The upright title ends a little right of its edge, where the wall behind does not reach it; the others
-            // begin or end beyond their tick labels.
+            // stand beyond their tick labels.
             let (position, anchor) = if axis == 2 {
                 let mut top = base;
                 top.z = 0.5 * self.sides.z;
                 (on_sheet(top).map(|at| (at.0 + 16.0, at.1 - 16.0)), Anchor::End)
             } else {
                 let rightwards = camera.axes()[0].dot(outward) > 0.0;
-                let (shift, anchor) = if rightwards { (14.0, Anchor::Start) } else { (-14.0, Anchor::End) };
-                (on_sheet(base + 0.12 * outward).map(|at| (at.0 + shift, at.1 + 18.0)), anchor)
+                let shift = if rightwards { 34.0 } else { -34.0 };
+                (on_sheet(base + 0.12 * outward).map(|at| (at.0 + shift, at.1 + 20.0)), Anchor::Middle)
             };
             if let Some(position) = position {
                 canvas.text(position, &title, plot::TITLE.anchored(anchor));

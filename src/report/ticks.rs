@@ -67,11 +67,13 @@ pub(super) fn ticks(range: [f64; 2], intervals: usize) -> Ticks {
     Ticks { marks, factor: if exponent == 0 { String::new() } else { format!("×10{}", superscript(exponent)) } }
 }
 
-/// The powers of ten inside `range`, both ends positive.
-pub(super) fn decades([low, high]: [f64; 2]) -> Ticks {
+/// The powers of ten inside `range`, both ends positive, every so many that there are at most `intervals` and one.
+pub(super) fn decades([low, high]: [f64; 2], intervals: usize) -> Ticks {
     // The slack keeps ends that are powers of ten themselves.
     let [first, last] = [(low.log10() - 1e-9).ceil() as i32, (high.log10() + 1e-9).floor() as i32];
+    let stride = (last - first).max(0) as usize / intervals.max(1) + 1;
     let marks = (first..=last)
+        .step_by(stride)
         .map(|exponent| {
             let label = match exponent {
                 -3..0 => format!("{:.*}", -exponent as usize, 10_f64.powi(exponent)),
@@ -149,8 +151,9 @@ mod tests {
 
     #[test]
     fn decades_are_the_powers_of_ten() {
-        let labels: Vec<String> = decades([0.01, 20_000.0]).marks.into_iter().map(|(_, label)| label).collect();
+        let labels: Vec<String> = decades([0.01, 20_000.0], 9).marks.into_iter().map(|(_, label)| label).collect();
         assert_eq!(labels, ["0.01", "0.1", "1", "10", "100", "1000", "10⁴"]);
+        assert!(decades([1e-300, 1e300], 9).marks.len() <= 10);
     }
 
     #[test]

@@ -43,6 +43,8 @@ pub struct Raster {
     height: usize,
     /// Linear light, a sample each.
     light: Vec<[f32; 3]>,
+    /// Directions towards key light, fill light, and the highlight's mirror normal.
+    lights: [DVec3; 3],
     /// Reciprocal distance along the view, larger is nearer; zero where nothing was drawn.
     nearness: Vec<f32>,
 }
@@ -52,7 +54,18 @@ impl Raster {
     #[must_use]
     pub fn new(camera: Camera) -> Self {
         let (width, height) = (camera.width * SAMPLES, camera.height * SAMPLES);
-        Self { camera, width, height, light: vec![[1.0; 3]; width * height], nearness: vec![0.0; width * height] }
+        let [right, up, towards] = camera.axes();
+        // The key stands above the viewer's left shoulder, the fill low on the right.
+        let key = (0.55 * towards + 0.65 * up - 0.5 * right).normalize();
+        let fill = (0.6 * towards - 0.1 * up + 0.8 * right).normalize();
+        Self {
+            lights: [key, fill, (key + towards).normalize()],
+            camera,
+            width,
+            height,
+            light: vec![[1.0; 3]; width * height],
+            nearness: vec![0.0; width * height],
+        }
     }
 
     /// What it is seen through.
@@ -134,7 +147,13 @@ impl Raster {
         let corners = [widened(a, -1.0), widened(a, 1.0), widened(b, -1.0), widened(b, 1.0)];
         let (columns, rows) = self.covered(corners);
         for row in rows {
-            for column in columns.clone() {
+            // Only the columns near the part of the line that is near this row: its box may be nearly empty.
+            let at = |y: f64| if along_y == 0.0 { 0.0 } else { ((y - a.y) / along_y).clamp(0.0, 1.0) };
+            let y = row as f64 + 0.5;
+            let part = if along_y.abs() > half { [at(y - half), at(y + half)] } else { [0.0, 1.0] };
+            let [from, to] = part.map(|share| a.x + share * along_x);
+            let near = (from.min(to) - half).floor() as usize..(from.max(to) + half).ceil() as usize + 1;
+            for column in columns.start.max(near.start)..columns.end.min(near.end) {
                 let (x, y) = (column as f64 + 0.5 - a.x, row as f64 + 0.5 - a.y);
                 let along = if length_squared > 0.0 {
                     ((x * along_x + y * along_y) / length_squared).clamp(0.0, 1.0)
@@ -203,19 +222,14 @@ impl Raster {
         if finish == Finish::Flat {
             return colour;
         }
-        let [right, up, towards] = self.camera.axes();
+        let towards = self.camera.axes()[2];
         // Closed bodies only: a normal that points away belongs to a surface interpolated across its rim.
-        let normal = if normal.dot(towards) < 0.0 {
-            (normal - normal.dot(towards) * towards).normalize_or_zero()
-        } else {
-            normal
-        };
-        // The key stands above the viewer's left shoulder, the fill low on the right.
-        let key = (0.55 * towards + 0.65 * up - 0.5 * right).normalize();
-        let fill = (0.6 * towards - 0.1 * up + 0.8 * right).normalize();
+        let away = normal.dot(towards).min(0.0);
+        let normal = if away < 0.0 { (normal - away * towards).normalize_or_zero() } else { normal };
+        let [key, fill, mirror] = self.lights;
         let sky = 0.5 + 0.5 * normal.z;
         let diffuse = 0.30 + 0.16 * sky + 0.58 * normal.dot(key).max(0.0) + 0.16 * normal.dot(fill).max(0.0);
-        let highlight = 0.10 * normal.dot((key + towards).normalize()).max(0.0).powi(40);
+        let highlight = 0.10 * normal.dot(mirror).max(0.0).powi(40);
         colour.map(|channel| channel * diffuse as f32 + highlight as f32)
     }
 }
