@@ -99,7 +99,7 @@ impl Lane {
         let values = || self.curves.iter().flat_map(|curve| &curve.points).map(|point| point.1);
         let [mut low, high] = ticks::range(values(), 0.06);
         // What is never negative begins at zero, not at the margin below it.
-        if low < 0.0 && values().all(|value| !(value < 0.0)) {
+        if low < 0.0 && !values().any(|value| value < 0.0) {
             low = 0.0;
         }
         let up =
