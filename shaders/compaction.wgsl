@@ -4,7 +4,8 @@
 override WORKGROUP: u32 = 256u;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
-@group(0) @binding(1) var<storage, read> outcomes: array<Outcome>;
+// Smallest gap of each configuration.
+@group(0) @binding(1) var<storage, read> gaps: array<f32>;
 @group(0) @binding(2) var<storage, read_write> list: array<u32>;
 
 // Number of contacts in the runs of all invocations so far.
@@ -17,7 +18,7 @@ fn main(@builtin(local_invocation_index) local: u32) {
     let last = min(first + run, parameters.configurations);
     var count = 0u;
     for (var configuration = first; configuration < last; configuration += 1u) {
-        count += select(0u, 1u, outcomes[configuration].status == STATUS_UNCONVERGED);
+        count += select(0u, 1u, gaps[configuration] < 0.0);
     }
     sums[local] = count;
     workgroupBarrier();
@@ -33,7 +34,7 @@ fn main(@builtin(local_invocation_index) local: u32) {
     }
     var place = sums[local] - count;
     for (var configuration = first; configuration < last; configuration += 1u) {
-        if outcomes[configuration].status == STATUS_UNCONVERGED {
+        if gaps[configuration] < 0.0 {
             list[1u + place] = configuration;
             place += 1u;
         }

@@ -5,17 +5,14 @@ override WORKGROUP: u32 = 64u;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
 // Surface nodes at rest; w is unused.
+// Surface nodes at rest; then the bounding sphere (centre, radius) of each triangle; then each proxy node's radius in x.
 @group(0) @binding(1) var<storage, read> rest: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> mesh: array<u32>;
-// Bounding sphere of each triangle: centre, radius.
-@group(0) @binding(3) var<storage, read> spheres: array<vec4<f32>>;
-// Of each proxy node.
-@group(0) @binding(4) var<storage, read> radii: array<f32>;
-@group(0) @binding(5) var<storage, read> positions: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read_write> gaps: array<f32>;
+// Proxy nodes; w receives the gap.
+@group(0) @binding(3) var<storage, read_write> positions: array<vec4<f32>>;
 
-fn node_position(node: u32) -> vec3<f32> {
-    return rest[node].xyz;
+fn node_from(node: u32, x: vec3<f32>) -> vec3<f32> {
+    return rest[node].xyz - x;
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -31,22 +28,26 @@ fn main(
     let x = positions[index].xyz;
     var least = FAR_AWAY;
     var best = 0u;
-    var best_closest = Closest(vec3<f32>(1.0, 0.0, 0.0), 0u);
+    var best_point = ClosestPoint();
+    var best_offset = vec3<f32>(0.0);
     for (var triangle = 0u; triangle < parameters.triangles; triangle += 1u) {
-        let sphere = spheres[triangle];
+        let sphere = rest[parameters.surface_nodes + triangle];
         if distance(x, sphere.xyz) - sphere.w >= least {
             continue;
         }
-        let a = node_position(corner(triangle, 0u));
-        let b = node_position(corner(triangle, 1u));
-        let c = node_position(corner(triangle, 2u));
-        let closest = closest_on_triangle(x, a, b, c);
-        let foot = closest.weights.x * a + closest.weights.y * b + closest.weights.z * c;
-        if distance(x, foot) < least {
-            least = distance(x, foot);
+        let a = node_from(corner(triangle, 0u), x);
+        let b = node_from(corner(triangle, 1u), x);
+        let c = node_from(corner(triangle, 2u), x);
+        let closest = closest_point(vec3<f32>(0.0), a, b, c);
+        let offset = closest.weights.x * a + closest.weights.y * b + closest.weights.z * c;
+        if length(offset) < least {
+            least = length(offset);
             best = triangle;
-            best_closest = closest;
+            best_point = closest;
+            best_offset = offset;
         }
     }
-    gaps[index] = signed_distance(x, best, best_closest) - radii[index % parameters.proxy_nodes];
+    let inside = dot(best_offset, pseudonormal(best, best_point.feature, x)) > 0.0;
+    let radius = rest[parameters.surface_nodes + parameters.triangles + index % parameters.proxy_nodes].x;
+    positions[index].w = select(least, -least, inside) - radius;
 }

@@ -8,7 +8,7 @@ override WORKGROUP: u32 = 64u;
 @group(0) @binding(2) var<storage, read> proxy_nodes: array<ProxyNode>;
 // Configuration by configuration, joint fastest: (cos q, sin q), or (q, 0) of a prismatic joint.
 @group(0) @binding(3) var<storage, read> motions: array<vec2<f32>>;
-// Configuration by configuration, node fastest; w is unused.
+// Configuration by configuration, node fastest; w is left for the gap.
 @group(0) @binding(4) var<storage, read_write> positions: array<vec4<f32>>;
 
 // Rodrigues: v turned about the unit vector `axis` by the angle with the given cosine and sine.

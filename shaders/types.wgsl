@@ -2,8 +2,10 @@
 // centroid, in metres; forces in newtons.
 
 struct Parameters {
-    // Configurations in this chunk.
+    // Configurations of this dispatch.
     configurations: u32,
+    // Place in the list of contacts of this dispatch's first one.
+    first: u32,
     joints: u32,
     proxy_nodes: u32,
     surface_nodes: u32,
@@ -11,13 +13,21 @@ struct Parameters {
     max_iterations: u32,
     // Contact stiffness Kc of one spring [N/m].
     stiffness: f32,
+    // The energy form's stiffness at a contact point [N/m].
+    kc: f32,
     // Relative residual at which a configuration counts as converged.
     tolerance: f32,
-    // Half the diagonal of the object's bounding box [m]: the scale of rounding errors.
-    extent: f32,
+    // Largest trace of a node's own block of C [m/N].
+    softest: f32,
+    // Below this distance to an edge or vertex the direction to it is rounding [m].
+    least_distance: f32,
+    // What a depth is rounded by [m].
+    depth_rounding: f32,
+    // Invocations of a workgroup of the equilibrium stages: read, not known to the compiler, so that reductions stay
+    // loops; unrolled at each of their places they make programs that take minutes to compile.
+    lanes: u32,
     padding_0: u32,
     padding_1: u32,
-    padding_2: u32,
 }
 
 // One joint of the chain; axis is a unit vector.
@@ -40,23 +50,25 @@ struct Outcome {
     status: u32,
     iterations: u32,
     residual: f32,
-    energy: f32,
-    // Smallest signed distance at rest, less the node's radius.
-    gap: f32,
-    // Contacts found; those beyond the list's capacity are not in it.
+    // Elastic part of the stored energy [J]; that of the contact springs follows from the touches.
+    elastic: f32,
+    // Entries of the list of touches in use.
     touches: u32,
     padding_0: u32,
     padding_1: u32,
+    padding_2: u32,
 }
 
-// One proxy node in contact: `force` on it, its reaction spread on three nodes.
+// Forces of one proxy node on three object nodes [N].
 struct Touch {
     nodes: vec3<u32>,
     proxy_node: u32,
-    weights: vec3<f32>,
-    depth: f32,
-    force: vec3<f32>,
-    padding: u32,
+    force_0: vec3<f32>,
+    padding_0: u32,
+    force_1: vec3<f32>,
+    padding_1: u32,
+    force_2: vec3<f32>,
+    padding_2: u32,
 }
 
 // Number of this workgroup when a dispatch is folded into two dimensions.

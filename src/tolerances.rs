@@ -1,12 +1,5 @@
 //! Every numerical tolerance of the engine, each with its derivation. No other file holds a bare tolerance.
 
-/// Stands for "no distance yet" in f32 kernels [m]: above any distance in a scene, and its square is still finite.
-pub const GPU_FAR_AWAY: f32 = 1e18;
-
-/// Least divisor in f32 kernels: a hundred times the least normal number (1.2e-38), below which a device may flush to
-/// zero. Squared edge lengths stay above it down to 1e-18 m.
-pub const GPU_LEAST_DIVISOR: f32 = 1e-36;
-
 /// Smallest height of a triangle over its longest edge, and of a closed surface's volume over its area times its extent
 /// [1]. Coordinates in single precision, as STL files and the GPU hold them, round at 6e-8 of their size: below this
 /// bound the triangle's normal would be uncertain by more than about 6 %, and its side a matter of luck.
@@ -19,6 +12,52 @@ pub const MIN_RECIPROCAL_CONDITION: f64 = f64::EPSILON / 1e-6;
 /// Shift, relative to the norm of K, under which the free motion of a singular K is sought [1]: the square root of
 /// machine precision is far above the rounding of a factorisation and far below the stiffness of any spring that counts.
 pub const MECHANISM_SHIFT: f64 = 1.5e-8;
+
+// --- GPU (f32 kernels) ---
+
+/// Stands for "no distance yet" in f32 kernels [m]: above any distance in a scene, and its square is still finite.
+pub const GPU_FAR_AWAY: f32 = 1e18;
+
+/// Least divisor in f32 kernels: a hundred times the least normal number (1.2e-38), below which a device may flush to
+/// zero. Squared edge lengths stay above it down to 1e-18 m.
+pub const GPU_LEAST_DIVISOR: f32 = 1e-36;
+
+/// Least relative residual that the f32 solver is asked for [1]: rounding of f32 (6e-8) grows over sums of about a
+/// hundred products to a few 1e-6, so 1e-5 is what can be told from zero.
+pub const GPU_LEAST_TOLERANCE: f64 = 1e-5;
+
+/// Largest relative residual of an f32 result that is passed on as converged [1]. Where rounding of depths leaves more,
+/// as in very shallow contact, the configuration is solved in f64.
+pub const GPU_RESOLVED_RESIDUAL: f64 = 1e-4;
+
+/// Distance of a node to an edge or vertex, relative to the object's extent, below which f32 does not resolve the
+/// direction between them [1]: coordinates of one extent carry 6e-8, and 16 times that gives a direction good to 6 %,
+/// where the pseudonormal is the better one.
+pub const GPU_LEAST_DISTANCE_PER_EXTENT: f64 = 1e-6;
+
+/// What a depth is rounded by, relative to the longest edge of the surface [1]: three coordinates of a corner relative to
+/// the proxy node, each rounded by 6e-8 of at most an edge, enter with weights that sum to one.
+pub const GPU_DEPTH_ROUNDING_PER_EDGE: f64 = 2e-7;
+
+/// Gap at rest, relative to the object's extent, within which contact or not is decided in f64 [1]: proxy nodes are
+/// placed to 1e-9 of the chain's reach, and distances of coordinates up to some extents are rounded by 6e-8 of each.
+pub const GPU_GAP_BAND_PER_EXTENT: f64 = 1e-6;
+
+/// Widening of bounding spheres, relative to the object's extent [1]: coordinates of up to ten extents (a proxy node far
+/// away) are rounded to f32 by 6e-8 each.
+pub const GPU_BOUND_SLACK: f64 = 1e-6;
+
+/// [`ENERGY_ROUNDING`] for f32, whose eps is 1.2e-7.
+pub const GPU_ENERGY_ROUNDING: f32 = 16.0 * f32::EPSILON;
+
+/// [`GIVE_UP_RADIUS`] for f32: coordinates do not change visibly under a step this much smaller than the first.
+pub const GPU_GIVE_UP_RADIUS: f32 = 1e-6;
+
+/// [`INNER_TOLERANCE_FLOOR`] for f32: eps times the about 1e3 by which rounding grows over some tens of iterations.
+pub const GPU_INNER_TOLERANCE_FLOOR: f32 = 1e-4;
+
+/// Relative residual of the paper's step 2 in f32 [1]: ten times better than the least tolerance of the iteration.
+pub const GPU_PAPER_INNER_TOLERANCE: f32 = 1e-6;
 
 // --- contact ---
 

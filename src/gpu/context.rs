@@ -163,6 +163,7 @@ struct Failures {
 pub struct Context {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
+    choice: AdapterChoice,
     adapter: AdapterSummary,
     failures: Arc<Mutex<Failures>>,
 }
@@ -186,7 +187,7 @@ impl Context {
             if choice == AdapterChoice::Hardware && !summary.hardware {
                 continue;
             }
-            match Self::open_on(adapter, summary) {
+            match Self::open_on(adapter, summary, choice) {
                 Ok(context) => return Ok(context),
                 Err(error) => refusal = refusal.or(Some(error)),
             }
@@ -197,7 +198,7 @@ impl Context {
         }))
     }
 
-    fn open_on(adapter: &wgpu::Adapter, summary: AdapterSummary) -> Result<Self, GpuError> {
+    fn open_on(adapter: &wgpu::Adapter, summary: AdapterSummary, choice: AdapterChoice) -> Result<Self, GpuError> {
         let offered = adapter.limits();
         // WebGPU's defaults, which every device has, but for the two sizes that decide which objects fit.
         let limits = wgpu::Limits {
@@ -218,7 +219,15 @@ impl Context {
         device.on_uncaptured_error(Arc::new(move |error| {
             lock(&on_error).error.get_or_insert_with(|| GpuError::from(error));
         }));
-        Ok(Self { device, queue, adapter: summary, failures })
+        Ok(Self { device, queue, choice, adapter: summary, failures })
+    }
+
+    /// A new device by the same choice: what is left to do once this one is lost.
+    ///
+    /// # Errors
+    /// As [`Context::open`].
+    pub fn reopen(&self) -> Result<Self, GpuError> {
+        Self::open(self.choice)
     }
 
     /// The adapter in use.
@@ -250,8 +259,8 @@ impl Context {
     ///
     /// # Errors
     /// When the device was lost, refused a command, or does not answer.
-    pub fn wait(&self, submission: wgpu::SubmissionIndex) -> Result<(), GpuError> {
-        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(WAIT_LIMIT) };
+    pub fn wait(&self, submission: &wgpu::SubmissionIndex) -> Result<(), GpuError> {
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission.clone()), timeout: Some(WAIT_LIMIT) };
         let outcome = self.device.poll(wait);
         self.check()?;
         match outcome {

@@ -204,11 +204,12 @@ impl StorageBuffer {
     /// # Errors
     /// When the device fails.
     pub fn read<T: Pod>(&self, context: &Context, count: usize) -> Result<Vec<T>, GpuError> {
-        let staging = Staging::new(context, (count * size_of::<T>()) as u64)?;
+        let bytes = (count * size_of::<T>()) as u64;
+        let staging = Staging::new(context, bytes)?;
         let mut encoder = context.device.create_command_encoder(&Default::default());
-        staging.record(&mut encoder, &[self]);
+        staging.record(&mut encoder, &[(self, bytes)]);
         let submission = context.queue.submit([encoder.finish()]);
-        staging.take(context, submission, |bytes| bytemuck::pod_collect_to_vec(&bytes[..count * size_of::<T>()]))
+        staging.take(context, &submission, bytes, bytemuck::pod_collect_to_vec)
     }
 }
 
@@ -234,28 +235,29 @@ impl Staging {
         Ok(Self { raw })
     }
 
-    /// Records the copies of as much of `sources` as there is room for.
-    pub fn record(&self, encoder: &mut wgpu::CommandEncoder, sources: &[&StorageBuffer]) {
+    /// Records copies of the first bytes of `sources`, one behind the other.
+    pub fn record(&self, encoder: &mut wgpu::CommandEncoder, sources: &[(&StorageBuffer, u64)]) {
         let mut offset = 0;
-        for source in sources {
-            let bytes = source.size().min(self.raw.size() - offset);
-            encoder.copy_buffer_to_buffer(&source.raw, 0, &self.raw, offset, bytes);
+        for (source, bytes) in sources {
+            encoder.copy_buffer_to_buffer(&source.raw, 0, &self.raw, offset, *bytes);
             offset += bytes;
         }
     }
 
-    /// Waits for `submission` and hands the bytes to `use_bytes`.
+    /// Waits for `submission` and hands the first `bytes` bytes to `use_bytes`.
     ///
     /// # Errors
     /// When the device fails.
     pub fn take<T>(
         &self,
         context: &Context,
-        submission: wgpu::SubmissionIndex,
+        submission: &wgpu::SubmissionIndex,
+        bytes: u64,
         use_bytes: impl FnOnce(&[u8]) -> T,
     ) -> Result<T, GpuError> {
         let (sender, receiver) = mpsc::channel();
-        self.raw.map_async(wgpu::MapMode::Read, .., move |outcome| {
+        let bytes = bytes.next_multiple_of(4);
+        self.raw.map_async(wgpu::MapMode::Read, ..bytes, move |outcome| {
             // The receiver outlives the wait below; without it nobody needs the outcome.
             let _ = sender.send(outcome);
         });
@@ -265,7 +267,7 @@ impl Staging {
             Ok(Err(error)) => return Err(GpuError::Lost(error.to_string())),
             Err(_) => return Err(GpuError::Lost("the read-back was never answered".to_owned())),
         }
-        let view = self.raw.get_mapped_range(..).map_err(|error| GpuError::Refused(error.to_string()))?;
+        let view = self.raw.get_mapped_range(..bytes).map_err(|error| GpuError::Refused(error.to_string()))?;
         let used = use_bytes(&view);
         drop(view);
         self.raw.unmap();

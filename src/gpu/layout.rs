@@ -8,17 +8,21 @@ use bytemuck::{Pod, Zeroable};
 #[expect(missing_docs, reason = "documented where the shader reads them")]
 pub struct Parameters {
     pub configurations: u32,
+    pub first: u32,
     pub joints: u32,
     pub proxy_nodes: u32,
     pub surface_nodes: u32,
     pub triangles: u32,
     pub max_iterations: u32,
     pub stiffness: f32,
+    pub kc: f32,
     pub tolerance: f32,
-    pub extent: f32,
+    pub softest: f32,
+    pub least_distance: f32,
+    pub depth_rounding: f32,
+    pub lanes: u32,
     pub padding_0: u32,
     pub padding_1: u32,
-    pub padding_2: u32,
 }
 
 /// `Joint` of `shaders/types.wgsl`.
@@ -49,11 +53,11 @@ pub struct Outcome {
     pub status: u32,
     pub iterations: u32,
     pub residual: f32,
-    pub energy: f32,
-    pub gap: f32,
+    pub elastic: f32,
     pub touches: u32,
     pub padding_0: u32,
     pub padding_1: u32,
+    pub padding_2: u32,
 }
 
 /// `Touch` of `shaders/types.wgsl`.
@@ -63,21 +67,23 @@ pub struct Outcome {
 pub struct Touch {
     pub nodes: [u32; 3],
     pub proxy_node: u32,
-    pub weights: [f32; 3],
-    pub depth: f32,
-    pub force: [f32; 3],
-    pub padding: u32,
+    pub force_0: [f32; 3],
+    pub padding_0: u32,
+    pub force_1: [f32; 3],
+    pub padding_1: u32,
+    pub force_2: [f32; 3],
+    pub padding_2: u32,
 }
 
-/// `FrameParameters` of `shaders/frame.wgsl` (uniform).
+/// `FrameParameters` of `shaders/frame_common.wgsl` (uniform).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented where the shader reads them")]
 pub struct FrameParameters {
     pub nodes: u32,
     pub period: f32,
-    pub padding_0: u32,
-    pub padding_1: u32,
+    pub odd: u32,
+    pub groups: u32,
 }
 
 #[cfg(test)]
@@ -114,13 +120,12 @@ mod tests {
     fn every_shared_struct_is_laid_out_as_in_wgsl() {
         let reflected = reflect();
         let expected = [
-            layout!(Parameters: configurations, joints, proxy_nodes, surface_nodes, triangles, max_iterations, stiffness,
-                tolerance, extent, padding_0, padding_1, padding_2),
+            layout!(Parameters: configurations, first, joints, proxy_nodes, surface_nodes, triangles, max_iterations, stiffness, kc, tolerance, softest, least_distance, depth_rounding, lanes, padding_0, padding_1),
             layout!(Joint: origin, kind, axis, padding),
             layout!(ProxyNode: position, link),
-            layout!(Outcome: status, iterations, residual, energy, gap, touches, padding_0, padding_1),
-            layout!(Touch: nodes, proxy_node, weights, depth, force, padding),
-            layout!(FrameParameters: nodes, period, padding_0, padding_1),
+            layout!(Outcome: status, iterations, residual, elastic, touches, padding_0, padding_1, padding_2),
+            layout!(Touch: nodes, proxy_node, force_0, padding_0, force_1, padding_1, force_2, padding_2),
+            layout!(FrameParameters: nodes, period, odd, groups),
         ];
         for (name, members, size) in expected {
             let (wgsl_members, wgsl_size) = reflected.get(name).unwrap_or_else(|| panic!("{name} is in no shader"));

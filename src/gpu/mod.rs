@@ -5,6 +5,11 @@
 //! | `context` | adapter, device, what can go wrong with them |
 //! | `layout` | structs shared with WGSL, checked against it |
 //! | `shaders` | shaders embedded, assembled from parts, with their override sets |
+//! | `model` | object, proxy and contact law as buffers |
+//! | `pipeline` | the stages of a batch and their buffers |
+//! | `solver` | the backend of a sweep: chunks, batches, retries |
+//! | `unpack` | from what the kernels wrote to equilibria, in f64 |
+//! | `frame` | the object's nodes, one passive step a frame |
 //! | `kernel` | one compute pipeline with its bindings; buffers, poison, read-back |
 //!
 //! A shader in `shaders/` and its CPU twin share names and order of statements. The GPU computes in f32 with
@@ -12,9 +17,18 @@
 //! the host in f64.
 
 mod context;
+mod frame;
 mod kernel;
 pub mod layout;
+mod model;
+mod pipeline;
 pub mod shaders;
+mod solver;
+mod unpack;
 
 pub use context::{AdapterChoice, AdapterSummary, Context, GpuError, adapters};
+pub use frame::{FrameError, FrameMethod, FrameUpdate};
 pub use kernel::{Access, Kernel, POISON, StorageBuffer};
+pub use model::DeviceModel;
+pub use pipeline::Room;
+pub use solver::GpuSolver;

@@ -18,8 +18,13 @@ pub struct Shader {
 }
 
 const TYPES: &str = include_str!("../../shaders/types.wgsl");
+const CLOSEST_POINT: &str = include_str!("../../shaders/closest_point.wgsl");
 const SURFACE: &str = include_str!("../../shaders/surface.wgsl");
+const DEPTH: &str = include_str!("../../shaders/depth.wgsl");
+const SUPPORT: &str = include_str!("../../shaders/support.wgsl");
+const FRAME_COMMON: &str = include_str!("../../shaders/frame_common.wgsl");
 const FRAME: &str = include_str!("../../shaders/frame.wgsl");
+const FRAME_ITERATIVE: &str = include_str!("../../shaders/frame_iterative.wgsl");
 
 /// Node positions for a batch of configurations.
 pub static KINEMATICS: Shader = Shader {
@@ -33,11 +38,11 @@ pub static KINEMATICS: Shader = Shader {
 pub static DETECTION: Shader = Shader {
     name: "detection",
     entry: "main",
-    parts: &[TYPES, SURFACE, include_str!("../../shaders/detection.wgsl")],
+    parts: &[TYPES, CLOSEST_POINT, SURFACE, include_str!("../../shaders/detection.wgsl")],
     overrides: &[&[]],
 };
 
-/// Free or in contact.
+/// Smallest gap of every configuration.
 pub static CLASSIFICATION: Shader = Shader {
     name: "classification",
     entry: "main",
@@ -53,15 +58,97 @@ pub static COMPACTION: Shader = Shader {
     overrides: &[&[]],
 };
 
-/// Right-hand side of the object's frame update.
-pub static FRAME_LOAD: Shader = Shader { name: "frame", entry: "load", parts: &[TYPES, FRAME], overrides: &[&[]] };
+/// Least room for contacts and support that the engine uses: tests of the overflow path.
+const CRAMPED: &[(&str, f64)] = &[("CONTACTS", 2.0)];
 
-/// New state of the object's nodes.
+/// Equilibrium by the energy form.
+pub static ENERGY: Shader = Shader {
+    name: "energy",
+    entry: "main",
+    parts: &[
+        TYPES,
+        CLOSEST_POINT,
+        SURFACE,
+        DEPTH,
+        SUPPORT,
+        include_str!("../../shaders/trust_region.wgsl"),
+        include_str!("../../shaders/energy.wgsl"),
+    ],
+    overrides: &[&[], &[("FROZEN", 1.0)], CRAMPED],
+};
+
+/// Equilibrium by the paper's iteration.
+pub static PAPER: Shader = Shader {
+    name: "paper",
+    entry: "main",
+    parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, SUPPORT, include_str!("../../shaders/paper.wgsl")],
+    overrides: &[&[], CRAMPED],
+};
+
+/// Frame update by the inverse: right-hand side.
+pub static FRAME_LOAD: Shader =
+    Shader { name: "frame", entry: "load", parts: &[TYPES, FRAME_COMMON, FRAME], overrides: &[&[]] };
+
+/// Frame update by the inverse: new state.
 pub static FRAME_ADVANCE: Shader =
-    Shader { name: "frame", entry: "advance", parts: &[TYPES, FRAME], overrides: &[&[]] };
+    Shader { name: "frame", entry: "advance", parts: &[TYPES, FRAME_COMMON, FRAME], overrides: &[&[]] };
+
+/// Frame update by conjugate gradients: first residual and direction.
+pub static FRAME_BEGIN: Shader = Shader {
+    name: "frame_iterative",
+    entry: "begin",
+    parts: &[TYPES, FRAME_COMMON, FRAME_ITERATIVE],
+    overrides: &[&[]],
+};
+
+/// Frame update by conjugate gradients: matrix times direction.
+pub static FRAME_PRODUCT: Shader = Shader {
+    name: "frame_iterative",
+    entry: "product",
+    parts: &[TYPES, FRAME_COMMON, FRAME_ITERATIVE],
+    overrides: &[&[]],
+};
+
+/// Frame update by conjugate gradients: step along the direction.
+pub static FRAME_CORRECT: Shader = Shader {
+    name: "frame_iterative",
+    entry: "correct",
+    parts: &[TYPES, FRAME_COMMON, FRAME_ITERATIVE],
+    overrides: &[&[]],
+};
+
+/// Frame update by conjugate gradients: next direction.
+pub static FRAME_TURN: Shader = Shader {
+    name: "frame_iterative",
+    entry: "turn",
+    parts: &[TYPES, FRAME_COMMON, FRAME_ITERATIVE],
+    overrides: &[&[]],
+};
+
+/// Frame update by conjugate gradients: new state.
+pub static FRAME_FINISH: Shader = Shader {
+    name: "frame_iterative",
+    entry: "finish",
+    parts: &[TYPES, FRAME_COMMON, FRAME_ITERATIVE],
+    overrides: &[&[]],
+};
 
 /// Every shader of the engine.
-pub static ALL: &[&Shader] = &[&KINEMATICS, &DETECTION, &CLASSIFICATION, &COMPACTION, &FRAME_LOAD, &FRAME_ADVANCE];
+pub static ALL: &[&Shader] = &[
+    &KINEMATICS,
+    &DETECTION,
+    &CLASSIFICATION,
+    &COMPACTION,
+    &ENERGY,
+    &PAPER,
+    &FRAME_LOAD,
+    &FRAME_ADVANCE,
+    &FRAME_BEGIN,
+    &FRAME_PRODUCT,
+    &FRAME_CORRECT,
+    &FRAME_TURN,
+    &FRAME_FINISH,
+];
 
 /// Constants that both sides use, as WGSL.
 fn constants() -> String {
@@ -74,9 +161,25 @@ fn constants() -> String {
     ] {
         text.push_str(&format!("const STATUS_{name}: u32 = {}u;\n", status as u8));
     }
-    for (name, value) in [("FAR_AWAY", tolerances::GPU_FAR_AWAY), ("LEAST_DIVISOR", tolerances::GPU_LEAST_DIVISOR)] {
+    for (name, value) in [
+        ("FAR_AWAY", tolerances::GPU_FAR_AWAY),
+        ("LEAST_DIVISOR", tolerances::GPU_LEAST_DIVISOR),
+        ("RESIDUAL_FLOOR", tolerances::RESIDUAL_FLOOR as f32),
+        ("ACCEPTED_SHARE", tolerances::ACCEPTED_SHARE as f32),
+        ("POOR_SHARE", tolerances::POOR_SHARE as f32),
+        ("GOOD_SHARE", tolerances::GOOD_SHARE as f32),
+        ("SHRINK", tolerances::SHRINK as f32),
+        ("WIDEN", tolerances::WIDEN as f32),
+        ("INNER_TOLERANCE", tolerances::INNER_TOLERANCE as f32),
+        ("INNER_TOLERANCE_FLOOR", tolerances::GPU_INNER_TOLERANCE_FLOOR),
+        ("ENERGY_ROUNDING", tolerances::GPU_ENERGY_ROUNDING),
+        ("GIVE_UP_RADIUS", tolerances::GPU_GIVE_UP_RADIUS),
+        ("PAPER_INNER_TOLERANCE", tolerances::GPU_PAPER_INNER_TOLERANCE),
+    ] {
         text.push_str(&format!("const {name}: f32 = {value:e}f;\n"));
     }
+    let most = tolerances::INNER_ITERATIONS_PER_UNKNOWN;
+    text.push_str(&format!("const INNER_ITERATIONS_PER_UNKNOWN: u32 = {most}u;\n"));
     text
 }
 

@@ -1,0 +1,127 @@
+//! Object, proxy and contact law as buffers on the device: what stays the same for all configurations of a sweep.
+//!
+//! Positions are relative to the contact model's centre, so that f32 resolves the object and not its distance from the
+//! origin. Compliance entries are rounded from f64 one by one: each keeps 24 bits whatever the condition number of K.
+
+use super::{
+    context::{Context, GpuError},
+    kernel::StorageBuffer,
+    layout::{Joint, Parameters, ProxyNode},
+};
+use crate::{JointVector, contact, object::Object, proxy, scene::JointKind, tolerances};
+use glam::DVec3;
+
+/// Invocations of a workgroup of the equilibrium stages, one of which keeps one contact: the least that GPUs run in step.
+pub(super) const LANES: u32 = 32;
+
+/// The device's copy of a contact model.
+pub struct DeviceModel {
+    /// Without the configurations, which each dispatch sets.
+    pub(super) parameters: Parameters,
+    kinds: Vec<JointKind>,
+    pub(super) joints: StorageBuffer,
+    pub(super) proxy_nodes: StorageBuffer,
+    pub(super) rest: StorageBuffer,
+    pub(super) mesh: StorageBuffer,
+    pub(super) compliance: StorageBuffer,
+    /// Gaps within this of zero are decided in f64 [m].
+    pub(super) gap_band: f64,
+}
+
+impl DeviceModel {
+    /// Uploads a model.
+    ///
+    /// # Errors
+    /// When a buffer exceeds the device's limits or memory.
+    pub fn new(context: &Context, model: &contact::Model<'_>) -> Result<Self, GpuError> {
+        let contact::Model { object, chain, contact, .. } = model;
+        let extent = model.rest.iter().map(|n| n.length()).fold(0.0, f64::max);
+        let corners = |t: &[u32; 3]| t.map(|j| model.rest[j as usize]);
+        let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
+        let longest_edge = object.triangles.iter().map(|t| edge(corners(t))).fold(0.0, f64::max);
+        let compliance: Vec<f32> = object.compliance.entries.iter().map(|&entry| entry as f32).collect();
+        Ok(Self {
+            parameters: Parameters {
+                joints: chain.joints.len() as u32,
+                proxy_nodes: chain.nodes.len() as u32,
+                surface_nodes: object.surface_nodes as u32,
+                triangles: object.triangles.len() as u32,
+                max_iterations: contact.max_iterations,
+                stiffness: contact.stiffness as f32,
+                kc: model.kc as f32,
+                tolerance: contact.tolerance.max(tolerances::GPU_LEAST_TOLERANCE) as f32,
+                softest: model.softest as f32,
+                least_distance: (tolerances::GPU_LEAST_DISTANCE_PER_EXTENT * extent) as f32,
+                depth_rounding: (tolerances::GPU_DEPTH_ROUNDING_PER_EDGE * longest_edge) as f32,
+                lanes: LANES,
+                ..bytemuck::Zeroable::zeroed()
+            },
+            kinds: chain.joints.iter().map(|joint| joint.kind).collect(),
+            joints: StorageBuffer::from_slice(context, "joints", &joints(chain, model.centre))?,
+            proxy_nodes: StorageBuffer::from_slice(context, "proxy nodes", &proxy_nodes(chain))?,
+            rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, extent))?,
+            mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(object))?,
+            compliance: StorageBuffer::from_slice(context, "compliance", &compliance)?,
+            gap_band: tolerances::GPU_GAP_BAND_PER_EXTENT * extent,
+        })
+    }
+
+    /// (cos q, sin q) of every joint, or (q, 0) of a prismatic one: all that kinematics needs of a configuration.
+    pub(super) fn motions(&self, configurations: &[JointVector]) -> Vec<[f32; 2]> {
+        let motion = |(&kind, &q): (&JointKind, &f64)| match kind {
+            JointKind::Revolute => [q.cos() as f32, q.sin() as f32],
+            JointKind::Prismatic => [q as f32, 0.0],
+        };
+        configurations.iter().flat_map(|q| self.kinds.iter().zip(q.iter()).map(motion)).collect()
+    }
+}
+
+fn padded(v: DVec3) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, 0.0]
+}
+
+/// The first joint's origin carries the shift to the centre; all others are relative to their parents anyway.
+fn joints(chain: &proxy::Chain, centre: DVec3) -> Vec<Joint> {
+    let convert = |(k, joint): (usize, &proxy::Joint)| Joint {
+        origin: (if k == 0 { joint.origin - centre } else { joint.origin }).as_vec3().to_array(),
+        kind: match joint.kind {
+            JointKind::Revolute => 0,
+            JointKind::Prismatic => 1,
+        },
+        axis: joint.axis.as_vec3().to_array(),
+        padding: 0,
+    };
+    chain.joints.iter().enumerate().map(convert).collect()
+}
+
+fn proxy_nodes(chain: &proxy::Chain) -> Vec<ProxyNode> {
+    let convert =
+        |node: &proxy::Node| ProxyNode { position: node.position.as_vec3().to_array(), link: node.link as u32 };
+    chain.nodes.iter().map(convert).collect()
+}
+
+/// Surface nodes, bounding spheres of the triangles, radii of the proxy nodes, one behind the other.
+fn rest(model: &contact::Model<'_>, extent: f64) -> Vec<[f32; 4]> {
+    let sphere = |triangle: &[u32; 3]| {
+        let corners = triangle.map(|j| model.rest[j as usize]);
+        let centre = corners.into_iter().sum::<DVec3>() / 3.0;
+        let radius = corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max);
+        let [x, y, z, _] = padded(centre);
+        [x, y, z, (radius + tolerances::GPU_BOUND_SLACK * extent) as f32]
+    };
+    let nodes = model.rest.iter().map(|&n| padded(n));
+    let spheres = model.object.triangles.iter().map(sphere);
+    let radii = model.chain.nodes.iter().map(|node| [node.radius as f32, 0.0, 0.0, 0.0]);
+    nodes.chain(spheres).chain(radii).collect()
+}
+
+/// Corners, neighbours and lists around nodes, one behind the other: see `shaders/surface.wgsl`.
+fn mesh(object: &Object) -> Vec<u32> {
+    let topology = &object.topology;
+    let mut mesh = Vec::new();
+    mesh.extend(object.triangles.iter().flatten());
+    mesh.extend(topology.across.iter().flatten());
+    mesh.extend(&topology.around_offsets);
+    mesh.extend(&topology.around);
+    mesh
+}

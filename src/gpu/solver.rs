@@ -1,0 +1,233 @@
+//! Equilibria of many configurations on the GPU: the backend of a sweep.
+//!
+//! A chunk of configurations is placed and tested for contact in one submission; the host then knows how many touch, and
+//! submits these in batches, one workgroup a configuration, unpacking one batch while the device solves the next. Sizes
+//! of chunks and batches follow from measured time: a dispatch should last tens of milliseconds. Results do not depend
+//! on them.
+//!
+//! What f32 or the kernel's room cannot decide is solved by the CPU's f64 solver: contact within rounding of none,
+//! residuals that rounding keeps above [`GPU_RESOLVED_RESIDUAL`], more contacts than the lists hold. Nothing is cut off.
+
+use super::{
+    context::{AdapterSummary, Context, GpuError},
+    pipeline::{Pipeline, Room},
+    unpack::unpack,
+};
+use crate::{
+    JointVector,
+    contact::{self, Equilibrium, Status},
+    haptize::Backend,
+    scene::Algorithm,
+    tolerances::GPU_RESOLVED_RESIDUAL,
+};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+/// How long a dispatch should last: long enough to keep the device busy, far below the 2 s after which an operating
+/// system takes it for hung.
+const DISPATCH_TARGET: Duration = Duration::from_millis(50);
+
+/// Solves configurations on the GPU.
+pub struct GpuSolver<'a> {
+    context: Arc<Context>,
+    model: &'a contact::Model<'a>,
+    cpu: contact::Solver<'a>,
+    room: Room,
+    pipeline: Pipeline,
+    chunk: Pace,
+    batch: Pace,
+    solved_on_cpu: usize,
+}
+
+/// A number of configurations that follows measured time.
+#[derive(Clone, Copy, Debug)]
+struct Pace {
+    now: usize,
+    most: usize,
+}
+
+impl Pace {
+    /// Steers towards [`DISPATCH_TARGET`], at most by a factor of two up and four down.
+    fn adapt(&mut self, done: usize, time: Duration) {
+        // A dispatch that was cut short by the end of the list says nothing about a full one.
+        if done < self.now && time < DISPATCH_TARGET {
+            return;
+        }
+        let ratio = (DISPATCH_TARGET.as_secs_f64() / time.as_secs_f64().max(1e-6)).clamp(0.25, 2.0);
+        self.now = ((done as f64 * ratio) as usize).clamp(1, self.most);
+    }
+}
+
+/// One batch under way.
+struct Flight {
+    first: usize,
+    count: usize,
+    set: usize,
+    submission: wgpu::SubmissionIndex,
+    since: Instant,
+}
+
+impl<'a> GpuSolver<'a> {
+    /// A solver of `model` on `context`.
+    ///
+    /// # Errors
+    /// When the object does not fit the device, or the device refuses.
+    pub fn new(context: Arc<Context>, model: &'a contact::Model<'a>) -> Result<Self, GpuError> {
+        Self::with_room(context, model, Room::default())
+    }
+
+    /// The same with other bounds on what one submission holds.
+    ///
+    /// # Errors
+    /// As [`GpuSolver::new`].
+    pub fn with_room(context: Arc<Context>, model: &'a contact::Model<'a>, room: Room) -> Result<Self, GpuError> {
+        let room = room.within(context.binding_limit(), model);
+        let pipeline = Pipeline::new(&context, model, room)?;
+        Ok(Self {
+            context,
+            model,
+            cpu: contact::Solver::new(model),
+            room,
+            pipeline,
+            // First dispatches are small: nothing is known of the device yet.
+            chunk: Pace { now: room.chunk.min(1024), most: room.chunk },
+            batch: Pace { now: room.batch.min(64), most: room.batch },
+            solved_on_cpu: 0,
+        })
+    }
+
+    /// The adapter in use.
+    #[must_use]
+    pub fn adapter(&self) -> &AdapterSummary {
+        self.context.adapter()
+    }
+
+    /// A good number of configurations for one call: progress is told between calls.
+    #[must_use]
+    pub fn chunk(&self) -> usize {
+        if self.adapter().hardware { self.room.chunk } else { self.room.chunk.min(1024) }
+    }
+
+    /// How many configurations so far went to the CPU's f64 solver, because f32 or the kernel's room did not decide them.
+    #[must_use]
+    pub fn solved_on_cpu(&self) -> usize {
+        self.solved_on_cpu
+    }
+
+    /// Equilibria of one chunk.
+    fn solve_chunk(&mut self, chunk: &[JointVector]) -> Result<Vec<Equilibrium>, GpuError> {
+        let since = Instant::now();
+        let (gaps, touching) = self.pipeline.detect(&self.context, chunk)?;
+        self.chunk.adapt(chunk.len(), since.elapsed());
+        let mut results: Vec<Equilibrium> =
+            gaps.iter().zip(chunk).map(|(&gap, q)| free(f64::from(gap), q.len())).collect();
+        let mut flight = None;
+        let mut first = 0;
+        while first < touching.len() || flight.is_some() {
+            let previous = flight.take();
+            if first < touching.len() {
+                let count = self.batch.now.min(touching.len() - first);
+                let set = previous.as_ref().map_or(0, |flight: &Flight| 1 - flight.set);
+                let submission = self.pipeline.solve(&self.context, first, count, set);
+                flight = Some(Flight { first, count, set, submission, since: Instant::now() });
+                first += count;
+            }
+            if let Some(done) = previous {
+                let members = &touching[done.first..done.first + done.count];
+                self.land(chunk, members, &done, &mut results)?;
+                // The next one began when this one ended.
+                if let Some(next) = &mut flight {
+                    next.since = Instant::now();
+                }
+            }
+        }
+        for (result, q) in results.iter_mut().zip(chunk) {
+            if self.is_undecided(result) {
+                *result = self.cpu.solve(q);
+                self.solved_on_cpu += 1;
+            }
+        }
+        Ok(results)
+    }
+
+    /// Waits for a batch and stores its results.
+    fn land(
+        &mut self,
+        chunk: &[JointVector],
+        members: &[u32],
+        flight: &Flight,
+        results: &mut [Equilibrium],
+    ) -> Result<(), GpuError> {
+        let (outcomes, touches) = self.pipeline.collect(&self.context, flight.set, flight.count, &flight.submission)?;
+        self.batch.adapt(flight.count, flight.since.elapsed());
+        let unpacked = unpack(self.model, self.room.contacts, chunk, members, &outcomes, &touches)?;
+        for (&member, equilibrium) in members.iter().zip(unpacked) {
+            let gap = results[member as usize].gap;
+            results[member as usize] = Equilibrium { gap, ..equilibrium };
+        }
+        Ok(())
+    }
+
+    /// Whether f32 or the kernel's room left open what the equilibrium is. The paper's iteration often does not converge in
+    /// any precision, and is then left at that.
+    fn is_undecided(&self, result: &Equilibrium) -> bool {
+        result.gap.abs() < self.pipeline.gap_band()
+            || match result.status {
+                Status::Contact => result.residual.is_nan() || result.residual > GPU_RESOLVED_RESIDUAL,
+                Status::Unconverged => self.model.contact.algorithm != Algorithm::Paper,
+                Status::Overflow => true,
+                Status::Free | Status::Outside => false,
+            }
+    }
+
+    /// Opens the device anew, with half the room.
+    fn reopen(&mut self) -> Result<(), GpuError> {
+        let context = Arc::new(self.context.reopen()?);
+        let room = self.room.half();
+        self.pipeline = Pipeline::new(&context, self.model, room)?;
+        self.context = context;
+        self.room = room;
+        for (pace, most) in [(&mut self.chunk, room.chunk), (&mut self.batch, room.batch)] {
+            *pace = Pace { now: (pace.now / 2).clamp(1, most), most };
+        }
+        Ok(())
+    }
+}
+
+/// No contact.
+pub(super) fn free(gap: f64, joints: usize) -> Equilibrium {
+    Equilibrium {
+        status: Status::Free,
+        iterations: 0,
+        residual: 0.0,
+        energy: 0.0,
+        gap,
+        torque: JointVector::zeros(joints),
+        forces: Vec::new(),
+        touches: Vec::new(),
+    }
+}
+
+impl Backend for GpuSolver<'_> {
+    type Error = GpuError;
+
+    /// Equilibria of `configurations`, in the same order. A device that is lost, hangs or runs out of memory is opened
+    /// anew, once a chunk, with half the room.
+    fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, GpuError> {
+        let mut results = Vec::with_capacity(configurations.len());
+        while results.len() < configurations.len() {
+            let rest = &configurations[results.len()..];
+            let solved = match self.solve_chunk(&rest[..rest.len().min(self.chunk.now)]) {
+                Err(GpuError::Lost(_) | GpuError::TimedOut(_) | GpuError::OutOfMemory(_)) => {
+                    self.reopen()?;
+                    self.solve_chunk(&rest[..rest.len().min(self.chunk.now)])?
+                }
+                outcome => outcome?,
+            };
+            results.extend(solved);
+        }
+        Ok(results)
+    }
+}

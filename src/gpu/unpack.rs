@@ -1,0 +1,99 @@
+//! From what the kernels wrote to equilibria: torque tau = sum_i J_i^T (force on x_i) and node forces, in f64.
+
+use super::{
+    context::GpuError,
+    kernel::POISON,
+    layout::{Outcome, Touch},
+    solver::free,
+};
+use crate::{
+    JointVector,
+    contact::{self, Equilibrium, NodeForce, Status},
+    proxy::Pose,
+    scene::Algorithm,
+    tolerances::MINIMUM_SQUARE,
+};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Equilibria of the configurations `chunk[member]`; their gaps are left at zero. `touches` holds `contacts` entries a
+/// member.
+///
+/// # Errors
+/// When a result was never written.
+pub(super) fn unpack(
+    model: &contact::Model<'_>,
+    contacts: usize,
+    chunk: &[JointVector],
+    members: &[u32],
+    outcomes: &[Outcome],
+    touches: &[Touch],
+) -> Result<Vec<Equilibrium>, GpuError> {
+    let lists = touches.par_chunks_exact(contacts);
+    let unpacked: Vec<Option<Equilibrium>> = (members.par_iter(), outcomes, lists)
+        .into_par_iter()
+        .map_init(
+            || model.chain.new_pose(),
+            |pose, (&member, outcome, list)| equilibrium(model, &chunk[member as usize], pose, outcome, list),
+        )
+        .collect();
+    let total = unpacked.len();
+    let written: Vec<Equilibrium> = unpacked.into_iter().flatten().collect();
+    if written.len() < total {
+        return Err(GpuError::NeverWritten { count: total - written.len(), total });
+    }
+    Ok(written)
+}
+
+/// One equilibrium; `None` when the kernel did not write it.
+fn equilibrium(
+    model: &contact::Model<'_>,
+    q: &[f64],
+    pose: &mut Pose,
+    outcome: &Outcome,
+    list: &[Touch],
+) -> Option<Equilibrium> {
+    const UNWRITTEN: u32 = u32::from_ne_bytes([POISON; 4]);
+    let status = Status::from_number(u8::try_from(outcome.status).ok()?)?;
+    let mut result = free(0.0, model.chain.joints.len());
+    result.status = status;
+    result.iterations = outcome.iterations;
+    result.residual = f64::from(outcome.residual);
+    if status == Status::Overflow {
+        return Some(result);
+    }
+    result.energy = f64::from(outcome.elastic);
+    model.chain.pose(q, pose);
+    let mut parts = Vec::new();
+    for touch in list.get(..outcome.touches as usize)? {
+        if touch.proxy_node == UNWRITTEN {
+            return None;
+        }
+        let forces = [touch.force_0, touch.force_1, touch.force_2].map(|f| DVec3::from(f.map(f64::from)));
+        let force = -(forces[0] + forces[1] + forces[2]);
+        if force == DVec3::ZERO {
+            continue;
+        }
+        // Of a force spread by weights these are the weights; of the paper's three forces, their shares along the whole.
+        let square = force.length_squared().max(MINIMUM_SQUARE);
+        let weights = forces.map(|part| -part.dot(force) / square);
+        // A contact spring kc at the contact point, or the paper's three springs Kc, stretched to these forces.
+        result.energy += match model.contact.algorithm {
+            Algorithm::Energy | Algorithm::Linearised => square / (2.0 * model.kc),
+            Algorithm::Paper => {
+                forces.iter().map(|part| part.length_squared()).sum::<f64>() / (2.0 * model.contact.stiffness)
+            }
+        };
+        model.chain.add_torque(pose, touch.proxy_node as usize, force, &mut result.torque);
+        result.touches.push(contact::Touch { proxy_node: touch.proxy_node, nodes: touch.nodes, weights, force });
+        parts.extend(touch.nodes.into_iter().zip(forces).filter(|(_, part)| *part != DVec3::ZERO));
+    }
+    parts.sort_by_key(|&(node, _)| node);
+    for (node, part) in parts {
+        match result.forces.last_mut() {
+            Some(last) if last.node == node => last.force += part,
+            _ => result.forces.push(NodeForce { node, force: part }),
+        }
+    }
+    Some(result)
+}
