@@ -5,9 +5,9 @@
 use glam::DVec3;
 use haptize::{
     JointVector,
-    contact::{Equilibrium, Model, NodeForce, Status},
+    contact::{Equilibrium, Model, NodeForce, Solver, Status},
     dataset::Dataset,
-    haptize::{Backend, CpuBackend, Progress, Run, Sweep, SweepError, SweepReport},
+    haptize::{Backend, CpuBackend, Inspection, Progress, Run, Sweep, SweepError, SweepReport},
     object::Object,
     proxy::Chain,
     scene::Scene,
@@ -413,4 +413,161 @@ fn the_number_of_threads_leaves_no_trace() {
     for (threads, chunk) in [(2, POINTS), (3, 17), (5, 1)] {
         assert!(baked(threads, chunk) == one, "{threads} threads, chunks of {chunk}");
     }
+}
+
+/// Everything but the date, bit for bit.
+fn columns(path: &Path) -> Vec<Vec<u8>> {
+    let dataset = Dataset::open(path).unwrap();
+    let contacts = dataset.contacts.as_ref().unwrap();
+    vec![
+        bytemuck::cast_slice(&dataset.torque).to_vec(),
+        dataset.status.to_vec(),
+        bytemuck::cast_slice(dataset.energy.as_ref().unwrap()).to_vec(),
+        bytemuck::cast_slice(dataset.gap.as_ref().unwrap()).to_vec(),
+        bytemuck::cast_slice(&contacts.nodes).to_vec(),
+        bytemuck::cast_slice(&contacts.forces).to_vec(),
+        dataset.scene.into_bytes(),
+    ]
+}
+
+/// The program, started in `folder` on a scene of `turns` times 90 configurations, once its part holds some of them.
+#[cfg(unix)]
+fn program_at_work(folder: &Folder, turns: usize) -> std::process::Child {
+    let fine = SCENE
+        .replace("step = 0.1, count = 7", &format!("stop = 0.3, count = {turns}"))
+        .replace("step = 0.004, count = 9", "step = 0.0004, count = 90");
+    std::fs::write(folder.0.path().join("fine.toml"), fine).unwrap();
+    let mut program = program(folder, &[]).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let part = folder.0.path().join("fine.haptize.part");
+    while std::fs::metadata(&part).map_or(0, |part| part.len()) < 50_000 {
+        assert!(program.try_wait().unwrap().is_none(), "ended before its part was seen");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    program
+}
+
+#[cfg(unix)]
+fn program(folder: &Folder, more: &[&str]) -> std::process::Command {
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
+    command.current_dir(folder.0.path()).args(["bake", "fine.toml", "--json"]).args(more);
+    command
+}
+
+#[cfg(unix)]
+#[test]
+fn a_killed_program_is_resumed_to_the_same_numbers() {
+    let folder = Folder::new();
+    let mut killed = program_at_work(&folder, 350);
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    assert_eq!(folder.names(), ["fine.haptize.part", "fine.toml"]);
+    let output = program(&folder, &["--resume"]).output().unwrap();
+    assert!(output.status.success());
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(report["resumed_points"].as_u64().unwrap() > 0);
+    assert_eq!(report["points"], 31_500);
+    assert_eq!(folder.names(), ["fine.haptize", "fine.toml"]);
+    let path = folder.0.path().join("fine.haptize");
+    let resumed = columns(&path);
+    assert!(program(&folder, &[]).output().unwrap().status.success());
+    assert!(columns(&path) == resumed);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_program_says_how_to_resume() {
+    let folder = Folder::new();
+    let interrupted = program_at_work(&folder, 10_000);
+    // SAFETY: kill(2) has no conditions; the process is our child and not yet waited for.
+    assert_eq!(unsafe { libc::kill(interrupted.id() as i32, libc::SIGINT) }, 0);
+    let output = interrupted.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("fine.haptize.part") && message.contains("--resume"), "{message}");
+    assert_eq!(folder.names(), ["fine.haptize.part", "fine.toml"]);
+}
+
+/// Largest entry of the difference over the largest entry of `expected`.
+fn relative_error(found: &[f64], expected: &[f64]) -> f64 {
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.map(f64::abs).fold(0.0, f64::max);
+    largest(&mut found.iter().zip(expected).map(|(a, b)| a - b)) / largest(&mut expected.iter().copied())
+}
+
+#[test]
+fn stored_forces_balance_the_object_and_make_the_torque() {
+    let scene = scene();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, scene.contact);
+    let folder = Folder::new();
+    let mut backend = CpuBackend::new(&model, 0).unwrap();
+    bake(&sweep(), &mut backend, &folder.output(), false, 1000, usize::MAX).unwrap();
+    let dataset = Dataset::open(&folder.output()).unwrap();
+    let mut solver = Solver::new(&model);
+    let mut checked = 0;
+    for point in (0..POINTS).filter(|&point| dataset.status(point) == Status::Contact) {
+        let q = dataset.grid.configuration(point);
+        let equilibrium = solver.solve(&q);
+        // K u of the displacement, against the forces as they went through the file.
+        let u: Vec<DVec3> = solver.displacement().chunks_exact(3).map(DVec3::from_slice).collect();
+        let mut elastic = vec![DVec3::ZERO; u.len()];
+        object.stiffness.apply(&u, &mut elastic);
+        let mut stored = vec![DVec3::ZERO; u.len()];
+        for contact in dataset.forces(point) {
+            stored[contact.node as usize] = contact.force;
+        }
+        let flat = |vectors: &[DVec3]| vectors.iter().flat_map(|v| v.to_array()).collect::<Vec<f64>>();
+        assert!(relative_error(&flat(&stored), &flat(&elastic)) < 1e-6, "point {point}");
+        let perturbed: Vec<f64> = flat(&stored).iter().map(|f| f * 1.00001).collect();
+        assert!(relative_error(&perturbed, &flat(&elastic)) > 1e-6, "the comparison sees an error of 1e-5");
+        // Along the slide the forces on object and proxy cancel.
+        let along = -stored.iter().sum::<DVec3>().dot(solver.pose().axes[1]);
+        assert!((dataset.torque(point)[1] - along).abs() <= 1e-6 * along.abs(), "point {point}");
+        let mut torque = JointVector::zeros(2);
+        for touch in &equilibrium.touches {
+            assert!(touch.force.dot(model.object.rest[touch.nodes[0] as usize]) > 0.0, "forces push outwards");
+            chain.add_torque(solver.pose(), touch.proxy_node as usize, touch.force, &mut torque);
+        }
+        assert!(relative_error(dataset.torque(point), &torque) < 1e-12, "point {point}");
+        checked += 1;
+    }
+    assert!(checked > 5);
+}
+
+#[test]
+fn an_inspection_tells_the_same_from_scene_and_dataset() {
+    let folder = Folder::new();
+    std::fs::write(folder.0.path().join("small.toml"), SCENE).unwrap();
+    let haptize = |arguments: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
+        let output = command.current_dir(folder.0.path()).args(arguments).arg("--json").output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
+    };
+    haptize(&["bake", "small.toml"]);
+    std::fs::remove_file(folder.0.path().join("small.toml")).unwrap();
+    let from_dataset = haptize(&["inspect", "small.haptize", "--q", "-0.2,0.042"]);
+    std::fs::write(folder.0.path().join("small.toml"), SCENE).unwrap();
+    let mut from_scene = haptize(&["inspect", "small.toml", "--q=-0.2,0.042"]);
+    assert_eq!(from_scene["status"], "contact");
+    // The grid point 1 x 8, as it was stored and as it is solved anew.
+    assert_eq!(from_dataset["stored"]["point"], 9 + 8);
+    let torque = |value: &serde_json::Value| serde_json::from_value::<Vec<f64>>(value["torque"].clone()).unwrap();
+    assert!(relative_error(&torque(&from_dataset["stored"]), &torque(&from_dataset)) < 1e-6);
+    from_scene["stored"] = from_dataset["stored"].clone();
+    assert_eq!(from_scene, from_dataset);
+}
+
+#[test]
+fn an_inspection_is_complete_enough_to_recompute_the_torque() {
+    let scene = scene();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, scene.contact);
+    let inspection = Inspection::new(&model, &[0.05, 0.045]);
+    assert_eq!((inspection.status.as_str(), inspection.proxy_nodes.len()), ("contact", 3));
+    assert_eq!(inspection.object_nodes.len(), object.surface_nodes);
+    assert!(relative_error(&inspection.torque_of_contacts(), &inspection.torque) < 1e-12);
+    let pushed: DVec3 = inspection.object_nodes.iter().map(|node| node.force).sum();
+    let pushing: DVec3 =
+        inspection.proxy_nodes.iter().filter_map(|node| node.contact).map(|contact| contact.force).sum();
+    assert!((pushed + pushing).length() < 1e-12 * pushed.length());
 }

@@ -53,6 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let result = bake.to_file(&output, arguments.resume);
     bar.finish_and_clear();
     let (_, report) = result?;
+    report.warnings.iter().for_each(|warning| eprintln!("haptize: {warning}"));
     let mut json = serde_json::to_value(&report)?;
     json["file"] = output.display().to_string().into();
     let lost = report.unconverged + report.overflowed;

@@ -14,6 +14,7 @@ mod bake;
 mod doctor;
 mod export;
 mod info;
+mod inspect;
 
 use clap::{Parser, Subcommand};
 use std::{
@@ -43,6 +44,8 @@ enum Command {
     Export(export::Arguments),
     /// Say what a dataset holds, after checking all of it.
     Info(info::Arguments),
+    /// Solve one configuration and tell all of it.
+    Inspect(inspect::Arguments),
 }
 
 impl Command {
@@ -52,6 +55,7 @@ impl Command {
             Self::Doctor(arguments) => doctor::run(arguments),
             Self::Export(arguments) => export::run(arguments),
             Self::Info(arguments) => info::run(arguments),
+            Self::Inspect(arguments) => inspect::run(arguments),
         }
     }
 }

@@ -90,6 +90,15 @@ impl Grid {
         Ok(points)
     }
 
+    /// The grid point nearest to `q`; `None` where `q` lies more than half a step outside the grid.
+    #[must_use]
+    pub fn nearest(&self, q: &[f64]) -> Option<usize> {
+        self.axes.iter().zip(q).try_fold(0, |point, (axis, q)| {
+            let line = ((q - axis.start) / axis.step).round();
+            (line >= 0.0 && line < axis.count as f64).then(|| point * axis.count + line as usize)
+        })
+    }
+
     /// Configuration q of grid point `point`.
     #[must_use]
     pub fn configuration(&self, point: usize) -> JointVector {
@@ -100,5 +109,45 @@ impl Grid {
             rest /= axis.count;
         }
         q
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(counts: &[usize]) -> Grid {
+        let axis = |&count| Axis { name: "a".into(), unit: "rad".into(), start: -0.3, step: 0.1, count };
+        Grid { axes: counts.iter().map(axis).collect() }
+    }
+
+    #[test]
+    fn the_nearest_point_to_a_grid_point_is_itself() {
+        for counts in [&[5][..], &[2, 3], &[3, 1, 4], &[2, 2, 2, 2, 2, 3]] {
+            let grid = grid(counts);
+            for point in 0..grid.points() {
+                let mut q = grid.configuration(point);
+                assert_eq!(grid.nearest(&q), Some(point));
+                q.iter_mut().for_each(|x| *x += 0.049);
+                assert_eq!(grid.nearest(&q), Some(point));
+                q[0] -= 10.0;
+                assert_eq!(grid.nearest(&q), None);
+                q[0] = f64::NAN;
+                assert_eq!(grid.nearest(&q), None);
+            }
+        }
+    }
+
+    #[test]
+    fn a_grid_without_distinct_finite_lines_is_unsound() {
+        assert_eq!(grid(&[5, 7]).check(), Ok(35));
+        assert!(grid(&[]).check().is_err());
+        assert!(grid(&[2; 7]).check().is_err());
+        assert!(grid(&[usize::MAX, 2]).check().is_err());
+        for (start, step) in [(0.0, 0.0), (0.0, -1.0), (1e17, 1.0), (f64::NAN, 1.0), (0.0, f64::INFINITY)] {
+            let mut grid = grid(&[5]);
+            (grid.axes[0].start, grid.axes[0].step) = (start, step);
+            assert!(grid.check().is_err(), "{start} {step}");
+        }
     }
 }

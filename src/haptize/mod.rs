@@ -4,6 +4,7 @@ mod bake;
 mod choice;
 mod columns;
 mod cpu;
+mod inspection;
 mod part;
 mod report;
 mod sweep;
@@ -11,6 +12,7 @@ mod sweep;
 pub use bake::{Bake, BakeError};
 pub use choice::{BackendChoice, BackendError, ChosenBackend};
 pub use cpu::CpuBackend;
+pub use inspection::{Contact, Inspection, ObjectNode, ProxyNode};
 pub use report::{Iterations, SweepReport};
 pub use sweep::{Progress, Run, Sweep, SweepError};
 

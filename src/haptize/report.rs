@@ -31,6 +31,8 @@ pub struct SweepReport {
     pub adapter: String,
     /// `energy`, `paper` or `linearised`.
     pub algorithm: String,
+    /// What was noticed about the object while it was built.
+    pub warnings: Vec<String>,
 }
 
 /// Iterations of the points in contact.
@@ -43,7 +45,7 @@ pub struct Iterations {
 }
 
 impl SweepReport {
-    pub(super) fn of(dataset: &Dataset, resumed_points: usize, time: Duration) -> Self {
+    pub(super) fn of(dataset: &Dataset, resumed_points: usize, time: Duration, warnings: Vec<String>) -> Self {
         let points = dataset.grid.points();
         let counts = dataset.status_counts();
         let contact_points = counts.contact + counts.unconverged + counts.overflow;
@@ -68,6 +70,7 @@ impl SweepReport {
             backend: dataset.provenance.backend.clone(),
             adapter: dataset.provenance.adapter.clone(),
             algorithm: dataset.provenance.algorithm.clone(),
+            warnings,
         }
     }
 }

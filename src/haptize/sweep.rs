@@ -142,6 +142,7 @@ pub struct Sweep {
     scene: String,
     provenance: Provenance,
     with_forces: bool,
+    warnings: Vec<String>,
 }
 
 impl Sweep {
@@ -187,6 +188,7 @@ impl Sweep {
                 date: date.into(),
             },
             with_forces: scene.graphics.is_some(),
+            warnings: object.warnings.clone(),
         })
     }
 
@@ -303,7 +305,7 @@ impl Sweep {
             (run.progress)(Progress { done: columns.points(), points, contact_points, rate });
         }
         let dataset = self.dataset(columns, provenance);
-        let report = SweepReport::of(&dataset, resumed, start.elapsed());
+        let report = SweepReport::of(&dataset, resumed, start.elapsed(), self.warnings.clone());
         Ok((dataset, report))
     }
 

@@ -1,0 +1,121 @@
+//! One configuration in full: what equation (2) says of it, for the eye and for other programs.
+
+use crate::{
+    JointVector,
+    contact::{Equilibrium, Model, Solver},
+};
+use glam::DVec3;
+use serde::Serialize;
+
+/// One configuration in full. Vectors are in the world's frame.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Inspection {
+    /// Configuration [rad or m].
+    pub q: Vec<f64>,
+    /// What became of it, in lower case.
+    pub status: String,
+    /// Iterations of the contact solver.
+    pub iterations: u32,
+    /// Relative residual [1].
+    pub residual: f64,
+    /// Stored energy U [J].
+    pub energy: f64,
+    /// Smallest signed distance of the proxy to the surface at rest [m].
+    pub gap: f64,
+    /// tau [N m or N].
+    pub torque: Vec<f64>,
+    /// All contact nodes of the proxy.
+    pub proxy_nodes: Vec<ProxyNode>,
+    /// All nodes of the object's surface.
+    pub object_nodes: Vec<ObjectNode>,
+}
+
+/// A contact node of the proxy.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ProxyNode {
+    /// Name of the joint whose link carries it.
+    pub link: String,
+    /// x_i [m].
+    pub position: DVec3,
+    /// Columns of J_i, one per joint [m/rad, or 1].
+    pub jacobian: Vec<DVec3>,
+    /// What it touches, where it does.
+    pub contact: Option<Contact>,
+}
+
+/// A contact of a proxy node.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Contact {
+    /// Force on the proxy node [N].
+    pub force: DVec3,
+    /// The three object nodes that carry its reaction.
+    pub nodes: [u32; 3],
+    /// Share of each.
+    pub weights: [f64; 3],
+}
+
+/// A node of the object's surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ObjectNode {
+    /// n0 [m].
+    pub rest: DVec3,
+    /// n [m].
+    pub position: DVec3,
+    /// Contact force f_j on it [N].
+    pub force: DVec3,
+}
+
+impl Inspection {
+    /// Solves the configuration `q` and tells all of it.
+    #[must_use]
+    pub fn new(model: &Model<'_>, q: &[f64]) -> Self {
+        let mut solver = Solver::new(model);
+        let equilibrium = solver.solve(q);
+        let (object, chain, pose) = (model.object, model.chain, solver.pose());
+        let rest = &object.rest[..object.surface_nodes];
+        let mut object_nodes: Vec<ObjectNode> = rest
+            .iter()
+            .zip(solver.displacement().chunks_exact(3))
+            .map(|(&rest, u)| ObjectNode { rest, position: rest + DVec3::from_slice(u), force: DVec3::ZERO })
+            .collect();
+        for contact in &equilibrium.forces {
+            object_nodes[contact.node as usize].force = contact.force;
+        }
+        let proxy_nodes =
+            chain.nodes.iter().zip(&pose.nodes).enumerate().map(|(node, (specified, &position))| ProxyNode {
+                link: chain.joints[specified.link].name.clone(),
+                position,
+                jacobian: (0..chain.joints.len()).map(|joint| chain.jacobian_column(pose, node, joint)).collect(),
+                contact: equilibrium
+                    .touches
+                    .iter()
+                    .find(|touch| touch.proxy_node as usize == node)
+                    .map(|touch| Contact { force: touch.force, nodes: touch.nodes, weights: touch.weights }),
+            });
+        let proxy_nodes = proxy_nodes.collect();
+        let Equilibrium { status, iterations, residual, energy, gap, torque, .. } = equilibrium;
+        Self {
+            q: q.to_vec(),
+            status: format!("{status:?}").to_lowercase(),
+            iterations,
+            residual,
+            energy,
+            gap,
+            torque: torque.to_vec(),
+            proxy_nodes,
+            object_nodes,
+        }
+    }
+
+    /// tau once more, as the sum of J_i^T (force on x_i) over the contacts told [N m or N].
+    #[must_use]
+    pub fn torque_of_contacts(&self) -> JointVector {
+        let mut torque = JointVector::zeros(self.q.len());
+        for node in &self.proxy_nodes {
+            if let Some(contact) = node.contact {
+                torque.iter_mut().zip(&node.jacobian).for_each(|(tau, column)| *tau += column.dot(contact.force));
+            }
+        }
+        torque
+    }
+}
