@@ -158,3 +158,63 @@ pub const LEAST_INTERVAL: f64 = 1e-6;
 /// Greatest time between two ticks [s]: a whole period of a hand's fastest motion, 10 Hz. After more, the position before
 /// says nothing about the velocity.
 pub const GREATEST_INTERVAL: f64 = 0.1;
+// --- gridization of scattered samples; positions are scaled to the unit box ---
+
+/// Samples closer than this fraction of the extent are one point: far below any encoder's resolution (a 16-bit encoder
+/// over the range resolves 1.5e-5), far above rounding.
+pub const MERGE_DISTANCE: f64 = 1e-9;
+
+/// Greatest displacement of a point before it is tetrahedralised, as a fraction of the extent. Without it every cell
+/// of an exact grid is cospherical and each predicate runs its exact branch. It must exceed the predicates' static
+/// error, about 1e-15 of the products involved, by a margin for cells of 1/100 of the extent.
+pub const JITTER: f64 = 1.0 / (1_u64 << 40) as f64;
+
+/// Fraction by which a position just outside the hull is pulled towards its centre: 100 times the jitter, so that a grid
+/// point on a hull facet is found as long as the hull is thicker than about 1/50 of its extent there.
+pub const HULL_PULL: f64 = 100.0 * JITTER;
+
+/// [`JITTER`] for 4 to 6 joints, where circumspheres are computed in floating point: on a cell of cospherical points
+/// squeezed to thickness t the centre is known to about 1e-16 / t, and must be known better than t.
+pub const HYPER_JITTER: f64 = 1e-7;
+
+/// [`HULL_PULL`] for 4 to 6 joints.
+pub const HYPER_PULL: f64 = 100.0 * HYPER_JITTER;
+
+/// A point counts as beyond a facet from this height on: below the jitter, above the rounding of a height.
+pub const HYPER_FACET: f64 = 1e-12;
+
+/// A weight down to minus this counts as inside: the rounding of a weight in a cell of thickness `HYPER_JITTER`.
+pub const HYPER_WEIGHT: f64 = 1e-9;
+
+/// Steps after which a walk in 4 to 6 joints is given up. Walks cross about d n^(1/d) cells; 10^5 samples in 4 joints
+/// give 70.
+pub const HYPER_STEPS: usize = 10_000;
+
+/// Cells that one worker keeps in 4 to 6 joints before it starts anew: about 500 bytes each.
+pub const HYPER_CELLS: usize = 200_000;
+
+/// Pivot below which the corners of a simplex span nothing in a direction, as a fraction of the extent: between the
+/// jitter (1e-7 and less), which makes slivers of points in a plane, and the thickness of honest simplices.
+pub const SLIVER_PIVOT: f64 = 1e-5;
+
+/// Extent of the samples off the best line or plane below which they count as flat: less than an encoder resolves.
+pub const FLAT_CLOUD: f64 = 1e-6;
+
+/// Simplices that may be created per point before an arrangement is called degenerate. Random points create about 27
+/// on the way to 6.8, scan lines up to 60.
+pub const SIMPLICES_PER_POINT: usize = 400;
+
+/// Simplices that any number of points may create.
+pub const FREE_SIMPLICES: usize = 1_000_000;
+
+/// A grid line this fraction of a step outside the samples' range still lies on its end.
+pub const GRID_LINE: f64 = 1e-9;
+
+/// Most grid points of one gridization: 2.4 GB of torque for three joints.
+pub const GRID_POINTS: f64 = 1e8;
+
+/// Contact threshold in standard deviations of the samples: noise alone exceeds three once in 370 samples.
+pub const CONTACT_DEVIATIONS: f64 = 3.0;
+
+/// Contact threshold as a fraction of the greatest torque where no deviation was measured.
+pub const CONTACT_FRACTION: f64 = 0.01;

@@ -5,6 +5,7 @@ mod choice;
 mod columns;
 mod cpu;
 mod inspection;
+pub mod gridize;
 mod part;
 mod report;
 mod sweep;

@@ -1,0 +1,189 @@
+//! Samples made ready for a triangulation: scaled, merged, checked for extent, and jittered.
+//!
+//! Delaunay triangulations depend on the metric. Joints of one unit keep theirs: all angles are divided by the widest
+//! extent among the angles, all lengths by the widest among the lengths, so that each group fits the unit box and
+//! radians are never weighed against metres by their accidental size. With joints of a single unit this is the
+//! triangulation of the raw coordinates.
+//!
+//! Samples within [`MERGE_DISTANCE`](crate::tolerances::MERGE_DISTANCE) are averaged into one point: duplicates have no
+//! triangulation. The jitter is a hash of a point's own coordinates, hence the same in every run and in any order.
+
+use super::{GridizeError, samples::Samples};
+use crate::{MAX_JOINTS, tolerances};
+use std::collections::HashMap;
+
+/// A position in scaled C-space; entries beyond the number of joints are zero.
+pub(super) type Position = [f64; MAX_JOINTS];
+
+/// Distinct points in scaled C-space with the averaged torque of each.
+pub(super) struct Cloud {
+    /// Number of joints d.
+    pub joints: usize,
+    /// Scaled position = (q - origin) * scale.
+    origin: Position,
+    scale: Position,
+    /// Scaled positions.
+    pub positions: Vec<Position>,
+    /// Torque, joint fastest.
+    pub torques: Vec<f64>,
+    /// Mean of all positions, inside the convex hull.
+    pub centre: Position,
+    /// d + 1 points that span a simplex of good volume.
+    pub spanning: Vec<u32>,
+    /// How many samples were averaged into others.
+    pub merged: usize,
+}
+
+impl Cloud {
+    /// Scales and merges `samples`, which must have passed [`Samples::check`].
+    pub fn new(samples: &Samples) -> Result<Self, GridizeError> {
+        let joints = samples.joints.len();
+        let need = joints + 1;
+        if samples.len() < need {
+            return Err(GridizeError::TooFew { have: samples.len(), need, joints });
+        }
+        let (origin, scale) = frame(samples)?;
+        let mut cloud = Self {
+            joints,
+            origin,
+            scale,
+            positions: Vec::new(),
+            torques: Vec::new(),
+            centre: [0.0; MAX_JOINTS],
+            spanning: Vec::new(),
+            merged: 0,
+        };
+        cloud.merge(samples);
+        if cloud.positions.len() < need {
+            return Err(GridizeError::TooFew { have: cloud.positions.len(), need, joints });
+        }
+        for position in &cloud.positions {
+            for (sum, x) in cloud.centre.iter_mut().zip(position) {
+                *sum += x / cloud.positions.len() as f64;
+            }
+        }
+        cloud.spanning = spanning_simplex(&cloud.positions, joints)?;
+        Ok(cloud)
+    }
+
+    /// `q` in scaled coordinates.
+    pub fn scaled(&self, q: &[f64]) -> Position {
+        let mut position = [0.0; MAX_JOINTS];
+        for (joint, x) in position.iter_mut().enumerate().take(self.joints) {
+            *x = (q[joint] - self.origin[joint]) * self.scale[joint];
+        }
+        position
+    }
+
+    /// Torque of point `point`.
+    pub fn torque(&self, point: u32) -> &[f64] {
+        let start = point as usize * self.joints;
+        &self.torques[start..start + self.joints]
+    }
+
+    /// Positions moved by up to `most` along each axis, so that no d + 2 are cospherical.
+    pub fn jittered(&self, most: f64) -> Vec<Position> {
+        self.positions.iter().map(|position| jitter(position, self.joints, most)).collect()
+    }
+
+    fn merge(&mut self, samples: &Samples) {
+        let joints = self.joints;
+        let mut cells: HashMap<[i64; MAX_JOINTS], usize> = HashMap::with_capacity(samples.len());
+        let mut counts: Vec<f64> = Vec::new();
+        let rows = samples.configurations.chunks_exact(joints).zip(samples.torques.chunks_exact(joints));
+        for (q, torque) in rows {
+            let position = self.scaled(q);
+            let cell = position.map(|x| (x / tolerances::MERGE_DISTANCE).round() as i64);
+            let point = *cells.entry(cell).or_insert(counts.len());
+            if point == counts.len() {
+                counts.push(1.0);
+                self.positions.push(position);
+                self.torques.extend_from_slice(torque);
+            } else {
+                counts[point] += 1.0;
+                self.merged += 1;
+                for (mean, value) in self.positions[point].iter_mut().zip(position) {
+                    *mean += (value - *mean) / counts[point];
+                }
+                for (mean, value) in self.torques[point * joints..].iter_mut().zip(torque) {
+                    *mean += (value - *mean) / counts[point];
+                }
+            }
+        }
+    }
+}
+
+/// Origin and scale of the unit box of each unit.
+fn frame(samples: &Samples) -> Result<(Position, Position), GridizeError> {
+    let joints = samples.joints.len();
+    let mut low = [0.0; MAX_JOINTS];
+    let mut extent = [0.0; MAX_JOINTS];
+    for joint in 0..joints {
+        let column = || samples.configurations.iter().skip(joint).step_by(joints).copied();
+        low[joint] = column().fold(f64::INFINITY, f64::min);
+        extent[joint] = column().fold(f64::NEG_INFINITY, f64::max) - low[joint];
+        if !extent[joint].is_finite() || extent[joint] <= f64::MIN_POSITIVE {
+            return Err(GridizeError::NoExtent { joint: samples.joints[joint].name.clone() });
+        }
+    }
+    let mut scale = [0.0; MAX_JOINTS];
+    for (scale, label) in scale.iter_mut().zip(&samples.joints) {
+        let group = samples.joints.iter().zip(extent).filter(|(other, _)| other.unit == label.unit);
+        *scale = 1.0 / group.map(|(_, extent)| extent).fold(0.0, f64::max);
+    }
+    Ok((low, scale))
+}
+
+/// Grows a simplex by the point farthest from the span of those chosen before; refuses a cloud that is flat.
+fn spanning_simplex(positions: &[Position], joints: usize) -> Result<Vec<u32>, GridizeError> {
+    let origin = positions[0];
+    let mut residuals: Vec<Position> =
+        positions.iter().map(|position| std::array::from_fn(|joint| position[joint] - origin[joint])).collect();
+    let mut chosen = vec![0];
+    for rank in 0..joints {
+        let length = |r: &Position| dot(r, r);
+        let (farthest, square) = residuals
+            .iter()
+            .enumerate()
+            .map(|(point, residual)| (point, length(residual)))
+            .fold((0, 0.0), |best, next| if next.1 > best.1 { next } else { best });
+        let distance = square.sqrt();
+        if distance < tolerances::FLAT_CLOUD {
+            return Err(GridizeError::Flat { rank, joints, thickness: distance });
+        }
+        let direction = residuals[farthest].map(|x| x / distance);
+        for residual in &mut residuals {
+            let along = dot(residual, &direction);
+            for (x, n) in residual.iter_mut().zip(direction) {
+                *x -= along * n;
+            }
+        }
+        chosen.push(farthest as u32);
+    }
+    Ok(chosen)
+}
+
+/// Inner product of two positions.
+pub(super) fn dot(a: &Position, b: &Position) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// `position` moved along each axis by a hash of its coordinates, by at most `most`.
+fn jitter(position: &Position, joints: usize, most: f64) -> Position {
+    let mut seed = position.iter().fold(0, |seed, x| mix(seed ^ x.to_bits()));
+    let mut moved = *position;
+    for x in moved.iter_mut().take(joints) {
+        seed = mix(seed);
+        let unit = (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
+        *x += most * unit;
+    }
+    moved
+}
+
+/// SplitMix64's finalizer (Steele, Lea and Flood, 2014).
+pub(super) fn mix(value: u64) -> u64 {
+    let mut z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}

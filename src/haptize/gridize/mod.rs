@@ -1,0 +1,312 @@
+//! Uniform gridization (section 2.3): scattered torques become a dataset over a uniform grid in C-space.
+//!
+//! Every number of joints has the same interpolation, linear on the simplices of a Delaunay triangulation, which is
+//! what the paper's TriScatteredInterp and SciPy's LinearNDInterpolator compute: exact for torques linear in q,
+//! continuous, bounded by the measured values, and *absent* outside the convex hull of the samples
+//! ([`Status::Outside`]). One joint: a sorted line. Two: `spade`. Three: tetrahedra of our own on exact predicates.
+//! Four to six: the simplices of the grid points alone (see `hyperspace`). Natural neighbours in two joints, where asked.
+//!
+//! The contact index of a grid point is the paper's (section 3.1): contact where the torque exceeds epsilon.
+
+mod barycentric;
+mod cloud;
+mod hyperspace;
+mod interpolant;
+mod line;
+mod order;
+mod plane;
+mod samples;
+mod space;
+mod tetrahedra;
+
+pub use samples::{JointLabel, Samples, SamplesError};
+
+use crate::{
+    MAX_JOINTS,
+    contact::Status,
+    dataset::{Axis, Dataset, Grid, Provenance},
+    tolerances,
+};
+use cloud::Cloud;
+use interpolant::{Interpolant, Linear};
+use rayon::prelude::*;
+
+/// How scattered torques are interpolated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Interpolation {
+    /// Linear on Delaunay simplices, 1 to 6 joints.
+    #[default]
+    Linear,
+    /// Natural neighbours (Sibson), 2 joints.
+    Natural,
+}
+
+/// What the grid shall be.
+#[derive(Clone, Debug)]
+pub struct GridizeOptions {
+    /// Grid step of each joint [rad or m]; one number serves all joints.
+    pub steps: Vec<f64>,
+    /// Contact where the norm of the torque exceeds this, epsilon of section 3.1 [N m]. Absent: three times the median
+    /// standard deviation of the samples, or a hundredth of the greatest torque where none was measured.
+    pub epsilon: Option<f64>,
+    /// How torques are interpolated.
+    pub interpolation: Interpolation,
+}
+
+/// What gridization did.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct GridizeReport {
+    /// Samples given.
+    pub samples: usize,
+    /// Samples averaged into others at the same configuration.
+    pub merged: usize,
+    /// Grid points in all.
+    pub points: usize,
+    /// Grid points inside the convex hull.
+    pub inside: usize,
+    /// Grid points in contact.
+    pub contact_points: usize,
+    /// Torque threshold used [N m].
+    pub epsilon: f64,
+}
+
+/// Why a gridization was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum GridizeError {
+    /// The samples are not usable.
+    #[error(transparent)]
+    Samples(#[from] SamplesError),
+    /// Too few distinct samples.
+    #[error("{have} distinct samples cannot span {joints} joints; at least {need} are needed")]
+    TooFew {
+        /// Distinct samples given.
+        have: usize,
+        /// Least number.
+        need: usize,
+        /// Number of joints.
+        joints: usize,
+    },
+    /// A joint that did not move.
+    #[error("joint `{joint}` has the same position in every sample: leave it out, or move it in the scan")]
+    NoExtent {
+        /// The joint's name.
+        joint: String,
+    },
+    /// All samples in a subspace.
+    #[error(
+        "the samples span only {rank} of {joints} joint directions (thickness {thickness:.1e} of the extent): measure off \
+         that line or plane too, or leave out a joint"
+    )]
+    Flat {
+        /// Directions spanned.
+        rank: usize,
+        /// Number of joints.
+        joints: usize,
+        /// Extent in the next direction, as a fraction of the widest.
+        thickness: f64,
+    },
+    /// A step that is no step.
+    #[error("grid step {step} of joint `{joint}` is not a positive number")]
+    Step {
+        /// The joint's name.
+        joint: String,
+        /// The step.
+        step: f64,
+    },
+    /// One step a joint, or one for all.
+    #[error("{have} grid steps were given for {joints} joints: give one step, or one a joint")]
+    Steps {
+        /// Steps given.
+        have: usize,
+        /// Number of joints.
+        joints: usize,
+    },
+    /// A grid without a point.
+    #[error("no multiple of the grid step {step} lies within the range of joint `{joint}`: take a smaller step")]
+    NoGridLine {
+        /// The joint's name.
+        joint: String,
+        /// The step.
+        step: f64,
+    },
+    /// A grid over the limit.
+    #[error("the grid would hold {points:.3e} points, the limit is {limit:.0e}: take a larger step")]
+    TooManyPoints {
+        /// Points of the grid.
+        points: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// A negative or infinite threshold.
+    #[error("torque threshold {0} is not a number of zero or more")]
+    Epsilon(f64),
+    /// Natural neighbours are defined here for two joints only.
+    #[error("natural neighbour interpolation takes 2 joints, the samples have {0}: use linear interpolation")]
+    NaturalNeighbours(usize),
+    /// Too many tetrahedra.
+    #[error(
+        "triangulating {points} samples passed the limit of {limit} simplices: their arrangement is degenerate (two \
+         skew lines, say); decimate them"
+    )]
+    TooManySimplices {
+        /// Distinct samples.
+        points: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// Refused by the triangulation library.
+    #[error("the samples cannot be triangulated: {0}")]
+    Triangulation(String),
+}
+
+/// Interpolates `samples` on a uniform grid whose lines lie at multiples of the step, within the samples' range.
+///
+/// The dataset holds torque and status: no energy, gap, contact forces or surface, which nobody measured. Torque is
+/// zero where the status is [`Status::Outside`].
+///
+/// # Errors
+/// [`GridizeError`]: samples that are not finite, too few, flat in C-space, or a grid that is empty or too large.
+pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, GridizeReport), GridizeError> {
+    samples.check()?;
+    let epsilon = options.epsilon.unwrap_or_else(|| default_epsilon(samples));
+    if !(epsilon.is_finite() && epsilon >= 0.0) {
+        return Err(GridizeError::Epsilon(epsilon));
+    }
+    let cloud = Cloud::new(samples)?;
+    let grid = grid(samples, &options.steps)?;
+    let linear = |pull| (pull, &cloud);
+    let torque = match (options.interpolation, cloud.joints) {
+        (Interpolation::Natural, 2) => fill(&plane::NaturalNeighbours::new(&cloud)?, &cloud, &grid),
+        (Interpolation::Natural, joints) => return Err(GridizeError::NaturalNeighbours(joints)),
+        (Interpolation::Linear, 1) => fill_linear(line::Line::new(&cloud), linear(tolerances::HULL_PULL), &grid),
+        (Interpolation::Linear, 2) => fill_linear(plane::Plane::new(&cloud)?, linear(tolerances::HULL_PULL), &grid),
+        (Interpolation::Linear, 3) => fill_linear(space::Space::new(&cloud)?, linear(tolerances::HULL_PULL), &grid),
+        _ => fill_linear(hyperspace::Hyperspace::new(&cloud), linear(tolerances::HYPER_PULL), &grid),
+    };
+    let (torque, inside) = torque;
+    let status: Vec<u8> = torque
+        .chunks_exact(cloud.joints)
+        .zip(&inside)
+        .map(|(torque, inside)| match (inside, torque.iter().map(|t| t * t).sum::<f64>().sqrt() > epsilon) {
+            (false, _) => Status::Outside,
+            (true, true) => Status::Contact,
+            (true, false) => Status::Free,
+        } as u8)
+        .collect();
+    let report = GridizeReport {
+        samples: samples.len(),
+        merged: cloud.merged,
+        points: inside.len(),
+        inside: inside.iter().filter(|inside| **inside).count(),
+        contact_points: status.iter().filter(|status| **status == Status::Contact as u8).count(),
+        epsilon,
+    };
+    let algorithm = match options.interpolation {
+        Interpolation::Linear => "gridized, linear on Delaunay simplices",
+        Interpolation::Natural => "gridized, natural neighbours",
+    };
+    let dataset = Dataset {
+        grid,
+        torque: torque.into(),
+        energy: None,
+        gap: None,
+        status: status.into(),
+        residual: None,
+        iterations: None,
+        contacts: None,
+        surface: None,
+        scene: String::new(),
+        provenance: Provenance {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            algorithm: algorithm.to_owned(),
+            ..Provenance::default()
+        },
+    };
+    Ok((dataset, report))
+}
+
+fn default_epsilon(samples: &Samples) -> f64 {
+    let joints = samples.joints.len();
+    let mut deviations: Vec<f64> = samples.deviations.iter().flat_map(|column| norms(column, joints)).collect();
+    if deviations.is_empty() {
+        return tolerances::CONTACT_FRACTION * norms(&samples.torques, joints).fold(0.0, f64::max);
+    }
+    let middle = deviations.len() / 2;
+    tolerances::CONTACT_DEVIATIONS * *deviations.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+fn norms(column: &[f64], joints: usize) -> impl Iterator<Item = f64> {
+    column.chunks_exact(joints).map(|row| row.iter().map(|x| x * x).sum::<f64>().sqrt())
+}
+
+/// Grid lines at multiples of the step inside the samples' range.
+fn grid(samples: &Samples, steps: &[f64]) -> Result<Grid, GridizeError> {
+    let joints = samples.joints.len();
+    if steps.len() != 1 && steps.len() != joints {
+        return Err(GridizeError::Steps { have: steps.len(), joints });
+    }
+    let mut axes = Vec::with_capacity(joints);
+    let mut points = 1.0;
+    for (joint, label) in samples.joints.iter().enumerate() {
+        let step = steps[joint % steps.len()];
+        if !(step.is_finite() && step > 0.0) {
+            return Err(GridizeError::Step { joint: label.name.clone(), step });
+        }
+        let column = || samples.configurations.iter().skip(joint).step_by(joints).copied();
+        let slack = tolerances::GRID_LINE;
+        let first = (column().fold(f64::INFINITY, f64::min) / step - slack).ceil();
+        let last = (column().fold(f64::NEG_INFINITY, f64::max) / step + slack).floor();
+        let count = last - first + 1.0;
+        if count < 1.0 {
+            return Err(GridizeError::NoGridLine { joint: label.name.clone(), step });
+        }
+        points *= count;
+        if points > tolerances::GRID_POINTS {
+            return Err(GridizeError::TooManyPoints { points, limit: tolerances::GRID_POINTS });
+        }
+        axes.push(Axis {
+            name: label.name.clone(),
+            unit: label.unit.clone(),
+            start: first * step,
+            step,
+            count: count as usize,
+        });
+    }
+    Ok(Grid { axes })
+}
+
+fn fill_linear<T: interpolant::Triangulation>(
+    triangulation: T,
+    (pull, cloud): (f64, &Cloud),
+    grid: &Grid,
+) -> (Vec<f64>, Vec<bool>) {
+    fill(&Linear { triangulation, cloud, pull }, cloud, grid)
+}
+
+/// Torque and membership of every grid point. Blocks of fixed size, each with a walk of its own: the same numbers
+/// whatever the number of threads.
+fn fill<I: Interpolant>(interpolant: &I, cloud: &Cloud, grid: &Grid) -> (Vec<f64>, Vec<bool>) {
+    const BLOCK: usize = 8192;
+    let joints = cloud.joints;
+    let mut torque = vec![0.0; grid.points() * joints];
+    let mut inside = vec![false; grid.points()];
+    let blocks = torque.par_chunks_mut(BLOCK * joints).zip(inside.par_chunks_mut(BLOCK)).enumerate();
+    blocks.for_each(|(block, (torque, inside))| {
+        let mut walk = interpolant.walk();
+        let mut weights = Vec::with_capacity(MAX_JOINTS + 1);
+        for (offset, (torque, inside)) in torque.chunks_exact_mut(joints).zip(inside).enumerate() {
+            let q = grid.configuration(block * BLOCK + offset);
+            interpolant.weights(&mut walk, &cloud.scaled(&q), &mut weights);
+            *inside = !weights.is_empty();
+            for &(point, weight) in &weights {
+                for (sum, value) in torque.iter_mut().zip(cloud.torque(point)) {
+                    *sum += weight * value;
+                }
+            }
+        }
+    });
+    (torque, inside)
+}
+
+#[cfg(test)]
+mod tests;
