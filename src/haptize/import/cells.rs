@@ -1,0 +1,187 @@
+//! Rows averaged in cells of C-space, direction by direction: memory bounded by the cells, not by the rows.
+//!
+//! A *visit* is an unbroken run of rows in one cell and one direction. The mean of each visit counts once, however long
+//! it lasted, and the spread of the means over visits is the repeatability of the measurement: what a second pass
+//! over the same place would give.
+
+use super::{ImportError, mapping::Keep};
+use crate::{JointVector, MAX_JOINTS, haptize::gridize::Samples, tolerances};
+use std::collections::BTreeMap;
+
+/// Cell number on each axis.
+type Key = [i64; MAX_JOINTS];
+
+/// Direction of motion of the lead joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Direction {
+    Forward,
+    Backward,
+}
+
+/// Running mean and sum of squared departures (Welford 1962).
+#[derive(Clone, Copy)]
+struct Mean {
+    count: f64,
+    mean: JointVector,
+    squares: JointVector,
+}
+
+impl Mean {
+    fn new(joints: usize) -> Self {
+        Self { count: 0.0, mean: JointVector::zeros(joints), squares: JointVector::zeros(joints) }
+    }
+
+    fn add(&mut self, values: &JointVector) {
+        self.count += 1.0;
+        for (joint, value) in values.iter().enumerate() {
+            let before = value - self.mean[joint];
+            self.mean[joint] += before / self.count;
+            self.squares[joint] += before * (value - self.mean[joint]);
+        }
+    }
+
+    /// Variance of the mean over visits; `None` for a single visit.
+    fn variance_of_mean(&self, joint: usize) -> Option<f64> {
+        (self.count > 1.5).then(|| self.squares[joint] / ((self.count - 1.0) * self.count))
+    }
+}
+
+/// One direction of one cell.
+#[derive(Clone, Copy)]
+struct Branch {
+    q: Mean,
+    torque: Mean,
+    /// Variance within the visits, summed.
+    within: JointVector,
+}
+
+/// The run of rows under way.
+struct Visit {
+    key: Key,
+    direction: Direction,
+    q: Mean,
+    torque: Mean,
+}
+
+/// Rows sorted into cells.
+pub(super) struct Cells {
+    sides: Vec<f64>,
+    joints: usize,
+    cells: BTreeMap<Key, [Option<Branch>; 2]>,
+    visit: Option<Visit>,
+}
+
+/// What the cells tell beside the samples.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct CellReport {
+    /// Cells that were visited.
+    pub cells: usize,
+    /// Cells visited in both directions.
+    pub both_directions: usize,
+    /// Mean of half the difference between the directions, a joint each: dry friction and backlash [N m].
+    pub hysteresis: Vec<f64>,
+    /// Root mean square over cells of the standard deviation between visits, a joint each: what measuring again at the
+    /// same place in the same direction would give [N m].
+    pub repeatability: Vec<f64>,
+}
+
+impl Cells {
+    pub fn new(sides: &[f64]) -> Self {
+        Self { sides: sides.to_vec(), joints: sides.len(), cells: BTreeMap::new(), visit: None }
+    }
+
+    /// Adds a row.
+    pub fn add(&mut self, q: &JointVector, torque: &JointVector, direction: Direction) -> Result<(), ImportError> {
+        let mut key = [0; MAX_JOINTS];
+        for (k, (x, side)) in key.iter_mut().zip(q.iter().zip(&self.sides)) {
+            *k = (x / side).floor() as i64;
+        }
+        if self.visit.as_ref().is_none_or(|visit| visit.key != key || visit.direction != direction) {
+            self.end_visit();
+            if self.cells.len() > tolerances::IMPORT_CELLS {
+                return Err(ImportError::TooManyCells { limit: tolerances::IMPORT_CELLS });
+            }
+            let empty = Mean::new(self.joints);
+            self.visit = Some(Visit { key, direction, q: empty, torque: empty });
+        }
+        if let Some(visit) = &mut self.visit {
+            visit.q.add(q);
+            visit.torque.add(torque);
+        }
+        Ok(())
+    }
+
+    /// The motion was interrupted: what follows is another visit.
+    pub fn end_visit(&mut self) {
+        let Some(visit) = self.visit.take() else { return };
+        let joints = self.joints;
+        let branch = &mut self.cells.entry(visit.key).or_default()[visit.direction as usize];
+        let branch = branch.get_or_insert_with(|| Branch {
+            q: Mean::new(joints),
+            torque: Mean::new(joints),
+            within: JointVector::zeros(joints),
+        });
+        branch.q.add(&visit.q.mean);
+        branch.torque.add(&visit.torque.mean);
+        for (joint, sum) in branch.within.iter_mut().enumerate() {
+            *sum += visit.torque.squares[joint] / visit.torque.count;
+        }
+    }
+
+    /// One sample a cell that has what `keep` asks for.
+    pub fn samples(&self, keep: Keep, samples: &mut Samples) {
+        let mut deviations = Vec::new();
+        for [forward, backward] in self.cells.values() {
+            let used: Vec<&Branch> = match keep {
+                Keep::Average if forward.is_none() || backward.is_none() => continue,
+                Keep::Forward => forward.iter().collect(),
+                Keep::Backward => backward.iter().collect(),
+                _ => forward.iter().chain(backward).collect(),
+            };
+            if used.is_empty() {
+                continue;
+            }
+            let share = 1.0 / used.len() as f64;
+            for joint in 0..self.joints {
+                samples.configurations.push(share * used.iter().map(|branch| branch.q.mean[joint]).sum::<f64>());
+                samples.torques.push(share * used.iter().map(|branch| branch.torque.mean[joint]).sum::<f64>());
+                let single = |branch: &Branch| branch.within[joint] / branch.torque.count;
+                let variance =
+                    |branch: &&Branch| branch.torque.variance_of_mean(joint).unwrap_or_else(|| single(branch));
+                deviations.push(share * used.iter().map(variance).sum::<f64>().sqrt());
+            }
+        }
+        samples.deviations = Some(deviations);
+    }
+
+    pub fn report(&self) -> CellReport {
+        let mut report = CellReport {
+            cells: self.cells.len(),
+            hysteresis: vec![0.0; self.joints],
+            repeatability: vec![0.0; self.joints],
+            ..CellReport::default()
+        };
+        let mut repeated = 0.0;
+        for cell in self.cells.values() {
+            if let [Some(forward), Some(backward)] = cell {
+                report.both_directions += 1;
+                for (joint, sum) in report.hysteresis.iter_mut().enumerate() {
+                    *sum += 0.5 * (forward.torque.mean[joint] - backward.torque.mean[joint]).abs();
+                }
+            }
+            for branch in cell.iter().flatten().filter(|branch| branch.torque.count > 1.5) {
+                repeated += 1.0;
+                for (joint, sum) in report.repeatability.iter_mut().enumerate() {
+                    *sum += branch.torque.squares[joint] / (branch.torque.count - 1.0);
+                }
+            }
+        }
+        for sum in &mut report.hysteresis {
+            *sum /= report.both_directions.max(1) as f64;
+        }
+        for sum in &mut report.repeatability {
+            *sum = (*sum / f64::max(repeated, 1.0)).sqrt();
+        }
+        report
+    }
+}

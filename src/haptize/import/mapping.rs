@@ -1,0 +1,327 @@
+//! Which columns of a log are what: a small TOML file, so that any table of joint positions and torques becomes a
+//! dataset without code. `datasets/instrument.toml` is an example with every key explained.
+
+use crate::{MAX_JOINTS, haptize::gridize::JointLabel};
+use serde::Deserialize;
+use std::path::Path;
+
+/// A column mapping, validated.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mapping {
+    /// How the text is laid out.
+    #[serde(default)]
+    pub table: Table,
+    /// Where time comes from.
+    pub time: Time,
+    /// One entry a joint, in the order of the dataset.
+    #[serde(rename = "joint")]
+    pub joints: Vec<Joint>,
+    /// What is removed or averaged row by row.
+    #[serde(default)]
+    pub filter: Filter,
+    /// Which torque is kept where the mechanism has friction.
+    #[serde(default)]
+    pub torque: Torque,
+}
+
+/// Layout of the text.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Table {
+    /// One character between columns; a blank takes any run of blanks and tabs.
+    pub delimiter: char,
+    /// `.` or `,`.
+    pub decimal: char,
+    /// Lines that begin with this are skipped; empty: none are.
+    pub comment: String,
+    /// The first line that is no comment names the columns.
+    pub header: bool,
+    /// Columns that every row must have; absent: as many as the first row.
+    pub columns: Option<usize>,
+    /// What happens to a row with a wrong number of columns, or with a field that is missing or not a finite number.
+    pub bad_rows: BadRows,
+}
+
+/// What happens to a row that cannot be used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BadRows {
+    /// The import stops and names the line.
+    #[default]
+    Refuse,
+    /// The row is left out, counted, and the first such line is reported.
+    Drop,
+}
+
+/// Where time comes from: a column, or a constant period between rows.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Time {
+    /// The column of time stamps.
+    pub column: Option<ColumnName>,
+    /// Seconds a unit of that column.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Time between rows where there is no column [s].
+    pub period: Option<f64>,
+    /// A longer pause begins a new segment, across which nothing is filtered [s].
+    #[serde(default = "unlimited")]
+    pub gap: f64,
+}
+
+/// A column by its number, from 1, or by its name in the header.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(untagged)]
+pub enum ColumnName {
+    /// From 1.
+    Number(usize),
+    /// As in the header line.
+    Name(String),
+}
+
+/// One joint.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Joint {
+    /// Its name in the dataset.
+    pub name: String,
+    /// `rad` or `m`: the unit of the position after scaling.
+    #[serde(default = "radians")]
+    pub unit: String,
+    /// The joint's position.
+    pub position: Quantity,
+    /// Contact torque on the proxy; a sensor that measures the torque on the object has a negative scale.
+    pub torque: Quantity,
+}
+
+/// `scale * column + offset`, in SI units.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quantity {
+    /// Where it stands.
+    pub column: ColumnName,
+    /// SI units a unit of the column.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Added after scaling, in SI units.
+    #[serde(default)]
+    pub offset: f64,
+}
+
+/// Row by row.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Filter {
+    /// Speed is the difference over this many rows to either side.
+    pub speed_rows: usize,
+    /// A row whose torque departs from the median of the five rows to either side by more than this many robust
+    /// deviations is left out and counted; absent: none is.
+    pub outliers: Option<f64>,
+    /// This many consecutive rows are averaged into one.
+    pub decimate: usize,
+}
+
+/// Which torque is kept.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Torque {
+    /// Which rows count, and how they are combined.
+    pub keep: Keep,
+    /// Name of the joint whose direction of motion counts; absent: the first.
+    pub lead: Option<String>,
+    /// Speed of the lead joint below which it counts as still [rad/s or m/s].
+    pub still: f64,
+    /// Rows are averaged in cells of C-space with these sides, one a joint [rad or m]; needed for all but `all`.
+    pub cell: Vec<f64>,
+}
+
+/// Which rows count, and how they are combined.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Keep {
+    /// Every row is a sample.
+    #[default]
+    All,
+    /// Rows at which every joint is still, averaged in cells.
+    Static,
+    /// The mean of both directions in cells visited in both: dry friction cancels.
+    Average,
+    /// Rows in which the lead joint moves up, averaged in cells.
+    Forward,
+    /// Rows in which the lead joint moves down, averaged in cells.
+    Backward,
+}
+
+impl Default for Table {
+    fn default() -> Self {
+        Self {
+            delimiter: ',',
+            decimal: '.',
+            comment: "#".to_owned(),
+            header: false,
+            columns: None,
+            bad_rows: BadRows::Refuse,
+        }
+    }
+}
+
+impl Default for Filter {
+    fn default() -> Self {
+        Self { speed_rows: 10, outliers: None, decimate: 1 }
+    }
+}
+
+const fn one() -> f64 {
+    1.0
+}
+
+const fn unlimited() -> f64 {
+    f64::INFINITY
+}
+
+fn radians() -> String {
+    "rad".to_owned()
+}
+
+/// Why a mapping was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum MappingError {
+    /// The file cannot be read.
+    #[error("{file}: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not TOML, an unknown key, or a wrong type.
+    #[error("{file}: {message}")]
+    Syntax {
+        /// The file.
+        file: String,
+        /// Line, column and reason.
+        message: String,
+    },
+    /// A value that cannot be.
+    #[error("{file}: {message}")]
+    Value {
+        /// The file.
+        file: String,
+        /// Which key, and what it must be.
+        message: String,
+    },
+}
+
+impl Mapping {
+    /// Reads and validates a mapping file.
+    ///
+    /// # Errors
+    /// [`MappingError`] names the file and the key.
+    pub fn load(path: &Path) -> Result<Self, MappingError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|source| MappingError::Read { file: file.clone(), source })?;
+        Self::parse(&text, &file)
+    }
+
+    /// Validates `text`; `file` is named in errors.
+    ///
+    /// # Errors
+    /// [`MappingError`] names the file and the key.
+    pub fn parse(text: &str, file: &str) -> Result<Self, MappingError> {
+        let file = file.to_owned();
+        let mapping: Self = toml::from_str(text)
+            .map_err(|error| MappingError::Syntax { file: file.clone(), message: error.to_string() })?;
+        mapping.check().map_err(|message| MappingError::Value { file, message })?;
+        Ok(mapping)
+    }
+
+    /// Names and units of the joints.
+    #[must_use]
+    pub fn labels(&self) -> Vec<JointLabel> {
+        self.joints.iter().map(|joint| JointLabel { name: joint.name.clone(), unit: joint.unit.clone() }).collect()
+    }
+
+    /// Number of the lead joint.
+    #[must_use]
+    pub fn lead(&self) -> usize {
+        let named = self.torque.lead.as_ref();
+        named.and_then(|name| self.joints.iter().position(|joint| joint.name == *name)).unwrap_or(0)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let count = self.joints.len();
+        let refuse = |bad: bool, message: String| if bad { Err(message) } else { Ok(()) };
+        refuse(!(1..=MAX_JOINTS).contains(&count), format!("{count} [[joint]] tables; 1 to {MAX_JOINTS} are needed"))?;
+        refuse(
+            self.table.delimiter == self.table.decimal,
+            "table.delimiter and table.decimal are the same character; tables with comma decimals mostly use `;`"
+                .to_owned(),
+        )?;
+        refuse(![',', '.'].contains(&self.table.decimal), "table.decimal must be `.` or `,`".to_owned())?;
+        let positive = |x: f64| x > 0.0;
+        match (&self.time.column, self.time.period) {
+            (Some(_), None) => refuse(
+                !(positive(self.time.scale) && self.time.scale.is_finite()),
+                "time.scale must be a positive number of seconds".to_owned(),
+            )?,
+            (None, Some(period)) => refuse(
+                !(positive(period) && period.is_finite()),
+                "time.period must be a positive number of seconds".to_owned(),
+            )?,
+            _ => return Err("[time] needs either a column or a period".to_owned()),
+        }
+        refuse(!positive(self.time.gap), "time.gap must be a positive number of seconds".to_owned())?;
+        for (number, joint) in self.joints.iter().enumerate() {
+            let name = &joint.name;
+            let twin = self.joints[..number].iter().any(|other| other.name == *name);
+            refuse(twin || name.is_empty(), format!("joint name `{name}` is empty or used twice"))?;
+            refuse(
+                !["rad", "m"].contains(&joint.unit.as_str()),
+                format!("unit of joint `{name}` must be `rad` or `m`; degrees and millimetres are scaled to these"),
+            )?;
+            for (what, quantity) in [("position", &joint.position), ("torque", &joint.torque)] {
+                let usable = quantity.scale.is_finite() && quantity.scale != 0.0 && quantity.offset.is_finite();
+                refuse(
+                    !usable,
+                    format!("{what} of joint `{name}`: scale must be a number other than zero, offset a number"),
+                )?;
+            }
+        }
+        self.check_columns()?;
+        refuse(self.filter.decimate == 0, "filter.decimate must be 1 or more".to_owned())?;
+        refuse(
+            !(1..=10_000).contains(&self.filter.speed_rows),
+            "filter.speed_rows must lie between 1 and 10000".to_owned(),
+        )?;
+        let outliers = self.filter.outliers.unwrap_or(1.0);
+        refuse(!(outliers.is_finite() && positive(outliers)), "filter.outliers must be a positive number".to_owned())?;
+        let torque = &self.torque;
+        refuse(!(torque.still.is_finite() && torque.still >= 0.0), "torque.still must be zero or more".to_owned())?;
+        if let Some(lead) = &torque.lead {
+            refuse(!self.joints.iter().any(|joint| joint.name == *lead), format!("torque.lead: no joint `{lead}`"))?;
+        }
+        let cells = torque.cell.len() == count && torque.cell.iter().all(|side| side.is_finite() && positive(*side));
+        refuse(
+            torque.keep != Keep::All && !cells,
+            format!("torque.cell must hold {count} positive numbers, one a joint, to average rows"),
+        )
+    }
+
+    fn check_columns(&self) -> Result<(), String> {
+        let quantities = self.joints.iter().flat_map(|joint| [&joint.position.column, &joint.torque.column]);
+        for column in quantities.chain(&self.time.column) {
+            match column {
+                ColumnName::Number(0) => return Err("columns are numbered from 1, not from 0".to_owned()),
+                ColumnName::Number(number) if self.table.columns.is_some_and(|columns| *number > columns) => {
+                    return Err(format!("column {number} is beyond table.columns"));
+                }
+                ColumnName::Name(name) if !self.table.header => {
+                    return Err(format!("column `{name}` is named, but table.header is not true"));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}

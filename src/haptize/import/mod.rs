@@ -1,0 +1,309 @@
+//! Logs of a real mechanism, read as samples of its contact torque.
+//!
+//! Any table of joint positions and torques, described by a [`Mapping`]. Rows stream through: parsed, placed in time,
+//! judged against their neighbours (speed, outliers), decimated, and kept as samples or averaged in cells of C-space.
+//! Memory is bounded by the samples or cells kept, never by the length of the log.
+//!
+//! A mechanism with friction has no single torque at a configuration: it depends on the direction of motion. The
+//! mapping says which one is kept (section 2.2 measures at rest; a log of a moving mechanism offers the mean of both
+//! directions, in which dry friction cancels, or either branch), and the report says how far apart they lie.
+
+mod cells;
+mod mapping;
+mod rows;
+mod window;
+
+pub use cells::CellReport;
+pub use mapping::{BadRows, ColumnName, Filter, Joint, Keep, Mapping, MappingError, Quantity, Table, Time, Torque};
+
+use crate::{JointVector, haptize::gridize::Samples, tolerances};
+use cells::{Cells, Direction};
+use rows::{Outcome, Row, Rows};
+use std::{
+    fs::File,
+    io::{BufRead, BufReader},
+    path::{Path, PathBuf},
+};
+use window::{Seen, Window};
+
+/// Why a log was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// The file cannot be read.
+    #[error("{file}: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A line that cannot be used.
+    #[error("{file}:{line}: {message}")]
+    Line {
+        /// The file.
+        file: String,
+        /// From 1.
+        line: u64,
+        /// What is wrong, and what to do.
+        message: String,
+    },
+    /// Every row would be a sample.
+    #[error("more than {limit} samples: set filter.decimate, or average rows in cells (torque.keep and torque.cell)")]
+    TooManySamples {
+        /// The limit.
+        limit: usize,
+    },
+    /// Cells too small.
+    #[error("more than {limit} cells of C-space were visited: enlarge torque.cell")]
+    TooManyCells {
+        /// The limit.
+        limit: usize,
+    },
+    /// Nothing left.
+    #[error("no row was kept: {0}")]
+    Nothing(String),
+}
+
+/// Why a row was left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reason {
+    /// A wrong number of columns.
+    Columns,
+    /// A field that is missing or not a finite number.
+    NotANumber,
+    /// The time stamp of the row before.
+    RepeatedTime,
+    /// A time before that of the row before.
+    TimeGoesBack,
+    /// A torque far off its neighbours'.
+    Outlier,
+}
+
+/// Rows left out for one reason.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Dropped {
+    /// Why.
+    pub reason: Reason,
+    /// How many.
+    pub rows: u64,
+    /// File and line of the first.
+    pub first: String,
+}
+
+/// What an import did.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct ImportReport {
+    /// Rows read, comments and header not counted.
+    pub rows: u64,
+    /// Samples made of them.
+    pub samples: usize,
+    /// Rows left out.
+    pub dropped: Vec<Dropped>,
+    /// Pauses in time longer than the mapping's gap.
+    pub gaps: u64,
+    /// Present where rows were averaged in cells.
+    pub cells: Option<CellReport>,
+}
+
+/// How far an import has come.
+#[derive(Clone, Copy, Debug)]
+pub struct ImportProgress {
+    /// Bytes read of all files.
+    pub bytes: u64,
+    /// Rows read.
+    pub rows: u64,
+}
+
+/// Reads the logs `files` through `mapping`, one after another. `progress` is called now and then.
+///
+/// # Errors
+/// [`ImportError`] names the file and the line.
+pub fn import(
+    mapping: &Mapping,
+    files: &[PathBuf],
+    progress: &mut dyn FnMut(ImportProgress),
+) -> Result<(Samples, ImportReport), ImportError> {
+    let mut import = Import::new(mapping);
+    let mut bytes = 0;
+    for path in files {
+        let file = path.display().to_string();
+        let opened = File::open(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
+        bytes += import.read(BufReader::with_capacity(1 << 16, opened), &file, &mut |read, rows| {
+            progress(ImportProgress { bytes: bytes + read, rows });
+        })?;
+    }
+    import.finish()
+}
+
+/// Total size of `files`, for a progress bar [bytes].
+#[must_use]
+pub fn total_size(files: &[impl AsRef<Path>]) -> u64 {
+    files.iter().filter_map(|path| std::fs::metadata(path).ok()).map(|metadata| metadata.len()).sum()
+}
+
+/// An import under way.
+struct Import<'a> {
+    mapping: &'a Mapping,
+    window: Window,
+    block: Block,
+    cells: Cells,
+    samples: Samples,
+    report: ImportReport,
+}
+
+/// Rows under way to be averaged into one.
+#[derive(Clone, Copy)]
+struct Block {
+    count: usize,
+    q: JointVector,
+    torque: JointVector,
+    speed: JointVector,
+}
+
+impl Block {
+    fn new(joints: usize) -> Self {
+        let zeros = JointVector::zeros(joints);
+        Self { count: 0, q: zeros, torque: zeros, speed: zeros }
+    }
+
+    fn add(&mut self, seen: &Seen) {
+        self.count += 1;
+        let share = 1.0 / self.count as f64;
+        for (mean, value) in
+            [(&mut self.q, &seen.row.q), (&mut self.torque, &seen.row.torque), (&mut self.speed, &seen.speed)]
+        {
+            mean.iter_mut().zip(value.iter()).for_each(|(mean, value)| *mean += share * (value - *mean));
+        }
+    }
+}
+
+impl<'a> Import<'a> {
+    fn new(mapping: &'a Mapping) -> Self {
+        let joints = mapping.joints.len();
+        Self {
+            mapping,
+            window: Window::new(mapping.filter.speed_rows, mapping.filter.outliers),
+            block: Block::new(joints),
+            cells: Cells::new(&mapping.torque.cell),
+            samples: Samples { joints: mapping.labels(), ..Samples::default() },
+            report: ImportReport::default(),
+        }
+    }
+
+    /// Reads one log; returns its length in bytes.
+    fn read(
+        &mut self,
+        reader: impl BufRead,
+        file: &str,
+        progress: &mut dyn FnMut(u64, u64),
+    ) -> Result<u64, ImportError> {
+        const ROWS_A_REPORT: u64 = 1 << 14;
+        let mapping = self.mapping;
+        let mut rows = Rows::new(mapping, reader, file);
+        loop {
+            let row = match rows.next()? {
+                Outcome::End => break,
+                Outcome::Row(row) => row,
+                Outcome::Dropped(reason) => {
+                    self.report.rows += 1;
+                    self.drop_row(reason, file, rows.line());
+                    continue;
+                }
+            };
+            self.report.rows += 1;
+            self.take(row, file)?;
+            if self.report.rows.is_multiple_of(ROWS_A_REPORT) {
+                progress(rows.bytes, self.report.rows);
+            }
+        }
+        self.report.gaps += rows.gaps;
+        self.end_segment(file)?;
+        progress(rows.bytes, self.report.rows);
+        Ok(rows.bytes)
+    }
+
+    fn drop_row(&mut self, reason: Reason, file: &str, line: u64) {
+        match self.report.dropped.iter_mut().find(|dropped| dropped.reason == reason) {
+            Some(dropped) => dropped.rows += 1,
+            None => self.report.dropped.push(Dropped { reason, rows: 1, first: format!("{file}:{line}") }),
+        }
+    }
+
+    fn take(&mut self, row: Row, file: &str) -> Result<(), ImportError> {
+        if row.first {
+            self.end_segment(file)?;
+        }
+        match self.window.push(row) {
+            Some(seen) => self.keep(&seen, file),
+            None => Ok(()),
+        }
+    }
+
+    fn end_segment(&mut self, file: &str) -> Result<(), ImportError> {
+        while let Some(seen) = self.window.flush() {
+            self.keep(&seen, file)?;
+        }
+        self.end_block()?;
+        self.cells.end_visit();
+        Ok(())
+    }
+
+    fn keep(&mut self, seen: &Seen, file: &str) -> Result<(), ImportError> {
+        if seen.outlier {
+            self.drop_row(Reason::Outlier, file, seen.row.line);
+            return Ok(());
+        }
+        self.block.add(seen);
+        if self.block.count >= self.mapping.filter.decimate { self.end_block() } else { Ok(()) }
+    }
+
+    /// Hands the averaged block on: as a sample, or to its cell.
+    fn end_block(&mut self) -> Result<(), ImportError> {
+        let block = std::mem::replace(&mut self.block, Block::new(self.mapping.joints.len()));
+        if block.count == 0 {
+            return Ok(());
+        }
+        let Torque { keep, still, .. } = self.mapping.torque;
+        let lead = block.speed[self.mapping.lead()];
+        let at_rest = block.speed.iter().all(|speed| speed.abs() <= still);
+        let direction = if lead < 0.0 { Direction::Backward } else { Direction::Forward };
+        match keep {
+            Keep::All => {
+                if self.samples.len() >= tolerances::IMPORT_SAMPLES {
+                    return Err(ImportError::TooManySamples { limit: tolerances::IMPORT_SAMPLES });
+                }
+                self.samples.configurations.extend_from_slice(&block.q);
+                self.samples.torques.extend_from_slice(&block.torque);
+                Ok(())
+            }
+            Keep::Static if at_rest => self.cells.add(&block.q, &block.torque, Direction::Forward),
+            Keep::Average | Keep::Forward | Keep::Backward if lead.abs() > still => {
+                self.cells.add(&block.q, &block.torque, direction)
+            }
+            _ => {
+                self.cells.end_visit();
+                Ok(())
+            }
+        }
+    }
+
+    fn finish(mut self) -> Result<(Samples, ImportReport), ImportError> {
+        let keep = self.mapping.torque.keep;
+        if keep != Keep::All {
+            self.cells.samples(keep, &mut self.samples);
+            self.report.cells = Some(self.cells.report());
+        }
+        self.report.samples = self.samples.len();
+        if self.samples.is_empty() {
+            return Err(ImportError::Nothing(format!(
+                "{} rows were read; see torque.keep, torque.still and torque.cell in the mapping",
+                self.report.rows
+            )));
+        }
+        Ok((self.samples, self.report))
+    }
+}
+
+#[cfg(test)]
+mod tests;

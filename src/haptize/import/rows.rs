@@ -1,0 +1,255 @@
+//! Rows of a log, read one at a time: line numbers kept, nothing of the text held but one line.
+
+use super::{
+    ImportError, Reason,
+    mapping::{BadRows, ColumnName, Mapping, Quantity},
+};
+use crate::JointVector;
+use std::io::{BufRead, Read};
+
+/// Longest line that is read [bytes]; a binary file has no line ends.
+const LONGEST_LINE: u64 = 1 << 20;
+
+/// One usable row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    /// True where a new segment begins: at the start, and after a gap.
+    pub first: bool,
+    /// Line in its file, from 1.
+    pub line: u64,
+    /// [s]
+    pub time: f64,
+    pub q: JointVector,
+    pub torque: JointVector,
+}
+
+/// Reads rows from `reader`.
+pub(super) struct Rows<'a, R> {
+    mapping: &'a Mapping,
+    reader: R,
+    file: String,
+    line: u64,
+    /// Bytes read so far.
+    pub bytes: u64,
+    text: Vec<u8>,
+    layout: Option<Layout>,
+    last_time: Option<f64>,
+    count: u64,
+    /// Pauses longer than the mapping's gap so far.
+    pub gaps: u64,
+}
+
+/// Column numbers, from 0.
+struct Layout {
+    columns: usize,
+    time: Option<usize>,
+    positions: Vec<usize>,
+    torques: Vec<usize>,
+}
+
+/// What became of a line.
+pub(super) enum Outcome {
+    Row(Row),
+    /// Left out, and why.
+    Dropped(Reason),
+    End,
+}
+
+impl<'a, R: BufRead> Rows<'a, R> {
+    pub fn new(mapping: &'a Mapping, reader: R, file: &str) -> Self {
+        Self {
+            mapping,
+            reader,
+            file: file.to_owned(),
+            line: 0,
+            bytes: 0,
+            text: Vec::new(),
+            layout: None,
+            last_time: None,
+            count: 0,
+            gaps: 0,
+        }
+    }
+
+    /// Number of the line read last.
+    pub fn line(&self) -> u64 {
+        self.line
+    }
+
+    /// The next row, or why a line was left out.
+    pub fn next(&mut self) -> Result<Outcome, ImportError> {
+        loop {
+            if !self.read_line()? {
+                return Ok(Outcome::End);
+            }
+            let comment = self.mapping.table.comment.as_bytes();
+            if self.text.is_empty() || !comment.is_empty() && self.text.starts_with(comment) {
+                continue;
+            }
+            let text = std::mem::take(&mut self.text);
+            let outcome = self.line_outcome(&text);
+            self.text = text;
+            if let Some(outcome) = outcome? {
+                return Ok(outcome);
+            }
+        }
+    }
+
+    /// Reads one line without its end; false at the end of the file.
+    fn read_line(&mut self) -> Result<bool, ImportError> {
+        self.text.clear();
+        let read = self.reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut self.text);
+        let read = read.map_err(|source| ImportError::Read { file: self.file.clone(), source })? as u64;
+        if read == 0 {
+            return Ok(false);
+        }
+        self.line += 1;
+        self.bytes += read;
+        if read == LONGEST_LINE && self.text.last() != Some(&b'\n') {
+            return Err(
+                self.error(format!("the line is longer than {LONGEST_LINE} bytes: this is not a table of text"))
+            );
+        }
+        while self.text.last().is_some_and(u8::is_ascii_whitespace) {
+            self.text.pop();
+        }
+        if self.line == 1 && self.text.starts_with(&[0xef, 0xbb, 0xbf]) {
+            self.text.drain(..3);
+        }
+        Ok(true)
+    }
+
+    fn error(&self, message: String) -> ImportError {
+        ImportError::Line { file: self.file.clone(), line: self.line, message }
+    }
+
+    /// What a line that is no comment means; `None` for the header.
+    fn line_outcome(&mut self, text: &[u8]) -> Result<Option<Outcome>, ImportError> {
+        let delimiter = self.mapping.table.delimiter;
+        let Ok(text) = std::str::from_utf8(text) else {
+            return self.refuse(Reason::NotANumber, "the line is not text".to_owned()).map(Some);
+        };
+        let Some(layout) = &self.layout else {
+            let names: Vec<&str> = fields(text, delimiter).collect();
+            self.layout = Some(self.layout(&names)?);
+            return if self.mapping.table.header { Ok(None) } else { self.line_outcome(text.as_bytes()) };
+        };
+        let mut found = [0.0; 2 * crate::MAX_JOINTS + 1];
+        let joints = layout.positions.len();
+        let wanted = layout.time.iter().chain(&layout.positions).chain(&layout.torques);
+        let mut slots = [usize::MAX; 2 * crate::MAX_JOINTS + 1];
+        slots.iter_mut().zip(wanted).for_each(|(slot, column)| *slot = *column);
+        let mut columns = 0;
+        let mut bad: Option<(usize, &str)> = None;
+        for (column, field) in fields(text, delimiter).enumerate() {
+            columns += 1;
+            for (value, _) in found.iter_mut().zip(slots).filter(|(_, slot)| *slot == column) {
+                match number(field, self.mapping.table.decimal) {
+                    Some(x) => *value = x,
+                    None => bad = bad.or(Some((column, field))),
+                }
+            }
+        }
+        if columns != layout.columns {
+            let message = format!("{columns} columns where {} are expected", layout.columns);
+            return self.refuse(Reason::Columns, message).map(Some);
+        }
+        if let Some((column, field)) = bad {
+            let message =
+                format!("column {} holds `{field}`, not a finite number{}", column + 1, self.decimal_hint(field));
+            return self.refuse(Reason::NotANumber, message).map(Some);
+        }
+        let skip = usize::from(layout.time.is_some());
+        let stamp = layout.time.map(|_| found[0] * self.mapping.time.scale);
+        let (mut q, mut torque) = (JointVector::zeros(joints), JointVector::zeros(joints));
+        for (joint, spec) in self.mapping.joints.iter().enumerate() {
+            q[joint] = converted(&spec.position, found[skip + joint]);
+            torque[joint] = converted(&spec.torque, found[skip + joints + joint]);
+        }
+        self.timed(stamp, q, torque).map(Some)
+    }
+
+    /// Places a row in time: repeated stamps are left out, going back is refused, a long pause begins a segment.
+    fn timed(&mut self, stamp: Option<f64>, q: JointVector, torque: JointVector) -> Result<Outcome, ImportError> {
+        let period = self.mapping.time.period.unwrap_or(0.0);
+        let time = stamp.unwrap_or(self.count as f64 * period);
+        let mut first = self.last_time.is_none();
+        if let Some(last) = self.last_time {
+            if time == last {
+                return Ok(Outcome::Dropped(Reason::RepeatedTime));
+            }
+            if time < last {
+                return self.refuse(Reason::TimeGoesBack, format!("time goes back from {last} s to {time} s"));
+            }
+            first = time - last > self.mapping.time.gap;
+            self.gaps += u64::from(first);
+        }
+        self.last_time = Some(time);
+        self.count += 1;
+        Ok(Outcome::Row(Row { first, line: self.line, time, q, torque }))
+    }
+
+    fn refuse(&self, reason: Reason, message: String) -> Result<Outcome, ImportError> {
+        match self.mapping.table.bad_rows {
+            BadRows::Drop => Ok(Outcome::Dropped(reason)),
+            BadRows::Refuse => Err(self.error(format!("{message}; `bad_rows = \"drop\"` would leave the row out"))),
+        }
+    }
+
+    fn decimal_hint(&self, field: &str) -> &'static str {
+        let comma_number = self.mapping.table.decimal == '.' && number(field, ',').is_some();
+        if comma_number { " (decimals seem to be commas: set `decimal = \",\"`)" } else { "" }
+    }
+
+    fn layout(&self, names: &[&str]) -> Result<Layout, ImportError> {
+        let columns = self.mapping.table.columns.unwrap_or(names.len());
+        let find = |column: &ColumnName| match column {
+            ColumnName::Number(number) if *number <= columns => Ok(number - 1),
+            ColumnName::Number(number) => {
+                Err(self.error(format!("the mapping names column {number}, the line has {columns}")))
+            }
+            ColumnName::Name(name) => {
+                let known = || format!("no column is called `{name}`; there are {}", names.join(", "));
+                names.iter().position(|known| known == name).ok_or_else(|| self.error(known()))
+            }
+        };
+        let all = |of: fn(&super::mapping::Joint) -> &Quantity| {
+            self.mapping.joints.iter().map(|joint| find(&of(joint).column)).collect::<Result<Vec<_>, _>>()
+        };
+        Ok(Layout {
+            columns,
+            time: self.mapping.time.column.as_ref().map(find).transpose()?,
+            positions: all(|joint| &joint.position)?,
+            torques: all(|joint| &joint.torque)?,
+        })
+    }
+}
+
+fn converted(quantity: &Quantity, raw: f64) -> f64 {
+    quantity.scale * raw + quantity.offset
+}
+
+/// Fields of a line, trimmed of blanks and quotation marks.
+fn fields(text: &str, delimiter: char) -> impl Iterator<Item = &str> {
+    let blank = delimiter == ' ';
+    let split = text.split(move |c: char| if blank { c.is_ascii_whitespace() } else { c == delimiter });
+    split.filter(move |field| !(blank && field.is_empty())).map(|field| field.trim().trim_matches('"'))
+}
+
+/// A finite number written with `decimal`.
+fn number(field: &str, decimal: char) -> Option<f64> {
+    if decimal == '.' {
+        return field.parse().ok().filter(|x: &f64| x.is_finite());
+    }
+    let mut buffer = [0_u8; 64];
+    let bytes = field.as_bytes();
+    let target = buffer.get_mut(..bytes.len())?;
+    for (byte, source) in target.iter_mut().zip(bytes) {
+        *byte = match *source {
+            b'.' => return None,
+            b',' => b'.',
+            other => other,
+        };
+    }
+    std::str::from_utf8(target).ok()?.parse().ok().filter(|x: &f64| x.is_finite())
+}

@@ -1,0 +1,195 @@
+//! Logs as they come: comma decimals, gaps, NaN, repeated stamps, wrong columns, and friction of a known size.
+
+use super::*;
+
+const TWO: &str = r#"
+[time]
+column = 1
+[[joint]]
+name = "a"
+position = { column = 2 }
+torque = { column = 3 }
+"#;
+
+fn read(mapping: &str, log: &str) -> Result<(Samples, ImportReport), ImportError> {
+    let mapping = Mapping::parse(mapping, "map.toml").unwrap();
+    let mut import = Import::new(&mapping);
+    import.read(log.as_bytes(), "log.csv", &mut |_, _| {})?;
+    import.finish()
+}
+
+fn refused(mapping: &str, log: &str) -> String {
+    read(mapping, log).err().unwrap().to_string()
+}
+
+#[test]
+fn columns_are_scaled_and_named() {
+    let mapping = r#"
+        [table]
+        header = true
+        delimiter = ";"
+        decimal = ","
+        comment = "%"
+        [time]
+        column = "t"
+        scale = 0.001
+        [[joint]]
+        name = "elbow"
+        position = { column = "angle", scale = 0.5, offset = 1.0 }
+        torque = { column = "load", scale = -2.0 }
+    "#;
+    let log = "\u{feff}% made by hand\r\n\"t\"; load ;angle\r\n0;1,5;2,0\r\n\r\n10;-1,5e0;4\r\n";
+    let (samples, report) = read(mapping, log).unwrap();
+    assert_eq!(samples.joints[0].name, "elbow");
+    assert_eq!(samples.configurations, [2.0, 3.0]);
+    assert_eq!(samples.torques, [-3.0, 3.0]);
+    assert_eq!((report.rows, report.samples), (2, 2));
+    let error = refused(&mapping.replace("\"load\"", "\"force\""), log);
+    assert!(error.contains("log.csv:2") && error.contains("`force`") && error.contains("angle"), "{error}");
+}
+
+#[test]
+fn bad_rows_are_refused_with_their_line_or_dropped_and_counted() {
+    let rows =
+        ["0,1,1", "1,2", "2,nan,1", "3,,1", "3.5,inf,1", "4,0x1,1", "5,1,1,1", "6,3,1", "6,4,1", "5.5,1,1", "7,5,1"];
+    let log = rows.join("\n");
+    for (bad, line, what) in
+        [(1, 2, "2 columns where 3"), (2, 2, "`nan`"), (3, 2, "``"), (5, 2, "`0x1`"), (9, 2, "time goes back")]
+    {
+        let first = if bad == 9 { rows[7] } else { rows[0] };
+        let error = refused(TWO, &[first, rows[bad]].join("\n"));
+        assert!(error.contains(&format!("log.csv:{line}")) && error.contains(what), "{error}");
+        assert!(error.contains("bad_rows"), "{error}");
+    }
+    assert!(refused(TWO, "0,\"1\",1\n1,1 5,1").contains("log.csv:2"));
+    let dropping = format!("[table]\nbad_rows = \"drop\"\n{TWO}");
+    let (samples, report) = read(&dropping, &log).unwrap();
+    assert_eq!(samples.configurations, [1.0, 3.0, 5.0]);
+    let dropped: Vec<_> = report.dropped.iter().map(|d| (d.reason, d.rows, d.first.as_str())).collect();
+    assert_eq!(
+        dropped,
+        [
+            (Reason::Columns, 2, "log.csv:2"),
+            (Reason::NotANumber, 4, "log.csv:3"),
+            (Reason::RepeatedTime, 1, "log.csv:9"),
+            (Reason::TimeGoesBack, 1, "log.csv:10")
+        ]
+    );
+    assert_eq!(report.rows, 11);
+}
+
+#[test]
+fn comma_decimals_in_a_table_of_points_are_explained() {
+    let spaced = TWO.replace("[time]", "[table]\ndelimiter = \" \"\n[time]");
+    let error = refused(&spaced, "0 \t 1.5 2\n1 1,5 2");
+    assert!(error.contains("log.csv:2") && error.contains("decimal = \",\""), "{error}");
+}
+
+#[test]
+fn binary_files_and_other_text_are_refused_in_small_memory() {
+    let binary = vec![7_u8; 3 << 20];
+    let mapping = Mapping::parse(TWO, "map.toml").unwrap();
+    let error = Import::new(&mapping).read(binary.as_slice(), "x.bin", &mut |_, _| {}).err().unwrap().to_string();
+    assert!(error.contains("x.bin:1") && error.contains("not a table"), "{error}");
+    assert!(refused(TWO, "only one column\n").contains("column 2"));
+    assert!(refused(TWO, "").contains("no row was kept"));
+}
+
+#[test]
+fn mappings_that_cannot_be_are_refused_with_the_key() {
+    let bad = |from: &str, to: &str| Mapping::parse(&TWO.replace(from, to), "map.toml").err().unwrap().to_string();
+    assert!(bad("column = 2", "column = 0").contains("from 1"));
+    assert!(bad("column = 2", "column = \"x\"").contains("table.header"));
+    assert!(bad("column = 2", "column = 2, scale = 0.0").contains("scale"));
+    assert!(bad("column = 2", "column = 2, scael = 1.0").contains("map.toml"));
+    assert!(bad("column = 1\n", "").contains("[time]"));
+    assert!(bad("name = \"a\"", "name = \"a\"\nunit = \"deg\"").contains("degrees"));
+    assert!(bad("[time]", "[torque]\nkeep = \"average\"\n[time]").contains("torque.cell"));
+    assert!(bad("[time]", "[torque]\nlead = \"z\"\n[time]").contains("`z`"));
+    assert!(bad("[time]", "[table]\ndecimal = \",\"\n[time]").contains("same character"));
+    assert!(bad("[time]", "[filter]\ndecimate = 0\n[time]").contains("decimate"));
+    assert!(bad("[time]", "[time]\ngap = -1\n[time]").contains("map.toml"));
+    assert!(Mapping::load(Path::new("no/such.toml")).err().unwrap().to_string().contains("no/such.toml"));
+}
+
+#[test]
+fn decimation_averages_and_never_across_a_gap() {
+    let mapping = TWO.replace("column = 1", "column = 1\ngap = 0.5") + "[filter]\ndecimate = 2\n";
+    let (samples, report) = read(&mapping, "0,1,10\n0.1,3,30\n0.2,5,50\n9.0,7,70\n9.1,9,90\n").unwrap();
+    assert_eq!(samples.configurations, [2.0, 5.0, 8.0]);
+    assert_eq!(samples.torques, [20.0, 50.0, 80.0]);
+    assert_eq!(report.gaps, 1);
+}
+
+#[test]
+fn spikes_are_dropped_and_steps_of_the_encoder_are_not() {
+    let mut log = String::new();
+    for i in 0..400 {
+        let torque = if i == 200 { 90.0 } else { f64::from(i / 7) };
+        log += &format!("{},{},{torque}\n", f64::from(i) * 0.001, i / 3);
+    }
+    let (samples, report) = read(&format!("{TWO}[filter]\noutliers = 6.0\n"), &log).unwrap();
+    assert_eq!(samples.len(), 399);
+    assert_eq!(report.dropped.len(), 1);
+    assert_eq!((report.dropped[0].reason, report.dropped[0].first.as_str()), (Reason::Outlier, "log.csv:201"));
+}
+
+/// A swing of `cycles` with stiffness 2, dry friction 0.3 and a small disturbance from cycle to cycle.
+fn swing(cycles: usize) -> String {
+    let mut log = String::new();
+    for i in 0..cycles * 2000 {
+        let phase = std::f64::consts::TAU * i as f64 / 2000.0;
+        let disturbance = if i / 2000 % 2 == 0 { 0.02 } else { -0.02 };
+        let torque = -2.0 * phase.sin() - 0.3 * phase.cos().signum() + disturbance;
+        log += &format!("{},{},{torque}\n", i as f64 * 0.001, phase.sin());
+    }
+    log
+}
+
+#[test]
+fn both_directions_averaged_cancel_dry_friction_and_the_report_tells_its_size() {
+    let keep = |keep: &str| format!("{TWO}[torque]\nkeep = \"{keep}\"\nstill = 0.2\ncell = [0.02]\n");
+    let (samples, report) = read(&keep("average"), &swing(6)).unwrap();
+    let cells = report.cells.unwrap();
+    assert!((cells.hysteresis[0] - 0.3).abs() < 1e-2, "{cells:?}");
+    // Disturbances of +-0.02, three visits each: standard deviation 0.02 sqrt(6/5).
+    assert!((cells.repeatability[0] - 0.02 * (6.0_f64 / 5.0).sqrt()).abs() < 2e-3, "{cells:?}");
+    for (q, torque) in samples.configurations.iter().zip(&samples.torques) {
+        assert!((torque + 2.0 * q).abs() < 1e-2, "{q} {torque}");
+    }
+    for (name, friction) in [("forward", -0.3), ("backward", 0.3)] {
+        let (samples, _) = read(&keep(name), &swing(6)).unwrap();
+        for (q, torque) in samples.configurations.iter().zip(&samples.torques) {
+            assert!((torque + 2.0 * q - friction).abs() < 1e-2, "{name} {q} {torque}");
+        }
+    }
+}
+
+#[test]
+fn static_torque_is_that_of_the_rows_at_rest() {
+    let mut log = String::new();
+    for i in 0..6000 {
+        let (step, within) = (i / 1000, i % 1000);
+        let q = f64::from(step) + (f64::from(within) / 500.0).min(1.0);
+        let torque = if within < 520 { 99.0 } else { 7.0 * q };
+        log += &format!("{},{q},{torque}\n", f64::from(i) * 0.001);
+    }
+    let mapping = format!("{TWO}[filter]\nspeed_rows = 30\n[torque]\nkeep = \"static\"\nstill = 0.001\ncell = [0.1]\n");
+    let (samples, _) = read(&mapping, &log).unwrap();
+    assert_eq!(samples.len(), 6);
+    for (q, torque) in samples.configurations.iter().zip(&samples.torques) {
+        assert!((torque - 7.0 * q).abs() < 1e-9, "{q} {torque}");
+    }
+}
+
+#[test]
+fn samples_and_cells_are_bounded() {
+    let tiny = format!("{TWO}[torque]\nkeep = \"forward\"\ncell = [1e-12]\n");
+    let mut log = String::new();
+    for i in 0..50 {
+        log += &format!("{i},{},0\n", f64::from(i) * 0.1);
+    }
+    assert_eq!(read(&tiny, &log).unwrap().1.cells.unwrap().cells, 50);
+    let far = format!("{TWO}[torque]\nkeep = \"forward\"\ncell = [1e-300]\n");
+    assert!(read(&far, &log).is_ok());
+}
