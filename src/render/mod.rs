@@ -12,7 +12,6 @@ pub mod npmi;
 pub mod passivity;
 pub mod realtime;
 pub mod session;
-pub mod stage;
 pub mod stencil;
 pub mod timing;
 pub mod trace;
