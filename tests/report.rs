@@ -12,6 +12,7 @@ use haptize::{
     render::{
         accounts::Accounts,
         flags::Flags,
+        timing::{Durations, Timing},
         trace::{Frame, JointLabel, Tick, Trace},
     },
     report::{
@@ -24,7 +25,7 @@ use resvg::{
     tiny_skia::Rect,
     usvg::{Group, Node, Options, Tree},
 };
-use std::path::PathBuf;
+use std::{path::PathBuf, time::Duration};
 
 const CENTRE: DVec3 = DVec3::new(0.2, 0.0, -0.02);
 const RADIUS: f64 = 0.05;
@@ -273,10 +274,11 @@ fn all(dataset: &Dataset, chain: &Chain, trace: &Trace) -> Vec<(&'static str, Ca
     figures
 }
 
-fn lateness(values: impl Iterator<Item = u64>) -> hdrhistogram::Histogram<u64> {
-    let mut histogram = hdrhistogram::Histogram::new(3).unwrap();
-    values.for_each(|value| histogram.record(value).unwrap());
-    histogram
+/// What a real-time session would say about ticks that came as late as `nanoseconds`.
+fn timing(nanoseconds: impl Iterator<Item = u64>) -> Timing {
+    let mut durations = Durations::new().unwrap();
+    nanoseconds.for_each(|value| durations.record(Duration::from_nanos(value)));
+    Timing { lateness: durations.percentiles(), lateness_bins: durations.bins(), ..Timing::default() }
 }
 
 #[test]
@@ -410,7 +412,7 @@ fn empty_and_broken_data_give_annotated_figures() {
     for canvas in [report::press::press(&trace), report::press::energy(&trace)] {
         assert!(says(&canvas, "no data") && misplaced_text(&canvas).is_empty());
     }
-    let no_lateness = report::jitter::jitter(&lateness(std::iter::empty()));
+    let no_lateness = report::jitter::jitter(&timing(std::iter::empty()));
     assert!(says(&no_lateness, "no data"));
     assert!(misplaced_text(&no_lateness).is_empty(), "{:?}", misplaced_text(&no_lateness));
 
@@ -466,7 +468,7 @@ fn parts_that_do_not_belong_together_are_refused() {
 #[test]
 fn lateness_is_counted_in_logarithmic_bins_with_its_quantiles() {
     let values = (0..20_000_u64).map(|k| 300 + k * k % 5_003 + if k == 9 { 400_000 } else { 0 });
-    let canvas = report::jitter::jitter(&lateness(values));
+    let canvas = report::jitter::jitter(&timing(values));
     assert!(misplaced_text(&canvas).is_empty(), "{:?}", misplaced_text(&canvas));
     for text in ["median", "99 %", "99.9 %", "latest 400 µs", "Lateness [µs]"] {
         assert!(says(&canvas, text), "{text}");

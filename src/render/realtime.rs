@@ -165,6 +165,7 @@ pub fn run(
         let timing = Timing {
             refused,
             lateness: lateness.percentiles(),
+            lateness_bins: lateness.bins(),
             tick_cost: cost.percentiles(),
             frame_cost,
             missed_deadlines,

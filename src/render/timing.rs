@@ -31,6 +31,17 @@ pub struct Percentiles {
     pub max: f64,
 }
 
+/// Number of durations within an interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bin {
+    /// Lower end [us]; included.
+    pub from: f64,
+    /// Upper end [us]; not included, but for the rounding of the histogram's own bins.
+    pub to: f64,
+    /// How many.
+    pub count: u64,
+}
+
 /// What a real-time session says about time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Timing {
@@ -38,6 +49,8 @@ pub struct Timing {
     pub refused: Vec<String>,
     /// From a tick's deadline to its beginning.
     pub lateness: Percentiles,
+    /// The same as a histogram, ten bins a decade from 0.1 us on, ascending; the first holds all that was shorter.
+    pub lateness_bins: Vec<Bin>,
     /// From a tick's beginning to its torque.
     pub tick_cost: Percentiles,
     /// Cost of a frame.
@@ -60,6 +73,25 @@ impl Durations {
     /// Counts `duration`. Allocates nothing.
     pub fn record(&mut self, duration: Duration) {
         self.0.saturating_record(u64::try_from(duration.as_nanos()).unwrap_or(GREATEST));
+    }
+
+    /// What was counted, ten bins a decade from 0.1 us to the longest; the first holds all that was shorter.
+    #[must_use]
+    pub fn bins(&self) -> Vec<Bin> {
+        /// Ratio of a bin's ends.
+        const RATIO: f64 = 1.258_925_411_794_167_2;
+        /// Upper end of the first bin [ns]: clocks resolve little less.
+        const FIRST: u64 = 100;
+        let mut from = FIRST as f64 / RATIO;
+        self.0
+            .iter_log(FIRST, RATIO)
+            .map(|step| {
+                let to = (step.value_iterated_to() + 1) as f64;
+                let bin = Bin { from: from * 1e-3, to: to * 1e-3, count: step.count_since_last_iteration() };
+                from = to;
+                bin
+            })
+            .collect()
     }
 
     /// Shares of what was counted.
@@ -92,5 +124,21 @@ mod tests {
         assert_eq!(percentiles.count, 1000);
         assert!((percentiles.p50 - 500.0).abs() < 1.0, "{percentiles:?}");
         assert!((percentiles.max - 1e7).abs() < 1e4, "{percentiles:?}");
+    }
+
+    #[test]
+    fn bins_are_seamless_and_hold_everything() {
+        let mut durations = Durations::new().unwrap();
+        for nanoseconds in [0, 40, 99, 101, 5_000, 5_001, 800_000] {
+            durations.record(Duration::from_nanos(nanoseconds));
+        }
+        let bins = durations.bins();
+        assert_eq!(bins.iter().map(|bin| bin.count).sum::<u64>(), 7);
+        assert_eq!(bins[0].count, 3);
+        assert!(bins.windows(2).all(|pair| pair[0].to == pair[1].from && pair[0].from < pair[0].to));
+        let five = bins.iter().find(|bin| (bin.from..bin.to).contains(&5.0)).unwrap();
+        assert_eq!(five.count, 2);
+        assert!(bins.last().unwrap().to >= 800.0);
+        assert!(Durations::new().unwrap().bins().is_empty());
     }
 }

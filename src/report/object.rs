@@ -14,7 +14,10 @@ use crate::{
     contact::NodeForce,
     dataset::Dataset,
     proxy::{Chain, Pose},
-    render::{stencil::Lattice, trace::Trace},
+    render::{
+        graphics::ContactForces,
+        trace::{Frame, Trace},
+    },
 };
 use glam::DVec3;
 
@@ -39,7 +42,8 @@ const WIDTH: f64 = 800.0;
 const COLUMNS: usize = 3;
 const CELL: [f64; 2] = [226.0, 200.0];
 
-/// Instants of a recording worth looking at: from just before the first contact to just after the last, evenly.
+/// `count` instants of a recording: from the frame before the first contact to that of the last, evenly. Frames every
+/// 50 ms or closer leave something to choose from.
 ///
 /// # Errors
 /// [`ReportError::Data`] when frames, dataset and chain do not belong together.
@@ -49,40 +53,33 @@ pub fn instants(dataset: &Dataset, chain: &Chain, trace: &Trace, count: usize) -
         let (joints, axes) = (chain.joints.len(), dataset.grid.joints());
         return Err(refused(format!("the chain has {joints} joints, the dataset {axes}; load both from one scene")));
     }
-    let lattice = Lattice::new(&dataset.grid).map_err(|error| refused(error.to_string()))?;
     let frames = &trace.frames;
-    let touched = |time: f64| trace.ticks.iter().any(|tick| tick.contact && (tick.time - time).abs() < NEAR);
-    let first = frames.iter().position(|frame| touched(frame.time)).unwrap_or(0).saturating_sub(1);
-    let last = frames.iter().rposition(|frame| touched(frame.time)).unwrap_or(frames.len().saturating_sub(1));
+    let touching = |frame: &Frame| {
+        let tick = trace.ticks.partition_point(|tick| tick.time <= frame.time).checked_sub(1);
+        tick.is_some_and(|tick| trace.ticks[tick].contact)
+    };
+    let first = frames.iter().position(touching).unwrap_or(0).saturating_sub(1);
+    let last = frames.iter().rposition(touching).unwrap_or(frames.len().saturating_sub(1));
     let chosen = (0..count).filter_map(|k| frames.get(first + k * (last - first) / count.saturating_sub(1).max(1)));
     let mut pose = chain.new_pose();
+    let nodes = frames.iter().map(|frame| frame.nodes.len()).max().unwrap_or(0);
+    let all = dataset.contacts.is_some().then(|| ContactForces::new(dataset, nodes)).transpose();
+    let all = all.map_err(|error| refused(error.to_string()))?;
     chosen
         .map(|frame| {
             if frame.proxy.len() != chain.joints.len() {
                 return Err(refused(format!("the frame at {} s has {} joints", frame.time, frame.proxy.len())));
             }
             chain.pose(&frame.proxy, &mut pose);
-            let forces = forces_at(dataset, &lattice, &frame.proxy, frame.nodes.len());
+            let mut forces = vec![DVec3::ZERO; nodes];
+            if let (Some(all), true) = (&all, touching(frame)) {
+                all.interpolate(&frame.proxy, 1.0, &mut forces);
+            }
+            let acting = forces.into_iter().enumerate().filter(|(_, force)| *force != DVec3::ZERO);
+            let forces = acting.map(|(node, force)| NodeForce { node: node as u32, force }).collect();
             Ok(Instant { time: frame.time, nodes: frame.nodes.clone(), forces, pose: pose.clone() })
         })
         .collect()
-}
-
-/// Ticks within this of a frame belong to it: less than a frame, more than a tick [s].
-const NEAR: f64 = 4e-3;
-
-/// Contact forces interpolated over the grid cell (section 3.2, f_ex), those that are not zero.
-fn forces_at(dataset: &Dataset, lattice: &Lattice, q: &[f64], nodes: usize) -> Vec<NodeForce> {
-    let mut sum = vec![DVec3::ZERO; nodes];
-    for (point, weight) in lattice.locate(q).corners() {
-        for NodeForce { node, force } in dataset.forces(point) {
-            if let Some(sum) = sum.get_mut(node as usize) {
-                *sum += weight * force;
-            }
-        }
-    }
-    let acting = sum.into_iter().enumerate().filter(|(_, force)| *force != DVec3::ZERO);
-    acting.map(|(node, force)| NodeForce { node: node as u32, force }).collect()
 }
 
 /// The object at all `instants`, in rows of three, one camera and one colour map for all.
