@@ -17,6 +17,7 @@ use haptize::{
         haptic::{Haptics, Inputs},
         realtime::{self, Ends, HapticLoop},
         session::Plan,
+        setup::labels,
     },
     scene::Waypoint,
 };
@@ -84,7 +85,7 @@ fn a_session_against_the_clock_does_every_tick_that_it_does_not_report() {
     let data = object(3);
     let haptics = build(&data);
     let mut hand = hand(3);
-    let plan = Plan::new(&data, &haptics, 0.4, 0);
+    let plan = Plan::new(labels(&data.grid), haptics.period(), 0.4, 0);
     let (trace, timing) = realtime::run(&haptics, &mut hand, None, &plan).unwrap();
     let done = trace.ticks.len() as u64 + timing.unrecorded;
     // The last tick may leave out deadlines beyond the end of the plan.

@@ -21,7 +21,8 @@ use haptize::{
         haptic::{Haptics, Inputs},
         passivity,
         session::{self, Plan},
-        trace::{JointLabel, Trace},
+        setup::labels,
+        trace::Trace,
     },
     scene::{GroundNodes, GroundSpec, HapticsSpec, ObjectSpec, Shape, SpringKind, SpringSpec, Waypoint},
 };
@@ -46,6 +47,10 @@ fn build(data: &Dataset, spec: &HapticsSpec) -> Haptics {
     Haptics::new(field, proxy(data.grid.joints()), spec)
 }
 
+fn plan(data: &Dataset, seconds: f64) -> Plan {
+    Plan::new(labels(&data.grid), 1e-3, seconds, 0)
+}
+
 /// Into the object, along it, and out again, in two seconds.
 fn press(joints: usize) -> Motion {
     let mut along = all(joints, 0.25);
@@ -58,11 +63,7 @@ fn pressed(joints: usize, spec: &HapticsSpec) -> Trace {
     let data = object(joints);
     let haptics = build(&data, spec);
     let mut hand = SimulatedHand::new(spec, press(joints)).unwrap();
-    session::run(&haptics, &mut hand, None, &Plan::new(&data, &haptics, 2.0, 0)).unwrap()
-}
-
-fn labels(joints: usize) -> Vec<JointLabel> {
-    (0..joints).map(|a| JointLabel { name: format!("joint {a}"), unit: "rad".into() }).collect()
+    session::run(&haptics, &mut hand, None, &plan(&data, 2.0)).unwrap()
 }
 
 /// A device that reports what it is told.
@@ -130,7 +131,7 @@ fn without_input_the_proxy_comes_to_rest_and_the_device_feels_the_contact_torque
     let (data, spec) = (object(3), haptics(3));
     let haptics = build(&data, &spec);
     let mut device = Scripted::new([all(3, 0.3)]);
-    let trace = session::run(&haptics, &mut device, None, &Plan::new(&data, &haptics, 3.0, 0)).unwrap();
+    let trace = session::run(&haptics, &mut device, None, &plan(&data, 3.0)).unwrap();
     let last = trace.ticks.last().unwrap();
     assert!(last.accounts.kinetic < 1e-20, "{:?}", last.accounts);
     // Springs in series: 5 of the object along the diagonal, 15 of the coupling.
@@ -167,7 +168,7 @@ fn a_recorded_session_replays_bit_for_bit() {
     }
     let mut device = Recorded::new(Motion::from_csv(file.path(), 2).unwrap());
     let haptics = build(&data, &spec);
-    let again = session::run(&haptics, &mut device, None, &Plan::new(&data, &haptics, 2.0, 0)).unwrap();
+    let again = session::run(&haptics, &mut device, None, &plan(&data, 2.0)).unwrap();
     assert_eq!(again.ticks.len(), trace.ticks.len());
     for (a, b) in again.ticks.iter().zip(&trace.ticks) {
         assert_eq!((a.device_torque, a.proxy, a.accounts), (b.device_torque, b.proxy, b.accounts), "at {} s", a.time);
@@ -183,8 +184,7 @@ fn torque_is_limited_in_size_and_rate() {
     let positions = (0..400).map(|k| all(2, if k < 100 { -0.5 } else { 0.5 }));
     let data = object(2);
     let haptics = build(&data, &spec);
-    let trace =
-        session::run(&haptics, &mut Scripted::new(positions), None, &Plan::new(&data, &haptics, 0.4, 0)).unwrap();
+    let trace = session::run(&haptics, &mut Scripted::new(positions), None, &plan(&data, 0.4)).unwrap();
     let mut before = all(2, 0.0);
     for tick in &trace.ticks {
         for (tau, before) in tick.device_torque.iter().zip(before.iter()) {
@@ -253,19 +253,21 @@ fn a_device_that_fails_is_let_go_smoothly_with_the_reason() {
 fn gains_beyond_their_bound_are_named_with_the_safe_value() {
     let (data, mut spec) = (object(2), haptics(2));
     let field = |spec: &HapticsSpec| TorqueField::new(&data, 0.5, &spec.boundary_slope).unwrap();
-    assert_eq!(passivity::exceeded(&spec, &field(&spec), &labels(2)), []);
+    assert_eq!(passivity::exceeded(&spec, &field(&spec), &labels(&data.grid)), []);
     spec.boundary_slope[1] = 50.0;
     spec.coupling_stiffness[0] = 30.0;
-    let found = passivity::exceeded(&spec, &field(&spec), &labels(2));
+    let found = passivity::exceeded(&spec, &field(&spec), &labels(&data.grid));
     let safe: Vec<(f64, f64)> = found.iter().map(|bound| (bound.value, bound.safe)).collect();
     assert_eq!(safe, [(30.0, 20.0), (50.0, 40.0)]);
     assert!(found[1].to_string().contains("boundary slope Ks of joint joint 1 is 50.0000, beyond the passive 40.0000"));
     // The values that it names are safe.
     spec.boundary_slope[1] = safe[1].1;
     spec.coupling_stiffness[0] = safe[0].1;
-    assert_eq!(passivity::exceeded(&spec, &field(&spec), &labels(2)), []);
+    assert_eq!(passivity::exceeded(&spec, &field(&spec), &labels(&data.grid)), []);
     spec.proxy_damping = all(2, 1e-3);
-    assert!(passivity::exceeded(&spec, &field(&spec), &labels(2)).iter().any(|b| b.what.starts_with("stiffness")));
+    assert!(
+        passivity::exceeded(&spec, &field(&spec), &labels(&data.grid)).iter().any(|b| b.what.starts_with("stiffness"))
+    );
 }
 
 /// The paper's sphere: 102 nodes.
@@ -387,7 +389,7 @@ fn two_loops_run_at_two_rates_and_repeat_bit_for_bit() {
         let motion = Motion::through(&way.map(|(time, q)| Waypoint { time, q: vector(&[q]) }), 1).unwrap();
         let mut hand = SimulatedHand::new(&spec, motion).unwrap();
         let mut graphics = Graphics::new(&data, &object, 60.0).unwrap();
-        let plan = Plan { snapshots: vec![0.0, 0.8, 0.8001, 1.45], ..Plan::new(&data, &haptics, 1.5, 0) };
+        let plan = Plan { snapshots: vec![0.0, 0.8, 0.8001, 1.45], ..plan(&data, 1.5) };
         session::run(&haptics, &mut hand, Some(&mut graphics), &plan).unwrap()
     };
     let trace = run();

@@ -15,6 +15,7 @@ mod doctor;
 mod export;
 mod info;
 mod inspect;
+mod play;
 
 use clap::{Parser, Subcommand};
 use std::{
@@ -46,6 +47,8 @@ enum Command {
     Info(info::Arguments),
     /// Solve one configuration and tell all of it.
     Inspect(inspect::Arguments),
+    /// Feel a dataset through a simulated hand: traces and figures.
+    Play(play::Arguments),
 }
 
 impl Command {
@@ -56,6 +59,7 @@ impl Command {
             Self::Export(arguments) => export::run(arguments),
             Self::Info(arguments) => info::run(arguments),
             Self::Inspect(arguments) => inspect::run(arguments),
+            Self::Play(arguments) => play::run(arguments),
         }
     }
 }

@@ -12,6 +12,7 @@ pub mod npmi;
 pub mod passivity;
 pub mod realtime;
 pub mod session;
+pub mod setup;
 pub mod stencil;
 pub mod timing;
 pub mod trace;

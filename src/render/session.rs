@@ -10,7 +10,7 @@ use super::{
     haptic::{Haptics, Inputs, State},
     trace::{Frame, JointLabel, Tick, Trace},
 };
-use crate::{JointVector, dataset::Dataset, device::Device};
+use crate::{JointVector, device::Device};
 
 /// How long, and what to keep of the object's shape.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,13 +63,12 @@ pub struct Driver<'session> {
 }
 
 impl Plan {
-    /// A session of `seconds` at `haptics`'s rate over `dataset`'s joints, with `snapshots` instants spread evenly.
+    /// A session of `seconds` with a tick every `period` [s], and `snapshots` instants spread evenly over it.
     #[must_use]
-    pub fn new(dataset: &Dataset, haptics: &Haptics, seconds: f64, snapshots: usize) -> Self {
-        let label = |axis: &crate::dataset::Axis| JointLabel { name: axis.name.clone(), unit: axis.unit.clone() };
+    pub fn new(joints: Vec<JointLabel>, period: f64, seconds: f64, snapshots: usize) -> Self {
         Self {
-            joints: dataset.grid.axes.iter().map(label).collect(),
-            ticks: (seconds.max(0.0) / haptics.period()).round() as usize,
+            joints,
+            ticks: (seconds.max(0.0) / period).round() as usize,
             snapshots: (0..snapshots).map(|k| k as f64 * seconds / snapshots as f64).collect(),
         }
     }

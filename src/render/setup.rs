@@ -1,0 +1,142 @@
+//! Everything that a dataset's rendering needs, built from the dataset alone: its scene's text gives chain and gains, its
+//! surface the object.
+
+use super::{
+    field::{FieldError, TorqueField},
+    graphics::{Graphics, GraphicsError},
+    haptic::Haptics,
+    npmi::{InertiaError, Npmi},
+    passivity::{self, Exceeded},
+    session::Plan,
+    trace::JointLabel,
+};
+use crate::{
+    JointVector,
+    dataset::{Dataset, Grid},
+    device::{HandError, Motion, SimulatedHand},
+    object::{Object, ObjectError},
+    proxy::Chain,
+    scene::{Scene, SceneError},
+};
+use glam::DVec3;
+
+/// A dataset, ready to be felt and drawn.
+pub struct Setup {
+    /// The dataset's scene.
+    pub scene: Scene,
+    /// The proxy.
+    pub chain: Chain,
+    /// The haptic loop.
+    pub haptics: Haptics,
+    /// The object; absent where the scene has no graphics or the dataset no surface.
+    pub object: Option<Object>,
+    /// Gains beyond their passivity bound.
+    pub exceeded: Vec<Exceeded>,
+}
+
+/// A dataset cannot be rendered.
+#[derive(Debug, thiserror::Error)]
+pub enum SetupError {
+    /// The dataset has no scene: no chain, no gains.
+    #[error("the dataset holds no scene, so that its proxy and gains are not known: bake or gridize it with one")]
+    NoScene,
+    /// The scene in the dataset is not valid.
+    #[error("the scene in the dataset: {0}")]
+    Scene(#[from] SceneError),
+    /// Scene and grid do not belong together.
+    #[error("the dataset's grid has {grid} axes and the proxy of its scene {chain} joints: bake it again")]
+    Joints {
+        /// Axes of the grid.
+        grid: usize,
+        /// Joints of the chain.
+        chain: usize,
+    },
+    /// The torques cannot be interpolated.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// The proxy cannot be integrated.
+    #[error(transparent)]
+    Inertia(#[from] InertiaError),
+    /// The object cannot be built.
+    #[error("the object in the dataset: {0}")]
+    Object(#[from] ObjectError),
+    /// The hand cannot be simulated.
+    #[error(transparent)]
+    Hand(#[from] HandError),
+    /// The object cannot be drawn.
+    #[error(transparent)]
+    Graphics(#[from] GraphicsError),
+}
+
+impl Setup {
+    /// Builds all that rendering `dataset` needs. The proxy's inertia is constant: that at the grid's centre.
+    ///
+    /// # Errors
+    /// When the dataset has no valid scene, or its parts do not fit.
+    pub fn new(dataset: &Dataset) -> Result<Self, SetupError> {
+        if dataset.scene.trim().is_empty() {
+            return Err(SetupError::NoScene);
+        }
+        let scene = Scene::parse(&dataset.scene, "scene")?;
+        let chain = Chain::new(&scene.proxy);
+        let (grid, joints) = (dataset.grid.joints(), chain.joints.len());
+        if grid != joints {
+            return Err(SetupError::Joints { grid, chain: joints });
+        }
+        let field = TorqueField::new(dataset, scene.haptics.threshold, &scene.haptics.boundary_slope)?;
+        let mut pose = chain.new_pose();
+        chain.pose(&centre(&dataset.grid), &mut pose);
+        let limits: Vec<[f64; 2]> = chain.joints.iter().map(|joint| joint.limits).collect();
+        let npmi = Npmi::new(&chain.inertia(&pose), &limits)?;
+        let exceeded = passivity::exceeded(&scene.haptics, &field, &labels(&dataset.grid));
+        let haptics = Haptics::new(field, npmi, &scene.haptics);
+        let object = match (&scene.graphics, &dataset.contacts, &dataset.surface) {
+            (Some(_), Some(_), Some(surface)) => {
+                let nodes = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
+                let triangles = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+                Some(Object::from_surface(&scene.object, nodes, triangles)?)
+            }
+            _ => None,
+        };
+        Ok(Self { scene, chain, haptics, object, exceeded })
+    }
+
+    /// A simulated device in a hand that follows `motion`.
+    ///
+    /// # Errors
+    /// When motion and device do not fit.
+    pub fn hand(&self, motion: Motion) -> Result<SimulatedHand, SetupError> {
+        Ok(SimulatedHand::new(&self.scene.haptics, motion)?)
+    }
+
+    /// The graphics loop of `dataset`, from which this was made; absent where the scene has none.
+    ///
+    /// # Errors
+    /// When the dataset's contact forces do not fit the object.
+    pub fn graphics(&self, dataset: &Dataset) -> Result<Option<Graphics<'_>>, SetupError> {
+        match (&self.object, &self.scene.graphics) {
+            (Some(object), Some(graphics)) => Ok(Some(Graphics::new(dataset, object, graphics.rate)?)),
+            _ => Ok(None),
+        }
+    }
+
+    /// A session of `seconds`, with `snapshots` shapes of the object spread evenly over it.
+    #[must_use]
+    pub fn plan(&self, dataset: &Dataset, seconds: f64, snapshots: usize) -> Plan {
+        Plan::new(labels(&dataset.grid), self.haptics.period(), seconds, snapshots)
+    }
+}
+
+/// Names and units of the grid's joints.
+#[must_use]
+pub fn labels(grid: &Grid) -> Vec<JointLabel> {
+    grid.axes.iter().map(|axis| JointLabel { name: axis.name.clone(), unit: axis.unit.clone() }).collect()
+}
+
+fn centre(grid: &Grid) -> JointVector {
+    let mut q = JointVector::zeros(grid.joints());
+    for (q, axis) in q.iter_mut().zip(&grid.axes) {
+        *q = 0.5 * (axis.coordinate(0) + axis.coordinate(axis.count.saturating_sub(1)));
+    }
+    q
+}
