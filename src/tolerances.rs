@@ -77,6 +77,10 @@ pub const CULLING_SLACK: f64 = 64.0 * f64::EPSILON;
 /// 1e-24 J is a nanonewton over a femtometre.
 pub const RESIDUAL_FLOOR: f64 = 1e-12;
 
+/// Rounding of a depth, relative to the size of the object [1]: differences and products of coordinates, each rounded by
+/// eps / 2, add up to a few eps; 16 leave room for a flat angle between node and facet.
+pub const DEPTH_ROUNDING: f64 = 16.0 * f64::EPSILON;
+
 /// Rounding of the stored energy, in units of eps (E + sum lambda_i L): sums of about a hundred products each rounded
 /// by eps / 2, and depths rounded by a few eps L, are within 16 of these units; steps whose predicted decrease lies
 /// below are judged by the model alone.

@@ -265,3 +265,113 @@ fn contact_at(
         measure(x, radius, surface::corners(positions, nodes), weights, feature, pseudonormal);
     Some(Contact { proxy_node: i as u32, nodes, weights, normal, depth, curvature, multiplier: 0.0 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::object::Object;
+    use crate::proxy::Chain;
+    use crate::scene::{
+        Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, ObjectSpec, ProxyNodeSpec, ProxySpec,
+        Shape, SpringKind, SpringSpec,
+    };
+
+    /// A fixed pseudo-random sequence in [-1, 1).
+    fn sequence(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        }
+    }
+
+    fn ball() -> Object {
+        Object::build(&ObjectSpec {
+            shape: Shape::Sphere { centre: DVec3::new(1.0, -2.0, 0.5), radius: 0.05, rings: 10, segments: 10 },
+            springs: SpringSpec { kind: SpringKind::Isotropic, stiffness: 300.0 },
+            ground: GroundSpec { stiffness: 100.0, nodes: GroundNodes::All },
+            node_mass: 0.01,
+            node_damping: 0.1,
+        })
+        .unwrap()
+    }
+
+    /// As many free-floating proxy nodes as wanted; only their radii matter here.
+    fn nodes(count: usize, radius: f64) -> Chain {
+        Chain::new(&ProxySpec {
+            joints: vec![JointSpec {
+                name: "joint".into(),
+                kind: JointKind::Prismatic,
+                origin: DVec3::ZERO,
+                axis: DVec3::X,
+                limits: [-1.0, 1.0],
+                mass: 1.0,
+                centre_of_mass: DVec3::ZERO,
+                inertia: DVec3::ONE,
+                rotor_inertia: 0.0,
+                nodes: vec![ProxyNodeSpec { position: DVec3::ZERO, radius }; count],
+            }],
+        })
+    }
+
+    /// Contacts by trial of every triangle for every node.
+    fn brute_force(model: &Model, nodes: &[DVec3], positions: &[DVec3]) -> Vec<Contact> {
+        let mut contacts = Vec::new();
+        for (i, &x) in nodes.iter().enumerate() {
+            let mut closest = Closest::none();
+            for t in 0..model.object.triangles.len() {
+                closest.consider(x, positions, &model.object.triangles, t as u32);
+            }
+            let contact = contact_at(model, i, x, model.chain.nodes[i].radius, positions, &closest).unwrap();
+            if contact.depth > 0.0 {
+                contacts.push(contact);
+            }
+        }
+        contacts
+    }
+
+    /// To the last bit, for displacements from none to a radius, local and global, growing and shrinking within one
+    /// configuration.
+    #[test]
+    fn culling_changes_no_result() {
+        let object = ball();
+        let mut next = sequence(3);
+        let mut compared = 0;
+        for radius in [0.0, 0.01] {
+            let chain = nodes(30, radius);
+            let contact =
+                ContactSpec { stiffness: 1.0, algorithm: Algorithm::Energy, tolerance: 1e-8, max_iterations: 1 };
+            let model = Model::new(&object, &chain, contact);
+            let mut detection = Detection::new(&model);
+            for _ in 0..40 {
+                let world: Vec<DVec3> =
+                    (0..30).map(|_| model.centre + DVec3::new(next(), next(), next()) * 0.06).collect();
+                let gap = detection.take_up(&model, &world);
+                let x: Vec<DVec3> = world.iter().map(|node| *node - model.centre).collect();
+                let deepest = brute_force(&model, &x, &model.rest).iter().map(|c| c.depth).fold(0.0, f64::max);
+                assert!(((-gap).max(0.0) - deepest).abs() < 1e-15, "{gap} {deepest}");
+                for size in [0.0, 1e-9, 1e-3, 0.02, 0.005, 0.05, 0.0] {
+                    let centre = DVec3::new(next(), next(), next()) * 0.05;
+                    let displacement: Vec<f64> = (0..3 * model.rest.len())
+                        .map(|k| size * next() * (-(model.rest[k / 3] - centre).length() / 0.02).exp())
+                        .collect();
+                    let positions: Vec<DVec3> = (0..model.rest.len())
+                        .map(|j| model.rest[j] + DVec3::from_slice(&displacement[3 * j..]))
+                        .collect();
+                    let mut found = Vec::new();
+                    detection.deformed(&model, &displacement, &positions, &mut found);
+                    found.retain(|contact| contact.depth > 0.0);
+                    let expected = brute_force(&model, &x, &positions);
+                    assert_eq!(found.len(), expected.len());
+                    for (found, expected) in found.iter().zip(&expected) {
+                        compared += 1;
+                        assert_eq!(found.proxy_node, expected.proxy_node);
+                        assert_eq!((found.nodes, found.weights), (expected.nodes, expected.weights));
+                        assert_eq!((found.depth, found.normal), (expected.depth, expected.normal));
+                    }
+                }
+            }
+        }
+        assert!(compared > 1000, "{compared}");
+    }
+}

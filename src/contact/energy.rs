@@ -15,11 +15,11 @@
 use super::depth::Contact;
 use super::detection::Detection;
 use super::model::Model;
-use super::support::{Support, dot};
+use super::support::{Support, dot, root};
 use super::trust_region::{Springs, TrustRegion, add_contact_forces};
 use crate::tolerances::{
-    ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, ENERGY_ROUNDING, GIVE_UP_RADIUS, GOOD_SHARE,
-    INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, SHRINK, STAGE_TOLERANCE, WIDEN,
+    ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GIVE_UP_RADIUS,
+    GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, SHRINK, STAGE_TOLERANCE, WIDEN,
 };
 use glam::DVec3;
 
@@ -142,7 +142,10 @@ impl EnergySearch {
             self.try_step(model, detection, geometry);
             // Near the solution both decreases drown in rounding, which must not refuse a good step.
             let rounding = self.energy_rounding(detection.nodes());
-            let ratio = (self.state.energy - self.trial.energy + rounding) / (step.predicted + rounding);
+            let promised = step.predicted + rounding;
+            let ratio = (self.state.energy - self.trial.energy + rounding) / promised;
+            // Contacts that come and go may leave a step that promises nothing.
+            let ratio = if promised > 0.0 { ratio } else { 0.0 };
             if ratio < POOR_SHARE || ratio.is_nan() {
                 radius = SHRINK * step.length;
             } else if ratio > GOOD_SHARE && step.at_boundary {
@@ -210,10 +213,13 @@ impl EnergySearch {
         residual.extend(contact_forces.iter().zip(&state.forces).map(|(c, f)| c - f));
         product.resize(order, 0.0);
         support.multiply(residual, product);
-        let out_of_balance = dot(residual, product).max(0.0);
+        let out_of_balance = dot(residual, product);
         support.multiply(contact_forces, product);
-        let scale = dot(contact_forces, product).max(0.0);
-        out_of_balance.sqrt() / scale.sqrt().max(RESIDUAL_FLOOR)
+        let scale = dot(contact_forces, product);
+        // Forces of depths too small to be known to the tolerance are measured against the smallest that is.
+        let resolved_depth = DEPTH_ROUNDING * model.extent / model.contact.tolerance;
+        let floor = self.kc * resolved_depth * model.softest.sqrt();
+        root(out_of_balance) / root(scale).max(floor).max(RESIDUAL_FLOOR)
     }
 
     /// The state that the last trust-region step leads to.

@@ -22,6 +22,8 @@ pub struct Model<'a> {
     /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
     /// loses no digits.
     pub centre: DVec3,
+    /// Distance of the farthest surface node from the centre [m].
+    pub extent: f64,
     /// Rest positions of the surface nodes, relative to the centre [m].
     pub rest: Vec<DVec3>,
     /// Largest trace of a node's own block C_jj: no node moves farther than sqrt(softest) times |u| in the energy norm [m/N].
@@ -43,6 +45,7 @@ impl<'a> Model<'a> {
         let high = surface_rest.iter().copied().fold(DVec3::MIN, DVec3::max);
         let centre = low.midpoint(high);
         let rest: Vec<DVec3> = surface_rest.iter().map(|&position| position - centre).collect();
+        let extent = rest.iter().map(|position| position.length()).fold(0.0, f64::max);
         let triangles = &object.triangles;
         let rest_normals = (0..triangles.len())
             .map(|t| surface::pseudonormal(&rest, triangles, &object.topology, t, Feature::Face))
@@ -64,6 +67,7 @@ impl<'a> Model<'a> {
             contact,
             kc: 3.0 * contact.stiffness,
             centre,
+            extent,
             rest,
             softest,
             bounds,

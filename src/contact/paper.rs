@@ -18,7 +18,7 @@ use super::depth::Contact;
 use super::detection::Detection;
 use super::energy::Outcome;
 use super::model::Model;
-use super::support::{Support, dot};
+use super::support::{Support, dot, root};
 use super::surface;
 use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MINIMUM_SQUARE, PAPER_INNER_SHARE, RESIDUAL_FLOOR};
 use glam::DVec3;
@@ -194,10 +194,10 @@ impl PaperIteration {
         self.residual.extend(self.forces.iter().zip(&self.previous_forces).map(|(f, previous)| f - previous));
         self.image.resize(order, 0.0);
         self.support.multiply(&self.residual, &mut self.image);
-        let change = dot(&self.residual, &self.image).max(0.0);
+        let change = dot(&self.residual, &self.image);
         self.support.multiply(&self.forces, &mut self.image);
-        let scale = dot(&self.forces, &self.image).max(0.0);
-        change.sqrt() / scale.sqrt().max(RESIDUAL_FLOOR)
+        let scale = dot(&self.forces, &self.image);
+        root(change) / root(scale).max(RESIDUAL_FLOOR)
     }
 
     /// Positions from displacement.

@@ -114,3 +114,9 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     sum
 }
+
+/// Length whose square is `square`; rounding below zero counts as zero, what is not a number stays so.
+#[must_use]
+pub fn root(square: f64) -> f64 {
+    if square < 0.0 { 0.0 } else { square.sqrt() }
+}

@@ -20,7 +20,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::depth::{Contact, hessian_product, second_variation};
-use super::support::{Support, dot};
+use super::support::{Support, dot, root};
 use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES};
 use glam::DVec3;
 
@@ -97,7 +97,7 @@ impl TrustRegion {
             self.balance(springs, residual);
             support.multiply(&self.residual, &mut self.preconditioned);
         }
-        let length = dot(&self.force, &self.displacement).max(0.0).sqrt();
+        let length = root(dot(&self.force, &self.displacement));
         Step { predicted, length, at_boundary }
     }
 

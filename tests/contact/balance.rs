@@ -1,0 +1,189 @@
+//! Force balance, contact law, torque and energy of the energy form on random configurations.
+
+use crate::fixture::{Sequence, arm, arm_of_six, contact, random_configurations, sphere, torus};
+use crate::oracle::{check_account, check_contact_law, gap, pose};
+use haptize::contact::{Equilibrium, Model, Solver, Status, Touch};
+use haptize::object::Object;
+use haptize::proxy::Chain;
+use haptize::scene::{Algorithm, SpringKind};
+
+/// Solves all configurations, checks those in contact, and returns how many were and how many of them converged.
+fn check(object: &Object, chain: &Chain, stiffness: f64, configurations: &[Vec<f64>]) -> (usize, usize) {
+    let model = Model::new(object, chain, contact(Algorithm::Energy, stiffness));
+    let mut solver = Solver::new(&model);
+    let (mut touching, mut converged) = (0, 0);
+    for q in configurations {
+        let equilibrium = solver.solve(q);
+        let expected = gap(object, chain, &pose(chain, q));
+        assert!((equilibrium.gap - expected).abs() < 1e-12, "gap {} against {expected}", equilibrium.gap);
+        if expected >= 0.0 {
+            assert_eq!(equilibrium.status, Status::Free);
+            assert!(equilibrium.touches.is_empty() && equilibrium.forces.is_empty());
+            assert!(equilibrium.energy == 0.0 && equilibrium.torque.iter().all(|&t| t == 0.0));
+            continue;
+        }
+        touching += 1;
+        assert_ne!(equilibrium.status, Status::Free);
+        let history = solver.energy_history();
+        let rounding = 1e-13 * history[0];
+        assert!(history.windows(2).all(|pair| pair[1] <= pair[0] + rounding), "E rose: {history:?}");
+        if equilibrium.status == Status::Contact {
+            converged += 1;
+            assert!(equilibrium.residual <= model.contact.tolerance);
+            check_account(object, chain, q, &equilibrium).unwrap();
+            // Stored forces that are off by a residual r displace the surface by C r, and the law there by kc C r.
+            let tolerance = (10.0 * equilibrium.residual * model.kc * model.softest).max(1e-6);
+            check_contact_law(object, chain, q, model.kc, &equilibrium, tolerance).unwrap();
+        }
+    }
+    (touching, converged)
+}
+
+/// As [`check`], asserting the least number of contacts and the least share that converges.
+fn check_share(object: &Object, chain: &Chain, stiffness: f64, configurations: &[Vec<f64>], least: usize, share: f64) {
+    let (touching, converged) = check(object, chain, stiffness, configurations);
+    assert!(touching >= least, "only {touching} configurations touch");
+    assert!(converged as f64 >= share * touching as f64, "{converged} of {touching} converged");
+}
+
+#[test]
+fn balance_and_contact_law_hold_on_the_sphere() {
+    let chain = Chain::new(&arm(0.0));
+    for kind in [SpringKind::Isotropic, SpringKind::Axial] {
+        check_share(&sphere(kind), &chain, 500.0, &random_configurations(1, 120), 30, 1.0);
+    }
+}
+
+#[test]
+fn balance_and_contact_law_hold_on_a_concave_mesh() {
+    check_share(&torus(), &Chain::new(&arm(0.0)), 500.0, &random_configurations(2, 120), 20, 0.95);
+}
+
+/// From much softer to much stiffer than the object.
+#[test]
+fn balance_and_contact_law_hold_at_every_contact_stiffness() {
+    let object = sphere(SpringKind::Isotropic);
+    let chain = Chain::new(&arm(0.0));
+    let configurations = random_configurations(3, 60);
+    for stiffness in [1.0, 10.0, 1e2, 1e3, 1e4] {
+        check_share(&object, &chain, stiffness, &configurations, 15, 1.0);
+    }
+    for stiffness in [1e5, 1e6] {
+        check_share(&object, &chain, stiffness, &configurations, 15, 0.8);
+    }
+}
+
+/// Spheres instead of points. Where a node would rest in a fold, between two facets, the distance has a convex kink that the
+/// search cannot sit on: such configurations must be flagged.
+#[test]
+fn balance_and_contact_law_hold_for_nodes_with_a_radius() {
+    let chain = Chain::new(&arm(0.008));
+    check_share(&sphere(SpringKind::Isotropic), &chain, 100.0, &random_configurations(4, 100), 30, 0.9);
+}
+
+#[test]
+fn chains_of_one_and_six_joints_work() {
+    let object = sphere(SpringKind::Isotropic);
+    let one = Chain::new(&haptize::scene::ProxySpec { joints: arm(0.0).joints.split_off(1)[..1].to_vec() });
+    let mut sequence = Sequence::new(5);
+    let turns: Vec<Vec<f64>> = (0..40).map(|_| vec![sequence.between(-0.3, 0.4)]).collect();
+    let (touching, converged) = check(&object, &one, 500.0, &turns);
+    assert!(touching > 5 && converged == touching, "{converged} of {touching}");
+    let six = Chain::new(&arm_of_six());
+    let turns: Vec<Vec<f64>> = (0..60)
+        .map(|_| {
+            let mut q = vec![sequence.between(-0.3, 0.3), sequence.between(0.0, 0.4), sequence.between(-0.02, 0.02)];
+            q.extend([sequence.between(0.0, 0.6), sequence.between(-1.0, 1.0), sequence.between(-1.0, 1.0)]);
+            q
+        })
+        .collect();
+    let (touching, converged) = check(&object, &six, 500.0, &turns);
+    assert!(touching > 10 && converged == touching, "{converged} of {touching}");
+}
+
+/// Object nodes that carry a touch, ascending: a facet's three, an edge's two or a vertex.
+fn touched(touch: &Touch) -> Vec<u32> {
+    let carrying = touch.nodes.iter().zip(touch.weights).filter(|(_, weight)| *weight != 0.0);
+    let mut nodes: Vec<u32> = carrying.map(|(node, _)| *node).collect();
+    nodes.sort_unstable();
+    nodes
+}
+
+/// The envelope theorem: tau = -dU/dq at a minimum. A stencil whose ends touch other facets than its middle crosses a kink of U,
+/// where the derivative does not exist; those are counted and must be rare.
+#[test]
+fn torque_is_minus_the_gradient_of_stored_energy() {
+    let chain = Chain::new(&arm(0.0));
+    let h = 2e-6;
+    for kind in [SpringKind::Isotropic, SpringKind::Axial] {
+        let object = sphere(kind);
+        let model = Model::new(&object, &chain, contact(Algorithm::Energy, 500.0));
+        let mut solver = Solver::new(&model);
+        let (mut derivatives, mut kinks) = (0, 0);
+        for q in random_configurations(6, 200) {
+            let here = solver.solve(&q);
+            if here.status != Status::Contact {
+                continue;
+            }
+            for joint in 0..q.len() {
+                let mut at = |step: f64| {
+                    let mut q = q.clone();
+                    q[joint] += step;
+                    solver.solve(&q)
+                };
+                let (before, after) = (at(-h), at(h));
+                let facets = |e: &Equilibrium| {
+                    e.touches.iter().map(|touch| (touch.proxy_node, touched(touch))).collect::<Vec<_>>()
+                };
+                derivatives += 1;
+                if facets(&before) != facets(&here) || facets(&after) != facets(&here) {
+                    kinks += 1;
+                    continue;
+                }
+                let slope = (after.energy - before.energy) / (2.0 * h);
+                let scale = here.torque.norm().max(1e-3);
+                assert!((slope + here.torque[joint]).abs() < 1e-5 * scale, "{slope} against {:?}", here.torque);
+            }
+        }
+        assert!(derivatives > 150, "{derivatives}");
+        assert!(kinks * 50 <= derivatives, "{kinks} of {derivatives} stencils cross a kink");
+    }
+}
+
+/// A check that cannot fail proves nothing.
+#[test]
+fn perturbed_results_are_rejected() {
+    let object = sphere(SpringKind::Isotropic);
+    let chain = Chain::new(&arm(0.0));
+    let model = Model::new(&object, &chain, contact(Algorithm::Energy, 500.0));
+    let mut solver = Solver::new(&model);
+    let (q, right) = random_configurations(1, 120)
+        .into_iter()
+        .map(|q| (q.clone(), solver.solve(&q)))
+        .find(|(_, e)| e.status == Status::Contact && e.touches.len() > 1)
+        .unwrap();
+    let law = |e: &Equilibrium| check_contact_law(&object, &chain, &q, model.kc, e, 1e-6);
+    let account = |e: &Equilibrium| check_account(&object, &chain, &q, e);
+    law(&right).unwrap();
+    account(&right).unwrap();
+
+    let mut wrong = right.clone();
+    wrong.forces[0].force *= 1.0 + 1e-4;
+    assert!(law(&wrong).is_err() && account(&wrong).is_err(), "a force on the object");
+    let mut wrong = right.clone();
+    wrong.touches[0].force *= 1.0 + 1e-4;
+    assert!(law(&wrong).is_err() && account(&wrong).is_err(), "a force on the proxy");
+    let mut wrong = right.clone();
+    wrong.touches.pop();
+    assert!(law(&wrong).is_err() && account(&wrong).is_err(), "a lost contact");
+    let mut wrong = right.clone();
+    wrong.forces.iter_mut().for_each(|force| force.force = -force.force);
+    wrong.touches.iter_mut().for_each(|touch| touch.force = -touch.force);
+    assert!(law(&wrong).is_err(), "tension");
+    let mut wrong = right.clone();
+    wrong.torque[1] *= 1.0 + 1e-5;
+    assert!(account(&wrong).is_err(), "torque");
+    let mut wrong = right;
+    wrong.forces.swap(0, 1);
+    assert!(account(&wrong).is_err(), "order");
+}

@@ -1,0 +1,108 @@
+//! What must not change a result: where the world's origin is, how it is turned, what was solved before; and broken numbers.
+
+use crate::fixture::{arm, contact, object, random_configurations, sphere};
+use glam::{DMat3, DVec3};
+use haptize::contact::{Equilibrium, Model, Solver, Status};
+use haptize::object::Object;
+use haptize::proxy::Chain;
+use haptize::scene::{Algorithm, ProxySpec, SpringKind};
+
+/// Object and proxy turned by `rotation`, then moved by `shift`.
+fn moved(original: &Object, proxy: &ProxySpec, rotation: DMat3, shift: DVec3) -> (Object, Chain) {
+    let nodes = original.rest.iter().map(|&node| rotation * node + shift).collect();
+    let mut proxy = proxy.clone();
+    for (k, joint) in proxy.joints.iter_mut().enumerate() {
+        joint.origin = rotation * joint.origin + if k == 0 { shift } else { DVec3::ZERO };
+        joint.axis = rotation * joint.axis;
+        for node in &mut joint.nodes {
+            node.position = rotation * node.position;
+        }
+    }
+    (object(nodes, original.triangles.clone()), Chain::new(&proxy))
+}
+
+fn solve_all(object: &Object, chain: &Chain, algorithm: Algorithm) -> Vec<Equilibrium> {
+    let model = Model::new(object, chain, contact(algorithm, 500.0));
+    let mut solver = Solver::new(&model);
+    random_configurations(11, 80).iter().map(|q| solver.solve(q)).collect()
+}
+
+fn largest_difference(a: &[Equilibrium], b: &[Equilibrium]) -> f64 {
+    let mut largest = 0.0f64;
+    for (a, b) in a.iter().zip(b) {
+        assert_eq!(a.status, b.status);
+        for (x, y) in a.torque.iter().zip(b.torque.iter()) {
+            largest = largest.max((x - y).abs());
+        }
+        largest = largest.max((a.energy - b.energy).abs());
+    }
+    largest
+}
+
+#[test]
+fn turning_and_moving_the_world_changes_nothing() {
+    let original = sphere(SpringKind::Isotropic);
+    let rotation = DMat3::from_axis_angle(DVec3::new(1.0, -2.0, 0.5).normalize(), 1.1);
+    for algorithm in [Algorithm::Energy, Algorithm::Linearised, Algorithm::Paper] {
+        let here = solve_all(&original, &Chain::new(&arm(0.0)), algorithm);
+        assert!(here.iter().filter(|e| e.status == Status::Contact).count() > 8);
+        let (turned, chain) = moved(&original, &arm(0.0), rotation, DVec3::new(0.3, -0.2, 0.1));
+        assert!(largest_difference(&here, &solve_all(&turned, &chain, algorithm)) < 1e-7);
+        // A kilometre away coordinates are rounded at 1e-13 m: 1e-10 of a depth of a millimetre.
+        let (far, chain) = moved(&original, &arm(0.0), DMat3::IDENTITY, DVec3::new(1000.0, -700.0, 300.0));
+        assert!(largest_difference(&here, &solve_all(&far, &chain, algorithm)) < 1e-6);
+    }
+}
+
+/// The start is the rest state: nothing is carried from one configuration to the next, to the last bit.
+#[test]
+fn results_do_not_depend_on_what_was_solved_before() {
+    let object = sphere(SpringKind::Axial);
+    let chain = Chain::new(&arm(0.0));
+    for algorithm in [Algorithm::Energy, Algorithm::Linearised, Algorithm::Paper] {
+        let model = Model::new(&object, &chain, contact(algorithm, 2e3));
+        let mut together = Solver::new(&model);
+        for q in random_configurations(12, 60) {
+            let (a, b) = (together.solve(&q), Solver::new(&model).solve(&q));
+            assert_eq!(a.status, b.status);
+            assert_eq!(a.torque, b.torque);
+            assert_eq!(a.energy.to_bits(), b.energy.to_bits());
+            assert_eq!(a.gap.to_bits(), b.gap.to_bits());
+            assert_eq!(a.forces, b.forces);
+        }
+    }
+}
+
+fn assert_harmless(equilibrium: &Equilibrium) {
+    assert_eq!(equilibrium.status, Status::Unconverged);
+    assert!(equilibrium.energy == 0.0 && equilibrium.residual.is_finite() && equilibrium.gap.is_finite());
+    assert!(equilibrium.torque.iter().all(|&t| t == 0.0));
+    assert!(equilibrium.forces.is_empty() && equilibrium.touches.is_empty());
+}
+
+#[test]
+fn broken_numbers_are_flagged_and_never_come_out() {
+    let mut object = sphere(SpringKind::Isotropic);
+    let chain = Chain::new(&arm(0.0));
+    let q = [0.0, 0.25, 0.1];
+    for algorithm in [Algorithm::Energy, Algorithm::Linearised, Algorithm::Paper] {
+        let model = Model::new(&object, &chain, contact(algorithm, 500.0));
+        let mut solver = Solver::new(&model);
+        let right = solver.solve(&q);
+        assert!(right.gap < 0.0);
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_harmless(&solver.solve(&[0.0, bad, 0.1]));
+        }
+        assert_harmless(&solver.solve(&[0.0, 0.1]));
+        assert_harmless(&solver.solve(&[]));
+        let again = solver.solve(&q);
+        assert_eq!(again.torque, right.torque, "the solver recovers");
+        let absurd = solver.solve(&[1e300, -1e300, 1e300]);
+        assert!(absurd.torque.is_finite() && absurd.energy.is_finite() && absurd.gap.is_finite());
+    }
+    object.compliance.entries.fill(f64::NAN);
+    for algorithm in [Algorithm::Energy, Algorithm::Linearised, Algorithm::Paper] {
+        let model = Model::new(&object, &chain, contact(algorithm, 500.0));
+        assert_harmless(&Solver::new(&model).solve(&q));
+    }
+}

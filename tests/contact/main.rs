@@ -1,0 +1,10 @@
+//! Equilibrium of one configuration, checked from outside.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod analytic;
+mod balance;
+mod comparison;
+mod fixture;
+mod invariance;
+mod oracle;
