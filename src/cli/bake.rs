@@ -2,16 +2,21 @@
 
 use super::{Failure, Report};
 use haptize::{
-    haptize::{BackendChoice, Bake, Progress},
+    dataset::Dataset,
+    haptize::{BackendChoice, Bake, BakeError, Iterations, Progress, SweepReport},
     scene::{Algorithm, Scene},
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
+    fmt::{self, Write},
     io::{IsTerminal, stderr},
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, atomic::AtomicBool, atomic::Ordering},
     time::SystemTime,
 };
+
+/// Exit code of a program that Ctrl-C ended, as shells have it: 128 and the signal's number.
+const INTERRUPTED: i32 = 130;
 
 /// What to haptize, and how.
 #[derive(clap::Args)]
@@ -32,7 +37,7 @@ pub struct Arguments {
     resume: bool,
 }
 
-/// Haptizes the scene. Ctrl-C stops after the configurations at hand and leaves a part that `--resume` continues.
+/// Haptizes the scene. Ctrl-C leaves a part that `--resume` continues.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut scene = Scene::load(&arguments.scene)?;
     if let Some(algorithm) = arguments.algorithm {
@@ -43,38 +48,58 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file")?)
             .with_extension("haptize"),
     };
+    let bake = |bake: Bake<'_>| bake.to_file(&output, arguments.resume);
+    let (_, report) = watched(&scene, arguments.backend, bake)?;
+    let mut json = serde_json::to_value(&report)?;
+    json["file"] = output.display().to_string().into();
+    let mut text = String::new();
+    describe(&mut text, &output, &report)?;
+    // Every point was solved and says what became of it: that is the whole work.
+    Ok(Report { text, json, whole: true })
+}
+
+/// Runs `bake`, dated now, with a progress bar. Ctrl-C stops it after the configurations at hand; afterwards, or again,
+/// Ctrl-C ends the program at once. Warnings go to standard error.
+pub fn watched(
+    scene: &Scene,
+    backend: BackendChoice,
+    bake: impl FnOnce(Bake<'_>) -> Result<(Dataset, SweepReport), BakeError>,
+) -> Result<(Dataset, SweepReport), Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = stop.clone();
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))?;
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(INTERRUPTED);
+        }
+    })?;
     let bar = progress_bar();
     let mut progress = |progress: Progress| show(&bar, progress);
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
-    let bake = Bake { scene: &scene, backend: arguments.backend, date: &date, stop: &stop, progress: &mut progress };
-    let result = bake.to_file(&output, arguments.resume);
+    let result = bake(Bake { scene, backend, date: &date, stop: &stop, progress: &mut progress });
     bar.finish_and_clear();
-    let (_, report) = result?;
+    stop.store(true, Ordering::Relaxed);
+    let (dataset, report) = result?;
     report.warnings.iter().for_each(|warning| eprintln!("haptize: {warning}"));
-    let mut json = serde_json::to_value(&report)?;
-    json["file"] = output.display().to_string().into();
-    let lost = report.unconverged + report.overflowed;
-    let text = format!(
-        "{}: {} points, {} in contact, of these {lost} not converged ({} on {}, {})\n\
-         residual at most {:.1e}, iterations {:.1} on average and at most {}\n\
-         {:.2} s, {:.0} configurations a second\n",
-        output.display(),
-        report.points,
-        report.contact_points,
-        report.algorithm,
-        report.backend,
-        report.adapter,
-        report.max_residual,
-        report.iterations.mean,
-        report.iterations.max,
-        report.seconds,
-        report.configurations_per_second,
-    );
-    // Every point was solved and says what became of it: that is the whole work.
-    Ok(Report { text, json, whole: true })
+    Ok((dataset, report))
+}
+
+/// What was baked into `file`, for people.
+pub fn describe(text: &mut String, file: &Path, report: &SweepReport) -> fmt::Result {
+    let SweepReport { points, contact_points, unconverged, overflowed, .. } = report;
+    let SweepReport { seconds, configurations_per_second, algorithm, backend, adapter, .. } = report;
+    let Iterations { mean, max } = report.iterations;
+    let lost = unconverged + overflowed;
+    writeln!(text, "{}: {points} points, {contact_points} in contact, {lost} not converged", file.display())?;
+    writeln!(
+        text,
+        "  solved       in {seconds:.2} s, {configurations_per_second:.0} configurations a second, {algorithm} on \
+         {backend} ({adapter})"
+    )?;
+    writeln!(
+        text,
+        "  residual     at most {:.1e} where converged; iterations {mean:.1} on average, {max} at most",
+        report.max_residual
+    )
 }
 
 /// A bar on standard error, hidden where that is no terminal.

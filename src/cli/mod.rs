@@ -11,6 +11,7 @@
 //! Exit codes: 0 the work is whole, 1 it failed or is not whole, 2 the command line itself is wrong (given by clap).
 
 mod bake;
+mod demo;
 mod doctor;
 mod export;
 mod info;
@@ -26,10 +27,10 @@ use std::{
 
 /// Haptize: contact solved beforehand for every joint configuration, felt at 1 kHz.
 #[derive(Parser)]
-#[command(version, arg_required_else_help = true)]
+#[command(version, after_help = "Without a command: a demo. A soft sphere is haptized, pressed and drawn, into ./out.")]
 struct CommandLine {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
     /// Print one machine-readable JSON object on standard output.
     #[arg(long, global = true)]
     json: bool,
@@ -80,7 +81,8 @@ pub struct Report {
 /// Runs what the command line asks for.
 pub fn run() -> ExitCode {
     let line = CommandLine::parse();
-    match line.command.run().and_then(|report| print(&report, line.json).map(|()| report.whole)) {
+    let report = line.command.as_ref().map_or_else(demo::run, Command::run);
+    match report.and_then(|report| print(&report, line.json).map(|()| report.whole)) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(failure) => {

@@ -139,7 +139,8 @@ pub fn motion(setup: &Setup, name: &str) -> Result<Motion, Failure> {
     Ok(Motion::through(waypoints, joints)?)
 }
 
-fn describe(text: &mut String, s: &Summary) -> fmt::Result {
+/// What was felt, for people.
+pub fn describe(text: &mut String, s: &Summary) -> fmt::Result {
     writeln!(text, "{:.2} s, {} ticks, {:.0} % in contact", s.seconds, s.ticks, 100.0 * s.contact_share)?;
     writeln!(
         text,
@@ -170,7 +171,8 @@ fn describe(text: &mut String, s: &Summary) -> fmt::Result {
     Ok(())
 }
 
-fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
+/// How punctual it was, for people.
+pub fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
     let mut line = |what: &str, p: Percentiles| {
         let Percentiles { p50, p99, p999, p9999, max, .. } = p;
         writeln!(
