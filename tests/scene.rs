@@ -96,7 +96,7 @@ fn what_is_not_said_takes_the_documented_default() {
     assert_eq!((joint.name.as_str(), joint.axis, joint.origin), ("q1", DVec3::Z, DVec3::ZERO));
     assert_eq!((joint.mass, joint.rotor_inertia, joint.nodes[0].radius), (0.0, 1e-3, 0.0));
     assert_eq!(scene.contact.algorithm, Algorithm::Energy);
-    assert_eq!((scene.contact.tolerance, scene.contact.max_iterations), (1e-6, 100));
+    assert_eq!((scene.contact.tolerance, scene.contact.max_iterations), (1e-8, 100));
     let axis = scene.grid.axes[0];
     assert_eq!((axis.start, axis.step, axis.count), (-1.0, 0.1, 21));
     let haptics = &scene.haptics;

@@ -11,8 +11,10 @@ use super::error::SceneError;
 use super::file::{ContactTable, GraphicsTable, SceneTable};
 use super::{Algorithm, ContactSpec, GraphicsSpec, Scene};
 
-/// Default relative residual of the contact solver: what the stored equilibria promise [1].
-const CONTACT_TOLERANCE: f64 = 1e-6;
+/// Default relative residual of the contact solver, in the energy norm [1]. Forces are promised to balance K u to 1e-6 of the
+/// largest, node by node, which a residual of 1e-6 misses by a third; the last steps converge fast, so two digits more cost
+/// 8 % more iterations on the sphere (5.1 to 5.5).
+const CONTACT_TOLERANCE: f64 = 1e-8;
 /// Default cap on the contact solver's iterations [1].
 const CONTACT_ITERATIONS: u32 = 100;
 /// Default frame rate [Hz].
