@@ -9,9 +9,15 @@ pub fn jitter(timing: &Timing) -> Canvas {
     let lateness = &timing.lateness;
     let quantiles =
         [("median", lateness.p50), ("99 %", lateness.p99), ("99.9 %", lateness.p999), ("latest", lateness.max)];
-    let mark = |(name, microseconds): (&str, f64)| {
-        let decimals = if microseconds < 10.0 { 1 } else { 0 };
-        (microseconds, format!("{name} {} µs", ticks::number(microseconds, decimals)))
+    let mark = |(name, microseconds): (&str, f64)| match timing.lateness_bins.first() {
+        // The first bin holds all that is shorter, too: what lies in it is not told apart.
+        Some(first) if microseconds < first.to => {
+            (first.from, format!("{name} under {} µs", ticks::number(first.to, 1)))
+        }
+        _ => {
+            let decimals = if microseconds < 10.0 { 1 } else { 0 };
+            (microseconds, format!("{name} {} µs", ticks::number(microseconds, decimals)))
+        }
     };
     Histogram {
         headline: "How late the ticks of the real-time loop came".to_owned(),

@@ -29,6 +29,9 @@ pub struct Instant {
     pub nodes: Vec<DVec3>,
     /// Contact forces on them [N].
     pub forces: Vec<NodeForce>,
+    /// Object nodes in contact at the nearest grid point in contact (the recording's number; `forces`, interpolated
+    /// between grid points, act on more).
+    pub contact_nodes: u32,
     /// The proxy.
     pub pose: Pose,
 }
@@ -54,10 +57,11 @@ pub fn instants(dataset: &Dataset, chain: &Chain, trace: &Trace, count: usize) -
         return Err(refused(format!("the chain has {joints} joints, the dataset {axes}; load both from one scene")));
     }
     let frames = &trace.frames;
-    let touching = |frame: &Frame| {
-        let tick = trace.ticks.partition_point(|tick| tick.time <= frame.time).checked_sub(1);
-        tick.is_some_and(|tick| trace.ticks[tick].contact)
+    let tick = |frame: &Frame| {
+        let number = trace.ticks.partition_point(|tick| tick.time <= frame.time).checked_sub(1)?;
+        Some(&trace.ticks[number])
     };
+    let touching = |frame: &Frame| tick(frame).is_some_and(|tick| tick.contact);
     let first = frames.iter().position(touching).unwrap_or(0).saturating_sub(1);
     let last = frames.iter().rposition(touching).unwrap_or(frames.len().saturating_sub(1));
     let chosen = (0..count).filter_map(|k| frames.get(first + k * (last - first) / count.saturating_sub(1).max(1)));
@@ -77,7 +81,8 @@ pub fn instants(dataset: &Dataset, chain: &Chain, trace: &Trace, count: usize) -
             }
             let acting = forces.into_iter().enumerate().filter(|(_, force)| *force != DVec3::ZERO);
             let forces = acting.map(|(node, force)| NodeForce { node: node as u32, force }).collect();
-            Ok(Instant { time: frame.time, nodes: frame.nodes.clone(), forces, pose: pose.clone() })
+            let contact_nodes = tick(frame).map_or(0, |tick| tick.contact_nodes);
+            Ok(Instant { time: frame.time, nodes: frame.nodes.clone(), forces, contact_nodes, pose: pose.clone() })
         })
         .collect()
 }
@@ -121,9 +126,9 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
         let total: DVec3 = instant.forces.iter().map(|force| force.force).sum();
         let time = format!("{} s", ticks::number(instant.time, 2));
         canvas.text((x, y), &time, plot::TITLE);
-        let what = match instant.forces.len() {
+        let what = match instant.contact_nodes {
             0 => "free".to_owned(),
-            nodes => format!("{nodes} nodes, {} N", ticks::number(total.length(), 2)),
+            nodes => format!("{nodes} nodes in contact, {} N", ticks::number(total.length(), 1)),
         };
         canvas.text((x + plot::TITLE.width(&time) + 10.0, y), &what, plot::NOTE);
         canvas.picture((x, y + 8.0), scene.picture(instant));
@@ -258,7 +263,7 @@ mod tests {
         let pose = Pose { origins: vec![DVec3::new(-0.5, 0.0, 0.4)], ..Pose::default() };
         let force = NodeForce { node: 4, force: DVec3::NEG_Z * 20.0 * lowered };
         let forces = if lowered > 0.0 { vec![force] } else { vec![] };
-        Instant { time: 0.0, nodes, forces, pose }
+        Instant { time: 0.0, nodes, contact_nodes: forces.len() as u32, forces, pose }
     }
 
     fn at(picture: &Picture, scene: &Scene, point: DVec3) -> [u8; 3] {

@@ -126,6 +126,9 @@ pub enum Mark {
     Dot,
 }
 
+/// Base line of the titles above a panel or a colour bar: clear of a tick label at its upper end.
+const TITLE_LIFT: f64 = 11.0;
+
 /// Lengths of dash and gap of dashed curves.
 pub(super) const DASHES: [f64; 2] = [5.0, 3.5];
 
@@ -164,7 +167,7 @@ impl Panel {
             let position = (middle, self.area.bottom() + TICK_SIZE + 6.0 + TITLE_SIZE + 7.0);
             canvas.text(position, &titled(&self.across.title, &horizontal), TITLE.anchored(Anchor::Middle));
         }
-        canvas.text((self.area.x, self.area.y - 9.0), &titled(&self.up.title, &vertical), TITLE);
+        canvas.text((self.area.x, self.area.y - TITLE_LIFT), &titled(&self.up.title, &vertical), TITLE);
     }
 
     /// The zero line, where zero lies in the panel.
@@ -211,7 +214,7 @@ impl Panel {
 
     /// Legend above the panel, right-aligned.
     pub fn legend(&self, canvas: &mut Canvas, entries: &[Entry]) {
-        legend(canvas, (self.area.right(), self.area.y - 9.0), entries);
+        legend(canvas, (self.area.right(), self.area.y - TITLE_LIFT), entries);
     }
 }
 
@@ -262,7 +265,7 @@ pub(super) fn colour_bar(canvas: &mut Canvas, area: Area, map: ColourMap, title:
         canvas.text((area.right() + 8.0, y + 0.36 * TICK_SIZE), label, TICK.anchored(Anchor::Start));
     }
     let x = if anchor == Anchor::End { area.right() + 34.0 } else { area.x };
-    canvas.text((x, area.y - 13.0), &titled(title, &ticks), TITLE.anchored(anchor));
+    canvas.text((x, area.y - TITLE_LIFT), &titled(title, &ticks), TITLE.anchored(anchor));
 }
 
 /// The axis title with the common factor of its labels: `Energy [J]` becomes `Energy [×10⁻³ J]`.
