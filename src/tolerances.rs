@@ -230,3 +230,21 @@ pub const IMPORT_SAMPLES: usize = 5_000_000;
 
 /// Cells of C-space that an import averages in: about 1 kB each.
 pub const IMPORT_CELLS: usize = 1_000_000;
+
+// --- figures ---
+
+/// A number this fraction of a tick step beyond the end of an axis, or off a whole number of decimals, still counts as
+/// on it: a thousandth of what a pixel shows, and a million times the rounding of the step.
+pub const TICK_STEP: f64 = 1e-6;
+
+/// A recording that ends this fraction of its duration before a round number is drawn up to it: half of one percent is
+/// three points of a sheet, and a tick of a 1 kHz loop of one second is a fifth of it.
+pub const AXIS_END: f64 = 0.005;
+
+/// Depth, over the eye's distance from the origin, up to which a point counts as behind the eye: nearer ones would be
+/// projected beyond a million pixels. Nothing that a camera frames comes nearer than a tenth.
+pub const NEAR_PLANE: f64 = 1e-6;
+
+/// How much nearer, as a fraction of its distance, the edges of a mesh are drawn than its surface: above the rounding of
+/// the depth buffer (single precision) at grazing views, below a twentieth of what a camera frames.
+pub const EDGE_LIFT: f64 = 5e-3;

@@ -4,6 +4,8 @@
 //! Numbers below a hundredth or from ten thousand on are written with a common factor 10^(3k), which goes into the
 //! axis title; the rest as they are, all with the same number of decimals.
 
+use crate::tolerances::{AXIS_END, TICK_STEP};
+
 /// Ticks of one axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Ticks {
@@ -33,7 +35,7 @@ pub(super) fn snapped([low, high]: [f64; 2]) -> [f64; 2] {
     let grain = 10_f64.powf((high - low).log10().floor() - 1.0);
     let snap = |end: f64| {
         let round = (end / grain).round() * grain;
-        if (round - end).abs() < 0.005 * (high - low) { round } else { end }
+        if (round - end).abs() < AXIS_END * (high - low) { round } else { end }
     };
     [snap(low), snap(high)]
 }
@@ -48,8 +50,8 @@ pub(super) fn ticks(range: [f64; 2], intervals: usize) -> Ticks {
     }
     let coarsest = extent / intervals.max(1) as f64;
     let power = 10_f64.powf(coarsest.log10().floor());
-    // The relative slack keeps a step that fits exactly, whatever the rounding of the division.
-    let fits = |multiple: &f64| multiple * power * (1.0 + 1e-9) >= coarsest;
+    // The slack keeps a step that fits exactly, whatever the rounding of the division.
+    let fits = |multiple: &f64| multiple * power * (1.0 + TICK_STEP) >= coarsest;
     let step = power * [1.0, 2.0, 2.5, 5.0].into_iter().find(fits).unwrap_or(10.0);
     let largest = low.abs().max(high.abs());
     let exponent = if (1e-2..1e4).contains(&largest) { 0 } else { 3 * (largest.log10() / 3.0).floor() as i32 };
@@ -58,10 +60,10 @@ pub(super) fn ticks(range: [f64; 2], intervals: usize) -> Ticks {
         return none;
     }
     let decimals = (0..=6).find(|&decimals| is_whole(step / unit * 10_f64.powi(decimals))).unwrap_or(6);
-    let first = (low / step - 1e-6).ceil();
+    let first = (low / step - TICK_STEP).ceil();
     let marks = (0..=intervals)
         .map(|index| (first + index as f64) * step)
-        .take_while(|&value| value <= high + 1e-6 * step)
+        .take_while(|&value| value <= high + TICK_STEP * step)
         .map(|value| (value, number(value / unit, decimals as usize)))
         .collect();
     Ticks { marks, factor: if exponent == 0 { String::new() } else { format!("×10{}", superscript(exponent)) } }
@@ -70,7 +72,7 @@ pub(super) fn ticks(range: [f64; 2], intervals: usize) -> Ticks {
 /// The powers of ten inside `range`, both ends positive, every so many that there are at most `intervals` and one.
 pub(super) fn decades([low, high]: [f64; 2], intervals: usize) -> Ticks {
     // The slack keeps ends that are powers of ten themselves.
-    let [first, last] = [(low.log10() - 1e-9).ceil() as i32, (high.log10() + 1e-9).floor() as i32];
+    let [first, last] = [(low.log10() - TICK_STEP).ceil() as i32, (high.log10() + TICK_STEP).floor() as i32];
     let stride = (last - first).max(0) as usize / intervals.max(1) + 1;
     let marks = (first..=last)
         .step_by(stride)
@@ -97,7 +99,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
 }
 
 fn is_whole(value: f64) -> bool {
-    (value - value.round()).abs() < 1e-6
+    (value - value.round()).abs() < TICK_STEP
 }
 
 fn superscript(exponent: i32) -> String {

@@ -1,5 +1,6 @@
 //! A perspective camera that frames what it is given.
 
+use crate::tolerances::NEAR_PLANE;
 use glam::DVec3;
 
 /// Tangent of half the vertical field of view: 12 degrees, a portrait lens, so that boxes keep their shape.
@@ -88,8 +89,7 @@ impl Camera {
         let [right, up, towards] = self.axes;
         let offset = point - self.eye;
         let depth = -offset.dot(towards);
-        // A point nearer than a millionth of the eye's distance from the origin is as good as at the eye.
-        if !(depth.is_finite() && depth > 1e-6 * self.eye.length()) {
+        if !(depth.is_finite() && depth > NEAR_PLANE * self.eye.length()) {
             return None;
         }
         Some(Projected {

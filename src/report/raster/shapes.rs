@@ -1,7 +1,7 @@
 //! Bodies of revolution and meshes, made of triangles.
 
 use super::{Finish, Raster, Vertex};
-use crate::report::colour::Colour;
+use crate::{report::colour::Colour, tolerances::EDGE_LIFT};
 use glam::DVec3;
 
 /// Facets around an axis: with interpolated normals the rim looks round.
@@ -30,8 +30,6 @@ impl Raster {
 
     /// The edges of a mesh, each once.
     pub fn edges(&mut self, nodes: &[DVec3], triangles: &[[u32; 3]], width: f64, colour: Colour) {
-        // Edges lie on the surface: one part in two hundred of the distance keeps them above it and below all else.
-        const LIFT: f64 = 5e-3;
         for triangle in triangles {
             for side in 0..3 {
                 let (from, to) = (triangle[side], triangle[(side + 1) % 3]);
@@ -39,7 +37,7 @@ impl Raster {
                 if from < to
                     && let (Some(&a), Some(&b)) = (nodes.get(from as usize), nodes.get(to as usize))
                 {
-                    self.line([a, b], width, colour, LIFT);
+                    self.line([a, b], width, colour, EDGE_LIFT);
                 }
             }
         }
