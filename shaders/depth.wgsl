@@ -16,6 +16,8 @@ struct Contact {
     along: vec3<f32>,
     // 1/s on edges and at vertices, zero on faces.
     inverse_distance: f32,
+    // Force lambda by which the curvature counts; kc depth at the solution.
+    multiplier: f32,
     // g_j: columns.
     gradients: mat3x3<f32>,
 }
@@ -78,14 +80,14 @@ fn second_variation(contact: Contact, v: mat3x3<f32>) -> mat3x3<f32> {
     );
 }
 
-// Product of the Hessian of 1/2 kc depth^2 with node displacements v (columns): one vector a node.
+// Product of the Hessian of 1/2 kc depth^2 with node displacements v (columns): one vector a node. The force kc depth
+// that weighs the curvature is the contact's multiplier.
 fn hessian_product(contact: Contact, kc: f32, v: mat3x3<f32>) -> mat3x3<f32> {
-    let deepening = dot(contact.normal, v * contact.weights);
+    let stretch = contact.normal * (kc * dot(contact.normal, v * contact.weights));
     let product = second_variation(contact, v);
-    let stretch = contact.normal * deepening;
     return mat3x3<f32>(
-        (stretch * contact.weights.x + product[0] * contact.depth) * kc,
-        (stretch * contact.weights.y + product[1] * contact.depth) * kc,
-        (stretch * contact.weights.z + product[2] * contact.depth) * kc,
+        stretch * contact.weights.x + product[0] * contact.multiplier,
+        stretch * contact.weights.y + product[1] * contact.multiplier,
+        stretch * contact.weights.z + product[2] * contact.multiplier,
     );
 }

@@ -4,15 +4,15 @@
 // Two things differ from the twin, both because of f32. Depths are known to some 1e-9 m, which stiff contact turns into
 // forces far above the tolerance; so a Newton step that is small itself also ends the search, and the contact forces
 // follow from it by the linear law kc (depth + N . du), in which the small numbers are not differences of large ones.
-// And where the step changes no depth by more than rounding, the search ends as well: f32 can tell no more. The residual
-// says how good that is.
+// And where two steps in a row change no depth by more than rounding, the search ends as well: f32 can tell no more. The
+// residual says how good that is.
 
 // Geometry frozen at rest: linearised contact.
 override FROZEN: bool = false;
 
 // Contact forces -kc depth w_j N on the object's nodes: columns.
-fn contact_forces(contact: Contact) -> mat3x3<f32> {
-    let force = contact.normal * (-parameters.kc * max(contact.depth, 0.0));
+fn contact_forces(contact: Contact, kc: f32) -> mat3x3<f32> {
+    let force = contact.normal * (-kc * max(contact.depth, 0.0));
     return mat3x3<f32>(force * contact.weights.x, force * contact.weights.y, force * contact.weights.z);
 }
 
@@ -25,24 +25,24 @@ fn frozen_contact(row: Contact) -> Contact {
     return contact;
 }
 
-// Brings support, contact forces and residual up to date with a contact of each invocation; returns r . C r and c . C c.
-fn balance(contact: Contact, local: u32) -> vec2<f32> {
+// Brings support, contact forces and residual force up to date with a contact of each invocation; returns r . C r and
+// c . C c.
+fn balance(contact: Contact, kc: f32, local: u32) -> vec2<f32> {
     assign_slots(acting_nodes(contact), local);
-    shares[local] = contact_forces(contact);
+    shares[local] = contact_forces(contact, kc);
     workgroupBarrier();
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
         let force = gather(slot);
         vectors[at(IMAGE, slot)] = force;
-        vectors[at(RESIDUAL, slot)] = force - vectors[at(FORCES, slot)];
+        vectors[at(BALANCE, slot)] = force - vectors[at(FORCES, slot)];
     }
     workgroupBarrier();
     var squares = vec4<f32>(0.0);
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
-        let preconditioned = multiply(RESIDUAL, slot);
-        vectors[at(PRECONDITIONED, slot)] = preconditioned;
+        let product = multiply(BALANCE, slot);
         // C c = C f + C r.
-        let whole = displacement[displacement_base + support_nodes[slot]].xyz + preconditioned;
-        squares.x += dot(vectors[at(RESIDUAL, slot)], preconditioned);
+        let whole = displacement[displacement_base + support_nodes[slot]].xyz + product;
+        squares.x += dot(vectors[at(BALANCE, slot)], product);
         squares.y += dot(vectors[at(IMAGE, slot)], whole);
     }
     return max(add_up(squares, local).xy, vec2<f32>(0.0));
@@ -60,71 +60,63 @@ fn main(
     }
     displacement_base = place * parameters.surface_nodes;
     position_base = list[1u + parameters.first + place] * parameters.proxy_nodes;
-
-    // The rest state.
-    for (var node = local; node < parameters.surface_nodes; node += WORKGROUP) {
-        displacement[displacement_base + node] = vec4<f32>(0.0);
-    }
     for (var slot = local; slot < SUPPORT; slot += WORKGROUP) {
         vectors[at(FORCES, slot)] = vec3<f32>(0.0);
     }
-    storageBarrier();
-    workgroupBarrier();
-    deformed(0.0, 0.0, local);
-    var contact = own_contact(local);
-    var elastic = 0.0;
-    var energy = add_up(vec4<f32>(0.5 * parameters.kc * contact.depth * contact.depth, 0.0, 0.0, 0.0), local).x;
-    let first_radius = sqrt(2.0 * energy);
-    var row = contact;
+    // Of the frozen problem: nodes farther from the surface than this can never touch (see the twin).
+    var reach = 0.0;
     if FROZEN {
-        deformed(0.0, sqrt(2.0 * energy * parameters.softest), local);
-        row = own_contact(local);
-        row.along = vec3<f32>(0.0);
-        row.distance = 0.0;
-        row.inverse_distance = 0.0;
-        row.gradients = mat3x3<f32>();
-        contact = row;
+        var square = 0.0;
+        for (var node = local; node < parameters.proxy_nodes; node += WORKGROUP) {
+            let depth = max(-positions[position_base + node].w, 0.0);
+            square += depth * depth;
+        }
+        square = add_up(vec4<f32>(square, 0.0, 0.0, 0.0), local).x;
+        reach = sqrt(parameters.kc * square * parameters.softest);
     }
 
+    // Stages of growing stiffness, each from the state before.
+    var kc = parameters.kc;
+    if !FROZEN {
+        kc = min(kc, CONTINUATION_START / parameters.softest);
+    }
     var outcome = Outcome();
-    var radius = first_radius;
-    var squares = balance(contact, local);
-    var scale = max(sqrt(squares.y), RESIDUAL_FLOOR);
-    outcome.residual = sqrt(squares.x) / scale;
-    var converged = outcome.residual <= parameters.tolerance;
-    while !converged && outcome.iterations < parameters.max_iterations && radius > GIVE_UP_RADIUS * first_radius
-        && overflow == 0u
-    {
-        outcome.iterations += 1u;
-        let inner = clamp(outcome.residual, INNER_TOLERANCE_FLOOR, INNER_TOLERANCE);
-        let step = trust_region_step(contact, squares.x, radius, inner, local);
-        let motion = entries(STEP, slots[local]);
-        let deepening = dot(contact.normal, motion * contact.weights);
-        let felt = greatest(select(0.0, abs(deepening), contact.depth > 0.0), local);
-        if !step.at_boundary && (step.length <= parameters.tolerance * scale || felt <= parameters.depth_rounding) {
-            var work = vec4<f32>(0.0);
-            for (var slot = local; slot < support_count; slot += WORKGROUP) {
-                work.x += dot(vectors[at(FORCES, slot)] + 0.5 * vectors[at(STEP_FORCE, slot)], vectors[at(STEP, slot)]);
-            }
-            elastic += add_up(work, local).x;
-            contact.depth = select(0.0, contact.depth + deepening, contact.depth > 0.0);
-            outcome.residual = step.length / scale;
-            converged = true;
-            break;
-        }
-
-        // Try the step: DIRECTION_FORCE holds the trial's forces.
-        for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            vectors[at(DIRECTION_FORCE, slot)] = vectors[at(FORCES, slot)] + vectors[at(STEP_FORCE, slot)];
-        }
-        workgroupBarrier();
-        let moved = displace(DIRECTION_FORCE, local);
+    var contact = Contact();
+    var row = Contact();
+    var elastic = 0.0;
+    var energy = 0.0;
+    var square = 0.0;
+    var scale = 1.0;
+    var first_radius = 0.0;
+    var radius = 0.0;
+    var step = Step();
+    var settled = false;
+    var new_stage = false;
+    var converged = false;
+    // Each pass takes up a new stage, or tries the forces in DIRECTION_FORCE, none at first; and then steps on.
+    while overflow == 0u {
+        let at_rest = outcome.iterations == 0u && !new_stage;
+        var accepted = true;
         var trial = contact;
-        if FROZEN {
-            trial = frozen_contact(row);
+        if new_stage {
+            kc = min(parameters.kc, CONTINUATION_FACTOR * kc);
         } else {
-            deformed(moved, 0.0, local);
-            trial = own_contact(local);
+            let moved = displace(DIRECTION_FORCE, local);
+            if !FROZEN || at_rest {
+                trial = deformed(moved, reach, local);
+            }
+            if FROZEN {
+                if at_rest {
+                    row = trial;
+                    row.along = vec3<f32>(0.0);
+                    row.distance = 0.0;
+                    row.inverse_distance = 0.0;
+                    row.gradients = mat3x3<f32>();
+                }
+                trial = frozen_contact(row);
+            }
+            // As the step predicted it; zero for a contact that it did not know of.
+            trial.multiplier = kc * max(contact.depth + step.deepening, 0.0);
         }
         var sums = vec4<f32>(0.0);
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
@@ -132,40 +124,82 @@ fn main(
         }
         let trial_depth = max(trial.depth, 0.0);
         sums.y = trial_depth * trial_depth;
-        let depth = max(contact.depth, 0.0);
-        sums.z = depth * length(proxy_position(contact.proxy_node));
+        sums.z = max(contact.depth, 0.0) * length(proxy_position(contact.proxy_node));
         sums = add_up(sums, local);
-        let trial_elastic = 0.5 * sums.x;
-        let trial_energy = trial_elastic + 0.5 * parameters.kc * sums.y;
-        // Near the solution both decreases drown in rounding, which must not refuse a good step.
-        let rounding = ENERGY_ROUNDING * (energy + parameters.kc * sums.z);
-        let ratio = (energy - trial_energy + rounding) / (step.predicted + rounding);
-        if !(ratio >= POOR_SHARE) {
-            radius = SHRINK * step.length;
-        } else if ratio > GOOD_SHARE && step.at_boundary {
-            radius *= WIDEN;
+        let trial_energy = 0.5 * sums.x + 0.5 * kc * sums.y;
+        if at_rest || new_stage {
+            // 1/2 |u|^2 in the energy norm never exceeds E.
+            first_radius = sqrt(2.0 * trial_energy);
+            radius = first_radius;
+        } else {
+            // Near the solution both decreases drown in rounding, which must not refuse a good step.
+            let rounding = ENERGY_ROUNDING * (energy + kc * sums.z);
+            let ratio = (energy - trial_energy + rounding) / max(step.predicted + rounding, LEAST_DIVISOR);
+            if !(ratio >= POOR_SHARE) {
+                radius = SHRINK * step.length;
+            } else if ratio > GOOD_SHARE && step.at_boundary {
+                radius *= WIDEN;
+            }
+            accepted = ratio >= ACCEPTED_SHARE;
         }
-        if ratio >= ACCEPTED_SHARE {
+        if accepted {
             contact = trial;
-            elastic = trial_elastic;
+            elastic = 0.5 * sums.x;
             energy = trial_energy;
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
                 vectors[at(FORCES, slot)] = vectors[at(DIRECTION_FORCE, slot)];
             }
             workgroupBarrier();
-            squares = balance(contact, local);
+            let squares = balance(contact, kc, local);
+            square = squares.x;
             scale = max(sqrt(squares.y), RESIDUAL_FLOOR);
-            outcome.residual = sqrt(squares.x) / scale;
-            converged = outcome.residual <= parameters.tolerance;
-        } else {
-            // The residual that the step used up.
-            squares = balance(contact, local);
+            outcome.residual = sqrt(square) / scale;
+        }
+        new_stage = kc < parameters.kc && outcome.residual <= STAGE_TOLERANCE;
+        if new_stage {
+            // The state as it is, as a trial at the next stiffness.
+            for (var slot = local; slot < support_count; slot += WORKGROUP) {
+                vectors[at(DIRECTION_FORCE, slot)] = vectors[at(FORCES, slot)];
+            }
+            workgroupBarrier();
+            continue;
+        }
+        converged = kc == parameters.kc && outcome.residual <= parameters.tolerance;
+        if converged || outcome.iterations >= parameters.max_iterations || !(radius >= GIVE_UP_RADIUS * first_radius)
+            || overflow != 0u
+        {
+            break;
+        }
+
+        outcome.iterations += 1u;
+        let inner = clamp(outcome.residual, INNER_TOLERANCE_FLOOR, INNER_TOLERANCE);
+        step = trust_region_step(contact, kc, square, radius, inner, local);
+        let after = max(contact.depth + step.deepening, 0.0);
+        let felt = greatest(select(0.0, abs(step.deepening), max(contact.depth, after) > 0.0), local);
+        var work = vec4<f32>(0.0);
+        work.y = after;
+        for (var slot = local; slot < support_count; slot += WORKGROUP) {
+            let forces = vectors[at(FORCES, slot)];
+            let step_force = vectors[at(STEP_FORCE, slot)];
+            vectors[at(DIRECTION_FORCE, slot)] = forces + step_force;
+            work.x += dot(forces + 0.5 * step_force, vectors[at(STEP, slot)]);
+        }
+        work = add_up(work, local);
+        let settled_before = settled;
+        settled = felt <= parameters.depth_rounding;
+        let small = step.length <= parameters.tolerance * scale || (settled && settled_before);
+        if small && kc == parameters.kc && !step.at_boundary && work.y > 0.0 {
+            elastic += work.x;
+            contact.depth = after;
+            outcome.residual = step.length / scale;
+            converged = true;
+            break;
         }
     }
 
     let used = u32(greatest(select(0.0, f32(local + 1u), contact.depth > 0.0), local));
     if local < used {
-        write_touch(place, local, contact.nodes, contact.proxy_node, contact_forces(contact));
+        write_touch(place, local, contact.nodes, contact.proxy_node, contact_forces(contact, kc));
     }
     if local == 0u {
         outcome.status = select(STATUS_UNCONVERGED, STATUS_CONTACT, converged);

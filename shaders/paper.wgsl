@@ -61,14 +61,15 @@ fn vertex_normal(node: u32, x: vec3<f32>) -> vec3<f32> {
 
 // Step 1: proxy nodes inside, each tied to the three closest object nodes.
 fn tie_nodes(moved: f32, local: u32) -> Tie {
-    deformed(moved, 0.0, local);
+    // Ties are found anew in every pass.
     if local == 0u {
+        contact_count = 0u;
         support_count = 0u;
     }
+    let contact = deformed(moved, 0.0, local);
     var tie = Tie();
     tie.nodes = vec3<u32>(ABSENT);
     if local < contact_count {
-        let contact = own_contact(local);
         tie.proxy_node = contact.proxy_node;
         tie.target_point = proxy_position(contact.proxy_node) - contact.normal * proxy_radius(contact.proxy_node);
         tie.nodes = three_closest(tie.target_point);

@@ -10,9 +10,8 @@ override WORKGROUP: u32 = 32u;
 override SUPPORT: u32 = 64u;
 // Most contacts, at most WORKGROUP.
 override CONTACTS: u32 = 32u;
-// Sizes that follow (named, because naga 30 loses count of overrides in array sizes that are expressions).
+// A size that follows; named, because naga 30 loses count of overrides in array sizes that are expressions.
 override VECTOR_ENTRIES: u32 = VECTORS * SUPPORT;
-override FOUND_ENTRIES: u32 = 2u * WORKGROUP;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
 // Surface nodes at rest; then the bounding sphere (centre, radius) of each triangle; then each proxy node's radius in x.
@@ -187,9 +186,13 @@ fn proxy_radius(proxy_node: u32) -> f32 {
     return rest[parameters.surface_nodes + parameters.triangles + proxy_node].x;
 }
 
-// Proxy nodes and the triangle closest to each: those in contact first, then those of the pass under way.
-var<workgroup> found: array<vec2<u32>, FOUND_ENTRIES>;
+// Proxy node of each contact. Invocation k keeps contact k from the first touch on, also as a near miss.
+var<workgroup> contact_nodes: array<u32, WORKGROUP>;
+// Closest triangle of each contact, ABSENT while the node is far outside.
+var<workgroup> contact_triangles: array<u32, WORKGROUP>;
 var<workgroup> contact_count: u32;
+// Proxy nodes near the surface, with their closest triangles, on their way to the contacts.
+var<workgroup> near: array<vec2<u32>, WORKGROUP>;
 // Closest triangle among each invocation's.
 var<workgroup> candidates: array<u32, WORKGROUP>;
 
@@ -243,70 +246,76 @@ fn closest_triangle(proxy_node: u32, moved: f32, local: u32) -> u32 {
     return triangle;
 }
 
-// Appends those of the `waiting` nodes behind the contacts that are in contact to them. `reach` is zero, or how far
-// outside a node still counts.
-fn sift(waiting: u32, reach: f32, local: u32) {
-    var touching = 0.0;
-    if local < waiting {
-        let candidate = found[WORKGROUP + local];
-        touching = select(0.0, 1.0, contact_at(candidate.x, candidate.y).depth > -reach);
-    }
-    partial[local].x = touching;
-    workgroupBarrier();
-    if local == 0u {
-        for (var k = 0u; k < waiting; k += 1u) {
+// Brings the contacts up to date with `waiting` near nodes, of which `partial` says which touch. For one invocation.
+fn sift(waiting: u32) {
+    for (var k = 0u; k < waiting; k += 1u) {
+        let place = near[k];
+        var contact = 0u;
+        while contact < contact_count && contact_nodes[contact] != place.x {
+            contact += 1u;
+        }
+        if contact == contact_count {
             if partial[k].x == 0.0 {
                 continue;
             }
-            if contact_count == CONTACTS {
+            if contact == CONTACTS {
                 overflow = 1u;
-            } else {
-                found[contact_count] = found[WORKGROUP + k];
-                contact_count += 1u;
+                continue;
             }
+            contact_nodes[contact] = place.x;
+            contact_count += 1u;
         }
+        contact_triangles[contact] = place.y;
     }
-    workgroupBarrier();
 }
 
-// Proxy nodes in contact with the surface as displaced, at most by `moved`: `found` and `contact_count`, ascending.
-fn deformed(moved: f32, reach: f32, local: u32) {
-    if local == 0u {
-        contact_count = 0u;
-    }
-    var waiting = 0u;
-    for (var proxy_node = 0u; proxy_node < parameters.proxy_nodes; proxy_node += 1u) {
-        // A node outside at rest by more than the surface moves is outside still.
-        if positions[position_base + proxy_node].w > moved + reach + parameters.least_distance {
-            continue;
+// This invocation's contact with the surface as displaced, at most by `moved`: of every node that touches, or comes within
+// `reach`, now or did so before in this configuration (then with a depth below zero, as it may touch again). Without one,
+// depth and weights are zero.
+fn deformed(moved: f32, reach: f32, local: u32) -> Contact {
+    contact_triangles[local] = ABSENT;
+    var contact = Contact();
+    var proxy_node = 0u;
+    var finished = false;
+    // Passes over as many near nodes as there are invocations; a last one, without any, turns to the contacts.
+    while !finished {
+        var waiting = 0u;
+        while proxy_node < parameters.proxy_nodes && waiting < WORKGROUP {
+            // A node outside at rest by more than the surface moves is outside still.
+            if positions[position_base + proxy_node].w <= moved + reach + parameters.least_distance {
+                let triangle = closest_triangle(proxy_node, moved, local);
+                if local == 0u {
+                    near[waiting] = vec2<u32>(proxy_node, triangle);
+                }
+                waiting += 1u;
+            }
+            proxy_node += 1u;
         }
-        let triangle = closest_triangle(proxy_node, moved, local);
+        workgroupBarrier();
+        finished = waiting == 0u;
+        var place = near[local];
+        var taking_part = local < waiting;
+        if finished {
+            place = vec2<u32>(contact_nodes[local], contact_triangles[local]);
+            taking_part = local < contact_count && place.y != ABSENT;
+        }
+        contact = Contact();
+        if taking_part {
+            contact = contact_at(place.x, place.y);
+        }
+        partial[local].x = select(0.0, 1.0, contact.depth > -reach);
+        workgroupBarrier();
         if local == 0u {
-            found[WORKGROUP + waiting] = vec2<u32>(proxy_node, triangle);
+            sift(waiting);
         }
-        waiting += 1u;
-        if waiting == WORKGROUP {
-            workgroupBarrier();
-            sift(waiting, reach, local);
-            waiting = 0u;
-        }
+        workgroupBarrier();
     }
-    workgroupBarrier();
-    sift(waiting, reach, local);
-}
-
-// This invocation's contact; one without contact has no depth and acts on no node.
-fn own_contact(local: u32) -> Contact {
-    if local < contact_count {
-        return contact_at(found[local].x, found[local].y);
-    }
-    return Contact();
+    return contact;
 }
 
 // Nodes that a contact acts on.
 fn acting_nodes(contact: Contact) -> vec3<u32> {
-    let acts = (contact.weights != vec3<f32>(0.0)) & vec3<bool>(contact.depth > 0.0);
-    return select(vec3<u32>(ABSENT), contact.nodes, acts);
+    return select(vec3<u32>(ABSENT), contact.nodes, contact.weights != vec3<f32>(0.0));
 }
 
 // --- Results ---

@@ -42,18 +42,31 @@ fn corner_angle(triangle: u32, node: u32, x: vec3<f32>) -> f32 {
     return atan2(length(cross(left, right)), dot(left, right));
 }
 
-// Pseudonormal of a feature of a triangle near x, outward, not of length one (Baerentzen & Aanaes 2005).
+// Pseudonormal of a feature of a triangle near x, outward, not of length one (Baerentzen & Aanaes 2005): normals of the
+// face, of the two faces at an edge, or of those around a vertex weighted by their angles there.
 fn pseudonormal(triangle: u32, feature: u32, x: vec3<f32>) -> vec3<f32> {
-    if feature == FEATURE_FACE {
-        return face_normal(triangle, x);
+    var first = 0u;
+    var last = 1u;
+    var node = 0u;
+    if feature < FEATURE_EDGE {
+        node = corner(triangle, feature);
+        first = around_start(node);
+        last = around_start(node + 1u);
+    } else if feature < FEATURE_FACE {
+        last = 2u;
     }
-    if feature >= FEATURE_EDGE {
-        return face_normal(triangle, x) + face_normal(across(triangle, feature - FEATURE_EDGE), x);
-    }
-    let node = corner(triangle, feature);
     var sum = vec3<f32>(0.0);
-    for (var entry = around_start(node); entry < around_start(node + 1u); entry += 1u) {
-        sum += face_normal(around(entry), x) * corner_angle(around(entry), node, x);
+    for (var entry = first; entry < last; entry += 1u) {
+        // One loop for all features: a normal at each of four places would quadruple the program.
+        var face = triangle;
+        var weight = 1.0;
+        if feature < FEATURE_EDGE {
+            face = around(entry);
+            weight = corner_angle(face, node, x);
+        } else if entry == 1u {
+            face = across(triangle, feature - FEATURE_EDGE);
+        }
+        sum += weight * face_normal(face, x);
     }
     return sum;
 }

@@ -2,24 +2,30 @@
 // src/contact/trust_region.rs).
 
 const FORCES: u32 = 0u;
-// r, then the residual left over as the step grows.
-const RESIDUAL: u32 = 1u;
-// C times that.
-const PRECONDITIONED: u32 = 2u;
-const DIRECTION_FORCE: u32 = 3u;
-// C times that.
-const DIRECTION: u32 = 4u;
-const STEP_FORCE: u32 = 5u;
-// C times that.
-const STEP: u32 = 6u;
-const IMAGE: u32 = 7u;
-const VECTORS: u32 = 8u;
+// Residual force r = c(u) - f of the current state.
+const BALANCE: u32 = 1u;
+// What is left of it as the step grows, and C times that.
+const RESIDUAL: u32 = 2u;
+const PRECONDITIONED: u32 = 3u;
+// Search direction, and C times that.
+const DIRECTION_FORCE: u32 = 4u;
+const DIRECTION: u32 = 5u;
+// The step, and C times that.
+const STEP_FORCE: u32 = 6u;
+const STEP: u32 = 7u;
+// The step of the pass before, and C times that.
+const PREVIOUS_FORCE: u32 = 8u;
+const PREVIOUS_STEP: u32 = 9u;
+const IMAGE: u32 = 10u;
+const VECTORS: u32 = 11u;
 
 struct Step {
     // Decrease of the energy by the model [J].
     predicted: f32,
     // Length in the energy norm [sqrt(J)].
     length: f32,
+    // What the step deepens this invocation's contact by, to first order [m].
+    deepening: f32,
     // Whether the ball's boundary stopped it.
     at_boundary: bool,
 }
@@ -35,56 +41,111 @@ fn share_to_boundary(radius: f32, step_square: f32, mixed: f32, direction_square
     return select((root - mixed) / direction_square, left / max(mixed + root, LEAST_DIVISOR), mixed > 0.0);
 }
 
-// Step for the residual force r = RESIDUAL with PRECONDITIONED = C r and r . C r = `square`, within `radius`, solved to
-// `tolerance` relative to it; the step is left in STEP_FORCE and STEP.
-fn trust_region_step(contact: Contact, first_square: f32, radius: f32, tolerance: f32, local: u32) -> Step {
+// Step for the residual force BALANCE with energy norm `square`^(1/2), within `radius`, solved to `tolerance` relative to
+// it; the step is left in STEP_FORCE and STEP.
+fn trust_region_step(contact: Contact, kc: f32, square: f32, radius: f32, tolerance: f32, local: u32) -> Step {
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
-        vectors[at(DIRECTION_FORCE, slot)] = vectors[at(RESIDUAL, slot)];
-        vectors[at(DIRECTION, slot)] = vectors[at(PRECONDITIONED, slot)];
+        vectors[at(RESIDUAL, slot)] = vectors[at(BALANCE, slot)];
         vectors[at(STEP_FORCE, slot)] = vec3<f32>(0.0);
         vectors[at(STEP, slot)] = vec3<f32>(0.0);
     }
     workgroupBarrier();
-    var square = first_square;
-    let stop = tolerance * tolerance * first_square;
-    var result = Step(0.0, 0.0, false);
+    let stop = tolerance * tolerance * square;
+    var touching = contact.depth > 0.0;
+    var result = Step();
+    for (var pass_number = 0u; pass_number < MODEL_PASSES; pass_number += 1u) {
+        for (var slot = local; slot < support_count; slot += WORKGROUP) {
+            vectors[at(PREVIOUS_FORCE, slot)] = vectors[at(STEP_FORCE, slot)];
+            vectors[at(PREVIOUS_STEP, slot)] = vectors[at(STEP, slot)];
+        }
+        let stopped = conjugate_gradients(contact, select(0.0, kc, touching), radius, stop, local);
+
+        // m(0) - m(df), in differences that do not cancel near the solution.
+        let v = entries(STEP, slots[local]);
+        let bend = second_variation(contact, v);
+        let deepening = dot(contact.normal, v * contact.weights);
+        let before = max(contact.depth, 0.0);
+        let after = max(contact.depth + deepening, 0.0);
+        // The part of 1/2 kc depth^2 that is of first order is in the residual.
+        let stretch = select(after * after - before * (before + 2.0 * deepening), deepening * deepening,
+            before > 0.0 && after > 0.0);
+        let bending = dot(v[0], bend[0]) + dot(v[1], bend[1]) + dot(v[2], bend[2]);
+        let touches = contact.depth + deepening > 0.0;
+        var sums = vec4<f32>(-0.5 * (kc * stretch + contact.multiplier * bending), 0.0, 0.0, 0.0);
+        sums.y = select(0.0, 1.0, touches != touching);
+        for (var slot = local; slot < support_count; slot += WORKGROUP) {
+            let step = vectors[at(STEP, slot)];
+            let step_square = dot(step, vectors[at(STEP_FORCE, slot)]);
+            sums.x += dot(step, vectors[at(BALANCE, slot)]) - 0.5 * step_square;
+            sums.z += step_square;
+        }
+        sums = add_up(sums, local);
+        if pass_number > 0u && !(sums.x > result.predicted) {
+            // Contacts came and went to no avail: the pass before was better.
+            for (var slot = local; slot < support_count; slot += WORKGROUP) {
+                vectors[at(STEP_FORCE, slot)] = vectors[at(PREVIOUS_FORCE, slot)];
+                vectors[at(STEP, slot)] = vectors[at(PREVIOUS_STEP, slot)];
+            }
+            workgroupBarrier();
+            break;
+        }
+        result = Step(sums.x, sqrt(max(sums.z, 0.0)), deepening, stopped);
+        touching = touches;
+        if sums.y == 0.0 {
+            break;
+        }
+
+        // Residual force of the model at the step.
+        let push = kc * (after - before);
+        shares[local] = mat3x3<f32>(
+            -(contact.normal * (push * contact.weights.x) + bend[0] * contact.multiplier),
+            -(contact.normal * (push * contact.weights.y) + bend[1] * contact.multiplier),
+            -(contact.normal * (push * contact.weights.z) + bend[2] * contact.multiplier),
+        );
+        workgroupBarrier();
+        for (var slot = local; slot < support_count; slot += WORKGROUP) {
+            vectors[at(RESIDUAL, slot)] = vectors[at(BALANCE, slot)] - vectors[at(STEP_FORCE, slot)] + gather(slot);
+        }
+        workgroupBarrier();
+    }
+    return result;
+}
+
+// Goes on from the current step, contacts having stiffness `kc` or, where they do not touch, none, until the residual's
+// squared energy norm is at most `stop`; true when the boundary stopped it.
+fn conjugate_gradients(contact: Contact, kc: f32, radius: f32, stop: f32, local: u32) -> bool {
+    var square = 0.0;
     let most = INNER_ITERATIONS_PER_UNKNOWN * 3u * support_count;
-    for (var iteration = 0u; iteration < most; iteration += 1u) {
-        if square <= stop {
-            break;
-        }
-        shares[local] = mat3x3<f32>();
-        if contact.depth > 0.0 {
-            shares[local] = hessian_product(contact, parameters.kc, entries(DIRECTION, slots[local]));
-        }
-        workgroupBarrier();
-        var products = vec4<f32>(0.0);
-        for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            let direction_force = vectors[at(DIRECTION_FORCE, slot)];
-            let direction = vectors[at(DIRECTION, slot)];
-            let step_force = vectors[at(STEP_FORCE, slot)];
-            let image = direction_force + gather(slot);
-            vectors[at(IMAGE, slot)] = image;
-            products += vec4<f32>(dot(direction, image), dot(step_force, direction), dot(direction_force, direction),
-                dot(step_force, vectors[at(STEP, slot)]));
-        }
-        products = add_up(products, local);
-        let curvature = products.x;
-        let to_boundary = share_to_boundary(radius, products.w, products.y, products.z);
-        let newton = square / max(curvature, LEAST_DIVISOR);
-        result.at_boundary = !(curvature > 0.0 && newton < to_boundary);
-        let share = select(newton, to_boundary, result.at_boundary);
-        // Along a conjugate direction the residual's part is `square`: no need for the residual at the start.
-        result.predicted += share * (square - 0.5 * share * curvature);
-        result.length = sqrt(max(products.w + share * (2.0 * products.y + share * products.z), 0.0));
-        for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            vectors[at(STEP_FORCE, slot)] += share * vectors[at(DIRECTION_FORCE, slot)];
-            vectors[at(STEP, slot)] += share * vectors[at(DIRECTION, slot)];
-            vectors[at(RESIDUAL, slot)] -= share * vectors[at(IMAGE, slot)];
-        }
-        workgroupBarrier();
-        if result.at_boundary {
-            break;
+    // Iteration 0 only begins: one place for the product with C keeps the program small.
+    for (var iteration = 0u; iteration <= most; iteration += 1u) {
+        if iteration > 0u {
+            shares[local] = hessian_product(contact, kc, entries(DIRECTION, slots[local]));
+            workgroupBarrier();
+            var products = vec4<f32>(0.0);
+            for (var slot = local; slot < support_count; slot += WORKGROUP) {
+                let direction_force = vectors[at(DIRECTION_FORCE, slot)];
+                let direction = vectors[at(DIRECTION, slot)];
+                let step_force = vectors[at(STEP_FORCE, slot)];
+                let image = direction_force + gather(slot);
+                vectors[at(IMAGE, slot)] = image;
+                products += vec4<f32>(dot(direction, image), dot(step_force, direction),
+                    dot(direction_force, direction), dot(step_force, vectors[at(STEP, slot)]));
+            }
+            products = add_up(products, local);
+            let curvature = products.x;
+            let to_boundary = share_to_boundary(radius, products.w, products.y, products.z);
+            let newton = square / max(curvature, LEAST_DIVISOR);
+            let inside = curvature > 0.0 && newton < to_boundary;
+            let share = select(to_boundary, newton, inside);
+            for (var slot = local; slot < support_count; slot += WORKGROUP) {
+                vectors[at(STEP_FORCE, slot)] += share * vectors[at(DIRECTION_FORCE, slot)];
+                vectors[at(STEP, slot)] += share * vectors[at(DIRECTION, slot)];
+                vectors[at(RESIDUAL, slot)] -= share * vectors[at(IMAGE, slot)];
+            }
+            workgroupBarrier();
+            if !inside {
+                return true;
+            }
         }
         var next = 0.0;
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
@@ -93,7 +154,7 @@ fn trust_region_step(contact: Contact, first_square: f32, radius: f32, tolerance
             next += dot(vectors[at(RESIDUAL, slot)], preconditioned);
         }
         next = add_up(vec4<f32>(next, 0.0, 0.0, 0.0), local).x;
-        let ratio = next / max(square, LEAST_DIVISOR);
+        let ratio = select(0.0, next / max(square, LEAST_DIVISOR), iteration > 0u);
         square = next;
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
             vectors[at(DIRECTION_FORCE, slot)] =
@@ -101,6 +162,9 @@ fn trust_region_step(contact: Contact, first_square: f32, radius: f32, tolerance
             vectors[at(DIRECTION, slot)] = vectors[at(PRECONDITIONED, slot)] + ratio * vectors[at(DIRECTION, slot)];
         }
         workgroupBarrier();
+        if square <= stop {
+            break;
+        }
     }
-    return result;
+    return false;
 }

@@ -172,14 +172,21 @@ fn constants() -> String {
         ("WIDEN", tolerances::WIDEN as f32),
         ("INNER_TOLERANCE", tolerances::INNER_TOLERANCE as f32),
         ("INNER_TOLERANCE_FLOOR", tolerances::GPU_INNER_TOLERANCE_FLOOR),
+        ("CONTINUATION_START", tolerances::CONTINUATION_START as f32),
+        ("CONTINUATION_FACTOR", tolerances::CONTINUATION_FACTOR as f32),
+        ("STAGE_TOLERANCE", tolerances::STAGE_TOLERANCE as f32),
         ("ENERGY_ROUNDING", tolerances::GPU_ENERGY_ROUNDING),
         ("GIVE_UP_RADIUS", tolerances::GPU_GIVE_UP_RADIUS),
         ("PAPER_INNER_TOLERANCE", tolerances::GPU_PAPER_INNER_TOLERANCE),
     ] {
         text.push_str(&format!("const {name}: f32 = {value:e}f;\n"));
     }
-    let most = tolerances::INNER_ITERATIONS_PER_UNKNOWN;
-    text.push_str(&format!("const INNER_ITERATIONS_PER_UNKNOWN: u32 = {most}u;\n"));
+    for (name, count) in [
+        ("INNER_ITERATIONS_PER_UNKNOWN", tolerances::INNER_ITERATIONS_PER_UNKNOWN),
+        ("MODEL_PASSES", tolerances::MODEL_PASSES),
+    ] {
+        text.push_str(&format!("const {name}: u32 = {count}u;\n"));
+    }
     text
 }
 

@@ -88,6 +88,8 @@ fn equilibrium(
         result.touches.push(contact::Touch { proxy_node: touch.proxy_node, nodes: touch.nodes, weights, force });
         parts.extend(touch.nodes.into_iter().zip(forces).filter(|(_, part)| *part != DVec3::ZERO));
     }
+    // The kernel lists contacts in the order of their first touch.
+    result.touches.sort_by_key(|touch| touch.proxy_node);
     parts.sort_by_key(|&(node, _)| node);
     for (node, part) in parts {
         match result.forces.last_mut() {
