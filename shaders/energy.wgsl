@@ -134,7 +134,9 @@ fn main(
         } else {
             // Near the solution both decreases drown in rounding, which must not refuse a good step.
             let rounding = ENERGY_ROUNDING * (energy + kc * sums.z);
-            let ratio = (energy - trial_energy + rounding) / max(step.predicted + rounding, LEAST_DIVISOR);
+            let promised = step.predicted + rounding;
+            // Contacts that come and go may leave a step that promises nothing.
+            let ratio = select(0.0, (energy - trial_energy + rounding) / promised, promised > 0.0);
             if !(ratio >= POOR_SHARE) {
                 radius = SHRINK * step.length;
             } else if ratio > GOOD_SHARE && step.at_boundary {

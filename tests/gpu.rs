@@ -1,11 +1,15 @@
 //! The GPU backend against the CPU's f64 solver, on whatever adapter there is (software Vulkan counts). None is a failure.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use glam::DVec3;
 use haptize::JointVector;
 use haptize::contact::{Equilibrium, Model, Solver, Status};
-use haptize::gpu::{AdapterChoice, Context, GpuSolver};
+use haptize::gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuError, GpuSolver, Room, adapters};
 use haptize::haptize::Backend;
 use haptize::object::Object;
 use haptize::proxy::Chain;
+use haptize::render::graphics::ObjectMotion;
 use haptize::scene::{Algorithm, Scene};
 use std::sync::{Arc, OnceLock};
 
@@ -44,41 +48,296 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Relative agreement that f32 owes f64 where both converged to the tolerance 1e-5: a hundred times the residual's
-/// square in U, which is stationary, and ten times the residual in the torque.
-const ENERGY_AGREEMENT: f64 = 1e-5;
+/// Relative agreement of U that f32 owes f64: U is stationary in the displacement, so it differs by the rounding of proxy
+/// positions (1e-8 m of a depth of a millimetre or more) and of sums (a hundred terms of 6e-8).
+const ENERGY_AGREEMENT: f64 = 1e-4;
+
+/// Relative agreement of the torque: ten times the residual of 1e-5 that f32 is asked for.
 const TORQUE_AGREEMENT: f64 = 1e-4;
 
-/// What differs between two results beyond f32, or `None`.
+/// Agreement of gaps [m]: coordinates of about 0.2 m rounded a few times by 6e-8.
+const GAP_AGREEMENT: f64 = 1e-7;
+
+/// What differs between an f64 and an f32 result beyond rounding, or `None`.
 fn difference(cpu: &Equilibrium, gpu: &Equilibrium) -> Option<String> {
-    if cpu.status != gpu.status {
-        return Some(format!("status {:?}, {:?}", cpu.status, gpu.status));
+    let gap = (cpu.gap - gpu.gap).abs();
+    if cpu.status != gpu.status || gap > GAP_AGREEMENT {
+        return Some(format!("status {:?}, {:?}; gap {gap:.1e} m", cpu.status, gpu.status));
     }
     if cpu.status != Status::Contact {
         return None;
     }
     let energy = (cpu.energy - gpu.energy).abs() / cpu.energy;
     let torque = distance(&cpu.torque, &gpu.torque) / cpu.torque.norm();
-    let agree = energy <= ENERGY_AGREEMENT && torque <= TORQUE_AGREEMENT && (cpu.gap - gpu.gap).abs() < 1e-6;
-    (!agree).then(|| format!("U {energy:.1e}, tau {torque:.1e}, gap {:.1e}", cpu.gap - gpu.gap))
+    (!(energy <= ENERGY_AGREEMENT && torque <= TORQUE_AGREEMENT)).then(|| format!("U {energy:.1e}, tau {torque:.1e}"))
+}
+
+/// Share by which f32 may miss an invariant that is recomputed in f64 [1].
+const INVARIANT_AGREEMENT: f64 = 1e-4;
+
+/// What is rounded of a depth recomputed in f64 at the exact proxy position [m].
+const DEPTH_AGREEMENT: f64 = 1e-7;
+
+/// Which law a result of the energy form breaks, recomputed in f64 from its forces alone, or `None`.
+fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<String> {
+    let pose = {
+        let mut pose = model.chain.new_pose();
+        model.chain.pose(q, &mut pose);
+        pose
+    };
+    // Force balance: u = K^-1 f.
+    let displacement = |node: u32| -> DVec3 {
+        let compliance = &model.object.compliance;
+        result.forces.iter().map(|f| compliance.block(node as usize, f.node as usize) * f.force).sum()
+    };
+    let mut torque = JointVector::zeros(q.len());
+    let mut energy = 0.0;
+    for touch in &result.touches {
+        let magnitude = touch.force.length();
+        let normal = touch.force / magnitude;
+        // Contact law: lambda = kc depth, and compression: lambda > 0 outwards.
+        let foot: DVec3 = (touch.nodes.iter().zip(touch.weights))
+            .map(|(&node, weight)| (model.object.rest[node as usize] + displacement(node)) * weight)
+            .sum();
+        let radius = model.chain.nodes[touch.proxy_node as usize].radius;
+        let depth = radius + normal.dot(foot - pose.nodes[touch.proxy_node as usize]);
+        if (depth - magnitude / model.kc).abs() > DEPTH_AGREEMENT + INVARIANT_AGREEMENT * depth.abs() {
+            return Some(format!("contact law: depth {depth:e} m, force {magnitude:e} N"));
+        }
+        let outward = model.object.triangles.iter().find(|t| t.iter().all(|n| touch.nodes.contains(n)));
+        let corners = outward.map(|t| t.map(|n| model.object.rest[n as usize] + displacement(n)));
+        let Some([a, b, c]) = corners else { return Some(format!("no triangle {:?}", touch.nodes)) };
+        if (b - a).cross(c - a).dot(normal) < 0.0 {
+            return Some("tension".into());
+        }
+        energy += 0.5 * magnitude * magnitude / model.kc;
+        model.chain.add_torque(&pose, touch.proxy_node as usize, touch.force, &mut torque);
+    }
+    for force in &result.forces {
+        // The object's nodes carry what the touches press on them.
+        let pressed: DVec3 = (result.touches.iter())
+            .flat_map(|touch| {
+                touch.nodes.iter().zip(touch.weights).map(|(&node, weight)| (node, touch.force * -weight))
+            })
+            .filter_map(|(node, part)| (node == force.node).then_some(part))
+            .sum();
+        if force.force.distance(pressed) > 1e-5 * pressed.length() {
+            return Some(format!("node {} carries {} N of {pressed} N", force.node, force.force));
+        }
+        energy += 0.5 * force.force.dot(displacement(force.node));
+    }
+    if distance(&torque, &result.torque) > 1e-12 * torque.norm() {
+        return Some(format!("tau {:?} is not J^T f {torque:?}", result.torque));
+    }
+    if (energy - result.energy).abs() > INVARIANT_AGREEMENT * energy {
+        return Some(format!("U {:e}, by its forces {energy:e}", result.energy));
+    }
+    None
+}
+
+/// Solves a part of a scene on both sides; asserts agreement and, of the energy form, its laws.
+fn check_scene(name: &str, algorithm: Algorithm, stride: usize) {
+    let (scene, object, chain) = load(name);
+    let configurations = configurations(&scene, 11, stride);
+    let model = Model::new(&object, &chain, haptize::scene::ContactSpec { algorithm, ..scene.contact });
+    let mut cpu = Solver::new(&model);
+    let mut gpu = GpuSolver::new(context(), &model).unwrap();
+    let results = gpu.solve(&configurations).unwrap();
+    assert_eq!(results.len(), configurations.len());
+    let (mut touching, mut unlike) = (0, Vec::new());
+    for (q, result) in configurations.iter().zip(&results) {
+        let reference = cpu.solve(q);
+        if reference.status == Status::Contact {
+            touching += 1;
+            if algorithm != Algorithm::Paper && result.status == Status::Contact {
+                assert_eq!(broken_law(&model, q, result), None, "{name}, {algorithm:?}, {q:?}");
+            }
+        }
+        unlike.extend(difference(&reference, result).map(|difference| format!("{q:?}: {difference}")));
+    }
+    // The paper's iteration converges for few of those in contact.
+    let expected = if algorithm == Algorithm::Paper { 5 } else { 15 };
+    assert!(touching >= expected, "{name}, {algorithm:?}: only {touching} configurations in contact");
+    // The paper's iteration is chaotic where it does not settle at once: rounding decides now and then whether it does.
+    let allowed = if algorithm == Algorithm::Paper { configurations.len() / 50 } else { 0 };
+    assert!(unlike.len() <= allowed, "{name}, {algorithm:?}: {unlike:#?}");
+    // Left to the CPU: what lies within rounding of no contact, about 1e-6 of all; on scenes of moderate stiffness little else.
+    assert!(gpu.solved_on_cpu() * 10 <= touching, "{name}, {algorithm:?}: {} left to the CPU", gpu.solved_on_cpu());
 }
 
 #[test]
 fn the_sphere_has_the_same_equilibria_on_gpu_and_cpu() {
+    check_scene("sphere.toml", Algorithm::Energy, 131);
+    check_scene("sphere.toml", Algorithm::Linearised, 131);
+    check_scene("sphere.toml", Algorithm::Paper, 131);
+}
+
+#[test]
+fn the_mesh_has_the_same_equilibria_on_gpu_and_cpu() {
+    check_scene("mesh.toml", Algorithm::Energy, 101);
+    check_scene("mesh.toml", Algorithm::Linearised, 101);
+    check_scene("mesh.toml", Algorithm::Paper, 101);
+}
+
+#[test]
+fn the_comparators_reject_perturbed_results() {
+    let (scene, object, chain) = load("sphere.toml");
+    let model = Model::new(&object, &chain, scene.contact);
+    let mut cpu = Solver::new(&model);
+    let (q, good) = configurations(&scene, 11, 131)
+        .into_iter()
+        .map(|q| (q, cpu.solve(&q)))
+        .find(|(_, result)| result.touches.len() >= 2)
+        .unwrap();
+    assert_eq!(difference(&good, &good), None);
+    assert_eq!(broken_law(&model, &q, &good), None);
+    let perturbed = |change: &dyn Fn(&mut Equilibrium)| {
+        let mut bad = good.clone();
+        change(&mut bad);
+        bad
+    };
+    assert!(difference(&good, &perturbed(&|bad| bad.torque.iter_mut().for_each(|tau| *tau *= 1.0 + 3e-4))).is_some());
+    assert!(difference(&good, &perturbed(&|bad| bad.energy *= 1.0 + 3e-4)).is_some());
+    assert!(difference(&good, &perturbed(&|bad| bad.gap += 1e-6)).is_some());
+    assert!(difference(&good, &perturbed(&|bad| bad.status = Status::Unconverged)).is_some());
+    assert!(
+        broken_law(&model, &q, &perturbed(&|bad| bad.torque.iter_mut().for_each(|tau| *tau *= 1.0 + 1e-9))).is_some()
+    );
+    assert!(broken_law(&model, &q, &perturbed(&|bad| bad.energy *= 1.0 + 3e-4)).is_some());
+    assert!(broken_law(&model, &q, &perturbed(&|bad| bad.forces[0].force *= 1.01)).is_some());
+    assert!(broken_law(&model, &q, &perturbed(&|bad| bad.touches[0].force *= -1.0)).is_some());
+    assert!(broken_law(&model, &q, &perturbed(&|bad| bad.touches[0].weights.swap(0, 1))).is_some());
+}
+
+#[test]
+fn sizes_of_chunks_and_batches_leave_no_trace() {
+    let (scene, object, chain) = load("sphere.toml");
+    let configurations = configurations(&scene, 5, 211);
+    let model = Model::new(&object, &chain, scene.contact);
+    let solve = |room| GpuSolver::with_room(context(), &model, room).unwrap().solve(&configurations).unwrap();
+    let whole = solve(Room::default());
+    let pieces = solve(Room { chunk: 7, batch: 2, ..Room::default() });
+    assert!(whole.iter().any(|result| result.status == Status::Contact));
+    assert_eq!(format!("{whole:?}"), format!("{pieces:?}"), "bit for bit");
+}
+
+#[test]
+fn contacts_beyond_the_kernels_room_are_solved_on_the_cpu() {
     let (scene, object, chain) = load("sphere.toml");
     let configurations = configurations(&scene, 11, 131);
-    let mut spec = scene.contact;
-    spec.algorithm = Algorithm::Energy;
-    let model = Model::new(&object, &chain, spec);
-    let mut cpu = Solver::new(&model);
-    let mut gpu = GpuSolver::new(context(), &model).unwrap();
-    let results = gpu.solve(&configurations).unwrap();
-    let mut touching = 0;
-    for (q, result) in configurations.iter().zip(&results) {
-        let reference = cpu.solve(q);
-        touching += usize::from(reference.status == Status::Contact);
-        assert_eq!(difference(&reference, result), None, "{q:?}");
+    for algorithm in [Algorithm::Energy, Algorithm::Paper] {
+        let model = Model::new(&object, &chain, haptize::scene::ContactSpec { algorithm, ..scene.contact });
+        let mut cpu = Solver::new(&model);
+        let mut gpu = GpuSolver::with_room(context(), &model, Room { contacts: 2, ..Room::default() }).unwrap();
+        let results = gpu.solve(&configurations).unwrap();
+        let mut crowded = 0;
+        for (q, result) in configurations.iter().zip(&results) {
+            assert_ne!(result.status, Status::Overflow);
+            let reference = cpu.solve(q);
+            if reference.touches.len() > 2 {
+                crowded += 1;
+                assert_eq!(format!("{result:?}"), format!("{reference:?}"), "the f64 result itself");
+            }
+        }
+        assert!(crowded > 1, "{algorithm:?}: only {crowded}");
+        assert!(gpu.solved_on_cpu() >= crowded);
     }
-    assert!(touching > 15, "only {touching} configurations touch");
-    assert!(gpu.solved_on_cpu() * 10 <= touching, "{} of {touching} left to the CPU", gpu.solved_on_cpu());
+}
+
+#[test]
+fn no_configuration_is_no_work() {
+    let (scene, object, chain) = load("sphere.toml");
+    let model = Model::new(&object, &chain, scene.contact);
+    assert!(GpuSolver::new(context(), &model).unwrap().solve(&[]).unwrap().is_empty());
+}
+
+#[test]
+fn asking_for_hardware_names_what_was_found_instead() {
+    let hardware = adapters().iter().any(|adapter| adapter.hardware);
+    match Context::open(AdapterChoice::Hardware) {
+        Ok(context) => assert!(hardware && context.adapter().hardware),
+        Err(GpuError::NoAdapter { found, .. }) => {
+            assert!(!hardware);
+            assert!(adapters().iter().all(|adapter| found.contains(&adapter.name)), "{found}");
+        }
+        Err(other) => panic!("{other}"),
+    }
+}
+
+/// A push on one node for some frames, then none: states of both sides after each frame.
+fn frames(method: FrameMethod, check: impl Fn(usize, &ObjectMotion, &[DVec3], &[DVec3])) {
+    let (_, object, _) = load("sphere.toml");
+    let period = 1.0 / 60.0;
+    let mut twin = ObjectMotion::new(&object, period).unwrap();
+    let mut gpu = FrameUpdate::new(context(), &object, period, method).unwrap();
+    for frame in 0..40 {
+        let mut forces = vec![DVec3::ZERO; object.rest.len()];
+        if frame < 15 {
+            forces[17] = DVec3::new(1.0, -0.5, 2.0);
+            forces[60] = DVec3::new(0.0, 0.3, 0.0);
+        }
+        twin.step(&forces);
+        gpu.step(&forces).unwrap();
+        let (displacement, velocity) = gpu.read().unwrap();
+        check(frame, &twin, &displacement, &velocity);
+    }
+}
+
+/// Largest difference of two fields over the largest of the first.
+fn relative(reference: &[DVec3], other: &[DVec3]) -> f64 {
+    let size = reference.iter().map(|v| v.length()).fold(0.0, f64::max);
+    let error = reference.iter().zip(other).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    error / size
+}
+
+/// Stored and kinetic energy of the object [J].
+fn energy(object: &Object, displacement: &[DVec3], velocity: &[DVec3]) -> f64 {
+    let mut force = vec![DVec3::ZERO; displacement.len()];
+    object.stiffness.apply(displacement, &mut force);
+    let stored: f64 = displacement.iter().zip(&force).map(|(u, f)| u.dot(*f)).sum();
+    let kinetic: f64 = velocity.iter().zip(&object.mass).map(|(v, m)| m * v.length_squared()).sum();
+    0.5 * (stored + kinetic)
+}
+
+#[test]
+fn frames_follow_the_cpus() {
+    // Forty frames of sums of three hundred terms rounded by 6e-8 each.
+    frames(FrameMethod::Inverse, |frame, twin, displacement, velocity| {
+        assert!(relative(twin.displacement(), displacement) < 1e-4, "frame {frame}");
+        assert!(relative(twin.velocity(), velocity) < 1e-4, "frame {frame}");
+    });
+    frames(FrameMethod::Iterations(60), |frame, twin, displacement, velocity| {
+        assert!(relative(twin.displacement(), displacement) < 1e-3, "frame {frame}");
+        assert!(relative(twin.velocity(), velocity) < 1e-3, "frame {frame}");
+    });
+    let rotated: Vec<DVec3> = [DVec3::X, DVec3::Y].into();
+    assert!(relative(&[DVec3::X, DVec3::X], &rotated) > 1.0, "the comparator tells fields apart");
+}
+
+#[test]
+fn without_forces_the_objects_energy_never_rises_however_few_the_iterations() {
+    let (_, object, _) = load("sphere.toml");
+    for method in [FrameMethod::Inverse, FrameMethod::Iterations(1), FrameMethod::Iterations(3)] {
+        let before = std::cell::Cell::new(f64::MAX);
+        let greatest = std::cell::Cell::new(0.0f64);
+        frames(method, |frame, _, displacement, velocity| {
+            let now = energy(&object, displacement, velocity);
+            assert!(now.is_finite());
+            greatest.set(greatest.get().max(now));
+            if frame > 15 {
+                // To rounding of what is stored: 1e-6 of it.
+                assert!(now <= before.get() * (1.0 + 1e-6), "{method:?}, frame {frame}: {now} after {}", before.get());
+            }
+            before.set(now);
+        });
+        assert!(greatest.get() > 1e-6 && before.get() < 0.9 * greatest.get(), "{method:?}: it moved, and came to rest");
+    }
+}
+
+#[test]
+fn a_frame_period_that_is_no_time_is_refused() {
+    let (_, object, _) = load("sphere.toml");
+    for period in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+        assert!(FrameUpdate::new(context(), &object, period, FrameMethod::Inverse).is_err());
+    }
 }

@@ -11,10 +11,7 @@ use super::{
     layout::FrameParameters,
     shaders,
 };
-use crate::{
-    contact::NodeForce,
-    object::{Factor, FactorError, Object},
-};
+use crate::object::{Factor, FactorError, Object};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -53,6 +50,9 @@ pub enum FrameError {
     /// The matrix.
     #[error(transparent)]
     Matrix(#[from] FactorError),
+    /// The time between frames is not a positive number.
+    #[error("the time between frames is {0} s; it must be a positive number")]
+    Period(f64),
 }
 
 /// One recorded dispatch: kernel, bindings, workgroups.
@@ -64,8 +64,8 @@ pub struct FrameUpdate {
     nodes: usize,
     state: StorageBuffer,
     forces: StorageBuffer,
-    /// Dense copy of the forces, so that a frame writes them in one go.
-    dense_forces: Vec<[f32; 4]>,
+    /// The forces as the shader reads them.
+    padded_forces: Vec<[f32; 4]>,
     stages: Vec<Stage>,
 }
 
@@ -75,6 +75,9 @@ impl FrameUpdate {
     /// # Errors
     /// When the matrix is not positive definite (masses, damping or period are not positive) or the device refuses.
     pub fn new(context: Arc<Context>, object: &Object, period: f64, method: FrameMethod) -> Result<Self, FrameError> {
+        if !(period > 0.0 && period.is_finite()) {
+            return Err(FrameError::Period(period));
+        }
         let nodes = object.rest.len();
         let gpu = context.as_ref();
         let state = StorageBuffer::from_slice(gpu, "frame state", &vec![[0.0f32; 4]; 2 * nodes])?;
@@ -106,21 +109,19 @@ impl FrameUpdate {
                 iterative_stages(gpu, [&even, &odd], common, [&work, &sums], groups, iterations)?
             }
         };
-        Ok(Self { nodes, state, forces, dense_forces: vec![[0.0; 4]; nodes], stages, context })
+        Ok(Self { nodes, state, forces, padded_forces: vec![[0.0; 4]; nodes], stages, context })
     }
 
-    /// Advances by one frame under `forces` on the object's nodes. Does not wait for the device.
+    /// Advances by one frame under `forces`, one per node [N]; missing ones count as zero. Does not wait for the device.
     ///
     /// # Errors
     /// When the device has failed.
-    pub fn step(&mut self, forces: &[NodeForce]) -> Result<(), GpuError> {
-        self.dense_forces.fill([0.0; 4]);
-        for NodeForce { node, force } in forces {
-            if let Some(dense) = self.dense_forces.get_mut(*node as usize) {
-                *dense = [force.x as f32, force.y as f32, force.z as f32, 0.0];
-            }
+    pub fn step(&mut self, forces: &[DVec3]) -> Result<(), GpuError> {
+        self.padded_forces.fill([0.0; 4]);
+        for (padded, force) in self.padded_forces.iter_mut().zip(forces) {
+            *padded = force.as_vec3().extend(0.0).to_array();
         }
-        self.forces.write(&self.context, &self.dense_forces);
+        self.forces.write(&self.context, &self.padded_forces);
         let mut encoder = self.context.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
