@@ -35,7 +35,7 @@ fn build(data: &Dataset) -> Haptics {
     let joints = data.grid.joints();
     let spec = haptics(joints);
     let field = TorqueField::new(data, spec.threshold, &spec.boundary_slope).unwrap();
-    Haptics::new(field, proxy(joints), &spec)
+    Haptics::new(field, proxy(joints), &spec).unwrap()
 }
 
 fn hand(joints: usize) -> SimulatedHand {

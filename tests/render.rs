@@ -13,19 +13,21 @@ use haptize::{
     contact::Status,
     dataset::{Contacts, Dataset},
     device::{Device, Motion, Reading, Recorded, SimulatedHand},
+    haptize::{BackendChoice, Bake},
     object::Object,
     render::{
         field::TorqueField,
         flags::{Fault, Flags},
         graphics::{ContactForces, Graphics, GraphicsError, ObjectMotion},
-        haptic::{Haptics, Inputs},
+        haptic::{Haptics, Inputs, JointsError},
         passivity,
         session::{self, Plan},
-        setup::labels,
-        trace::Trace,
+        setup::{Setup, SetupError, labels},
+        trace::{Frame, Trace},
     },
-    scene::{GroundNodes, GroundSpec, HapticsSpec, ObjectSpec, Shape, SpringKind, SpringSpec, Waypoint},
+    scene::{GroundNodes, GroundSpec, HapticsSpec, ObjectSpec, Scene, Shape, SpringKind, SpringSpec, Waypoint},
 };
+use std::sync::atomic::AtomicBool;
 use synthetic::{dataset, grid, half_space};
 
 fn vector(values: &[f64]) -> JointVector {
@@ -44,7 +46,7 @@ fn object(joints: usize) -> Dataset {
 
 fn build(data: &Dataset, spec: &HapticsSpec) -> Haptics {
     let field = TorqueField::new(data, spec.threshold, &spec.boundary_slope).unwrap();
-    Haptics::new(field, proxy(data.grid.joints()), spec)
+    Haptics::new(field, proxy(data.grid.joints()), spec).unwrap()
 }
 
 fn plan(data: &Dataset, seconds: f64) -> Plan {
@@ -66,24 +68,30 @@ fn pressed(joints: usize, spec: &HapticsSpec) -> Trace {
     session::run(&haptics, &mut hand, None, &plan(&data, 2.0)).unwrap()
 }
 
-/// A device that reports what it is told.
-struct Scripted(Vec<Reading>, usize);
+/// A device that reports what it is told, and keeps the torque that it was given last.
+struct Scripted {
+    readings: Vec<Reading>,
+    next: usize,
+    torque: JointVector,
+}
 
 impl Scripted {
     fn new(positions: impl IntoIterator<Item = JointVector>) -> Self {
         let reading = |position| Reading { position, age: 0.0, hand: position };
-        Self(positions.into_iter().map(reading).collect(), 0)
+        Self { readings: positions.into_iter().map(reading).collect(), next: 0, torque: vector(&[]) }
     }
 }
 
 impl Device for Scripted {
     fn read(&mut self, _: f64) -> Reading {
-        let reading = self.0[self.1.min(self.0.len() - 1)];
-        self.1 += 1;
+        let reading = self.readings[self.next.min(self.readings.len() - 1)];
+        self.next += 1;
         reading
     }
 
-    fn apply(&mut self, _: &JointVector) {}
+    fn apply(&mut self, torque: &JointVector) {
+        self.torque = *torque;
+    }
 }
 
 #[test]
@@ -132,6 +140,7 @@ fn without_input_the_proxy_comes_to_rest_and_the_device_feels_the_contact_torque
     let haptics = build(&data, &spec);
     let mut device = Scripted::new([all(3, 0.3)]);
     let trace = session::run(&haptics, &mut device, None, &plan(&data, 3.0)).unwrap();
+    assert_eq!(device.torque, all(3, 0.0), "the session leaves the device without torque");
     let last = trace.ticks.last().unwrap();
     assert!(last.accounts.kinetic < 1e-20, "{:?}", last.accounts);
     // Springs in series: 5 of the object along the diagonal, 15 of the coupling.
@@ -245,6 +254,9 @@ fn a_device_that_fails_is_let_go_smoothly_with_the_reason() {
         }
         assert!(output.torque.norm() > 0.5 && output.accounts.residual().abs() < 1e-11 * output.accounts.turnover);
     }
+    let field = TorqueField::new(&data, 0.5, &spec.boundary_slope).unwrap();
+    let differing = JointsError { field: 2, proxy: 3, gains: 2 };
+    assert_eq!(Haptics::new(field, proxy(3), &spec).err(), Some(differing));
     assert_eq!(haptics.start(&all(2, f64::NAN)).err(), Some(Fault::NotFinite));
     assert_eq!(haptics.start(&all(1, 0.0)).err(), Some(Fault::Joints));
 }
@@ -403,4 +415,61 @@ fn two_loops_run_at_two_rates_and_repeat_bit_for_bit() {
     let moved = |frame: usize| trace.frames[frame].nodes[3] - object.rest[3];
     assert_eq!(moved(0), DVec3::ZERO);
     assert!(moved(1).z < -1e-4, "{}", moved(1));
+}
+
+/// The paper's sphere scene, baked.
+fn baked_sphere() -> Dataset {
+    let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
+    let bake = Bake {
+        scene: &scene,
+        backend: BackendChoice::Cpu,
+        date: "2000-01-01T00:00:00Z",
+        stop: &AtomicBool::new(false),
+        progress: &mut |_| {},
+    };
+    bake.in_memory().unwrap().0
+}
+
+#[test]
+fn the_papers_press_is_smooth_multi_point_passive_and_repeatable() {
+    let data = baked_sphere();
+    let setup = Setup::new(&data).unwrap();
+    // The scene's gains keep to their bounds.
+    assert_eq!(setup.exceeded, []);
+    let run = || {
+        let motion = Motion::through(&setup.scene.motion.press, 3).unwrap();
+        let seconds = motion.duration();
+        let mut hand = setup.hand(motion).unwrap();
+        let mut graphics = setup.graphics(&data).unwrap();
+        session::run(&setup.haptics, &mut hand, graphics.as_mut(), &setup.plan(&data, seconds, 8)).unwrap()
+    };
+    let trace = run();
+    assert_eq!(trace, run());
+    let summary = trace.summary();
+    assert!(summary.max_contact_nodes >= 6, "{summary:?}");
+    // Ks = 15 N m/rad bounds the rise at contact; the hand moves at less than a radian a second.
+    assert!(summary.max_contact_torque > 0.2 && summary.max_contact_torque_step < 0.015, "{summary:?}");
+    assert!(summary.max_relative_account_residual < 1e-11 && summary.min_absorbed > -1e-15, "{summary:?}");
+    assert!(summary.leak.abs() < 0.05 * trace.ticks.iter().map(|tick| tick.accounts.stored).fold(0.0, f64::max));
+    assert_eq!((summary.faults, summary.absent, summary.unconverged), (0, 0, 0));
+    // The layer acts where contact begins and ends, not on the object.
+    let held = trace.ticks.iter().filter(|tick| tick.contact && tick.flags.contains(Flags::LAYER)).count();
+    assert!(held > 0 && held < 100, "{held} ticks");
+    // The object is seen to be dented, and to be round again.
+    let moved = |frame: &Frame| {
+        let rest = &setup.object.as_ref().unwrap().rest;
+        frame.nodes.iter().zip(rest).map(|(n, rest)| n.distance(*rest)).fold(0.0, f64::max)
+    };
+    assert!(trace.frames.iter().map(moved).fold(0.0, f64::max) > 2e-3);
+    assert!(moved(&trace.frames[0]) < 1e-6);
+}
+
+#[test]
+fn datasets_that_cannot_be_rendered_say_why() {
+    let mut data = object(2);
+    assert!(matches!(Setup::new(&data).err(), Some(SetupError::NoScene)));
+    data.scene = "name = 3".into();
+    assert!(matches!(Setup::new(&data).err(), Some(SetupError::Scene(_))));
+    data.scene = include_str!("../datasets/sphere.toml").into();
+    assert!(matches!(Setup::new(&data).err(), Some(SetupError::Joints { grid: 2, chain: 3 })));
 }

@@ -79,18 +79,33 @@ pub struct Output {
     pub accounts: Accounts,
 }
 
+/// Field, proxy and gains do not make a loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the dataset has {field} joints, the proxy {proxy}, and the haptic gains are for {gains}: they must agree")]
+pub struct JointsError {
+    /// Joints of the dataset.
+    pub field: usize,
+    /// Joints of the proxy.
+    pub proxy: usize,
+    /// Numbers in the first list of gains that differs, or in the last.
+    pub gains: usize,
+}
+
 impl Haptics {
-    /// A loop over `field` with the proxy `npmi` and the gains of `spec`; the three have the same number of joints.
-    #[must_use]
-    pub fn new(field: TorqueField, npmi: Npmi, spec: &HapticsSpec) -> Self {
-        Self {
-            field,
-            npmi,
-            coupling: Coupling::new(spec),
-            torque_limit: spec.torque_limit,
-            torque_rate_limit: spec.torque_rate_limit,
-            period: 1.0 / spec.rate,
+    /// A loop over `field` with the proxy `npmi` and the gains of `spec`.
+    ///
+    /// # Errors
+    /// When they differ in their number of joints.
+    pub fn new(field: TorqueField, npmi: Npmi, spec: &HapticsSpec) -> Result<Self, JointsError> {
+        let coupling = Coupling::new(spec);
+        let (torque_limit, torque_rate_limit) = (spec.torque_limit, spec.torque_rate_limit);
+        let lists = [coupling.stiffness, coupling.damping, coupling.proxy_damping, torque_limit, torque_rate_limit]
+            .map(|v| v.len());
+        let gains = lists.into_iter().find(|&len| len != field.joints()).unwrap_or(lists[0]);
+        if gains != field.joints() || npmi.joints() != field.joints() {
+            return Err(JointsError { field: field.joints(), proxy: npmi.joints(), gains });
         }
+        Ok(Self { field, npmi, coupling, torque_limit, torque_rate_limit, period: 1.0 / spec.rate })
     }
 
     /// Number of joints d.

@@ -53,7 +53,7 @@ pub struct Latest {
     pub share: f64,
 }
 
-/// The haptic loop with its device: one call a tick.
+/// The haptic loop with its device: one call a tick. However it ends, it leaves the device without torque.
 pub struct Driver<'session> {
     haptics: &'session Haptics,
     device: &'session mut dyn Device,
@@ -121,6 +121,12 @@ impl<'session> Driver<'session> {
             accounts: output.accounts,
         };
         (tick, latest)
+    }
+}
+
+impl Drop for Driver<'_> {
+    fn drop(&mut self) {
+        self.device.apply(&JointVector::zeros(self.haptics.joints()));
     }
 }
 

@@ -4,7 +4,7 @@
 use super::{
     field::{FieldError, TorqueField},
     graphics::{Graphics, GraphicsError},
-    haptic::Haptics,
+    haptic::{Haptics, JointsError},
     npmi::{InertiaError, Npmi},
     passivity::{self, Exceeded},
     session::Plan,
@@ -51,6 +51,9 @@ pub enum SetupError {
         /// Joints of the chain.
         chain: usize,
     },
+    /// Scene and dataset do not make a loop.
+    #[error(transparent)]
+    Loop(#[from] JointsError),
     /// The torques cannot be interpolated.
     #[error(transparent)]
     Field(#[from] FieldError),
@@ -89,7 +92,7 @@ impl Setup {
         let limits: Vec<[f64; 2]> = chain.joints.iter().map(|joint| joint.limits).collect();
         let npmi = Npmi::new(&chain.inertia(&pose), &limits)?;
         let exceeded = passivity::exceeded(&scene.haptics, &field, &labels(&dataset.grid));
-        let haptics = Haptics::new(field, npmi, &scene.haptics);
+        let haptics = Haptics::new(field, npmi, &scene.haptics)?;
         let object = match (&scene.graphics, &dataset.contacts, &dataset.surface) {
             (Some(_), Some(_), Some(surface)) => {
                 let nodes = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();

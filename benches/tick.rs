@@ -1,0 +1,70 @@
+//! What one tick of the haptic loop costs, for one to six joints: look-up alone and the whole tick, side by side.
+//!
+//!     cargo bench --bench tick
+
+#![allow(clippy::unwrap_used)] // A benchmark may stop.
+
+#[path = "../tests/desktop/mod.rs"]
+mod desktop;
+#[path = "../tests/synthetic/mod.rs"]
+mod synthetic;
+
+use haptize as engine;
+use haptize::{
+    JointVector, MAX_JOINTS,
+    render::{
+        field::TorqueField,
+        haptic::{Haptics, Inputs},
+    },
+};
+use std::{hint::black_box, time::Instant};
+
+const TICKS: u32 = 100_000;
+
+/// Median over blocks of a thousand of the mean time of `work` [ns].
+fn nanoseconds(mut work: impl FnMut(f64)) -> f64 {
+    let mut blocks: Vec<f64> = (0..TICKS / 1000)
+        .map(|block| {
+            let start = Instant::now();
+            (0..1000).for_each(|k| work(f64::from(1000 * block + k)));
+            start.elapsed().as_nanos() as f64 / 1000.0
+        })
+        .collect();
+    blocks.sort_by(f64::total_cmp);
+    blocks[blocks.len() / 2]
+}
+
+fn main() {
+    println!("joints  grid points  look-up [ns]  tick [ns]  tick / look-up  tick / tick of 3 joints");
+    let cost = |joints: usize| {
+        let count = [0, 4000, 200, 30, 14, 9, 7][joints];
+        let data = synthetic::half_space(synthetic::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]), 5.0);
+        let spec = desktop::haptics(joints);
+        let field = TorqueField::new(&data, spec.threshold, &spec.boundary_slope).unwrap();
+        // In and out of contact, through many cells.
+        let place = |k: f64| {
+            let mut q = JointVector::zeros(joints);
+            q.iter_mut().enumerate().for_each(|(a, q)| *q = 0.1 + 0.4 * (1e-3 * k + a as f64).sin());
+            q
+        };
+        let placing = nanoseconds(|k| {
+            black_box(place(k));
+        });
+        let look_up = nanoseconds(|k| {
+            black_box(field.sample(&place(k)));
+        });
+        let haptics = Haptics::new(field, desktop::proxy(joints), &spec).unwrap();
+        let mut state = haptics.start(&place(0.0)).unwrap();
+        let tick = nanoseconds(|k| {
+            let inputs = Inputs { position: place(k), age: 0.0, elapsed: 1e-3, interval: 1e-3 };
+            black_box(haptics.tick(&mut state, &inputs));
+        });
+        (data.grid.points(), look_up - placing, tick - placing)
+    };
+    let three = cost(3).2;
+    for joints in 1..=MAX_JOINTS {
+        let (points, look_up, tick) = cost(joints);
+        let (ratio, relative) = (tick / look_up, tick / three);
+        println!("{joints:6}  {points:11}  {look_up:12.0}  {tick:9.0}  {ratio:14.1}  {relative:23.2}");
+    }
+}
