@@ -1,5 +1,7 @@
 //! The program as a user meets it: exit codes, messages, `--json`, and what is left on disk.
 
+#![allow(clippy::unwrap_used)]
+
 use serde_json::Value;
 use std::{
     path::Path,
