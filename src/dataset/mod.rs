@@ -12,6 +12,7 @@ mod error;
 mod export;
 mod file;
 mod grid;
+mod read;
 mod summary;
 
 pub use atomic::replace_file;

@@ -4,6 +4,7 @@ mod bake;
 mod choice;
 mod columns;
 mod cpu;
+mod error;
 pub mod gridize;
 pub mod import;
 mod inspection;
@@ -14,9 +15,10 @@ mod sweep;
 pub use bake::{Bake, BakeError};
 pub use choice::{BackendChoice, BackendError, ChosenBackend};
 pub use cpu::CpuBackend;
+pub use error::SweepError;
 pub use inspection::{Contact, Inspection, ObjectNode, ProxyNode};
 pub use report::{Iterations, SweepReport};
-pub use sweep::{Progress, Run, Sweep, SweepError};
+pub use sweep::{Progress, Run, Sweep};
 
 use crate::{JointVector, contact::Equilibrium};
 

@@ -1,0 +1,179 @@
+//! Dataset files, read: mapped or copied, checked as a whole, and cut into columns where they lie.
+
+use super::{
+    Column, Contacts, Dataset, Error, Grid, Provenance, Surface, check,
+    file::{CHECKSUM, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, digits},
+};
+use memmap2::{Mmap, MmapMut};
+use safetensors::tensor::{Metadata as Tensors, TensorInfo};
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{self, Read},
+    path::Path,
+    sync::Arc,
+};
+
+impl Dataset {
+    /// Maps the file at `path` and checks all of it. The columns are read where they lie in the file.
+    ///
+    /// # Errors
+    /// Missing, foreign, of another version, cut short, or altered in any bit.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let read = |source| Error::Read { path: path.into(), source };
+        let file = regular_file(path).map_err(read)?;
+        // SAFETY: the map is read-only and private to this process; what changing the file meanwhile does is said in `file.rs`.
+        let map = unsafe { Mmap::map(&file) }.map_err(read)?;
+        decode(path, map)
+    }
+
+    /// Like [`Dataset::open`], but copies the file into memory: nothing that happens to the file can reach the reader.
+    ///
+    /// # Errors
+    /// As [`Dataset::open`]; also when it does not fit in memory.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let read = |source| Error::Read { path: path.into(), source };
+        let mut file = regular_file(path).map_err(read)?;
+        let length = file.metadata().map_err(read)?.len();
+        // A map of no bytes is refused by some systems; one zero byte is refused by the checks.
+        let bytes = usize::try_from(length).map_err(|error| read(io::Error::other(error)))?;
+        let mut map = MmapMut::map_anon(bytes.max(1)).map_err(read)?;
+        file.read_exact(&mut map[..bytes]).map_err(read)?;
+        decode(path, map.make_read_only().map_err(read)?)
+    }
+}
+
+/// Opens `path` unless it is a folder, a pipe or a device, which cannot be mapped or might never end.
+fn regular_file(path: &Path) -> io::Result<File> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
+    }
+    File::open(path)
+}
+
+/// Checks a whole file and makes a dataset of windows into it.
+fn decode(path: &Path, map: Mmap) -> Result<Dataset, Error> {
+    let foreign = |reason: &str| Error::Foreign { path: path.into(), reason: reason.into() };
+    let damaged = |reason: String| Error::Damaged { path: path.into(), reason };
+
+    if map.get(LENGTH..CHECKSUM) != Some(OPENING) {
+        return Err(foreign("it begins otherwise"));
+    }
+    let length = map.first_chunk::<LENGTH>().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+    let header = usize::try_from(length).unwrap_or(usize::MAX);
+    let start = header.saturating_add(LENGTH);
+    if header > MAX_HEADER || start > map.len() || !start.is_multiple_of(PAGE) {
+        return Err(damaged(format!("its header would be {length} bytes long, in a file of {}", map.len())));
+    }
+    let metadata: Tensors =
+        serde_json::from_slice(&map[LENGTH..start]).map_err(|error| damaged(format!("header: {error}")))?;
+    if metadata.data_len() != map.len() - start {
+        let (found, expected) = (map.len() - start, metadata.data_len());
+        return Err(damaged(format!("it holds {found} bytes of data where its header promises {expected}")));
+    }
+
+    // The digits are compared as text: a hexadecimal number would read the same in capitals.
+    let written = &map[CHECKSUM..CHECKSUM + NO_CHECKSUM.len()];
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&map[..CHECKSUM]);
+    hasher.update(NO_CHECKSUM.as_bytes());
+    hasher.update(&map[CHECKSUM + NO_CHECKSUM.len()..]);
+    let found = digits(hasher);
+    if written != found.as_bytes() {
+        let written = String::from_utf8_lossy(written);
+        return Err(damaged(format!("its contents have checksum {found}, its header says {written}")));
+    }
+
+    let texts: BTreeMap<_, _> = metadata.metadata().iter().flatten().collect();
+    let text = |key: &str| {
+        texts.get(&key.to_string()).map(|text| text.as_str()).ok_or_else(|| damaged(format!("{key} is missing")))
+    };
+    let format = text("format")?;
+    if format != FORMAT {
+        return Err(Error::Version { path: path.into(), found: format.into(), expected: FORMAT });
+    }
+    let grid: Grid = serde_json::from_str(text("grid")?).map_err(|error| damaged(format!("grid: {error}")))?;
+    let provenance: Provenance =
+        serde_json::from_str(text("provenance")?).map_err(|error| damaged(format!("provenance: {error}")))?;
+    let scene = text("scene")?.to_string();
+    grid.check().map_err(damaged)?;
+
+    let mut tensors: BTreeMap<_, _> = metadata.tensors().into_iter().map(|(name, info)| (name, info.clone())).collect();
+    let windows = Windows { map: Arc::new(map), start };
+    let dataset = windows.dataset(&mut tensors, grid, scene, provenance).map_err(damaged)?;
+    if let Some((name, _)) = tensors.first_key_value() {
+        return Err(damaged(format!("tensor {name} does not belong here")));
+    }
+    check::check(&dataset).map_err(damaged)?;
+    Ok(dataset)
+}
+
+/// Cuts a mapped file into columns.
+struct Windows {
+    map: Arc<Mmap>,
+    /// Where the tensors begin.
+    start: usize,
+}
+
+impl Windows {
+    fn dataset(
+        &self,
+        tensors: &mut BTreeMap<String, TensorInfo>,
+        grid: Grid,
+        scene: String,
+        provenance: Provenance,
+    ) -> Result<Dataset, String> {
+        let counts: Vec<_> = grid.counts().into_iter().map(Some).collect();
+        let with_joints: Vec<_> = counts.iter().copied().chain([Some(grid.joints())]).collect();
+        let missing = |name: &str| format!("tensor {name} is missing");
+        Ok(Dataset {
+            torque: self.column(tensors, "torque", &with_joints)?.ok_or_else(|| missing("torque"))?,
+            status: self.column(tensors, "status", &counts)?.ok_or_else(|| missing("status"))?,
+            energy: self.column(tensors, "energy", &counts)?,
+            gap: self.column(tensors, "gap", &counts)?,
+            residual: self.column(tensors, "residual", &counts)?,
+            iterations: self.column(tensors, "iterations", &counts)?,
+            contacts: match self.column(tensors, "contact_offsets", &[None])? {
+                None => None,
+                Some(offsets) => Some(Contacts {
+                    offsets,
+                    nodes: self.column(tensors, "contact_nodes", &[None])?.ok_or_else(|| missing("contact_nodes"))?,
+                    forces: self
+                        .column(tensors, "contact_forces", &[None, Some(3)])?
+                        .ok_or_else(|| missing("contact_forces"))?,
+                }),
+            },
+            surface: match self.column(tensors, "surface_nodes", &[None, Some(3)])? {
+                None => None,
+                Some(nodes) => Some(Surface {
+                    nodes,
+                    triangles: self
+                        .column(tensors, "surface_triangles", &[None, Some(3)])?
+                        .ok_or_else(|| missing("surface_triangles"))?,
+                }),
+            },
+            grid,
+            scene,
+            provenance,
+        })
+    }
+
+    /// Takes the tensor `name` out of `tensors`; `None` where it is absent. `shape` leaves free lengths as `None`.
+    fn column<T: Element>(
+        &self,
+        tensors: &mut BTreeMap<String, TensorInfo>,
+        name: &str,
+        shape: &[Option<usize>],
+    ) -> Result<Option<Column<T>>, String> {
+        let Some(info) = tensors.remove(name) else { return Ok(None) };
+        let fits = info.shape.len() == shape.len()
+            && info.shape.iter().zip(shape).all(|(found, expected)| expected.is_none_or(|expected| expected == *found));
+        if info.dtype != T::DTYPE || !fits {
+            return Err(format!("tensor {name} has type {:?} and shape {:?}", info.dtype, info.shape));
+        }
+        let (start, end) = info.data_offsets;
+        Column::mapped(self.map.clone(), self.start + start..self.start + end)
+            .map(Some)
+            .ok_or_else(|| format!("tensor {name} lies outside the file or is misaligned"))
+    }
+}

@@ -1,0 +1,94 @@
+//! Why a sweep ended early, what was kept of it, and what to do.
+
+use crate::dataset;
+use std::{
+    collections::TryReserveError,
+    io,
+    path::{Path, PathBuf},
+};
+
+/// A sweep failed, or was stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    /// The grid is none.
+    #[error("the scene's grid: {0}; correct [[grid.axes]] in the scene")]
+    Grid(String),
+    /// The columns do not fit in memory.
+    #[error("the grid's {points} points need {} MB of memory ({source}); take a coarser grid", bytes / 1_000_000)]
+    Memory {
+        /// Grid points.
+        points: usize,
+        /// Memory of their columns, contacts aside [bytes].
+        bytes: usize,
+        /// What the allocator said.
+        source: TryReserveError,
+    },
+    /// The backend failed; what was solved before is in the part, where there is one.
+    #[error("the backend failed at grid points {first} to {last}: {source}")]
+    Backend {
+        /// First point of the chunk.
+        first: usize,
+        /// Last point of the chunk.
+        last: usize,
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The backend returned another number of results than it was asked for.
+    #[error("the backend returned {found} results for {asked} configurations; please report this as a defect")]
+    Miscount {
+        /// Results asked for.
+        asked: usize,
+        /// Results returned.
+        found: usize,
+    },
+    /// Stopped from outside.
+    #[error("stopped after {done} of {points} grid points; {}", remedy(part.as_deref()))]
+    Stopped {
+        /// Points done.
+        done: usize,
+        /// Points asked for.
+        points: usize,
+        /// Where they are kept.
+        part: Option<PathBuf>,
+    },
+    /// The part cannot be read or written.
+    #[error("{path}: {source}; free some space or choose another folder, then continue with --resume")]
+    Part {
+        /// The part.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Another process writes the part.
+    #[error("{path}: another process is baking into this file; wait for it, or choose another output")]
+    Busy {
+        /// The part.
+        path: PathBuf,
+    },
+    /// A file in the part's place that is none.
+    #[error("{path}: cannot be continued: {reason}; move it away, or bake without --resume")]
+    ForeignPart {
+        /// The part.
+        path: PathBuf,
+        /// What gave it away.
+        reason: String,
+    },
+    /// The part of another sweep.
+    #[error("{path}: cannot be continued, it was begun with {difference}; restore that, or bake without --resume")]
+    OtherPart {
+        /// The part.
+        path: PathBuf,
+        /// What is different.
+        difference: &'static str,
+    },
+    /// The finished dataset could not be written; its points are in the part.
+    #[error(transparent)]
+    Dataset(#[from] dataset::Error),
+}
+
+fn remedy(part: Option<&Path>) -> String {
+    match part {
+        Some(part) => format!("they are kept in {}: continue with the same command and --resume", part.display()),
+        None => "nothing was kept".into(),
+    }
+}
