@@ -78,7 +78,7 @@ export VK_DRIVER_FILES VK_ICD_FILENAMES=$VK_DRIVER_FILES
 
 step 'formatting' cargo fmt --all --check
 step 'lints' cargo clippy --locked --all-targets --quiet -- -D warnings
-step 'tests' cargo test --locked --quiet
+step 'tests' cargo test --locked --quiet --no-fail-fast
 step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --no-deps --quiet
 step 'demo' demo
 

@@ -9,7 +9,7 @@
 //! The matrix is constant, symmetric and positive definite: factorised once. To rounding, for any T and stiffness,
 //! `Delta(1/2 v^T M v + 1/2 u^T K u) = T v_hat . f - T v_hat . B v_hat`: without forces energy never rises.
 //!
-//! [`ObjectMotion::load`] and [`ObjectMotion::advance`] are the twins of the entry points in `shaders/frame.wgsl`.
+//! `ObjectMotion::load` and `ObjectMotion::advance` are the twins of the entry points in `shaders/frame.wgsl`.
 
 use super::stencil::{Lattice, LatticeError};
 use crate::{

@@ -75,13 +75,17 @@ impl Durations {
         self.0.saturating_record(u64::try_from(duration.as_nanos()).unwrap_or(GREATEST));
     }
 
-    /// What was counted, ten bins a decade from 0.1 us to the longest; the first holds all that was shorter.
+    /// What was counted, ten bins a decade from 0.1 us to the longest; the first holds all that was shorter. None
+    /// where nothing was counted.
     #[must_use]
     pub fn bins(&self) -> Vec<Bin> {
         /// Ratio of a bin's ends.
         const RATIO: f64 = 1.258_925_411_794_167_2;
         /// Upper end of the first bin [ns]: clocks resolve little less.
         const FIRST: u64 = 100;
+        if self.0.is_empty() {
+            return Vec::new();
+        }
         let mut from = FIRST as f64 / RATIO;
         self.0
             .iter_log(FIRST, RATIO)
