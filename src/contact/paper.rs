@@ -10,8 +10,9 @@
 //! Then tau = sum_i J_i^T (-sum_j f_j^i).
 //!
 //! The iteration is faithful, and so is its failure: at stiff contact step 4 pushes the surface past the proxy node, and the
-//! next pass finds nothing inside. A configuration that started in contact and lost it is not converged, never free; one
-//! that cycles runs into the cap. A node with a radius, which the paper does not have, acts through its deepest
+//! next pass finds nothing inside. A configuration that started in contact and lost it is not converged, never free. One
+//! that cycles would run into the cap: a pass depends on nothing but the pass before, so it is given up as soon as a pass
+//! repeats an earlier one to the last bit (Brent 1980: compared with the pass of the last power of two). A node with a radius, which the paper does not have, acts through its deepest
 //! point x_i - r_i N_i.
 
 use super::depth::Contact;
@@ -48,6 +49,9 @@ pub struct PaperIteration {
     /// Forces on A after step 4 [N].
     pub forces: Vec<f64>,
     previous_forces: Vec<f64>,
+    /// The pass that later ones are compared with: a repetition is a cycle.
+    marked_ties: Vec<Tie>,
+    marked_forces: Vec<f64>,
     /// Displacement of all surface nodes after step 4 [m].
     pub displacement: Vec<f64>,
     positions: Vec<DVec3>,
@@ -71,6 +75,8 @@ impl PaperIteration {
             support: Support::new(model.rest.len()),
             forces: Vec::new(),
             previous_forces: Vec::new(),
+            marked_ties: Vec::new(),
+            marked_forces: Vec::new(),
             displacement: vec![0.0; 3 * model.rest.len()],
             positions: model.rest.clone(),
             contacts: Vec::new(),
@@ -104,6 +110,9 @@ impl PaperIteration {
                 return outcome;
             }
             outcome.converged = outcome.residual <= model.contact.tolerance;
+            if !outcome.converged && self.repeats(outcome.iterations) {
+                break;
+            }
         }
         outcome
     }
@@ -183,10 +192,7 @@ impl PaperIteration {
 
     /// Relative change of the forces (and so of n = n0 + C f) since the last pass, in the energy norm; one when S changed [1].
     fn relative_change(&mut self) -> f64 {
-        let same = |a: &Tie, b: &Tie| a.proxy_node == b.proxy_node && a.nodes == b.nodes;
-        if self.ties.len() != self.previous_ties.len()
-            || !self.ties.iter().zip(&self.previous_ties).all(|(a, b)| same(a, b))
-        {
+        if !same_selection(&self.ties, &self.previous_ties) {
             return 1.0;
         }
         let order = self.support.order();
@@ -198,6 +204,18 @@ impl PaperIteration {
         self.support.multiply(&self.forces, &mut self.image);
         let scale = dot(&self.forces, &self.image);
         root(change) / root(scale).max(RESIDUAL_FLOOR)
+    }
+
+    /// True when this pass repeats the marked one; marks it instead if its number is a power of two.
+    fn repeats(&mut self, pass: u32) -> bool {
+        if pass > 1 && same_selection(&self.ties, &self.marked_ties) && self.forces == self.marked_forces {
+            return true;
+        }
+        if pass.is_power_of_two() {
+            self.marked_ties.clone_from(&self.ties);
+            self.marked_forces.clone_from(&self.forces);
+        }
+        false
     }
 
     /// Positions from displacement.
@@ -242,6 +260,12 @@ impl PaperIteration {
             }
         }
     }
+}
+
+/// Whether two passes tie the same nodes, i.e. have the same S.
+fn same_selection(a: &[Tie], b: &[Tie]) -> bool {
+    let same = |(a, b): (&Tie, &Tie)| a.proxy_node == b.proxy_node && a.nodes == b.nodes;
+    a.len() == b.len() && a.iter().zip(b).all(same)
 }
 
 /// The three nodes closest to `x`, nearest first; ties go to the lower number.

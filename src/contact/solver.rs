@@ -96,7 +96,8 @@ impl<'a> Solver<'a> {
         &self.pose
     }
 
-    /// Stored energy at rest and after each accepted step of the last search of the energy form [J].
+    /// Energy at the start of the last stage of the energy form's last search, where contact has taken its full stiffness, and
+    /// after each step taken since: it never rises [J].
     #[must_use]
     pub fn energy_history(&self) -> &[f64] {
         &self.energy.history
