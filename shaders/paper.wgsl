@@ -10,7 +10,9 @@ const TIED_FORCES: u32 = 3u;
 const RESIDUAL: u32 = 4u;
 const DIRECTION: u32 = 5u;
 const IMAGE: u32 = 6u;
-const VECTORS: u32 = 7u;
+// Forces of the pass that later ones are compared with: a repetition is a cycle.
+const MARKED_FORCES: u32 = 7u;
+const VECTORS: u32 = 8u;
 
 // Number of ties on each slot.
 var<workgroup> multiplicity: array<f32, SUPPORT>;
@@ -188,11 +190,12 @@ fn main(
     var outcome = Outcome();
     outcome.residual = 1.0;
     var converged = false;
-    var lost = false;
+    var given_up = false;
     var moved = 0.0;
     var tie = Tie();
     tie.nodes = vec3<u32>(ABSENT);
-    while !converged && !lost && outcome.iterations < parameters.max_iterations && overflow == 0u {
+    var marked = tie;
+    while !converged && !given_up && outcome.iterations < parameters.max_iterations && overflow == 0u {
         outcome.iterations += 1u;
         for (var slot = local; slot < SUPPORT; slot += WORKGROUP) {
             vectors[at(PREVIOUS_FORCES, slot)] = vectors[at(FORCES, slot)];
@@ -231,9 +234,23 @@ fn main(
         outcome.elastic = 0.5 * sums.y;
         outcome.residual = select(sqrt(max(sums.x, 0.0)) / max(sqrt(max(sums.y, 0.0)), RESIDUAL_FLOOR), 1.0, sums.z > 0.0);
         // Contact was lost: nothing inside, or no force left that compresses.
-        lost = sums.w == 0.0;
-        outcome.residual = select(outcome.residual, 1.0, lost);
-        converged = !lost && outcome.residual <= parameters.tolerance;
+        given_up = sums.w == 0.0;
+        outcome.residual = select(outcome.residual, 1.0, given_up);
+        converged = !given_up && outcome.residual <= parameters.tolerance;
+
+        // A pass that repeats an earlier one to the last bit will do so for ever.
+        var differs = any(tie.nodes != marked.nodes) || tie.proxy_node != marked.proxy_node;
+        for (var slot = local; slot < support_count; slot += WORKGROUP) {
+            differs = differs || any(vectors[at(FORCES, slot)] != vectors[at(MARKED_FORCES, slot)]);
+        }
+        let repeats = greatest(select(0.0, 1.0, differs), local) == 0.0;
+        given_up = given_up || (outcome.iterations > 1u && repeats);
+        if (outcome.iterations & (outcome.iterations - 1u)) == 0u {
+            marked = tie;
+            for (var slot = local; slot < support_count; slot += WORKGROUP) {
+                vectors[at(MARKED_FORCES, slot)] = vectors[at(FORCES, slot)];
+            }
+        }
     }
 
     let used = u32(greatest(select(0.0, f32(local + 1u), tie.nodes.x != ABSENT), local));

@@ -6,15 +6,15 @@ use crate::JointVector;
 use glam::DVec3;
 
 mod bounding_volumes;
-mod closest_point;
-mod depth;
+pub(crate) mod closest_point;
+pub(crate) mod depth;
 mod detection;
 mod energy;
 mod model;
 mod paper;
 mod solver;
 mod support;
-mod surface;
+pub(crate) mod surface;
 mod trust_region;
 
 pub use model::Model;

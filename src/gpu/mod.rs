@@ -20,6 +20,8 @@ mod context;
 mod frame;
 mod kernel;
 pub mod layout;
+#[cfg(test)]
+mod leaf_tests;
 mod model;
 mod pipeline;
 pub mod shaders;
@@ -28,7 +30,5 @@ mod unpack;
 
 pub use context::{AdapterChoice, AdapterSummary, Context, GpuError, adapters};
 pub use frame::{FrameError, FrameMethod, FrameUpdate};
-pub use kernel::{Access, Kernel, POISON, StorageBuffer};
-pub use model::DeviceModel;
 pub use pipeline::Room;
 pub use solver::GpuSolver;

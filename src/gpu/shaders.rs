@@ -12,15 +12,15 @@ pub struct Shader {
     pub name: &'static str,
     /// Entry point.
     pub entry: &'static str,
-    parts: &'static [&'static str],
+    pub(super) parts: &'static [&'static str],
     /// Every set of override constants that the engine uses.
     pub overrides: &'static [&'static [(&'static str, f64)]],
 }
 
-const TYPES: &str = include_str!("../../shaders/types.wgsl");
-const CLOSEST_POINT: &str = include_str!("../../shaders/closest_point.wgsl");
-const SURFACE: &str = include_str!("../../shaders/surface.wgsl");
-const DEPTH: &str = include_str!("../../shaders/depth.wgsl");
+pub(super) const TYPES: &str = include_str!("../../shaders/types.wgsl");
+pub(super) const CLOSEST_POINT: &str = include_str!("../../shaders/closest_point.wgsl");
+pub(super) const SURFACE: &str = include_str!("../../shaders/surface.wgsl");
+pub(super) const DEPTH: &str = include_str!("../../shaders/depth.wgsl");
 const SUPPORT: &str = include_str!("../../shaders/support.wgsl");
 const FRAME_COMMON: &str = include_str!("../../shaders/frame_common.wgsl");
 const FRAME: &str = include_str!("../../shaders/frame.wgsl");
@@ -194,14 +194,8 @@ impl Shader {
     /// The whole text, as the device compiles it.
     #[must_use]
     pub fn source(&self) -> String {
-        self.with_parts(&[])
-    }
-
-    /// The same with `more` behind it: a test's kernel on the engine's own functions.
-    #[must_use]
-    pub fn with_parts(&self, more: &[&str]) -> String {
         let mut text = constants();
-        for part in self.parts.iter().chain(more) {
+        for part in self.parts {
             text.push('\n');
             text.push_str(part);
         }
