@@ -368,7 +368,7 @@ fn prismatic_joints_have_panels_of_their_own() {
     let mut trace = recording(&arm(3), &sphere(), 200);
     trace.joints[2].unit = "m".to_owned();
     let canvas = report::press::press(&trace);
-    for title in ["Contact torque on the proxy [N m]", "Contact torque on the proxy [N]", "Proxy configuration [m]"] {
+    for title in ["Contact torque on the proxy [N m]", "Contact force on the proxy [N]", "Proxy configuration [m]"] {
         assert!(says(&canvas, title), "{title}");
     }
     assert!(misplaced_text(&canvas).is_empty());

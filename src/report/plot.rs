@@ -293,6 +293,8 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         kept.extend(run.iter().max_by(by_height));
         kept.extend(run.last());
     }
+    // In a smooth curve the lowest and highest are the first and last themselves.
+    kept.dedup();
     kept
 }
 

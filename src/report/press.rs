@@ -17,9 +17,11 @@ use crate::{
 /// Joint contact torque, configuration and number of contacting object nodes against time, contact shaded (Fig. 5).
 #[must_use]
 pub fn press(trace: &Trace) -> Canvas {
-    let mut lanes = per_joint(trace, "Contact torque on the proxy", true, |tick| &tick.contact_torque);
-    lanes.extend(per_joint(trace, "Torque on the device", true, |tick| &tick.device_torque));
-    lanes.extend(per_joint(trace, "Proxy configuration", false, |tick| &tick.proxy));
+    let mut lanes = per_joint(trace, ["Contact torque on the proxy", "Contact force on the proxy"], true, |tick| {
+        &tick.contact_torque
+    });
+    lanes.extend(per_joint(trace, ["Torque on the device", "Force on the device"], true, |tick| &tick.device_torque));
+    lanes.extend(per_joint(trace, ["Proxy configuration"; 2], false, |tick| &tick.proxy));
     let nodes = curve(trace, "", colour::series(0), |tick| f64::from(tick.contact_nodes));
     lanes.push(Lane {
         title: "Contacting object nodes [1]".to_owned(),
@@ -81,10 +83,12 @@ fn stack(headline: String, trace: &Trace, lanes: Vec<Lane>) -> Canvas {
     .draw()
 }
 
-/// A panel for each unit that occurs among the joints, with a curve for each joint of that unit.
-fn per_joint(trace: &Trace, what: &str, torque: bool, value: impl Fn(&Tick) -> &JointVector) -> Vec<Lane> {
-    let units = ["rad", "m"].into_iter().filter(|unit| trace.joints.iter().any(|joint| joint.unit == *unit));
-    let lanes = units.map(|unit| {
+/// A panel for each unit that occurs among the joints, with a curve for each joint of that unit; `names` are those of the
+/// quantity for joints in radians and in metres.
+fn per_joint(trace: &Trace, names: [&str; 2], torque: bool, value: impl Fn(&Tick) -> &JointVector) -> Vec<Lane> {
+    let occurs = |unit: &str| trace.joints.iter().any(|joint| joint.unit == unit);
+    let units = ["rad", "m"].into_iter().zip(names).filter(|(unit, _)| occurs(unit));
+    let lanes = units.map(|(unit, what)| {
         let of_unit = trace.joints.iter().enumerate().filter(|(_, joint)| joint.unit == unit);
         let symbol = if torque { "τ" } else { "q" };
         let curves = of_unit.map(|(number, joint)| {
@@ -96,7 +100,7 @@ fn per_joint(trace: &Trace, what: &str, torque: bool, value: impl Fn(&Tick) -> &
     });
     let lanes: Vec<Lane> = lanes.collect();
     if lanes.is_empty() {
-        return vec![Lane::empty(what)];
+        return vec![Lane::empty(names[0])];
     }
     lanes
 }

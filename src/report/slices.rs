@@ -25,7 +25,8 @@ pub fn slices(dataset: &Dataset) -> Canvas {
         return line(dataset);
     }
     let slice = Slice::worth_showing(dataset);
-    let columns = dataset.grid.joints().min(3);
+    // Four are better two by two than three and one.
+    let columns = if dataset.grid.joints() == 4 { 2 } else { dataset.grid.joints().min(3) };
     let rows = dataset.grid.joints().div_ceil(columns);
     let (cell_width, cell_height) = (WIDTH / columns as f64, 260.0);
     let mut canvas = Canvas::new(WIDTH + chart::MARGIN, TOP + rows as f64 * cell_height + 12.0);
@@ -71,7 +72,7 @@ impl Tally {
     fn count(&mut self, dataset: &Dataset, point: usize) {
         self.points += 1;
         self.contacts += usize::from(touching(dataset.status(point)));
-        let size = dataset.torque(point).iter().map(|torque| torque * torque).sum::<f64>().sqrt();
+        let size = torque_size(dataset, point);
         self.torque += if size.is_finite() { size } else { 0.0 };
     }
 
@@ -248,6 +249,19 @@ fn pitch(dataset: &Dataset, axis: usize) -> usize {
 /// Whether the proxy touches the object, solved for or not.
 pub(super) fn touching(status: Status) -> bool {
     matches!(status, Status::Contact | Status::Unconverged | Status::Overflow)
+}
+
+/// Whether the chain has revolute and prismatic joints.
+pub(super) fn is_mixed(dataset: &Dataset) -> bool {
+    let kind = |unit: &str| dataset.grid.axes.iter().any(|axis| axis.unit == unit);
+    kind("rad") && kind("m")
+}
+
+/// Size of the torque at a grid point: of the revolute joints where there are both kinds [N m], else of all.
+pub(super) fn torque_size(dataset: &Dataset, point: usize) -> f64 {
+    let mixed = is_mixed(dataset);
+    let counted = dataset.torque(point).iter().zip(&dataset.grid.axes).filter(|(_, axis)| !mixed || axis.unit == "rad");
+    counted.map(|(torque, _)| torque * torque).sum::<f64>().sqrt()
 }
 
 /// Torque of a single joint against its coordinate.

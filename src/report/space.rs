@@ -2,7 +2,8 @@
 //! colour and size by the size of the torque, over the first three joints.
 //!
 //! With more than three joints the others stay where most configurations are in contact. Free configurations are not
-//! drawn: they would hide the others. The view is from the corner of the box to which the torque grows, so that the
+//! drawn: they would hide the others. Newtons and newton metres do not add up: where a chain has joints of both kinds the
+//! size of the torque is that of its revolute joints. The view is from the corner of the box to which the torque grows, so that the
 //! deep configurations are not hidden behind the boundary.
 
 use super::{
@@ -12,7 +13,7 @@ use super::{
     plot::{self, Entry, Mark},
     press::{subscript, torque_unit},
     raster::{Camera, Raster},
-    slices::touching,
+    slices::{is_mixed, torque_size, touching},
     ticks,
 };
 use crate::{contact::Status, dataset::Dataset, report::PIXELS};
@@ -26,7 +27,7 @@ const PICTURE: Area = Area { x: 36.0, y: 60.0, width: 600.0, height: 480.0 };
 #[must_use]
 pub fn space(dataset: &Dataset) -> Canvas {
     let points = points_in_contact(dataset);
-    let magnitude = |point: usize| dataset.torque(point).iter().map(|torque| torque * torque).sum::<f64>().sqrt();
+    let magnitude = |point: usize| torque_size(dataset, point);
     let trusted = |&point: &usize| dataset.status(point) == Status::Contact && magnitude(point).is_finite();
     let greatest = points.iter().copied().filter(|point| trusted(point)).map(magnitude).fold(0.0, f64::max);
     let map = ColourMap::Root { high: if greatest > 0.0 { greatest } else { 1.0 } };
@@ -58,8 +59,10 @@ pub fn space(dataset: &Dataset) -> Canvas {
     }
     space_box.label(&mut canvas, raster.camera(), direction, dataset);
     canvas.picture((PICTURE.x, PICTURE.y), raster.picture());
+    let unit =
+        if is_mixed(dataset) { "N m" } else { dataset.grid.axes.first().map_or("N m", |axis| torque_unit(&axis.unit)) };
     let bar = Area { x: PICTURE.right() + 30.0, y: PICTURE.y + 110.0, width: 14.0, height: 260.0 };
-    plot::colour_bar(&mut canvas, bar, map, &format!("‖τ‖ [{}]", units(dataset)), Anchor::Start);
+    plot::colour_bar(&mut canvas, bar, map, &format!("‖τ‖ [{unit}]"), Anchor::Start);
     canvas
 }
 
@@ -79,13 +82,6 @@ fn points_in_contact(dataset: &Dataset) -> Vec<usize> {
     (0..dataset.grid.points()).filter(touching).filter(|point| point % pitch.max(1) == most).collect()
 }
 
-/// `N m`, `N`, or both, after the kinds of the joints.
-fn units(dataset: &Dataset) -> String {
-    let mut units: Vec<&str> = dataset.grid.axes.iter().map(|axis| torque_unit(&axis.unit)).collect();
-    units.dedup();
-    units.join(", ")
-}
-
 fn caption(dataset: &Dataset, shown: &[usize]) -> String {
     let grid = &dataset.grid;
     let all = (0..grid.points()).filter(|&point| touching(dataset.status(point))).count();
@@ -96,9 +92,13 @@ fn caption(dataset: &Dataset, shown: &[usize]) -> String {
     if let (Some(&first), true) = (shown.first(), grid.joints() > 3) {
         let q = grid.configuration(first);
         let fixed = (3..grid.joints()).map(|joint| {
-            format!("q{} = {} {}", subscript(joint + 1), ticks::number(q[joint], 3), grid.axes[joint].unit)
+            let axis = &grid.axes[joint];
+            format!("q{} {} = {} {}", subscript(joint + 1), axis.name, ticks::number(q[joint], 3), axis.unit)
         });
         text += &format!(", {} of them at {}", thousands(shown.len()), fixed.collect::<Vec<_>>().join(", "));
+    }
+    if is_mixed(dataset) {
+        text += "; torque of the revolute joints";
     }
     text
 }
