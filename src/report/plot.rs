@@ -277,10 +277,10 @@ fn titled(title: &str, ticks: &Ticks) -> String {
     }
 }
 
-/// The same curve with fewer points: of those within half a point of the sheet the first, lowest, highest and last,
-/// which draw the same pixels.
+/// The same curve with fewer points: of those within a point of the sheet, half the width of a stroke, the first, lowest,
+/// highest and last.
 fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let column = |point: &(f64, f64)| (2.0 * point.0).floor();
+    let column = |point: &(f64, f64)| point.0.floor();
     let mut kept = Vec::new();
     for run in points.chunk_by(|a, b| column(a) == column(b)) {
         if run.len() <= 4 {
