@@ -248,3 +248,27 @@ pub const NEAR_PLANE: f64 = 1e-6;
 /// How much nearer, as a fraction of its distance, the edges of a mesh are drawn than its surface: above the rounding of
 /// the depth buffer (single precision) at grazing views, below a twentieth of what a camera frames.
 pub const EDGE_LIFT: f64 = 5e-3;
+
+// --- scanning ---
+
+/// Acceleration of gravity [m/s^2], standard value.
+pub const GRAVITY: f64 = 9.806_65;
+
+/// Distance at which a position counts as reached by inverse kinematics [m]: a thousandth of an encoder step at 0.1 m.
+pub const REACHED: f64 = 1e-7;
+
+/// First damping of inverse kinematics [m]: a tenth of a link's length, so that a first step stays in the linear range.
+pub const REACH_DAMPING: f64 = 0.01;
+
+/// Steps of inverse kinematics: converging ones take about ten, the rest allows for joint limits on the way.
+pub const REACH_STEPS: usize = 200;
+
+/// Most points of a scan: at a second a point, eleven days.
+pub const SCAN_POINTS: usize = 1_000_000;
+
+/// Time for which a device is braked after a limit [s]: several time constants of damping against inertia.
+pub const BRAKE_TIME: f64 = 0.3;
+
+/// Pivot below which the neighbours of a sample span no plane, relative to the greatest: their thickness squared, a
+/// thousandth of their reach.
+pub const PLANE_PIVOT: f64 = 1e-6;

@@ -14,9 +14,11 @@ mod bake;
 mod demo;
 mod doctor;
 mod export;
+mod gridize;
 mod info;
 mod inspect;
 mod play;
+mod scan;
 
 use clap::{Parser, Subcommand};
 use std::{
@@ -44,12 +46,16 @@ enum Command {
     Doctor(doctor::Arguments),
     /// Write a dataset for other programs.
     Export(export::Arguments),
+    /// Make a dataset of scattered measurements: a scan's log, or any tables of joint positions and torques.
+    Gridize(gridize::Arguments),
     /// Say what a dataset holds, after checking all of it.
     Info(info::Arguments),
     /// Solve one configuration and tell all of it.
     Inspect(inspect::Arguments),
     /// Feel a dataset through a simulated hand: traces and figures.
     Play(play::Arguments),
+    /// Haptize a real object by touching it on a rig (the one that ships is simulated).
+    Scan(scan::Arguments),
 }
 
 impl Command {
@@ -58,9 +64,11 @@ impl Command {
             Self::Bake(arguments) => bake::run(arguments),
             Self::Doctor(arguments) => doctor::run(arguments),
             Self::Export(arguments) => export::run(arguments),
+            Self::Gridize(arguments) => gridize::run(arguments),
             Self::Info(arguments) => info::run(arguments),
             Self::Inspect(arguments) => inspect::run(arguments),
             Self::Play(arguments) => play::run(arguments),
+            Self::Scan(arguments) => scan::run(arguments),
         }
     }
 }

@@ -10,6 +10,7 @@ pub mod import;
 mod inspection;
 mod part;
 mod report;
+pub mod scan;
 mod sweep;
 
 pub use bake::{Bake, BakeError};

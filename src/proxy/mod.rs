@@ -5,6 +5,7 @@
 //! o_i += q_i R_(i-1) axis_i for a prismatic one. Nothing here allocates once a [`Pose`] has its size.
 
 mod chain;
+mod gravity;
 mod inertia;
 mod jacobian;
 #[cfg(test)]

@@ -16,14 +16,14 @@ use crate::{
     device::{HandError, Motion, SimulatedHand},
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{Scene, SceneError},
+    scene::{Rendering, SceneError},
 };
 use glam::DVec3;
 
 /// A dataset, ready to be felt and drawn.
 pub struct Setup {
     /// The dataset's scene.
-    pub scene: Scene,
+    pub scene: Rendering,
     /// The proxy.
     pub chain: Chain,
     /// The haptic loop.
@@ -80,7 +80,7 @@ impl Setup {
         if dataset.scene.trim().is_empty() {
             return Err(SetupError::NoScene);
         }
-        let scene = Scene::parse(&dataset.scene, "scene")?;
+        let scene = Rendering::parse(&dataset.scene, "scene")?;
         let chain = Chain::new(&scene.proxy);
         let (grid, joints) = (dataset.grid.joints(), chain.joints.len());
         if grid != joints {
@@ -93,11 +93,11 @@ impl Setup {
         let npmi = Npmi::new(&chain.inertia(&pose), &limits)?;
         let exceeded = passivity::exceeded(&scene.haptics, &field, &labels(&dataset.grid));
         let haptics = Haptics::new(field, npmi, &scene.haptics)?;
-        let object = match (&scene.graphics, &dataset.contacts, &dataset.surface) {
-            (Some(_), Some(_), Some(surface)) => {
+        let object = match (&scene.object, &scene.graphics, &dataset.contacts, &dataset.surface) {
+            (Some(object), Some(_), Some(_), Some(surface)) => {
                 let nodes = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
                 let triangles = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-                Some(Object::from_surface(&scene.object, nodes, triangles)?)
+                Some(Object::from_surface(object, nodes, triangles)?)
             }
             _ => None,
         };

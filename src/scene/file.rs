@@ -2,7 +2,7 @@
 //!
 //! Unknown keys are refused with the list of the known ones. Nothing is checked here beyond types; see [`super::convert`].
 
-use super::{Algorithm, JointKind, SpringKind};
+use super::{Algorithm, Cover, JointKind, SpringKind};
 use serde::Deserialize;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 use toml::Spanned;
@@ -14,10 +14,11 @@ pub(super) type Vector = Spanned<[f64; 3]>;
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneTable {
     pub name: Option<String>,
-    pub object: Spanned<ObjectTable>,
+    pub object: Option<Spanned<ObjectTable>>,
     pub proxy: ProxyTable,
-    pub contact: ContactTable,
-    pub grid: Spanned<GridTable>,
+    pub contact: Option<ContactTable>,
+    pub grid: Option<Spanned<GridTable>>,
+    pub scan: Option<Spanned<ScanTable>>,
     #[serde(default)]
     pub haptics: HapticsTable,
     pub graphics: Option<GraphicsTable>,
@@ -170,6 +171,70 @@ pub(super) struct MotionTable {
 pub(super) struct WaypointTable {
     pub time: Number,
     pub q: Spanned<Vec<f64>>,
+}
+
+/// Haptization of a real object.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ScanTable {
+    pub workspace: Option<WorkspaceTable>,
+    pub joints: Option<Spanned<GridTable>>,
+    #[serde(default)]
+    pub control: ControlTable,
+    pub limits: LimitsTable,
+    pub simulated: SimulatedTable,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WorkspaceTable {
+    pub node: Option<Spanned<usize>>,
+    pub start: Vector,
+    pub across: Spanned<Vec<PlanAxisTable>>,
+    pub depth: PlanAxisTable,
+    pub clearance: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PlanAxisTable {
+    pub direction: Vector,
+    pub spacing: Number,
+    pub count: Spanned<usize>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ControlTable {
+    pub rate: Option<Number>,
+    pub stiffness: Option<Spanned<PerJoint>>,
+    pub damping: Option<Spanned<PerJoint>>,
+    pub speed: Option<Number>,
+    pub window: Option<Number>,
+    pub still: Option<Number>,
+    pub drift: Option<Number>,
+    pub timeout: Option<Number>,
+    pub average: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LimitsTable {
+    pub torque: Option<Spanned<PerJoint>>,
+    pub speed: Option<Number>,
+    pub workspace: Spanned<[[f64; 3]; 2]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SimulatedTable {
+    pub corner: Vector,
+    pub size: Vector,
+    pub cover: Option<Cover>,
+    pub friction: Option<Number>,
+    pub encoder: Option<Number>,
+    pub noise: Option<Number>,
+    pub joint_friction: Option<Number>,
 }
 
 /// One number for all joints, or a list with one for each.

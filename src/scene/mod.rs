@@ -7,9 +7,11 @@ mod check;
 mod convert;
 mod error;
 mod file;
+mod scan;
 mod spec;
 
 pub use error::{Diagnostic, SceneError};
+pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
 pub use spec::{
     Algorithm, AxisSpec, ContactSpec, GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticsSpec,
     JointKind, JointSpec, MotionSpec, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec, Waypoint,
@@ -44,6 +46,41 @@ pub struct Scene {
     pub motion: MotionSpec,
 }
 
+/// A scene with a real object, to be haptized by scanning (section 2.2): its file has `[scan]` in the place of `[object]`,
+/// `[contact]` and `[grid]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScanScene {
+    /// The text itself: stored in the scan's log.
+    pub text: String,
+    /// For titles and lists.
+    pub name: String,
+    /// The device that scans, which is the proxy that feels.
+    pub proxy: ProxySpec,
+    /// How it scans.
+    pub scan: ScanSpec,
+}
+
+/// What rendering needs of a scene, whether its object is virtual, real, or only known from a log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rendering {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// The text itself.
+    pub text: String,
+    /// For titles and lists.
+    pub name: String,
+    /// The deformable virtual object, where there is one.
+    pub object: Option<ObjectSpec>,
+    /// The multi-link virtual proxy.
+    pub proxy: ProxySpec,
+    /// The 1 kHz loop.
+    pub haptics: HapticsSpec,
+    /// The graphics loop, where there is one.
+    pub graphics: Option<GraphicsSpec>,
+    /// Motions to play.
+    pub motion: MotionSpec,
+}
+
 /// Longest scene file that is read [B]: a scene is a page or two, and its text goes into every dataset.
 const MAX_BYTES: u64 = 1 << 24;
 
@@ -54,19 +91,15 @@ impl Scene {
     /// When a file cannot be read, or the scene is not valid; the message names the line and the remedy.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
-        let unreadable = |reason: String| SceneError::Unreadable { path: path.to_owned(), reason };
-        let stream = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
-        let mut text = String::new();
-        stream.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(|error| unreadable(error.to_string()))?;
-        if text.len() as u64 > MAX_BYTES {
-            return Err(unreadable(format!("it is longer than {MAX_BYTES} bytes, which no scene is")));
-        }
-        let (scene, table) = read(&text, path)?;
-        if let (Shape::Mesh { file, .. }, Some(mesh)) = (&scene.object.shape, &table.object.get_ref().mesh)
+        let text = read_text(path)?;
+        let (checker, table) = table(&text, path)?;
+        let scene = convert::scene(&checker, &table)?;
+        let mesh = table.object.as_ref().and_then(|object| object.get_ref().mesh.as_ref());
+        if let (Shape::Mesh { file, .. }, Some(mesh)) = (&scene.object.shape, mesh)
             && let Err(error) = std::fs::metadata(file)
         {
             let message = format!("the mesh file {} cannot be opened: {error}", file.display());
-            return Err(Checker { path, text: &text }.error(mesh.file.span(), message));
+            return Err(checker.error(mesh.file.span(), message));
         }
         Ok(scene)
     }
@@ -77,15 +110,69 @@ impl Scene {
     /// # Errors
     /// When the scene is not valid; the message names the line and the remedy.
     pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
-        read(text, path.as_ref()).map(|(scene, _)| scene)
+        let (checker, table) = table(text, path.as_ref())?;
+        convert::scene(&checker, &table)
     }
 }
 
-fn read(text: &str, path: &Path) -> Result<(Scene, file::SceneTable), SceneError> {
+impl ScanScene {
+    /// Reads and validates the scene file at `path`.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or has no valid `[scan]`; the message names the line and the remedy.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let path = path.as_ref();
+        Self::parse(&read_text(path)?, path)
+    }
+
+    /// Validates the text of a scene; messages name `path`.
+    ///
+    /// # Errors
+    /// When the scene has no valid `[scan]`; the message names the line and the remedy.
+    pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let (checker, table) = table(text, path.as_ref())?;
+        convert::scan_scene(&checker, &table)
+    }
+}
+
+impl Rendering {
+    /// Reads and validates the scene file at `path`.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or the scene is not valid; the message names the line and the remedy.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let path = path.as_ref();
+        Self::parse(&read_text(path)?, path)
+    }
+
+    /// Validates the text of a scene; messages name `path`. No file is opened.
+    ///
+    /// # Errors
+    /// When the scene is not valid; the message names the line and the remedy.
+    pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let (checker, table) = table(text, path.as_ref())?;
+        convert::rendering(&checker, &table)
+    }
+}
+
+/// The text of the scene file at `path`.
+fn read_text(path: &Path) -> Result<String, SceneError> {
+    let unreadable = |reason: String| SceneError::Unreadable { path: path.to_owned(), reason };
+    let stream = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
+    let mut text = String::new();
+    stream.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(|error| unreadable(error.to_string()))?;
+    if text.len() as u64 > MAX_BYTES {
+        return Err(unreadable(format!("it is longer than {MAX_BYTES} bytes, which no scene is")));
+    }
+    Ok(text)
+}
+
+/// The tables of a scene's text, checked for layout alone.
+fn table<'a>(text: &'a str, path: &'a Path) -> Result<(Checker<'a>, file::SceneTable), SceneError> {
     let checker = Checker { path, text };
     let table: file::SceneTable = toml::from_str(text).map_err(|error| {
         let place = error.span().unwrap_or(0..0);
         checker.error(place, error.message())
     })?;
-    Ok((convert::scene(&checker, &table)?, table))
+    Ok((checker, table))
 }

@@ -26,6 +26,8 @@ pub(super) struct Cloud {
     pub positions: Vec<Position>,
     /// Torque, joint fastest.
     pub torques: Vec<f64>,
+    /// Variance of each torque, laid out alike; empty where none was measured.
+    pub variances: Vec<f64>,
     /// Mean of all positions, inside the convex hull.
     pub centre: Position,
     /// d + 1 points that span a simplex of good volume.
@@ -49,6 +51,7 @@ impl Cloud {
             scale,
             positions: Vec::new(),
             torques: Vec::new(),
+            variances: Vec::new(),
             centre: [0.0; MAX_JOINTS],
             spanning: Vec::new(),
             merged: 0,
@@ -91,7 +94,9 @@ impl Cloud {
         let mut cells: HashMap<[i64; MAX_JOINTS], usize> = HashMap::with_capacity(samples.len());
         let mut counts: Vec<f64> = Vec::new();
         let rows = samples.configurations.chunks_exact(joints).zip(samples.torques.chunks_exact(joints));
-        for (q, torque) in rows {
+        for (sample, (q, torque)) in rows.enumerate() {
+            let squares = samples.deviations.iter().flat_map(|column| &column[sample * joints..(sample + 1) * joints]);
+            let squares = squares.map(|deviation| deviation * deviation);
             let position = self.scaled(q);
             let cell = position.map(|x| (x / tolerances::MERGE_DISTANCE).round() as i64);
             let point = *cells.entry(cell).or_insert(counts.len());
@@ -99,6 +104,7 @@ impl Cloud {
                 counts.push(1.0);
                 self.positions.push(position);
                 self.torques.extend_from_slice(torque);
+                self.variances.extend(squares);
             } else {
                 counts[point] += 1.0;
                 self.merged += 1;
@@ -107,6 +113,11 @@ impl Cloud {
                 }
                 for (mean, value) in self.torques[point * joints..].iter_mut().zip(torque) {
                     *mean += (value - *mean) / counts[point];
+                }
+                // Variance of a mean of independent values: sum of variances over the square of their number.
+                let kept = ((counts[point] - 1.0) / counts[point]).powi(2);
+                for (variance, square) in self.variances.iter_mut().skip(point * joints).zip(squares) {
+                    *variance = kept * *variance + square / counts[point].powi(2);
                 }
             }
         }

@@ -16,6 +16,7 @@ mod line;
 mod order;
 mod plane;
 mod samples;
+mod smooth;
 mod space;
 mod tetrahedra;
 
@@ -51,6 +52,8 @@ pub struct GridizeOptions {
     pub epsilon: Option<f64>,
     /// How torques are interpolated.
     pub interpolation: Interpolation,
+    /// Smooth torques within their measured standard deviation first.
+    pub smooth: bool,
 }
 
 /// What gridization did.
@@ -154,6 +157,9 @@ pub enum GridizeError {
         /// The limit.
         limit: usize,
     },
+    /// Nothing says how far smoothing may go.
+    #[error("smoothing needs the standard deviation of the samples, and none was measured: leave it out")]
+    NoDeviations,
     /// Refused by the triangulation library.
     #[error("the samples cannot be triangulated: {0}")]
     Triangulation(String),
@@ -172,7 +178,10 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
     if !(epsilon.is_finite() && epsilon >= 0.0) {
         return Err(GridizeError::Epsilon(epsilon));
     }
-    let cloud = Cloud::new(samples)?;
+    let mut cloud = Cloud::new(samples)?;
+    if options.smooth {
+        smooth::smooth(&mut cloud)?;
+    }
     let grid = grid(samples, &options.steps)?;
     let linear = |pull| (pull, &cloud);
     let torque = match (options.interpolation, cloud.joints) {

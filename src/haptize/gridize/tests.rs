@@ -39,7 +39,7 @@ fn lattice(side: usize, joints: usize, step: f64) -> Vec<Vec<f64>> {
 }
 
 fn options(step: f64) -> GridizeOptions {
-    GridizeOptions { steps: vec![step], epsilon: Some(0.0), interpolation: Interpolation::Linear }
+    GridizeOptions { steps: vec![step], epsilon: Some(0.0), interpolation: Interpolation::Linear, smooth: false }
 }
 
 fn linear_field(q: &[f64]) -> f64 {
@@ -292,4 +292,34 @@ fn the_same_samples_in_another_order_give_the_same_torque() {
     assert!(a.status[..] == b.status[..]);
     let worst = a.torque.iter().zip(b.torque.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-12, "{worst:e}");
+}
+
+#[test]
+fn smoothing_removes_noise_of_the_measured_size_and_leaves_the_rest() {
+    let points = random_points(3000, 2, 31);
+    let noise = |q: &[f64]| 0.2 * (uniform(q[0].to_bits() ^ q[1].to_bits().rotate_left(17)) - 0.5) * 12_f64.sqrt();
+    let field = |q: &[f64]| 3.0 * q[0] + if q[1] > 0.1 { 5.0 } else { 0.0 };
+    let mut noisy = samples(&points, |q| field(q) + noise(q));
+    noisy.deviations = Some([0.2, 0.4].repeat(points.len()));
+    let smooth = GridizeOptions { smooth: true, ..options(0.02) };
+    let rms = |dataset: &Dataset, near: &dyn Fn(&[f64]) -> bool| {
+        let points = (0..dataset.grid.points()).filter(|&p| dataset.status(p) != Status::Outside);
+        let chosen: Vec<f64> = points
+            .map(|p| (dataset.torque(p)[0], dataset.grid.configuration(p)))
+            .filter(|(_, q)| near(q))
+            .map(|(tau, q)| (tau - field(&q)).powi(2))
+            .collect();
+        (chosen.iter().sum::<f64>() / chosen.len() as f64).sqrt()
+    };
+    let away = |q: &[f64]| (q[1] - 0.1).abs() > 0.1;
+    let rough = gridize(&noisy, &options(0.02)).unwrap().0;
+    let smoothed = gridize(&noisy, &smooth).unwrap().0;
+    assert!(rms(&smoothed, &away) < 0.6 * rms(&rough, &away), "{} {}", rms(&smoothed, &away), rms(&rough, &away));
+    let step = |q: &[f64]| (q[1] - 0.1).abs() > 0.03 && (q[1] - 0.1).abs() < 0.07;
+    assert!(rms(&smoothed, &step) < 1.5 * rms(&rough, &step), "the step is kept");
+    noisy.deviations = Some(vec![0.0; 2 * points.len()]);
+    let unchanged = gridize(&noisy, &smooth).unwrap().0;
+    assert!(unchanged.torque[..] == rough.torque[..]);
+    noisy.deviations = None;
+    assert!(matches!(gridize(&noisy, &smooth), Err(GridizeError::NoDeviations)));
 }

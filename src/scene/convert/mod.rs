@@ -5,11 +5,12 @@ mod haptics;
 mod motion;
 mod object;
 mod proxy;
+mod scan;
 
 use super::check::Checker;
 use super::error::SceneError;
 use super::file::{ContactTable, GraphicsTable, SceneTable};
-use super::{Algorithm, ContactSpec, GraphicsSpec, Scene};
+use super::{Algorithm, ContactSpec, GraphicsSpec, Rendering, ScanScene, Scene};
 
 /// Default relative residual of the contact solver, in the energy norm [1]. Forces are promised to balance K u to 1e-6 of the
 /// largest, node by node, which a residual of 1e-6 misses by a third; the last steps converge fast, so two digits more cost
@@ -20,18 +21,49 @@ const CONTACT_ITERATIONS: u32 = 100;
 /// Default frame rate [Hz].
 const GRAPHICS_RATE: f64 = 60.0;
 
-/// Validates `table`, read from the checker's text.
+/// Validates `table`, read from the checker's text, as a scene with a virtual object.
 pub(super) fn scene(checker: &Checker<'_>, table: &SceneTable) -> Result<Scene, SceneError> {
+    let (Some(object), Some(contact_table), Some(grid)) = (&table.object, &table.contact, &table.grid) else {
+        let message = "the scene needs [object], [contact] and [grid] to be baked; a scene of a real object, with [scan], \
+                       is haptized by `haptize scan`";
+        return Err(checker.error(0..0, message));
+    };
+    let Rendering { path, text, name, proxy, haptics, graphics, motion, .. } = rendering(checker, table)?;
+    Ok(Scene {
+        path,
+        text,
+        name,
+        object: object::convert(checker, object)?,
+        contact: contact(checker, contact_table)?,
+        grid: grid::convert(checker, grid, &proxy.joints)?,
+        haptics,
+        graphics,
+        motion,
+        proxy,
+    })
+}
+
+/// Validates `table` as a scene with a real object.
+pub(super) fn scan_scene(checker: &Checker<'_>, table: &SceneTable) -> Result<ScanScene, SceneError> {
+    let Some(scan) = &table.scan else {
+        let message = "the scene has no [scan]: it says nothing of how a real object is haptized; a virtual one is \
+                       haptized by `haptize bake`";
+        return Err(checker.error(0..0, message));
+    };
+    let Rendering { text, name, proxy, .. } = rendering(checker, table)?;
+    Ok(ScanScene { text, name, scan: scan::convert(checker, scan, &proxy)?, proxy })
+}
+
+/// Validates what rendering needs of `table`.
+pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Rendering, SceneError> {
     let proxy = proxy::convert(checker, &table.proxy)?;
     let joints = &proxy.joints;
     let file_stem = checker.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    Ok(Scene {
+    Ok(Rendering {
         path: checker.path.to_owned(),
         text: checker.text.to_owned(),
         name: table.name.clone().or(file_stem).unwrap_or_default(),
-        object: object::convert(checker, &table.object)?,
-        contact: contact(checker, &table.contact)?,
-        grid: grid::convert(checker, &table.grid, joints)?,
+        object: table.object.as_ref().map(|object| object::convert(checker, object)).transpose()?,
         haptics: haptics::convert(checker, &table.haptics, joints)?,
         graphics: table.graphics.as_ref().map(|table| graphics(checker, table)).transpose()?,
         motion: motion::convert(checker, &table.motion, joints)?,

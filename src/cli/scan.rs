@@ -1,0 +1,120 @@
+//! `haptize scan`: a real object haptized by touching it. The rig that ships is simulated, and says so.
+
+use super::{Failure, Report};
+use haptize::{
+    JointVector,
+    haptize::scan::{
+        LogHeader, LogWriter, Plan, Rig, ScanProgress, ScanReport, ScanRow, Session, labels, simulated::SimulatedRig,
+    },
+    proxy::Chain,
+    scene::ScanScene,
+};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::{
+    io::{IsTerminal, stderr},
+    path::PathBuf,
+    sync::{Arc, atomic::AtomicBool, atomic::Ordering},
+};
+
+/// What to scan.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The scene's file; its [scan] says where the device goes.
+    scene: PathBuf,
+    /// The log to write; by default the scene's name in the current folder, ending in .csv.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Continue a log that was interrupted.
+    #[arg(long)]
+    resume: bool,
+}
+
+/// Seed of the simulated rig's noise.
+const SEED: u64 = 1;
+
+/// Scans. Ctrl-C stops after the point at hand and leaves a log that `--resume` continues.
+pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    let scene = ScanScene::load(&arguments.scene)?;
+    let chain = Chain::new(&scene.proxy);
+    let plan = Plan::new(&scene.scan.plan, &chain)?;
+    let first = plan.stops.first().map_or_else(|| JointVector::zeros(chain.joints.len()), |stop| stop.q);
+    let mut rig = SimulatedRig::new(&scene.proxy, &scene.scan.simulated, first, SEED);
+    let output = match &arguments.output {
+        Some(output) => output.clone(),
+        None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file; give -o")?)
+            .with_extension("csv"),
+    };
+    let header = LogHeader {
+        rig: rig.description(),
+        simulated: rig.is_simulated(),
+        joints: labels(&chain),
+        scene: scene.text.clone(),
+    };
+    let (mut log, logged): (LogWriter, Vec<ScanRow>) = if arguments.resume {
+        LogWriter::resume(&output, &header)?
+    } else {
+        (LogWriter::create(&output, &header)?, Vec::new())
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = stop.clone();
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))?;
+    eprintln!("haptize: {}", rig.description());
+    let bar = progress_bar();
+    let mut progress = |progress: ScanProgress| {
+        bar.set_length(progress.points as u64);
+        bar.set_position(progress.done as u64);
+        bar.set_message(format!("{:.0} s on the rig", progress.time));
+    };
+    let mut session = Session {
+        spec: &scene.scan,
+        chain: &chain,
+        rig: &mut rig,
+        log: &mut log,
+        stop: &stop,
+        progress: &mut progress,
+    };
+    let result = session.scan(&plan, &logged);
+    bar.finish_and_clear();
+    let report = result?;
+    let mut json = serde_json::to_value(&report)?;
+    json["file"] = output.display().to_string().into();
+    let mut text = describe(&output, &report);
+    if !report.whole {
+        text += &format!(
+            "  interrupted; continue: haptize scan {} -o {} --resume\n",
+            arguments.scene.display(),
+            output.display()
+        );
+    }
+    Ok(Report { text, json, whole: report.whole })
+}
+
+fn describe(output: &std::path::Path, report: &ScanReport) -> String {
+    let mut text = format!(
+        "{}: {} of {} points measured in {:.0} s on the rig's clock\n  rig          {}\n",
+        output.display(),
+        report.steady,
+        report.points,
+        report.seconds,
+        report.rig
+    );
+    for (count, what) in [
+        (report.unsteady, "not steady in time, left out by gridize"),
+        (report.limited, "stopped by a limit, left out by gridize"),
+        (report.unreachable, "not reached by the joints"),
+    ] {
+        if count > 0 {
+            text += &format!("  note         {count} points {what}\n");
+        }
+    }
+    text
+}
+
+/// A bar on standard error, hidden where that is no terminal.
+fn progress_bar() -> ProgressBar {
+    if !stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} points, {msg}, {eta} left");
+    ProgressBar::new(0).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}

@@ -1,0 +1,419 @@
+//! The log of a scan: a table of text that a person can read, written row by row, so that an interrupted scan keeps
+//! all it measured and can be resumed.
+//!
+//! Comment lines say what was touched (or simulated), how the numbers are meant, and hold the scene's text (after
+//! `#>`), so that the log alone is enough to gridize and feel. Then a header line and one row a point: its number in the
+//! plan, time, measured configuration, contact torque on the proxy (minus control torque, gravity already
+//! subtracted), standard deviation of a single tick's torque, ticks averaged, status.
+
+use crate::{
+    JointVector, MAX_JOINTS,
+    haptize::gridize::{JointLabel, Samples},
+};
+use std::{
+    fmt::Write as _,
+    fs::{File, OpenOptions},
+    io::{BufRead, BufReader, BufWriter, Read, Seek, SeekFrom, Write},
+    path::{Path, PathBuf},
+};
+
+/// First line of every scan log.
+pub const SIGNATURE: &str = "# haptize scan log, version 1";
+/// Before every line of the scene.
+const SCENE: &str = "#> ";
+/// Longest line and most rows that are read.
+const LONGEST_LINE: u64 = 1 << 16;
+const MOST_ROWS: usize = 5_000_000;
+
+/// What became of a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RowStatus {
+    /// Measured in steady contact.
+    Steady,
+    /// Measured, but not steady when the time was over: not gridized.
+    Unsteady,
+    /// A limit stopped the scan here: not gridized.
+    Limit,
+}
+
+impl RowStatus {
+    const ALL: [(Self, &'static str); 3] =
+        [(Self::Steady, "steady"), (Self::Unsteady, "unsteady"), (Self::Limit, "limit")];
+
+    fn name(self) -> &'static str {
+        Self::ALL.into_iter().find(|(status, _)| *status == self).map_or("", |(_, name)| name)
+    }
+
+    fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|(_, known)| *known == name).map(|(status, _)| status)
+    }
+}
+
+/// One measurement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScanRow {
+    /// Number in the plan.
+    pub point: usize,
+    /// Since the rig was started [s].
+    pub time: f64,
+    /// Measured configuration, averaged [rad or m].
+    pub q: JointVector,
+    /// Contact torque on the proxy, averaged [N m or N].
+    pub torque: JointVector,
+    /// Standard deviation of the torque of a single tick [N m or N].
+    pub deviation: JointVector,
+    /// Ticks averaged.
+    pub ticks: u32,
+    /// What became of the point.
+    pub status: RowStatus,
+}
+
+/// What a log says before its rows.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LogHeader {
+    /// The rig's own words.
+    pub rig: String,
+    /// True where no real object was touched.
+    pub simulated: bool,
+    /// Names and units.
+    pub joints: Vec<JointLabel>,
+    /// The scene's text.
+    pub scene: String,
+}
+
+/// A log that was read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ScanLog {
+    /// What it says before its rows.
+    pub header: LogHeader,
+    /// In the order of measurement.
+    pub rows: Vec<ScanRow>,
+}
+
+/// A log that is written.
+#[derive(Debug)]
+pub struct LogWriter {
+    path: PathBuf,
+    file: BufWriter<File>,
+}
+
+/// A log cannot be read, continued or written.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// The system refused.
+    #[error("{}: {source}", .path.display())]
+    File {
+        /// The log.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The log is there already.
+    #[error("{}: exists already; continue it with --resume, or name another file", .0.display())]
+    Exists(PathBuf),
+    /// Another scene's log.
+    #[error("{}: the log was made with another scene or rig; it cannot be continued with this one", .0.display())]
+    OtherScene(PathBuf),
+    /// Not a scan log.
+    #[error("{}: not a scan log (its first line is not `{SIGNATURE}`); other tables need a column mapping", .0.display())]
+    Foreign(PathBuf),
+    /// A line that is wrong.
+    #[error("{}:{line}: {message}", .path.display())]
+    Line {
+        /// The log.
+        path: PathBuf,
+        /// From 1.
+        line: u64,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+fn effort(unit: &str) -> &'static str {
+    if unit == "m" { "N" } else { "N m" }
+}
+
+impl LogHeader {
+    fn columns(&self) -> String {
+        let mut text = "point,time [s]".to_owned();
+        for (what, is_effort) in [("q", false), ("tau", true), ("std", true)] {
+            for JointLabel { name, unit } in &self.joints {
+                let unit = if is_effort { effort(unit) } else { unit };
+                let _ = write!(text, ",{what} {name} [{unit}]");
+            }
+        }
+        text + ",ticks,status"
+    }
+
+    fn text(&self) -> String {
+        let kind = if self.simulated { "simulated" } else { "real" };
+        let mut text = format!(
+            "{SIGNATURE}\n# kind: {kind}\n# rig: {}\n\
+             # tau: contact torque on the proxy in steady contact, minus control torque, gravity subtracted\n\
+             # std: standard deviation of a single tick's torque over the ticks that were averaged\n",
+            self.rig
+        );
+        for line in self.scene.lines() {
+            let _ = writeln!(text, "{SCENE}{line}");
+        }
+        let _ = writeln!(text, "{}", self.columns());
+        text
+    }
+}
+
+impl LogWriter {
+    /// Begins the log at `path`.
+    ///
+    /// # Errors
+    /// When there is a file already, or it cannot be made.
+    pub fn create(path: &Path, header: &LogHeader) -> Result<Self, LogError> {
+        let failed = |source: std::io::Error| match source.kind() {
+            std::io::ErrorKind::AlreadyExists => LogError::Exists(path.to_owned()),
+            _ => LogError::File { path: path.to_owned(), source },
+        };
+        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
+        let mut writer = Self { path: path.to_owned(), file: BufWriter::new(file) };
+        writer.write(&header.text())?;
+        Ok(writer)
+    }
+
+    /// Continues the log at `path`; its rows so far. A last line that was cut off is removed.
+    ///
+    /// # Errors
+    /// When it cannot be read, or its header is not `header`.
+    pub fn resume(path: &Path, header: &LogHeader) -> Result<(Self, Vec<ScanRow>), LogError> {
+        let failed = |source| LogError::File { path: path.to_owned(), source };
+        let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(failed)?;
+        let whole = whole_lines(&mut file).map_err(failed)?;
+        file.set_len(whole).map_err(failed)?;
+        let log = ScanLog::read(path)?;
+        if log.header != *header {
+            return Err(LogError::OtherScene(path.to_owned()));
+        }
+        file.seek(SeekFrom::End(0)).map_err(failed)?;
+        Ok((Self { path: path.to_owned(), file: BufWriter::new(file) }, log.rows))
+    }
+
+    /// Appends a row, and hands it to the system at once.
+    ///
+    /// # Errors
+    /// Those of the file.
+    pub fn append(&mut self, row: &ScanRow) -> Result<(), LogError> {
+        let mut text = format!("{},{}", row.point, row.time);
+        for vector in [&row.q, &row.torque, &row.deviation] {
+            for value in vector.iter() {
+                let _ = write!(text, ",{value}");
+            }
+        }
+        let _ = writeln!(text, ",{},{}", row.ticks, row.status.name());
+        self.write(&text)
+    }
+
+    fn write(&mut self, text: &str) -> Result<(), LogError> {
+        let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.flush());
+        written.map_err(|source| LogError::File { path: self.path.clone(), source })
+    }
+}
+
+/// Length of the file up to its last line end [bytes].
+fn whole_lines(file: &mut File) -> std::io::Result<u64> {
+    let length = file.seek(SeekFrom::End(0))?;
+    let tail = length.min(LONGEST_LINE);
+    file.seek(SeekFrom::Start(length - tail))?;
+    let mut bytes = Vec::new();
+    Read::by_ref(file).take(tail).read_to_end(&mut bytes)?;
+    let cut = bytes.iter().rev().take_while(|byte| **byte != b'\n').count();
+    Ok(length - cut as u64)
+}
+
+impl ScanLog {
+    /// Whether the file at `path` begins like a scan log.
+    #[must_use]
+    pub fn is_one(path: &Path) -> bool {
+        let mut start = vec![0; SIGNATURE.len()];
+        File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == SIGNATURE.as_bytes()
+    }
+
+    /// Reads the log at `path`.
+    ///
+    /// # Errors
+    /// [`LogError`] names the file and the line.
+    pub fn read(path: &Path) -> Result<Self, LogError> {
+        let failed = |source| LogError::File { path: path.to_owned(), source };
+        let mut reader = BufReader::new(File::open(path).map_err(failed)?);
+        let mut log = Self::default();
+        let (mut text, mut number, mut has_columns) = (String::new(), 0, false);
+        loop {
+            text.clear();
+            let read = reader.by_ref().take(LONGEST_LINE).read_line(&mut text).map_err(failed)?;
+            if read == 0 {
+                break;
+            }
+            number += 1;
+            let line = text.trim_end_matches(['\n', '\r']);
+            let bad = |message: String| LogError::Line { path: path.to_owned(), line: number, message };
+            if number == 1 && line != SIGNATURE {
+                return Err(LogError::Foreign(path.to_owned()));
+            }
+            if let Some(scene) = line.strip_prefix(SCENE.trim_end()) {
+                log.header.scene += scene.strip_prefix(' ').unwrap_or(scene);
+                log.header.scene.push('\n');
+            } else if let Some(kind) = line.strip_prefix("# kind: ") {
+                log.header.simulated = kind == "simulated";
+            } else if let Some(rig) = line.strip_prefix("# rig: ") {
+                rig.clone_into(&mut log.header.rig);
+            } else if line.starts_with('#') || line.is_empty() {
+            } else if !has_columns {
+                log.header.joints = labels(line).map_err(bad)?;
+                has_columns = true;
+            } else if log.rows.len() == MOST_ROWS {
+                return Err(bad(format!("more than {MOST_ROWS} rows")));
+            } else {
+                log.rows.push(row(line, log.header.joints.len()).map_err(bad)?);
+            }
+        }
+        if !has_columns {
+            let message = "the log ends before its first row".to_owned();
+            return Err(LogError::Line { path: path.to_owned(), line: number, message });
+        }
+        Ok(log)
+    }
+
+    /// The steady measurements, each with the standard deviation of its mean: that of a tick over the root of the ticks.
+    #[must_use]
+    pub fn samples(&self) -> Samples {
+        let mut samples = Samples { joints: self.header.joints.clone(), ..Samples::default() };
+        let mut deviations = Vec::new();
+        for row in self.rows.iter().filter(|row| row.status == RowStatus::Steady) {
+            samples.configurations.extend_from_slice(&row.q);
+            samples.torques.extend_from_slice(&row.torque);
+            let root = f64::from(row.ticks.max(1)).sqrt();
+            deviations.extend(row.deviation.iter().map(|deviation| deviation / root));
+        }
+        samples.deviations = Some(deviations);
+        samples
+    }
+}
+
+/// Joint names and units from the header line.
+fn labels(line: &str) -> Result<Vec<JointLabel>, String> {
+    let wrong = || format!("the header line is not one of a scan log: `{line}`");
+    let names = line.split(',').skip(2).take_while(|column| column.starts_with("q "));
+    let joints: Option<Vec<JointLabel>> = names
+        .map(|column| {
+            let (name, unit) = column.strip_prefix("q ")?.strip_suffix(']')?.rsplit_once(" [")?;
+            Some(JointLabel { name: name.to_owned(), unit: unit.to_owned() })
+        })
+        .collect();
+    let joints = joints.filter(|joints| (1..=MAX_JOINTS).contains(&joints.len())).ok_or_else(wrong)?;
+    let header = LogHeader { joints, ..LogHeader::default() };
+    if header.columns() == line { Ok(header.joints) } else { Err(wrong()) }
+}
+
+fn row(line: &str, joints: usize) -> Result<ScanRow, String> {
+    let fields: Vec<&str> = line.split(',').collect();
+    let columns = 3 * joints + 4;
+    if fields.len() != columns {
+        return Err(format!("{} columns where {columns} are expected", fields.len()));
+    }
+    let number = |column: usize| {
+        let value: Option<f64> = fields[column].parse().ok();
+        let wrong = || format!("column {} holds `{}`, not a finite number", column + 1, fields[column]);
+        value.filter(|value| value.is_finite()).ok_or_else(wrong)
+    };
+    let vector = |first: usize| {
+        let values: Result<Vec<f64>, String> = (first..first + joints).map(number).collect();
+        values.map(|values| JointVector::from_slice(&values))
+    };
+    let whole = |column: usize| {
+        let wrong = || format!("column {} holds `{}`, not a whole number", column + 1, fields[column]);
+        fields[column].parse::<u32>().map_err(|_| wrong())
+    };
+    Ok(ScanRow {
+        point: whole(0)? as usize,
+        time: number(1)?,
+        q: vector(2)?,
+        torque: vector(2 + joints)?,
+        deviation: vector(2 + 2 * joints)?,
+        ticks: whole(columns - 2)?,
+        status: RowStatus::named(fields[columns - 1])
+            .ok_or_else(|| format!("status `{}` is unknown", fields[columns - 1]))?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header() -> LogHeader {
+        LogHeader {
+            rig: "a rig, on a table".to_owned(),
+            simulated: true,
+            joints: [("base yaw", "rad"), ("slide", "m")]
+                .map(|(name, unit)| JointLabel { name: name.to_owned(), unit: unit.to_owned() })
+                .into(),
+            scene: "name = \"x\"\n\n  # indented\n[scan]\n".to_owned(),
+        }
+    }
+
+    fn row(point: usize) -> ScanRow {
+        let vector = |x: f64| JointVector::from_slice(&[x, -x / 3.0]);
+        let x = point as f64;
+        ScanRow {
+            point,
+            time: 0.1 * x,
+            q: vector(x),
+            torque: vector(0.1 + x),
+            deviation: vector(0.01),
+            ticks: 100,
+            status: if point == 1 { RowStatus::Unsteady } else { RowStatus::Steady },
+        }
+    }
+
+    #[test]
+    fn a_log_is_read_as_it_was_written_and_continued_after_a_cut() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scan.csv");
+        let mut writer = LogWriter::create(&path, &header()).unwrap();
+        (0..3).for_each(|point| writer.append(&row(point)).unwrap());
+        drop(writer);
+        let log = ScanLog::read(&path).unwrap();
+        assert_eq!((&log.header, &log.rows[..]), (&header(), &[row(0), row(1), row(2)][..]));
+        assert_eq!(log.samples().configurations, [0.0, 0.0, 2.0, -2.0 / 3.0]);
+        assert!(matches!(LogWriter::create(&path, &header()), Err(LogError::Exists(_))));
+
+        let text = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &text[..text.len() - 9]).unwrap();
+        let (mut writer, rows) = LogWriter::resume(&path, &header()).unwrap();
+        assert_eq!(rows, [row(0), row(1)]);
+        writer.append(&row(7)).unwrap();
+        drop(writer);
+        assert_eq!(ScanLog::read(&path).unwrap().rows, [row(0), row(1), row(7)]);
+        let other = LogHeader { scene: "name = \"y\"\n".to_owned(), ..header() };
+        assert!(matches!(LogWriter::resume(&path, &other), Err(LogError::OtherScene(_))));
+    }
+
+    #[test]
+    fn broken_logs_are_refused_with_the_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scan.csv");
+        let refused = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            ScanLog::read(&path).err().unwrap().to_string()
+        };
+        let good = header().text() + "0,0,1,2,3,4,5,6,10,steady\n";
+        let last = good.lines().count();
+        assert!(refused("time,q\n1,2\n").contains("column mapping"));
+        assert!(refused(&format!("{SIGNATURE}\n")).contains("before its first row"));
+        for (from, to, what) in [
+            ("0,0,1,2", "0,0,1", "9 columns"),
+            ("0,0,1,2", "0,0,nan,2", "`nan`"),
+            ("0,0,1,2", "-1,0,1,2", "`-1`"),
+            ("10,steady", "10,fine", "`fine`"),
+        ] {
+            let error = refused(&good.replace(from, to));
+            assert!(error.contains(&format!("scan.csv:{last}:")) && error.contains(what), "{error}");
+        }
+        assert!(refused(&good.replace("std slide", "std slid")).contains("header line"));
+    }
+}

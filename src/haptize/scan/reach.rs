@@ -1,0 +1,53 @@
+//! Inverse kinematics: the configuration that puts a contact node at a position.
+//!
+//! Damped Gauss-Newton steps `dq = J^T (J J^T + lambda^2 1)^-1 (x - x_i(q))` from the configuration before, within
+//! the joints' limits; the damping (Nakamura and Hanafusa 1986) grows where a step makes things worse. Nearby positions
+//! thus get nearby configurations, with redundant chains too.
+
+use crate::{
+    JointVector,
+    proxy::{Chain, Pose},
+    tolerances,
+};
+use glam::{DMat3, DVec3};
+
+/// Configuration near `start` at which contact node `node` is at `target`, to [`tolerances::REACHED`]; `None` where
+/// the joints do not reach it.
+#[must_use]
+pub fn reach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) -> Option<JointVector> {
+    let mut q = *start;
+    let mut pose = chain.new_pose();
+    chain.pose(&q, &mut pose);
+    let mut distance = target.distance(pose.nodes[node]);
+    let mut damping = tolerances::REACH_DAMPING;
+    for _ in 0..tolerances::REACH_STEPS {
+        if distance < tolerances::REACHED {
+            return Some(q);
+        }
+        let next = step(chain, &pose, node, target, &q, damping);
+        chain.pose(&next, &mut pose);
+        let next_distance = target.distance(pose.nodes[node]);
+        if next_distance < distance {
+            (q, distance) = (next, next_distance);
+            damping *= 0.3;
+        } else {
+            damping *= 4.0;
+            chain.pose(&q, &mut pose);
+        }
+    }
+    None
+}
+
+fn step(chain: &Chain, pose: &Pose, node: usize, target: DVec3, q: &JointVector, damping: f64) -> JointVector {
+    let columns: Vec<DVec3> = (0..q.len()).map(|joint| chain.jacobian_column(pose, node, joint)).collect();
+    let outer = |a: &DVec3| DMat3::from_cols(*a * a.x, *a * a.y, *a * a.z);
+    let square = columns.iter().map(outer).fold(DMat3::ZERO, |sum, term| sum + term);
+    let system = square + DMat3::from_diagonal(DVec3::splat(damping * damping));
+    let pull = system.inverse() * (target - pose.nodes[node]);
+    let mut next = *q;
+    for (joint, value) in next.iter_mut().enumerate() {
+        let [least, greatest] = chain.joints[joint].limits;
+        *value = (*value + columns[joint].dot(pull)).clamp(least, greatest);
+    }
+    next
+}

@@ -1,0 +1,245 @@
+//! A scan against the simulated rig: what it logs is the block's own force, nothing else, and it stops and resumes.
+
+use super::simulated::{NodeContact, SimulatedRig, Sponge};
+use super::*;
+use crate::scene::{PlanAxis, ScanScene, WorkspacePlan};
+use std::path::PathBuf;
+
+fn scene() -> ScanScene {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("datasets/sponge.toml");
+    let mut scene = ScanScene::load(path).unwrap();
+    scene.scan.plan = plan([2, 2, 4], DVec3::new(0.15, -0.03, 0.012));
+    scene
+}
+
+fn plan([first, second, depth]: [usize; 3], start: DVec3) -> PlanSpec {
+    let axis = |direction, spacing, count| PlanAxis { direction, spacing, count };
+    PlanSpec::Workspace(WorkspacePlan {
+        node: 0,
+        start,
+        across: [axis(DVec3::Y, 0.03, first), axis(DVec3::X, 0.02, second)],
+        depth: axis(DVec3::NEG_Z, 0.008, depth),
+        clearance: 0.004,
+    })
+}
+
+/// A rig of the scene, its log, and what is needed to scan.
+struct Bench {
+    scene: ScanScene,
+    chain: Chain,
+    plan: Plan,
+    folder: tempfile::TempDir,
+    stop: AtomicBool,
+}
+
+impl Bench {
+    fn new(scene: ScanScene) -> Self {
+        let chain = Chain::new(&scene.proxy);
+        let plan = Plan::new(&scene.scan.plan, &chain).unwrap();
+        Self { chain, plan, folder: tempfile::tempdir().unwrap(), stop: AtomicBool::new(false), scene }
+    }
+
+    fn rig(&self) -> SimulatedRig {
+        SimulatedRig::new(&self.scene.proxy, &self.scene.scan.simulated, self.plan.stops[0].q, 7)
+    }
+
+    fn header(&self) -> LogHeader {
+        let rig = self.rig();
+        LogHeader {
+            rig: rig.description(),
+            simulated: rig.is_simulated(),
+            joints: labels(&self.chain),
+            scene: self.scene.text.clone(),
+        }
+    }
+
+    fn path(&self) -> PathBuf {
+        self.folder.path().join("log.csv")
+    }
+
+    fn session<T>(&self, rig: &mut dyn Rig, log: &mut LogWriter, run: impl FnOnce(&mut Session<'_>) -> T) -> T {
+        self.session_with(rig, log, &mut |_| {}, run)
+    }
+
+    fn session_with<T>(
+        &self,
+        rig: &mut dyn Rig,
+        log: &mut LogWriter,
+        progress: &mut dyn FnMut(ScanProgress),
+        run: impl FnOnce(&mut Session<'_>) -> T,
+    ) -> T {
+        let (spec, chain, stop) = (&self.scene.scan, &self.chain, &self.stop);
+        run(&mut Session { spec, chain, rig, log, stop, progress })
+    }
+
+    fn scan(&self) -> (Result<ScanReport, ScanError>, Vec<ScanRow>) {
+        let mut log = LogWriter::create(&self.path(), &self.header()).unwrap();
+        let report = self.session(&mut self.rig(), &mut log, |session| session.scan(&self.plan, &[]));
+        drop(log);
+        (report, ScanLog::read(&self.path()).unwrap().rows)
+    }
+
+    /// The block's relaxed force as joint torque at `q`, pressed straight down from above.
+    fn relaxed_torque(&self, q: &JointVector) -> JointVector {
+        let sponge = Sponge::new(&self.scene.scan.simulated);
+        let mut pose = self.chain.new_pose();
+        self.chain.pose(q, &mut pose);
+        let (end, radius) = (pose.nodes[0], self.chain.nodes[0].radius);
+        let mut contact = NodeContact::default();
+        for k in 0..=100 {
+            let above = DVec3::Z * (0.05 * (1.0 - f64::from(k) / 100.0));
+            sponge.force(&mut contact, end + above, radius, 0.01);
+        }
+        let force = (0..1000).map(|_| sponge.force(&mut contact, end, radius, 0.01)).last().unwrap();
+        let mut torque = JointVector::zeros(q.len());
+        self.chain.add_torque(&pose, 0, force, &mut torque);
+        torque
+    }
+}
+
+#[test]
+fn steady_torque_is_that_of_the_block_where_it_is_touched_and_nothing_elsewhere() {
+    let bench = Bench::new(scene());
+    let (report, rows) = bench.scan();
+    let report = report.unwrap();
+    assert_eq!((report.points, report.steady, report.whole, report.simulated), (16, 16, true, true));
+    let mut touched = 0;
+    for row in &rows {
+        let expected = bench.relaxed_torque(&row.q);
+        touched += usize::from(expected.norm() > 0.0);
+        for (joint, (measured, expected)) in row.torque.iter().zip(expected.iter()).enumerate() {
+            // Dry friction of the joint, tangential friction of the tip, and what has not relaxed.
+            let slack = 0.004 + 0.15 * bench.relaxed_torque(&row.q).norm();
+            assert!((measured - expected).abs() < slack, "{row:?} joint {joint}: {expected}");
+        }
+        // A joint held by friction within one encoder step is commanded a constant torque: no deviation.
+        assert!(row.deviation.iter().all(|deviation| (0.0..0.05).contains(deviation)), "{row:?}");
+    }
+    assert!(rows.iter().any(|row| row.deviation.norm() > 0.0), "noise reaches the log");
+    assert_eq!(touched, 12, "one level of four lies above the block");
+}
+
+#[test]
+fn gravity_is_subtracted() {
+    let mut scene = scene();
+    scene.scan.simulated.corner.z -= 1.0;
+    let heavy = scene.proxy.joints.iter().map(|joint| joint.mass).sum::<f64>() * tolerances::GRAVITY * 0.1;
+    let bench = Bench::new(scene);
+    let (report, rows) = bench.scan();
+    assert_eq!(report.unwrap().steady, 16);
+    for row in rows {
+        assert!(row.torque.norm() < 0.006 && row.torque.norm() < 0.05 * heavy, "{row:?}");
+    }
+}
+
+#[test]
+fn an_interrupted_scan_is_resumed_where_it_was() {
+    let bench = Bench::new(scene());
+    let mut log = LogWriter::create(&bench.path(), &bench.header()).unwrap();
+    let mut interrupt = |progress: ScanProgress| bench.stop.store(progress.done >= 6, Ordering::Relaxed);
+    let report =
+        bench.session_with(&mut bench.rig(), &mut log, &mut interrupt, |session| session.scan(&bench.plan, &[]));
+    drop(log);
+    let report = report.unwrap();
+    assert!(!report.whole && report.steady == 6);
+    bench.stop.store(false, Ordering::Relaxed);
+    let (mut log, logged) = LogWriter::resume(&bench.path(), &bench.header()).unwrap();
+    let report = bench.session(&mut bench.rig(), &mut log, |session| session.scan(&bench.plan, &logged)).unwrap();
+    assert!(report.whole && report.steady == 16);
+    let mut points: Vec<usize> = ScanLog::read(&bench.path()).unwrap().rows.iter().map(|row| row.point).collect();
+    points.sort_unstable();
+    assert!(points.into_iter().eq(0..16));
+}
+
+#[test]
+fn limits_stop_the_scan_log_the_point_and_let_it_go_on_after_it() {
+    let limited = |change: &dyn Fn(&mut ScanScene), what: &str| {
+        let mut scene = scene();
+        change(&mut scene);
+        let bench = Bench::new(scene);
+        let (report, rows) = bench.scan();
+        let error = report.err().unwrap().to_string();
+        assert!(error.contains(what) && error.contains("--resume"), "{error}");
+        let last = *rows.last().unwrap();
+        assert!(last.status == RowStatus::Limit && last.torque.norm() == 0.0);
+        assert!(rows.iter().all(|row| row.point != last.point || row.status == RowStatus::Limit));
+        let (mut log, logged) = LogWriter::resume(&bench.path(), &bench.header()).unwrap();
+        let again = bench.session(&mut bench.rig(), &mut log, |session| session.scan(&bench.plan, &logged));
+        drop(log);
+        let rows = ScanLog::read(&bench.path()).unwrap().rows;
+        assert_eq!(rows.iter().filter(|row| row.point == last.point).count(), 1, "{again:?}");
+    };
+    limited(&|scene| scene.scan.limits.torque.fill(0.12), "torque of joint");
+    limited(&|scene| scene.scan.limits.speed = 0.05, "speed of joint");
+    limited(&|scene| scene.scan.limits.workspace[0].z = -0.008, "outside the workspace");
+}
+
+#[test]
+fn a_rig_that_fails_ends_the_scan_and_keeps_the_log() {
+    struct Failing(SimulatedRig, usize);
+    impl Rig for Failing {
+        fn hold(&mut self, torque: &JointVector, period: f64) -> Result<RigReading, RigError> {
+            self.1 += 1;
+            if self.1 > 3000 { Err(RigError("no answer".to_owned())) } else { self.0.hold(torque, period) }
+        }
+        fn description(&self) -> String {
+            self.0.description()
+        }
+        fn is_simulated(&self) -> bool {
+            true
+        }
+    }
+    let bench = Bench::new(scene());
+    let mut log = LogWriter::create(&bench.path(), &bench.header()).unwrap();
+    let mut rig = Failing(bench.rig(), 0);
+    let result = bench.session(&mut rig, &mut log, |session| session.scan(&bench.plan, &[]));
+    assert!(result.err().unwrap().to_string().contains("no answer"));
+    assert!(!ScanLog::read(&bench.path()).unwrap().rows.is_empty());
+}
+
+#[test]
+fn points_out_of_reach_are_reported_and_the_rest_is_scanned() {
+    let mut scene = scene();
+    scene.scan.plan = plan([1, 3, 2], DVec3::new(0.24, 0.0, 0.012));
+    scene.scan.limits.workspace = [DVec3::splat(-1.0), DVec3::splat(1.0)];
+    let bench = Bench::new(scene);
+    assert!(!bench.plan.unreachable.is_empty() && bench.plan.unreachable.len() < 6, "{:?}", bench.plan.unreachable);
+    let report = bench.scan().0.unwrap();
+    assert_eq!(report.steady + report.unreachable, 6);
+    assert!(report.whole);
+    let far = plan([1, 1, 1], DVec3::new(2.0, 0.0, 0.0));
+    assert!(matches!(Plan::new(&far, &bench.chain), Err(ScanError::NothingReachable)));
+}
+
+#[test]
+fn a_plan_over_joints_visits_its_grid() {
+    let text = scene().text.replace("[scan.workspace]", "[ignored]");
+    let start = text.find("[ignored]").unwrap();
+    let end = text.find("[scan.control]").unwrap();
+    let axes = "[scan.joints]\nspacing = 0.05\naxes = [{ start = 0.0, count = 2 }, { start = 0.0, count = 2 }, \
+                { start = 1.3, count = 3 }]\n";
+    let text = text[..start].to_owned() + axes + &text[end..];
+    let bench = Bench::new(ScanScene::parse(&text, "joints.toml").unwrap());
+    let (report, rows) = bench.scan();
+    assert_eq!(report.unwrap().steady, 12);
+    for row in &rows {
+        let commanded = bench.plan.stops.iter().find(|stop| stop.point == Some(row.point)).unwrap().q;
+        let off = row.q.iter().zip(commanded.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 0.02, "{row:?} {commanded:?}");
+    }
+}
+
+#[test]
+fn inverse_kinematics_reaches_what_forward_kinematics_can() {
+    let bench = Bench::new(scene());
+    let mut pose = bench.chain.new_pose();
+    for k in 0..50 {
+        let share = |step: f64| (f64::from(k) * step).fract();
+        let q = JointVector::from_slice(&[2.0 * share(0.37) - 1.0, 1.4 * share(0.73) - 0.7, 0.7 + 1.6 * share(0.19)]);
+        bench.chain.pose(&q, &mut pose);
+        let target = pose.nodes[0];
+        let found = reach(&bench.chain, 0, target, &JointVector::from_slice(&[0.0, 0.0, 1.5])).unwrap();
+        bench.chain.pose(&found, &mut pose);
+        assert!(pose.nodes[0].distance(target) < 1e-6, "{q:?} {found:?}");
+    }
+}
