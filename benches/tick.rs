@@ -1,4 +1,5 @@
-//! What one tick of the haptic loop costs, for one to six joints: look-up alone and the whole tick, side by side.
+//! What one tick of the haptic loop costs, for one to six joints and each interpolation: look-up alone and the whole tick,
+//! side by side.
 //!
 //!     cargo bench --bench tick
 
@@ -16,6 +17,7 @@ use haptize::{
         field::TorqueField,
         haptic::{Haptics, Inputs},
     },
+    scene::Interpolation,
 };
 use std::{hint::black_box, time::Instant};
 
@@ -35,12 +37,17 @@ fn nanoseconds(mut work: impl FnMut(f64)) -> f64 {
 }
 
 fn main() {
-    println!("joints  grid points  look-up [ns]  tick [ns]  tick / look-up  tick / tick of 3 joints");
-    let cost = |joints: usize| {
+    println!(
+        "joints  interpolation  grid points  look-up [ns]  tick [ns]  look-up / linear  tick / linear of 3 joints"
+    );
+    let cost = |joints: usize, interpolation: Interpolation| {
         let count = [0, 4000, 200, 30, 14, 9, 7][joints];
-        let data = synthetic::half_space(synthetic::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]), 5.0);
+        let mut data =
+            synthetic::half_space(synthetic::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]), 5.0);
+        let depth = |point: usize| data.grid.configuration(point).iter().sum::<f64>() / (joints as f64).sqrt();
+        data.gap = Some((0..data.grid.points()).map(|point| -depth(point) as f32).collect::<Vec<_>>().into());
         let spec = desktop::haptics(joints);
-        let field = TorqueField::new(&data, spec.threshold, &spec.boundary_slope).unwrap();
+        let field = TorqueField::interpolated(&data, interpolation, spec.threshold, &spec.boundary_slope).unwrap();
         // In and out of contact, through many cells.
         let place = |k: f64| {
             let mut q = JointVector::zeros(joints);
@@ -61,10 +68,14 @@ fn main() {
         });
         (data.grid.points(), look_up - placing, tick - placing)
     };
-    let three = cost(3).2;
+    let three = cost(3, Interpolation::Linear).2;
     for joints in 1..=MAX_JOINTS {
-        let (points, look_up, tick) = cost(joints);
-        let (ratio, relative) = (tick / look_up, tick / three);
-        println!("{joints:6}  {points:11}  {look_up:12.0}  {tick:9.0}  {ratio:14.1}  {relative:23.2}");
+        let linear = cost(joints, Interpolation::Linear).1;
+        for interpolation in Interpolation::ALL {
+            let (points, look_up, tick) = cost(joints, interpolation);
+            let (ratio, relative) = (look_up / linear, tick / three);
+            let name = interpolation.name();
+            println!("{joints:6}  {name:13}  {points:11}  {look_up:12.0}  {tick:9.0}  {ratio:16.1}  {relative:25.2}");
+        }
     }
 }

@@ -78,7 +78,13 @@ fn main(
     // Stages of growing stiffness, each from the state before.
     var kc = parameters.kc;
     if !FROZEN {
-        kc = min(kc, CONTINUATION_START / parameters.softest);
+        // A spring pressed in beyond a node's radius would pull the node's centre through the surface.
+        var radii = 1.0;
+        for (var node = local; node < parameters.proxy_nodes; node += WORKGROUP) {
+            let radius = proxy_radius(node);
+            radii = max(radii, select(0.0, -positions[position_base + node].w / max(radius, LEAST_DIVISOR), radius > 0.0));
+        }
+        kc = min(kc, CONTINUATION_START / parameters.softest * greatest(radii, local));
     }
     var outcome = Outcome();
     var contact = Contact();
@@ -98,10 +104,10 @@ fn main(
         let at_rest = outcome.iterations == 0u && !new_stage;
         var accepted = true;
         var trial = contact;
+        let moved = displace(DIRECTION_FORCE, local);
         if new_stage {
             kc = min(parameters.kc, CONTINUATION_FACTOR * kc);
         } else {
-            let moved = displace(DIRECTION_FORCE, local);
             if !FROZEN || at_rest {
                 trial = deformed(moved, reach, local);
             }
@@ -157,7 +163,8 @@ fn main(
             scale = max(sqrt(squares.y), RESIDUAL_FLOOR);
             outcome.residual = sqrt(square) / scale;
         }
-        new_stage = kc < parameters.kc && outcome.residual <= STAGE_TOLERANCE;
+        new_stage = kc < parameters.kc
+            && (outcome.residual <= STAGE_TOLERANCE || !(radius >= STALLED_RADIUS * first_radius));
         if new_stage {
             // The state as it is, as a trial at the next stiffness.
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
@@ -190,7 +197,16 @@ fn main(
         let settled_before = settled;
         settled = felt <= parameters.depth_rounding;
         let small = step.length <= parameters.tolerance * scale || (settled && settled_before);
-        if small && kc == parameters.kc && !step.at_boundary && work.y > 0.0 {
+        if small && !step.at_boundary && work.y > 0.0 {
+            if kc < parameters.kc {
+                // f32 can tell no more at this stage.
+                new_stage = true;
+                for (var slot = local; slot < support_count; slot += WORKGROUP) {
+                    vectors[at(DIRECTION_FORCE, slot)] = vectors[at(FORCES, slot)];
+                }
+                workgroupBarrier();
+                continue;
+            }
             elastic += work.x;
             contact.depth = after;
             outcome.residual = step.length / scale;

@@ -60,7 +60,7 @@ fn begin(
     let n = parameters.nodes;
     var power = 0.0;
     if node < n {
-        var diagonal = vec3<f32>(2.0 * inertia[node].x / parameters.period + inertia[node].y);
+        var diagonal = vec3<f32>(inertial(node));
         for (var entry = structure[node]; entry < structure[node + 1u]; entry += 1u) {
             if column(entry) == node {
                 let own = block(entry);
@@ -90,7 +90,7 @@ fn product(
     var power = 0.0;
     if node < n {
         let p = work[2u * n + node].xyz;
-        var sum = (2.0 * inertia[node].x / parameters.period + inertia[node].y) * p;
+        var sum = inertial(node) * p;
         for (var entry = structure[node]; entry < structure[node + 1u]; entry += 1u) {
             sum += 0.5 * parameters.period * (block(entry) * work[2u * n + column(entry)].xyz);
         }

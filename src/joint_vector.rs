@@ -6,7 +6,7 @@ use std::ops::{Deref, DerefMut};
 pub const MAX_JOINTS: usize = 6;
 
 /// One number per joint: angles [rad] (or lengths [m] of prismatic joints), rates, or torques [N m] (forces [N]).
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Default, PartialEq)]
 pub struct JointVector {
     len: usize,
     values: [f64; MAX_JOINTS],
@@ -26,6 +26,12 @@ impl JointVector {
         let len = vector.len;
         vector.values[..len].copy_from_slice(&values[..len]);
         vector
+    }
+
+    /// The entries, then zeros.
+    #[must_use]
+    pub fn padded(&self) -> [f64; MAX_JOINTS] {
+        self.values
     }
 
     /// Euclidean norm.

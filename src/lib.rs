@@ -79,6 +79,9 @@ pub mod render;
 
 pub mod report;
 
+#[cfg(feature = "viewer")]
+pub mod viewer;
+
 pub mod tolerances;
 
 mod joint_vector;

@@ -5,6 +5,9 @@
 /// bound the triangle's normal would be uncertain by more than about 6 %, and its side a matter of luck.
 pub const MIN_TRIANGLE_ASPECT: f64 = 1e-6;
 
+/// Smallest volume of a tetrahedron over the cube of its longest edge [1]: for the same reason.
+pub const MIN_TETRAHEDRON_ASPECT: f64 = 1e-6;
+
 /// Smallest accepted reciprocal condition number of K [1]. K (C f) equals f to about machine precision over this number,
 /// and the equilibria that are stored promise 1e-6.
 pub const MIN_RECIPROCAL_CONDITION: f64 = f64::EPSILON / 1e-6;
@@ -26,8 +29,8 @@ pub const GPU_LEAST_DIVISOR: f32 = 1e-36;
 /// hundred products to a few 1e-6, so 1e-5 is what can be told from zero.
 pub const GPU_LEAST_TOLERANCE: f64 = 1e-5;
 
-/// Largest relative residual of an f32 result that is passed on as converged [1]. Where rounding of depths leaves more,
-/// as in very shallow contact, the configuration is solved in f64.
+/// Largest relative residual of an f32 result that is passed on as converged [1]; of the energy form's see
+/// [`GPU_REFINED_RESIDUAL`]. What has more is solved in f64.
 pub const GPU_RESOLVED_RESIDUAL: f64 = 1e-4;
 
 /// Distance of a node to an edge or vertex, relative to the object's extent, below which f32 does not resolve the
@@ -55,6 +58,22 @@ pub const GPU_GIVE_UP_RADIUS: f32 = 1e-6;
 
 /// [`INNER_TOLERANCE_FLOOR`] for f32: eps times the about 1e3 by which rounding grows over some tens of iterations.
 pub const GPU_INNER_TOLERANCE_FLOOR: f32 = 1e-4;
+
+/// Most iterations of one configuration in f32, whatever the scene allows: hardly any that needs more ends there, a group
+/// that goes on holds up its whole batch, and what is not converged is solved in f64 with all the scene's iterations.
+pub const GPU_MAX_ITERATIONS: u32 = 100;
+
+/// Passes in f64 over a result of the f32 kernel at most [1]. Changes shrink from pass to pass by the ratio of the surface's
+/// curvature to contact's stiffness, some tenths; where ten passes do not do, the search itself is needed.
+pub const REFINEMENT_PASSES: usize = 10;
+
+/// What the contact forces of a result of the energy form may lack after these passes, relative, in the energy norm [1]: f32
+/// is asked for 1e-5, so a result that has more was not found.
+pub const GPU_REFINED_RESIDUAL: f64 = 1e-5;
+
+/// Relative change of the contact forces, in the energy norm, at which passes in f64 end [1]: the default tolerance of the
+/// CPU's solver.
+pub const REFINED: f64 = 1e-8;
 
 /// Relative residual of the paper's step 2 in f32 [1]: ten times better than the least tolerance of the iteration.
 pub const GPU_PAPER_INNER_TOLERANCE: f32 = 1e-6;
@@ -126,17 +145,34 @@ pub const MODEL_PASSES: usize = 6;
 /// compliance) [1]: soft contact, as stiff as the object itself, converges within a few steps from anywhere.
 pub const CONTINUATION_START: f64 = 4.0;
 
-/// Growth of the contact stiffness from stage to stage [1]: measured on grids of the 102-node sphere at Kc = 1e3 to
-/// 1e6 N/m, 4 converges as fast as 10 where contact is shallow and more often where it is deep.
-pub const CONTINUATION_FACTOR: f64 = 4.0;
+/// Stiffness of a rigid contact point, in units of the stiffness of the object's softest node (one over the trace of its
+/// compliance) [1]: force and torque differ from those of perfectly rigid contact by the inverse of this.
+pub const RIGID_STIFFNESS: f64 = 1e6;
 
-/// Relative residual at which a stage but the last is left [1]: more accuracy would be thrown away by the next, whose
-/// own first residual is 1 - 1 / [`CONTINUATION_FACTOR`].
-pub const STAGE_TOLERANCE: f64 = 0.1;
+/// Growth of the contact stiffness from stage to stage [1]: measured on the 102-node sphere at Kc = 1e4 to 1e6 N/m, 3
+/// converges as fast as 4 and 10 where contact is shallow and more often where it is deep.
+pub const CONTINUATION_FACTOR: f64 = 3.0;
+
+/// Relative residual at which a stage but the last is left [1]. The next stage's own first residual is
+/// 1 - 1 / [`CONTINUATION_FACTOR`]; but a stage left at 0.1 had not always found its facets, and of deep contact at
+/// Kc = 1e6 N/m 91 % converged, after 0.01 98 % in the same time.
+pub const STAGE_TOLERANCE: f64 = 0.01;
+
+/// Trust-region radius, relative to the first, at which a stage but the last is left [1]: where a stage stalls, at a kink,
+/// the next has a different energy and mostly gets past it.
+pub const STALLED_RADIUS: f64 = 1e-5;
 
 /// Relative change of forces and displacements at which the paper's iteration has stopped changing is the scene's
 /// tolerance; its inner solve of equation (2) must be better than that by this factor [1].
 pub const PAPER_INNER_SHARE: f64 = 1e-3;
+
+/// How far the surface of an object is expected to move, in depths of the deepest proxy node below it at rest [1]: in stiff
+/// contact it moves by that depth along the normal, and as much again leaves room for what neighbouring nodes drag along.
+pub const EXPECTED_MOTION: f64 = 2.0;
+
+/// What a gap and the motion it is held against may be rounded by, relative to the lengths of chain and object [1]: a pose is a
+/// product of at most seven rotations, a distance a difference of coordinates, each good to some ten eps of those lengths.
+pub const FREE_SPACE_ROUNDING: f64 = 1e-12;
 
 /// How far beyond an end a grid line may lie and still count, in steps [1]: spacings such as pi/60 are written with a
 /// handful of digits, and 1e-6 of a step changes no torque that is interpolated between lines.
@@ -162,6 +198,35 @@ pub const LEAST_INTERVAL: f64 = 1e-6;
 /// Greatest time between two ticks [s]: a whole period of a hand's fastest motion, 10 Hz. After more, the position before
 /// says nothing about the velocity.
 pub const GREATEST_INTERVAL: f64 = 0.1;
+
+/// Energy that the loop may give the device from nowhere before its torque is brought to zero [J]: what 0.1 kg at the hand
+/// has at 1.4 m/s, which a hand stops within a centimetre with 10 N.
+pub const GREATEST_GIVEN_ENERGY: f64 = 0.1;
+
+/// Residual of the energy accounts over their turnover that is rounding [1]: each of up to a million ticks adds some terms,
+/// rounded by eps of the sums so far: eps times the square root of their number, 1e-13, if they are random, and a
+/// thousand times that if they are not.
+pub const ACCOUNT_ROUNDING: f64 = 1e-10;
+
+/// Least energy of motion that a passivity controller brakes [J]: a gram at a micrometre a second. Below, one tick's
+/// damping could not take anything that counts.
+pub const LEAST_MOVING_ENERGY: f64 = 1e-15;
+
+/// Least force that counts as a contact when friction or damping acts on it [N]: far below what is felt, and large enough
+/// that a normal is known to rounding.
+pub const LEAST_CONTACT_FORCE: f64 = 1e-9;
+
+/// Energy that the object may seem to gain in a frame from nowhere, over the most that it stored [1]: sums over up to 1e5
+/// coordinates, each rounded by eps, of terms that cancel.
+pub const FRAME_ENERGY_ROUNDING: f64 = 1e-10;
+
+/// The same where the state is f32 [1]: each displacement and velocity is rounded by 6e-8, and energy is their square.
+pub const GPU_FRAME_ENERGY_ROUNDING: f64 = 1e-6;
+
+/// Last step of an equilibrium of stiffening springs over its displacement [1]: a pixel is a thousandth of a
+/// picture.
+pub const SETTLED: f64 = 1e-9;
+
 // --- gridization of scattered samples; positions are scaled to the unit box ---
 
 /// Samples closer than this fraction of the extent are one point: far below any encoder's resolution (a 16-bit encoder
@@ -231,6 +296,28 @@ pub const IMPORT_SAMPLES: usize = 5_000_000;
 /// Cells of C-space that an import averages in: about 1 kB each.
 pub const IMPORT_CELLS: usize = 1_000_000;
 
+// --- interpolation ---
+
+/// Least gap, and least slope of the gap field, that is divided by [m, m/sqrt(J)]: a picometre is far below any depth that
+/// a force belongs to, and gaps are stored in f32, which keeps their relative accuracy down to 1e-38.
+pub const LEAST_GAP: f64 = 1e-12;
+
+/// Least stored energy over that of free space whose square root is told from zero [J]: a nanonewton over a femtometre,
+/// as in [`RESIDUAL_FLOOR`].
+pub const LEAST_ENERGY: f64 = RESIDUAL_FLOOR * RESIDUAL_FLOOR;
+
+/// Difference, relative to the integral of the power's size over the whole line, at which one stretch of a work integral is
+/// good enough [1]: fractions of a cell are rounded by some tens of eps, and the torque with them.
+pub const WORK_ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// Halvings of a stretch in a work integral at most: a kink of the torque within it then spoils 1e-9 of it, and, since the
+/// torque itself is continuous, 1e-18 of the work.
+pub const WORK_HALVINGS: u32 = 30;
+
+/// Most halvings of one stretch in all. A jump takes [`WORK_HALVINGS`] of them, and a cell is crossed by few boundaries; where
+/// rounding keeps more stretches from agreeing, further halves would only add to it.
+pub const WORK_STRETCHES: u32 = 32 * WORK_HALVINGS;
+
 // --- figures ---
 
 /// A number this fraction of a tick step beyond the end of an axis, or off a whole number of decimals, still counts as
@@ -272,3 +359,24 @@ pub const BRAKE_TIME: f64 = 0.3;
 /// Pivot below which the neighbours of a sample span no plane, relative to the greatest: their thickness squared, a
 /// thousandth of their reach.
 pub const PLANE_PIVOT: f64 = 1e-6;
+
+/// Determinant of a Jacobian relative to the product of its columns' lengths, below which an arm counts as singular: a
+/// force would be uncertain by a hundred times the torque's error.
+pub const REGULAR_JACOBIAN: f64 = 1e-2;
+
+/// Error of a gridized torque relative to the greatest one, where exact arithmetic has none: weights of slivers are known to
+/// the jitter ([`JITTER`], 1e-12) over their thickness, of a thousandth and more, and [`HYPER_WEIGHT`] bounds them in 4 to 6
+/// joints.
+pub const GRIDIZED_LINEAR: f64 = 1e-9;
+
+/// Lever arm with which a prismatic joint counts among revolute ones [m]: a tenth of a metre, the size of a tool in a hand. Gains'
+/// defaults and errors over joints of both kinds are converted with it.
+pub const LEVER_ARM: f64 = 0.1;
+
+/// Relative residual to which the reference of an accuracy study is solved [1]: three decades below the scenes' own 1e-8, and
+/// still above what rounding leaves of a residual (about 1e-13).
+pub const REFERENCE_TOLERANCE: f64 = 1e-11;
+
+/// How much finer than the finest measured grid the measured order is trusted [1]: two octaves, as many as it was measured
+/// over. What takes more is not offered.
+pub const FARTHEST_EXTRAPOLATION: f64 = 4.0;

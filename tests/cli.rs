@@ -224,3 +224,71 @@ fn the_demo_says_where_it_cannot_write() {
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stderr).contains("./out"), "{}", text(&output.stderr));
 }
+
+#[test]
+fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let motion = "\n[motion]\npress = [{ time = 0.0, q = [0.0] }, { time = 0.2, q = [0.25] }]\n";
+    std::fs::write(path("finger.toml"), format!("{FINGER}{motion}")).unwrap();
+    json(folder.path(), &["bake", "finger.toml", "--backend", "cpu", "--json"]);
+    let play = |arguments: &[&str]| json(folder.path(), &[&["play", "finger.haptize", "--json"], arguments].concat());
+    let first = play(&["--realtime", "--record", "r.csv", "-o", "first"]);
+    assert!(first["contact_share"].as_f64() > Some(0.0), "{first}");
+    let again = play(&["--replay", "r.csv", "-o", "again"]);
+    assert_eq!((&first["replayed"], &again["replayed"]), (&false.into(), &true.into()));
+    for file in ["trace.csv", "frames.csv"] {
+        let [a, b] = ["first", "again"].map(|folder| std::fs::read(path(folder).join(file)).unwrap());
+        assert!(a == b, "{file} differs");
+    }
+    // A device that leaps: torque to zero, the reason, and no success.
+    std::fs::write(path("leap.csv"), "0,0\n0.1,0\n0.101,0.25\n0.2,0.25\n").unwrap();
+    let output = haptize(folder.path(), &["play", "finger.haptize", "--motion", "leap.csv", "--exact", "--json"]);
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        told["fault"]["reason"].as_str().unwrap().contains("leapt") && told["faults"].as_u64() > Some(50),
+        "{told}"
+    );
+
+    std::fs::write(path("wide.csv"), "0,0\n0.1,0,0\n").unwrap();
+    std::fs::write(path("nan.csv"), "# by hand\ntime,q1\n0,0\n0.1,nan\n").unwrap();
+    std::fs::write(path("point.csv"), "0,0\n").unwrap();
+    let recorded = std::fs::read_to_string(path("r.csv")).unwrap();
+    let last = recorded.trim_end().rfind(',').unwrap();
+    std::fs::write(path("altered.csv"), format!("{}0.1\n", &recorded[..=last])).unwrap();
+    for (arguments, expected) in [
+        (&["none.haptize"][..], "none.haptize"),
+        (&["finger.haptize", "--motion", "none.csv"], "none.csv: cannot be read"),
+        (&["finger.haptize", "--motion", "wide.csv"], "wide.csv:2: 3 numbers"),
+        (&["finger.haptize", "--motion", "nan.csv"], "nan.csv:4: NaN is not a coordinate"),
+        (&["finger.haptize", "--motion", "point.csv"], "--seconds"),
+        (&["finger.haptize", "--motion", "scrape"], "no motion \"scrape\""),
+        (&["finger.haptize", "--seconds", "nan"], "--seconds"),
+        (&["finger.haptize", "--replay", "none.csv"], "none.csv: cannot be read"),
+        (&["finger.haptize", "--replay", "nan.csv"], "nan.csv:2: "),
+        (&["finger.haptize", "--replay", "altered.csv"], "altered.csv: the session differs from tick 1"),
+        (&["finger.haptize", "--record", "no/such/folder.csv"], "folder.csv"),
+        (&["finger.haptize", "-o", "nan.csv"], "nan.csv"),
+    ] {
+        let output = haptize(folder.path(), &[&["play"], arguments].concat());
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {message}");
+        assert!(message.starts_with("haptize: ") && message.contains(expected), "{arguments:?}: {message}");
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+    }
+    let both = haptize(folder.path(), &["play", "finger.haptize", "--replay", "r.csv", "--realtime"]);
+    assert_eq!(both.status.code(), Some(2));
+}
+
+#[test]
+fn hard_cases_make_one_table_and_an_unknown_room_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = json(folder.path(), &["stability", "gridization", "--sample", "--no-gpu", "--json"]);
+    let outcomes = found["outcomes"].as_array().unwrap();
+    assert!(outcomes.len() >= 8 && found["failed"] == 0);
+    assert!(outcomes.iter().all(|outcome| outcome["room"] == "gridization" && outcome["passed"] == true));
+    let output = haptize(folder.path(), &["stability", "kitchen", "--no-gpu"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("`kitchen`") && text(&output.stderr).contains("gridization"));
+}

@@ -64,6 +64,7 @@ fn sample() -> Dataset {
         }),
         scene: "name = \"sample\" # Kontakt \u{fc}ber \u{3c0}\n".into(),
         provenance: Provenance {
+            notices: vec!["from grid point 7 on: solved otherwise".into()],
             version: "0.0.0".into(),
             algorithm: "energy".into(),
             tolerance: 0.1 + 0.2,

@@ -10,7 +10,7 @@ use haptize::haptize::Backend;
 use haptize::object::Object;
 use haptize::proxy::Chain;
 use haptize::render::graphics::ObjectMotion;
-use haptize::scene::{Algorithm, Scene};
+use haptize::scene::{Algorithm, GraphicsEffects, Scene, StiffeningSpec};
 use std::sync::{Arc, OnceLock};
 
 /// One device for all tests of this process: opening one costs a second, and drivers dislike many.
@@ -87,20 +87,23 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
     };
     // Force balance: u = K^-1 f.
     let displacement = |node: u32| -> DVec3 {
-        let compliance = &model.object.compliance;
+        let compliance = &model.compliance;
         result.forces.iter().map(|f| compliance.block(node as usize, f.node as usize) * f.force).sum()
     };
     let mut torque = JointVector::zeros(q.len());
     let mut energy = 0.0;
     for touch in &result.touches {
         let magnitude = touch.force.length();
-        let normal = touch.force / magnitude;
         // Contact law: lambda = kc depth, and compression: lambda > 0 outwards.
         let foot: DVec3 = (touch.nodes.iter().zip(touch.weights))
             .map(|(&node, weight)| (model.object.rest[node as usize] + displacement(node)) * weight)
             .sum();
         let radius = model.chain.nodes[touch.proxy_node as usize].radius;
-        let depth = radius + normal.dot(foot - pose.nodes[touch.proxy_node as usize]);
+        let toward = foot - pose.nodes[touch.proxy_node as usize];
+        // Of a ball in a crease the edge between two walls counts against them.
+        let times = if touch.force.dot(toward) > 0.0 && magnitude < model.kc * radius { -1.0 } else { 1.0 };
+        let normal = touch.force * times / magnitude;
+        let depth = radius + normal.dot(toward);
         if (depth - magnitude / model.kc).abs() > DEPTH_AGREEMENT + INVARIANT_AGREEMENT * depth.abs() {
             return Some(format!("contact law: depth {depth:e} m, force {magnitude:e} N"));
         }
@@ -110,7 +113,7 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
         if (b - a).cross(c - a).dot(normal) < 0.0 {
             return Some("tension".into());
         }
-        energy += 0.5 * magnitude * magnitude / model.kc;
+        energy += times * 0.5 * magnitude * magnitude / model.kc;
         model.chain.add_torque(&pose, touch.proxy_node as usize, touch.force, &mut torque);
     }
     for force in &result.forces {
@@ -161,8 +164,9 @@ fn check_scene(name: &str, algorithm: Algorithm, stride: usize) {
     // The paper's iteration is chaotic where it does not settle at once: rounding decides now and then whether it does.
     let allowed = if algorithm == Algorithm::Paper { configurations.len() / 50 } else { 0 };
     assert!(unlike.len() <= allowed, "{name}, {algorithm:?}: {unlike:#?}");
-    // Left to the CPU: what lies within rounding of no contact, about 1e-6 of all; on scenes of moderate stiffness little else.
-    assert!(gpu.solved_on_cpu() * 10 <= touching, "{name}, {algorithm:?}: {} left to the CPU", gpu.solved_on_cpu());
+    // Left to the CPU: what lies within rounding of no contact, about 1e-6 of all, and what the passes in f64 do not bring to
+    // 1e-5, a quarter of those that touch.
+    assert!(gpu.solved_on_cpu() * 2 <= touching, "{name}, {algorithm:?}: {} left to the CPU", gpu.solved_on_cpu());
 }
 
 #[test]
@@ -268,8 +272,8 @@ fn asking_for_hardware_names_what_was_found_instead() {
 fn frames(method: FrameMethod, check: impl Fn(usize, &ObjectMotion, &[DVec3], &[DVec3])) {
     let (_, object, _) = load("sphere.toml");
     let period = 1.0 / 60.0;
-    let mut twin = ObjectMotion::new(&object, period).unwrap();
-    let mut gpu = FrameUpdate::new(context(), &object, period, method).unwrap();
+    let mut twin = ObjectMotion::new(&object, period, &GraphicsEffects::default()).unwrap();
+    let mut gpu = FrameUpdate::new(context(), &object, period, method, &GraphicsEffects::default()).unwrap();
     for frame in 0..40 {
         let mut forces = vec![DVec3::ZERO; object.rest.len()];
         if frame < 15 {
@@ -335,9 +339,117 @@ fn without_forces_the_objects_energy_never_rises_however_few_the_iterations() {
 }
 
 #[test]
+fn effects_follow_the_cpus_and_leave_nothing_behind_where_they_are_not_named() {
+    let (_, object, _) = load("sphere.toml");
+    let period = 1.0 / 60.0;
+    let none = GraphicsEffects::default();
+    let gravity = GraphicsEffects { gravity: Some(DVec3::new(0.0, 2.0, -9.81)), ..none };
+    let stiffening = GraphicsEffects { stiffening: Some(StiffeningSpec { factor: 6.0, strain: 0.02 }), ..none };
+    let both = GraphicsEffects { gravity: gravity.gravity, ..stiffening };
+    let quasi_static = GraphicsEffects { quasi_static: true, ..gravity };
+    let mut costs = Vec::new();
+    for effects in [none, gravity, stiffening, both, quasi_static] {
+        let mut twin = ObjectMotion::new(&object, period, &effects).unwrap();
+        let method = FrameMethod::Iterations(60);
+        let mut update = FrameUpdate::new(context(), &object, period, method, &effects).unwrap();
+        let mut forces = vec![DVec3::ZERO; object.rest.len()];
+        for frame in 0..20 {
+            forces[17] = if frame < 12 { DVec3::new(1.0, -0.5, 2.0) } else { DVec3::ZERO };
+            twin.step(&forces);
+            update.step(&forces).unwrap();
+            let (displacement, velocity) = update.read().unwrap();
+            assert!(relative(twin.displacement(), &displacement) < 1e-3, "{effects:?}, frame {frame}");
+            assert_eq!(velocity.len(), twin.velocity().len());
+        }
+        costs.push(update.takes());
+    }
+    // A load buffer for gravity and stiffening, reaches and a stage for stiffening; less without dynamics.
+    let [plain, heavy, stiff, all, still] = costs[..] else { panic!("{costs:?}") };
+    let (nodes, blocks) = (object.rest.len() as u64, object.stiffness.blocks.len() as u64);
+    let beyond = |cost: haptize::gpu::FrameCost| {
+        (cost.bytes - plain.bytes, cost.buffers - plain.buffers, cost.dispatches - plain.dispatches)
+    };
+    assert_eq!(beyond(heavy), (16 * nodes, 1, 0));
+    assert_eq!(beyond(stiff), (16 * nodes + 4 * blocks, 2, 1));
+    assert_eq!(beyond(all), beyond(stiff));
+    assert_eq!(stiff.pipelines, plain.pipelines + 1);
+    assert_eq!((heavy.bytes - still.bytes, heavy.buffers - still.buffers), (16 * nodes + 8 * nodes, 1));
+}
+
+#[test]
+fn on_the_gpu_too_effects_never_raise_energy_however_few_the_iterations() {
+    let (_, object, _) = load("sphere.toml");
+    let stiffening = StiffeningSpec { factor: 20.0, strain: 0.01 };
+    let effects = GraphicsEffects { stiffening: Some(stiffening), ..GraphicsEffects::default() };
+    let law = haptize::object::Stiffening::new(&object, stiffening.factor, stiffening.strain);
+    let method = FrameMethod::Iterations(2);
+    for period in [1e-3, 0.3] {
+        let mut update = FrameUpdate::new(context(), &object, period, method, &effects).unwrap();
+        let mut forces = vec![DVec3::ZERO; object.rest.len()];
+        let (mut before, mut greatest) = (f64::MAX, 0.0_f64);
+        for frame in 0..60 {
+            let pushed = frame < 20;
+            forces[60] = if pushed { DVec3::new(3.0, -5.0, 9.0) } else { DVec3::ZERO };
+            update.step(&forces).unwrap();
+            let (u, v) = update.read().unwrap();
+            let kinetic: f64 = v.iter().zip(&object.mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
+            let now = kinetic + law.energy(&object, &u);
+            assert!(pushed || now <= before * (1.0 + 1e-6), "{period} s, frame {frame}: {now} after {before}");
+            (before, greatest) = (now, greatest.max(now));
+        }
+        assert!(greatest > 1e-6, "{greatest}");
+    }
+}
+
+#[test]
 fn a_frame_period_that_is_no_time_is_refused() {
     let (_, object, _) = load("sphere.toml");
     for period in [0.0, -0.1, f64::NAN, f64::INFINITY] {
-        assert!(FrameUpdate::new(context(), &object, period, FrameMethod::Inverse).is_err());
+        assert!(
+            FrameUpdate::new(context(), &object, period, FrameMethod::Inverse, &GraphicsEffects::default()).is_err()
+        );
+    }
+}
+
+/// A kilometre from the origin, shallow to deep, points and balls: what f32 leaves is settled in f64.
+#[test]
+fn the_gpu_keeps_the_bounds_of_its_hard_cases() {
+    use haptize::report::stability::{Effort, Setting, cases, table};
+    let setting = Setting { effort: Effort::Sample, gpu: Some(context()) };
+    let case = cases().into_iter().find(|case| case.name == "far from the origin").unwrap();
+    let outcomes = (case.run)(&setting).unwrap();
+    assert!(outcomes.iter().filter(|outcome| outcome.varied.contains("GPU")).count() == 4);
+    assert!(outcomes.iter().all(haptize::report::stability::Outcome::passed), "{}", table(&outcomes));
+}
+
+/// At 600 times the paper's stiffness, where a depth in f32 says little: whatever is called converged is that.
+#[test]
+fn stiff_contact_is_as_accurate_as_soft_contact() {
+    let (scene, object, chain) = load("sphere.toml");
+    let configurations = configurations(&scene, 11, 131);
+    for stiffness in [1e4, 3e5, f64::INFINITY] {
+        let model = Model::new(&object, &chain, haptize::scene::ContactSpec { stiffness, ..scene.contact });
+        let mut cpu = Solver::new(&model);
+        let mut gpu = GpuSolver::new(context(), &model).unwrap();
+        let (mut touching, mut worst) = (0, 0.0f64);
+        for (q, result) in configurations.iter().zip(gpu.solve(&configurations).unwrap()) {
+            if result.status == Status::Contact {
+                touching += 1;
+                worst = worst.max(result.residual);
+                // From the f32 result f64 finds the CPU's own, unless there are two equilibria.
+                let reference = cpu.solve(q);
+                let same = (result.energy - reference.energy).abs() <= 1e-3 * reference.energy;
+                if same && reference.status == Status::Contact {
+                    let off = distance(&result.torque, &reference.torque) / reference.torque.norm();
+                    assert!(
+                        off < 1e-3,
+                        "Kc {stiffness}, {q:?}: tau off by {off:.1e}, residual {:.1e}",
+                        result.residual
+                    );
+                }
+            }
+        }
+        println!("Kc {stiffness}: {touching} touch, residual {worst:.1e}, {} by the CPU", gpu.solved_on_cpu());
+        assert!(touching > 20 && worst <= 1e-4);
     }
 }

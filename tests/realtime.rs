@@ -16,6 +16,7 @@ use haptize::{
         field::TorqueField,
         haptic::{Haptics, Inputs},
         realtime::{self, Ends, HapticLoop},
+        recording::Recording,
         session::Plan,
         setup::labels,
     },
@@ -67,10 +68,13 @@ fn the_real_time_loop_allocates_nothing() {
     let data = object(3);
     let haptics = build(&data);
     let mut hand = hand(3);
-    let (mut body, Ends { mut ticks, mut latest }) = HapticLoop::new(&haptics, &mut hand).unwrap();
+    let (mut body, Ends { mut ticks, mut latest, clear }) = HapticLoop::new(&haptics, &mut hand).unwrap();
     assert_no_alloc(|| {
-        for _ in 0..300 {
+        for k in 0..300 {
             body.tick();
+            if k == 150 {
+                clear.ask();
+            }
         }
     });
     let mut last = None;
@@ -81,7 +85,7 @@ fn the_real_time_loop_allocates_nothing() {
 }
 
 #[test]
-fn a_session_against_the_clock_does_every_tick_that_it_does_not_report() {
+fn a_session_against_the_clock_does_every_tick_that_it_does_not_report_and_replays_bit_for_bit() {
     let data = object(3);
     let haptics = build(&data);
     let mut hand = hand(3);
@@ -95,4 +99,14 @@ fn a_session_against_the_clock_does_every_tick_that_it_does_not_report() {
     let summary = trace.summary();
     assert!(summary.contact_share > 0.0 && summary.max_relative_account_residual < 1e-11, "{summary:?}");
     assert!(trace.ticks.windows(2).all(|pair| pair[0].time < pair[1].time));
+
+    // Whatever the clock did: from its file, the session comes again, to the last bit of every account.
+    assert_eq!(timing.unrecorded, 0);
+    let file = tempfile::NamedTempFile::new().unwrap();
+    Recording::of(&trace).write(&trace.joints, &mut file.as_file()).unwrap();
+    let recording = Recording::read(file.path(), 3).unwrap();
+    assert_eq!(recording, Recording::of(&trace));
+    let again = recording.replay(&haptics, None, labels(&data.grid)).unwrap();
+    assert_eq!(again, trace);
+    assert_eq!(recording.first_difference(&again), None);
 }

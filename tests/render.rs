@@ -21,11 +21,15 @@ use haptize::{
         graphics::{ContactForces, Graphics, GraphicsError, ObjectMotion},
         haptic::{Haptics, Inputs, JointsError},
         passivity,
-        session::{self, Plan},
+        recording::Recording,
+        session::{self, Driver, Plan},
         setup::{Setup, SetupError, labels},
         trace::{Frame, Trace},
     },
-    scene::{GroundNodes, GroundSpec, HapticsSpec, ObjectSpec, Scene, Shape, SpringKind, SpringSpec, Waypoint},
+    scene::{
+        GraphicsEffects, GraphicsSpec, GroundNodes, GroundSpec, HapticsSpec, Material, ObjectSpec, Scene, Shape,
+        SpringKind, SpringSpec, Waypoint,
+    },
 };
 use std::sync::atomic::AtomicBool;
 use synthetic::{dataset, grid, half_space};
@@ -167,7 +171,7 @@ fn the_same_session_gives_the_same_numbers_twice() {
 }
 
 #[test]
-fn a_recorded_session_replays_bit_for_bit() {
+fn a_device_that_moves_as_recorded_is_given_the_recorded_torques_bit_for_bit() {
     let (data, spec) = (object(2), haptics(2));
     let trace = pressed(2, &spec);
     let mut file = tempfile::NamedTempFile::new().unwrap();
@@ -184,13 +188,88 @@ fn a_recorded_session_replays_bit_for_bit() {
     }
 }
 
+/// A session as it happens at its worst: ticks that come early and late, a device that fails twice, a fault cleared.
+fn eventful(haptics: &Haptics) -> Trace {
+    let mut positions: Vec<JointVector> = (0..600).map(|k| all(2, 0.3 * (0.02 * f64::from(k)).sin())).collect();
+    positions[300] = vector(&[0.1, f64::NAN]);
+    positions[500] = vector(&[]);
+    let mut device = Scripted::new(positions);
+    let mut driver = Driver::new(haptics, &mut device).unwrap();
+    let mut trace = Trace { start: *driver.start(), ..Trace::default() };
+    let mut elapsed = 1e-3;
+    for k in 0..599 {
+        if k == 400 {
+            driver.clear_fault();
+        }
+        let interval = 1e-3 * (1.2 + (1.7 * f64::from(k)).sin());
+        trace.ticks.push(driver.tick(elapsed, interval).0);
+        elapsed = interval;
+    }
+    trace
+}
+
+#[test]
+fn a_recorded_session_replays_bit_for_bit_with_its_faults() {
+    let data = object(2);
+    let haptics = build(&data, &haptics(2));
+    let mut trace = eventful(&haptics);
+    trace.joints = labels(&data.grid);
+    let restarts = trace.ticks.iter().filter(|tick| tick.restart).count();
+    let reasons: Vec<_> = [0, 299, 398, 400, 499].map(|k| trace.ticks[k].fault).into();
+    assert_eq!(restarts, 1);
+    assert_eq!(reasons, [None, Some(Fault::NotFinite), Some(Fault::NotFinite), None, Some(Fault::Joints)]);
+
+    let file = tempfile::NamedTempFile::new().unwrap();
+    Recording::of(&trace).write(&trace.joints, &mut file.as_file()).unwrap();
+    let recording = Recording::read(file.path(), 2).unwrap();
+    let again = recording.replay(&haptics, None, labels(&data.grid)).unwrap();
+    assert_eq!(recording.first_difference(&again), None);
+    for (a, b) in again.ticks.iter().zip(&trace.ticks) {
+        assert_eq!((a.time, a.accounts, a.fault, a.restart), (b.time, b.accounts, b.fault, b.restart));
+    }
+    // The comparison sees the last bit of one torque, another tick, and other gains.
+    let mut altered = again.clone();
+    altered.ticks[7].device_torque[1] = f64::from_bits(altered.ticks[7].device_torque[1].to_bits() ^ 1);
+    assert_eq!(recording.first_difference(&altered), Some(7));
+    altered.ticks.truncate(5);
+    assert_eq!(recording.first_difference(&altered), Some(5));
+    let other = HapticsSpec { coupling_stiffness: all(2, 15.1), ..desktop::haptics(2) };
+    let other = recording.replay(&build(&data, &other), None, labels(&data.grid)).unwrap();
+    assert!(recording.first_difference(&other).is_some_and(|tick| tick < 5));
+}
+
+#[test]
+fn files_that_are_no_recording_are_refused_with_their_line() {
+    let good = "# start,0,0\nelapsed [s],...\n0.001,0.001,0,0,0,1,1,1,1,1,1,1,1\n";
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let read = |text: &str| {
+        std::fs::write(file.path(), text).unwrap();
+        Recording::read(file.path(), 2).map_err(|error| error.to_string())
+    };
+    assert_eq!(read(good).unwrap().ticks(), 1);
+    for (old, new, expected) in [
+        ("0.001,0.001,0,0,0,1", "0.001,0.001,0,0,0,1,1", ":3: 14 fields in the place of 13"),
+        ("0.001,0.001,0,0,0,1", "0.001,x,0,0,0,1", ":3: \"x\" is not such a number"),
+        ("0.001,0.001,0,0,0,1", "0.001,0.001,0,-1,0,1", ":3: \"-1\" is not such a number"),
+        ("0.001,0.001,0,0,0,1", "0.001,0.001,0,0,0,", ":3: \"\" is not such a number"),
+        ("# start,0,0\n", "", ":2: 1 ticks and a first position of 0 joints"),
+        ("# start,0,0\n", "# start,0\n", ":1: 1 coordinates"),
+        ("0.001,0.001,0,0,0,1,1,1,1,1,1,1,1\n", "", ":2: 0 ticks"),
+    ] {
+        assert_eq!(good.matches(old).count(), 1);
+        let message = read(&good.replace(old, new)).unwrap_err();
+        assert!(message.contains(expected) && message.contains("--record"), "{message}");
+    }
+    assert!(Recording::read(std::path::Path::new("/nowhere.csv"), 2).is_err());
+}
+
 #[test]
 fn torque_is_limited_in_size_and_rate() {
     let mut spec = haptics(2);
     spec.torque_limit = all(2, 0.4);
     spec.torque_rate_limit = all(2, 20.0);
-    // The device leaps by a radian.
-    let positions = (0..400).map(|k| all(2, if k < 100 { -0.5 } else { 0.5 }));
+    // The device is thrown by a radian within 40 ms.
+    let positions = (0..400).map(|k| all(2, -0.5 + f64::from(k - 100).clamp(0.0, 40.0) / 40.0));
     let data = object(2);
     let haptics = build(&data, &spec);
     let trace = session::run(&haptics, &mut Scripted::new(positions), None, &plan(&data, 0.4)).unwrap();
@@ -219,10 +298,11 @@ fn a_device_that_fails_is_let_go_smoothly_with_the_reason() {
         (Inputs { position: all(0, 0.3), ..good }, Fault::Joints),
         (Inputs { age: 1.0, ..good }, Fault::Stale),
         (Inputs { age: f64::NAN, ..good }, Fault::Stale),
-        (Inputs { elapsed: 0.0, ..good }, Fault::Interval),
-        (Inputs { elapsed: f64::NAN, ..good }, Fault::Interval),
-        (Inputs { interval: -1e-3, ..good }, Fault::Interval),
-        (Inputs { interval: f64::INFINITY, ..good }, Fault::Interval),
+        (Inputs { elapsed: 0.0, ..good }, Fault::Late),
+        (Inputs { elapsed: f64::NAN, ..good }, Fault::Late),
+        (Inputs { interval: -1e-3, ..good }, Fault::Late),
+        (Inputs { interval: f64::INFINITY, ..good }, Fault::Late),
+        (Inputs { position: all(2, 1.3), ..good }, Fault::Leap),
     ];
     for (bad, reason) in failures {
         let mut state = haptics.start(&good.position).unwrap();
@@ -246,12 +326,21 @@ fn a_device_that_fails_is_let_go_smoothly_with_the_reason() {
             ticks += 1;
             assert!(ticks < 10);
         }
-        // The device comes back: so does the torque, without a blow.
+        // The device comes back: the torque does not, until somebody asks for it, and then without a blow.
         let mut output = haptics.tick(&mut state, &good);
-        assert_eq!(output.fault, None);
+        assert_eq!((output.fault, output.torque.norm()), (Some(reason), 0.0));
+        assert!(haptics.restart(&mut state, &all(2, f64::NAN)).is_err());
+        assert_eq!(haptics.tick(&mut state, &good).fault, Some(reason));
+        haptics.restart(&mut state, &good.position).unwrap();
         for _ in 0..500 {
+            let before = output.torque;
             output = haptics.tick(&mut state, &good);
+            assert!(
+                output.torque.iter().zip(before.iter()).all(|(tau, b)| (tau - b).abs() <= 0.5 + 1e-12),
+                "{output:?}"
+            );
         }
+        assert_eq!(output.fault, None);
         assert!(output.torque.norm() > 0.5 && output.accounts.residual().abs() < 1e-11 * output.accounts.turnover);
     }
     let field = TorqueField::new(&data, 0.5, &spec.boundary_slope).unwrap();
@@ -259,6 +348,22 @@ fn a_device_that_fails_is_let_go_smoothly_with_the_reason() {
     assert_eq!(Haptics::new(field, proxy(3), &spec).err(), Some(differing));
     assert_eq!(haptics.start(&all(2, f64::NAN)).err(), Some(Fault::NotFinite));
     assert_eq!(haptics.start(&all(1, 0.0)).err(), Some(Fault::Joints));
+}
+
+#[test]
+fn a_torque_that_is_no_number_never_reaches_the_device() {
+    let (data, mut spec) = (object(2), haptics(2));
+    (spec.coupling_stiffness, spec.speed_limit) = (all(2, 1e308), all(2, 1e9));
+    let haptics = build(&data, &spec);
+    let mut state = haptics.start(&all(2, 0.0)).unwrap();
+    let mut fault = None;
+    for k in 0..40 {
+        let position = all(2, 10.0 * f64::from(k));
+        let output = haptics.tick(&mut state, &Inputs { position, age: 0.0, elapsed: 1e-3, interval: 1e-3 });
+        assert!(output.torque.iter().all(|tau| tau.abs() <= spec.torque_limit[0]));
+        fault = output.fault;
+    }
+    assert_eq!(fault, Some(Fault::Torque));
 }
 
 #[test]
@@ -286,12 +391,17 @@ fn gains_beyond_their_bound_are_named_with_the_safe_value() {
 fn sphere(stiffness: f64, damping: f64) -> Object {
     Object::build(&ObjectSpec {
         shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings: 10, segments: 10 },
-        springs: SpringSpec { kind: SpringKind::Isotropic, stiffness },
+        material: Material::Springs(SpringSpec { kind: SpringKind::Isotropic, stiffness }),
         ground: GroundSpec { stiffness: 0.3 * stiffness, nodes: GroundNodes::All },
         node_mass: 1e-3,
         node_damping: damping,
     })
     .unwrap()
+}
+
+/// The paper's graphics loop.
+fn graphics_60() -> GraphicsSpec {
+    GraphicsSpec { rate: 60.0, effects: GraphicsEffects::default() }
 }
 
 /// Kinetic and elastic energy of the object [J].
@@ -308,7 +418,7 @@ fn the_object_never_gains_energy_without_input_and_balances_with_it() {
     for stiffness in [300.0, 3e7] {
         let object = sphere(stiffness, 0.05);
         for period in [1e-3, 1.0 / 60.0, 1.0] {
-            let mut motion = ObjectMotion::new(&object, period).unwrap();
+            let mut motion = ObjectMotion::new(&object, period, &GraphicsEffects::default()).unwrap();
             let mut before = 0.0;
             for frame in 0..200 {
                 let pushed = frame < 20;
@@ -336,7 +446,7 @@ fn the_object_never_gains_energy_without_input_and_balances_with_it() {
 #[test]
 fn under_constant_forces_the_object_settles_where_its_springs_balance_them() {
     let object = sphere(300.0, 2.0);
-    let mut motion = ObjectMotion::new(&object, 1.0 / 60.0).unwrap();
+    let mut motion = ObjectMotion::new(&object, 1.0 / 60.0, &GraphicsEffects::default()).unwrap();
     let mut forces = vec![DVec3::ZERO; object.rest.len()];
     forces[0] = DVec3::new(0.1, 0.0, -0.8);
     for _ in 0..4000 {
@@ -387,7 +497,9 @@ fn contact_forces_that_do_not_fit_are_refused() {
         assert_eq!(ContactForces::new(&data, 102).err(), Some(GraphicsError::Rows { nodes: 102 }), "{offsets:?}");
     }
     assert_eq!(
-        ObjectMotion::new(&sphere(300.0, 0.05), f64::NAN).err().map(|e| e.to_string().contains("NaN")),
+        ObjectMotion::new(&sphere(300.0, 0.05), f64::NAN, &GraphicsEffects::default())
+            .err()
+            .map(|e| e.to_string().contains("NaN")),
         Some(true)
     );
 }
@@ -400,13 +512,19 @@ fn two_loops_run_at_two_rates_and_repeat_bit_for_bit() {
     let run = || {
         let motion = Motion::through(&way.map(|(time, q)| Waypoint { time, q: vector(&[q]) }), 1).unwrap();
         let mut hand = SimulatedHand::new(&spec, motion).unwrap();
-        let mut graphics = Graphics::new(&data, &object, 60.0).unwrap();
+        let mut graphics = Graphics::new(&data, &object, &graphics_60()).unwrap();
         let plan = Plan { snapshots: vec![0.0, 0.8, 0.8001, 1.45], ..plan(&data, 1.5) };
         session::run(&haptics, &mut hand, Some(&mut graphics), &plan).unwrap()
     };
     let trace = run();
     assert_eq!(trace, run());
     assert_eq!(trace.ticks.len(), 1500);
+    // Graphics comes again from a recording, too.
+    let mut graphics = Graphics::new(&data, &object, &graphics_60()).unwrap();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    Recording::of(&trace).write(&trace.joints, &mut file.as_file()).unwrap();
+    let recording = Recording::read(file.path(), 1).unwrap();
+    assert_eq!(recording.replay(&haptics, Some(&mut graphics), labels(&data.grid)).unwrap(), trace);
     // The first frame at or after each instant, each once.
     let times: Vec<f64> = trace.frames.iter().map(|frame| frame.time).collect();
     let expected = [0.0, 48.0 / 60.0, 49.0 / 60.0, 87.0 / 60.0];

@@ -12,6 +12,7 @@ use haptize::{
     render::{
         accounts::Accounts,
         flags::Flags,
+        haptic::Inputs,
         timing::{Durations, Timing},
         trace::{Frame, JointLabel, Tick, Trace},
     },
@@ -19,7 +20,7 @@ use haptize::{
         self,
         canvas::{Anchor, Canvas, TextStyle, Weight},
     },
-    scene::{GroundNodes, GroundSpec, JointKind, ObjectSpec, Shape, SpringKind, SpringSpec},
+    scene::{GroundNodes, GroundSpec, JointKind, Material, ObjectSpec, Shape, SpringKind, SpringSpec},
 };
 use resvg::{
     tiny_skia::Rect,
@@ -34,7 +35,7 @@ fn sphere() -> Object {
     let shape = Shape::Sphere { centre: CENTRE, radius: RADIUS, rings: 10, segments: 10 };
     Object::build(&ObjectSpec {
         shape,
-        springs: SpringSpec { kind: SpringKind::Isotropic, stiffness: 300.0 },
+        material: Material::Springs(SpringSpec { kind: SpringKind::Isotropic, stiffness: 300.0 }),
         ground: GroundSpec { stiffness: 100.0, nodes: GroundNodes::All },
         node_mass: 1e-3,
         node_damping: 0.1,
@@ -147,6 +148,8 @@ fn recording(chain: &Chain, object: &Object, ticks: usize) -> Trace {
         let stored = 0.02 * torque.norm();
         Tick {
             time,
+            inputs: Inputs { position: q, age: 0.0, elapsed: 1e-3, interval: 1e-3 },
+            restart: false,
             hand: q,
             device: q,
             proxy: q,
@@ -173,10 +176,11 @@ fn recording(chain: &Chain, object: &Object, ticks: usize) -> Trace {
     let ticks: Vec<Tick> = (0..ticks).map(tick).collect();
     let frame = |tick: &Tick| {
         let (_, forces, _) = touch(chain, object, &tick.proxy);
-        let displaced = |i: usize| {
-            object.rest[i] + forces.iter().map(|&(j, f)| object.compliance.block(i, j as usize) * f).sum::<DVec3>()
-        };
-        Frame { time: tick.time, proxy: tick.proxy, nodes: (0..object.surface_nodes).map(displaced).collect() }
+        let mut displacement = vec![DVec3::ZERO; object.rest.len()];
+        forces.iter().for_each(|&(node, force)| displacement[node as usize] = force);
+        object.factor.solve(&mut displacement);
+        let nodes = object.rest.iter().zip(&displacement).map(|(rest, u)| *rest + *u);
+        Frame { time: tick.time, proxy: tick.proxy, nodes: nodes.take(object.surface_nodes).collect() }
     };
     Trace {
         joints: chain
@@ -186,6 +190,7 @@ fn recording(chain: &Chain, object: &Object, ticks: usize) -> Trace {
             .collect(),
         frames: ticks.iter().step_by(16).map(frame).collect(),
         ticks,
+        ..Trace::default()
     }
 }
 
@@ -293,8 +298,18 @@ fn files_are_complete_and_the_same_twice() {
     };
     let once = write("once", &trace);
     let names: Vec<&str> = once.iter().map(|(name, _)| name.as_str()).collect();
-    let wanted =
-        ["cspace.png", "torque.svg", "torque.png", "press.svg", "press.png", "energy.svg", "energy.png", "object.png"];
+    let wanted = [
+        "cspace.png",
+        "torque.svg",
+        "torque.png",
+        "press.svg",
+        "press.png",
+        "energy.svg",
+        "energy.png",
+        "force.svg",
+        "force.png",
+        "object.png",
+    ];
     assert_eq!(names, wanted);
     assert!(once == write("twice", &trace), "the same data gave other bytes");
 
@@ -302,7 +317,7 @@ fn files_are_complete_and_the_same_twice() {
     other.ticks[700].contact_torque[1] += 0.05;
     let differing: Vec<String> =
         once.into_iter().zip(write("other", &other)).filter(|(a, b)| a != b).map(|(a, _)| a.0).collect();
-    assert_eq!(differing, ["press.svg", "press.png"]);
+    assert_eq!(differing, ["press.svg", "press.png", "force.svg", "force.png"]);
 }
 
 #[test]

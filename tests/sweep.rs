@@ -7,7 +7,9 @@ use haptize::{
     JointVector,
     contact::{Equilibrium, Model, NodeForce, Solver, Status},
     dataset::Dataset,
-    haptize::{Backend, CpuBackend, Inspection, Progress, Run, Sweep, SweepError, SweepReport},
+    haptize::{
+        Backend, CpuBackend, FreeSpace, Inspection, Progress, Run, Sweep, SweepError, SweepReport, WithFallback,
+    },
     object::Object,
     proxy::Chain,
     scene::Scene,
@@ -313,6 +315,73 @@ fn a_failing_backend_leaves_a_part_and_the_earlier_file() {
     let report = bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX).unwrap();
     assert_eq!(report.resumed_points, 20);
     assert!(std::fs::read(folder.output()).unwrap() == whole);
+}
+
+/// The device breaks down for good in the third batch of ten; the sweep goes on, and says so in report and file, also when it
+/// is killed later on and resumed.
+#[test]
+fn a_sweep_whose_device_is_lost_goes_on_with_the_cpu() {
+    let scene = scene();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, scene.contact);
+    let lossy = || WithFallback::new(MadeUp { breaks_after: 25, ..MadeUp::default() }, "a made-up device", &model);
+    let folder = Folder::new();
+    let report = bake(&sweep(), &mut lossy(), &folder.output(), false, 10, usize::MAX).unwrap();
+    let dataset = Dataset::open(&folder.output()).unwrap();
+    let [notice] = &dataset.provenance.notices[..] else { panic!("{:?}", dataset.provenance) };
+    assert!(notice.starts_with("from grid point 20 on: solved by "), "{notice}");
+    assert!(notice.ends_with("since a made-up device failed: device lost"), "{notice}");
+    assert_eq!(&report.warnings, &dataset.provenance.notices);
+    let mut solver = Solver::new(&model);
+    for point in 0..POINTS {
+        let q = dataset.grid.configuration(point);
+        let expected = if point < 20 { answer(&q) } else { solver.solve(&q) };
+        assert_eq!(dataset.torque(point), &expected.torque[..], "point {point}");
+        assert_eq!(dataset.status(point), expected.status, "point {point}");
+    }
+
+    let stopped = bake(&sweep(), &mut lossy(), &folder.output(), false, 10, 40).unwrap_err();
+    assert!(matches!(stopped, SweepError::Stopped { done: 40, .. }), "{stopped}");
+    bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX).unwrap();
+    let resumed = Dataset::open(&folder.output()).unwrap().provenance.notices;
+    assert_eq!(&resumed[..], [notice.as_str(), "from grid point 40 on: resumed on cpu (none)"]);
+}
+
+/// Skipping changes nothing but gaps far from contact, and those are then lower bounds.
+#[test]
+fn skipping_free_space_changes_no_more_than_far_gaps() {
+    let fine = SCENE.replace("step = 0.1, count = 7", "step = 0.01, count = 70");
+    let fine = fine.replace("start = 0.01, step = 0.004, count = 9", "start = 0.0, step = 0.0005, count = 100");
+    let scene = Scene::parse(&fine, "fine.toml").unwrap();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, scene.contact);
+    let run = |skip: bool| {
+        let mut sweep = Sweep::new(&scene, &object, "cpu", "none", "").unwrap();
+        if skip {
+            sweep.skip_free_space(&model).unwrap();
+        }
+        let run = Run { chunk: 300, stop: &AtomicBool::new(false), progress: &mut |_| () };
+        sweep.run(&mut CpuBackend::new(&model, 2).unwrap(), run).unwrap()
+    };
+    let ((whole, all), (skipping, some)) = (run(false), run(true));
+    assert_eq!((all.skipped_points, all.contact_points), (0, some.contact_points));
+    assert!(some.skipped_points > 2000 && some.contact_points > 500, "{some:?}");
+    assert!(*whole.torque == *skipping.torque && *whole.status == *skipping.status);
+    assert!(*whole.iterations.unwrap() == *skipping.iterations.unwrap());
+    assert!(*whole.contacts.unwrap().forces == *skipping.contacts.unwrap().forces);
+    let (whole_gap, gap) = (whole.gap.unwrap(), skipping.gap.unwrap());
+    let place = |point: usize| [point / 100, point % 100];
+    let touching: Vec<[usize; 2]> = (0..7000).filter(|&p| whole.status[p] != 0).map(place).collect();
+    let mut bounds = 0;
+    for point in 0..7000 {
+        if gap[point] != whole_gap[point] {
+            bounds += 1;
+            assert!(0.0 < gap[point] && gap[point] < whole_gap[point]);
+            let far = |[a, b]: &[usize; 2]| a.abs_diff(point / 100).max(b.abs_diff(point % 100)) > FreeSpace::MARGIN;
+            assert!(touching.iter().all(far), "point {point} is near contact");
+        }
+    }
+    assert!(bounds > 1000);
 }
 
 #[test]

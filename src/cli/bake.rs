@@ -73,7 +73,13 @@ pub fn watched(
         }
     })?;
     let bar = progress_bar();
-    let mut progress = |progress: Progress| show(&bar, progress);
+    let mut announced = false;
+    let mut progress = |progress: Progress| {
+        if !std::mem::replace(&mut announced, true) {
+            bar.suspend(|| announce(&progress));
+        }
+        show(&bar, progress);
+    };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
     let result = bake(Bake { scene, backend, date: &date, stop: &stop, progress: &mut progress });
     bar.finish_and_clear();
@@ -109,6 +115,18 @@ fn progress_bar() -> ProgressBar {
     }
     let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     ProgressBar::new(0).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// What the sweep is going to take, before it begins.
+fn announce(progress: &Progress) {
+    let megabytes = |bytes: usize| (bytes as f64 / 1e6).ceil();
+    let Progress { points, done, memory, .. } = progress;
+    eprintln!(
+        "haptize: {points} points, {done} of them done; their results take {} MB of memory, and {} MB if every node of the \
+         proxy touched everywhere",
+        megabytes(memory.least),
+        megabytes(memory.most)
+    );
 }
 
 fn show(bar: &ProgressBar, progress: Progress) {

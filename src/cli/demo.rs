@@ -34,8 +34,8 @@ pub fn run() -> Result<Report, Failure> {
     let setup = Setup::new(&dataset)?;
     let motion = play::motion(&setup, "press")?;
     let seconds = motion.duration();
-    let mut played = play::play(&setup, &dataset, motion.clone(), seconds, false)?;
-    played.timing = play::play(&setup, &dataset, motion, seconds, true)?.timing;
+    let mut played = play::play(&setup, &dataset, &mut setup.hand(motion.clone())?, seconds, false)?;
+    played.timing = play::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, true)?.timing;
 
     eprintln!("drawing ...");
     let mut files = vec![file.clone()];

@@ -23,9 +23,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let beside = || arguments.dataset.with_extension(arguments.format.extension());
     let files = dataset.export(&arguments.output.clone().unwrap_or_else(beside), arguments.format)?;
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
-    Ok(Report {
-        text: names.iter().map(|name| format!("{name}\n")).collect(),
-        json: serde_json::json!({ "files": names }),
-        whole: true,
-    })
+    let absent = dataset.absent();
+    let mut text: String = names.iter().map(|name| format!("{name}\n")).collect();
+    if !absent.is_empty() {
+        text += &format!("  not there    {}\n", absent.join(", "));
+    }
+    Ok(Report { text, json: serde_json::json!({ "files": names, "absent": absent }), whole: true })
 }

@@ -5,10 +5,16 @@ use haptize::{
     dataset::Dataset,
     haptize::{
         gridize::{GridizeOptions, GridizeReport, Interpolation, Samples, gridize},
-        import::{ImportProgress, ImportReport, Mapping, import, total_size},
+        import::{ImportProgress, ImportReport, Imported, Mapping, import, total_size},
         scan::{RowStatus, ScanLog},
     },
-    scene::Rendering,
+    report::{
+        self,
+        gridized::gridized,
+        hysteresis::hysteresis,
+        prediction::{Prediction, held_out, predict},
+    },
+    scene::{Rendering, ScanScene},
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
@@ -36,8 +42,8 @@ pub struct Arguments {
     /// A scene whose proxy and gains the dataset is to be felt with; scan logs bring theirs.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Torque above which a configuration counts as contact [N m]; by default three standard deviations of the samples, or
-    /// a hundredth of the greatest torque.
+    /// Torque above which a configuration counts as contact [N m]; by default what the scan's scene says, three standard
+    /// deviations of the samples, or a hundredth of the greatest torque.
     #[arg(long)]
     epsilon: Option<f64>,
     /// How torques are interpolated.
@@ -46,43 +52,61 @@ pub struct Arguments {
     /// Smooth torques within their measured standard deviation first.
     #[arg(long)]
     smooth: bool,
+    /// Say how well the dataset predicts measurements: this share of the samples is left out of a second one, which has to
+    /// predict them.
+    #[arg(long, value_name = "SHARE")]
+    held_out: Option<f64>,
+    /// Say how well the dataset predicts other logs of the same object.
+    #[arg(long, value_name = "LOG", num_args = 1..)]
+    against: Vec<PathBuf>,
+    /// A folder for figures: samples beside grid, torque, and the hysteresis of imported logs.
+    #[arg(long, value_name = "FOLDER")]
+    figures: Option<PathBuf>,
 }
 
 /// What was read.
 struct Source {
     samples: Samples,
     scene: String,
+    /// The torque threshold that the scan's scene names [N m].
+    epsilon: Option<f64>,
     /// For the dataset's provenance: `scan`, `simulated scan` or `import`, and of what.
     kind: &'static str,
     of: String,
     import: Option<ImportReport>,
+    /// Both directions of motion, and the joint whose direction it is.
+    branches: Option<([Samples; 2], usize)>,
     left_out: usize,
 }
 
 /// Reads the logs and writes the dataset.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let started = Instant::now();
-    let mut source = match &arguments.columns {
-        Some(columns) => imported(arguments, &Mapping::load(columns)?)?,
-        None => scanned(arguments)?,
-    };
+    let mapping = arguments.columns.as_deref().map(Mapping::load).transpose()?;
+    let mut source = read(&arguments.logs, mapping.as_ref())?;
     if let Some(path) = &arguments.scene {
         source.scene = scene(path, source.samples.joints.len())?;
     }
-    let read = started.elapsed().as_secs_f64();
+    let reading = started.elapsed().as_secs_f64();
     let options = GridizeOptions {
         steps: arguments.step.clone(),
-        epsilon: arguments.epsilon,
+        epsilon: arguments.epsilon.or(source.epsilon),
         interpolation: arguments.interpolation,
         smooth: arguments.smooth,
     };
     let (mut dataset, report) = gridize(&source.samples, &options)?;
+    let held_out = arguments.held_out.map(|share| held_out(&source.samples, &options, share)).transpose()?;
+    let against = match arguments.against.as_slice() {
+        [] => None,
+        logs => Some(predict(&dataset, &read(logs, mapping.as_ref())?.samples)?),
+    };
     dataset.scene = source.scene.clone();
     dataset.provenance.backend = source.kind.to_owned();
     dataset.provenance.adapter.clone_from(&source.of);
     dataset.provenance.date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
     let output = output(arguments)?;
     dataset.save(&output)?;
+    let figures = figures(arguments, &source, &dataset)?;
     let seconds = started.elapsed().as_secs_f64();
     let mut json = serde_json::to_value(&report)?;
     json["file"] = output.display().to_string().into();
@@ -90,6 +114,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     json["seconds"] = seconds.into();
     json["import"] = serde_json::to_value(&source.import)?;
     json["left_out"] = source.left_out.into();
+    json["held_out"] = serde_json::to_value(&held_out)?;
+    json["against"] = serde_json::to_value(&against)?;
+    json["figures"] = figures.iter().map(|file| file.display().to_string()).collect();
     let mut text = String::new();
     writeln!(
         text,
@@ -99,8 +126,26 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         report.points
     )?;
     describe(&mut text, &source, &dataset, &report)?;
-    writeln!(text, "  {seconds:.2} s, of these {read:.2} s for reading")?;
+    for (what, prediction) in [("held out", &held_out), ("against", &against)] {
+        if let Some(prediction) = prediction {
+            describe_prediction(&mut text, what, &source, &dataset, prediction)?;
+        }
+    }
+    if let Some(folder) = &arguments.figures {
+        writeln!(text, "  figures      {} files in {}", figures.len(), folder.display())?;
+    }
+    writeln!(text, "  {seconds:.2} s, of these {reading:.2} s for reading")?;
     Ok(Report { text, json, whole: true })
+}
+
+fn figures(arguments: &Arguments, source: &Source, dataset: &Dataset) -> Result<Vec<PathBuf>, Failure> {
+    let Some(folder) = &arguments.figures else { return Ok(Vec::new()) };
+    let mut files = report::write_figures(folder, dataset, None)?;
+    files.extend(report::write_both(folder, "gridized", &gridized(&source.samples, dataset))?);
+    if let Some(([forward, backward], lead)) = &source.branches {
+        files.extend(report::write_both(folder, "hysteresis", &hysteresis(forward, backward, *lead))?);
+    }
+    Ok(files)
 }
 
 fn output(arguments: &Arguments) -> Result<PathBuf, Failure> {
@@ -111,18 +156,33 @@ fn output(arguments: &Arguments) -> Result<PathBuf, Failure> {
     Ok(PathBuf::from(name).with_extension("haptize"))
 }
 
-fn scanned(arguments: &Arguments) -> Result<Source, Failure> {
-    let [path] = arguments.logs.as_slice() else {
+/// Reads `logs`, a scan's or, through `mapping`, any tables.
+fn read(logs: &[PathBuf], mapping: Option<&Mapping>) -> Result<Source, Failure> {
+    mapping.map_or_else(|| scanned(logs), |mapping| imported(logs, mapping))
+}
+
+fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
+    let [path] = logs else {
         return Err("several logs can be gridized together only with --columns".into());
     };
     let log = ScanLog::read(path)?;
     let left_out = log.rows.iter().filter(|row| row.status != RowStatus::Steady).count();
     let kind = if log.header.simulated { "simulated scan" } else { "scan" };
-    Ok(Source { samples: log.samples(), scene: log.header.scene, kind, of: log.header.rig, import: None, left_out })
+    let epsilon = Some(ScanScene::parse(&log.header.scene, path)?.scan.control.epsilon);
+    Ok(Source {
+        samples: log.samples(),
+        scene: log.header.scene,
+        epsilon,
+        kind,
+        of: log.header.rig,
+        import: None,
+        branches: None,
+        left_out,
+    })
 }
 
-fn imported(arguments: &Arguments, mapping: &Mapping) -> Result<Source, Failure> {
-    let total = total_size(&arguments.logs);
+fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
+    let total = total_size(logs);
     let bar = if stderr().is_terminal() { ProgressBar::new(total) } else { ProgressBar::hidden() };
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {bytes}/{total_bytes}, {msg}, {eta} left") {
         bar.set_style(style);
@@ -131,12 +191,21 @@ fn imported(arguments: &Arguments, mapping: &Mapping) -> Result<Source, Failure>
         bar.set_position(progress.bytes);
         bar.set_message(format!("{} rows", progress.rows));
     };
-    let imported = import(mapping, &arguments.logs, &mut progress);
+    let imported = import(mapping, logs, &mut progress);
     bar.finish_and_clear();
-    let (samples, report) = imported?;
+    let Imported { samples, branches, report } = imported?;
     let left_out = report.dropped.iter().map(|dropped| dropped.rows as usize).sum();
-    let names: Vec<String> = arguments.logs.iter().map(|log| log.display().to_string()).collect();
-    Ok(Source { samples, scene: String::new(), kind: "import", of: names.join(", "), import: Some(report), left_out })
+    let names: Vec<String> = logs.iter().map(|log| log.display().to_string()).collect();
+    Ok(Source {
+        samples,
+        scene: String::new(),
+        epsilon: None,
+        kind: "import",
+        of: names.join(", "),
+        import: Some(report),
+        branches: branches.map(|branches| (branches, mapping.lead())),
+        left_out,
+    })
 }
 
 /// The text of a valid scene with as many joints as the samples.
@@ -174,6 +243,33 @@ fn describe(text: &mut String, source: &Source, dataset: &Dataset, report: &Grid
             "  {:<12} hysteresis +-{hysteresis:.4} {unit}, repeatability {repeatability:.4} {unit}",
             axis.name
         )?;
+    }
+    Ok(())
+}
+
+fn describe_prediction(
+    text: &mut String,
+    what: &str,
+    source: &Source,
+    dataset: &Dataset,
+    prediction: &Prediction,
+) -> fmt::Result {
+    let Prediction { samples, predicted, rms, worst, deviation } = prediction;
+    writeln!(text, "  {what:<12} {samples} samples, {predicted} of them inside the grid and predicted")?;
+    if *predicted == 0 {
+        return Ok(());
+    }
+    let cells = source.import.as_ref().and_then(|import| import.cells.as_ref());
+    for (joint, axis) in dataset.grid.axes.iter().enumerate() {
+        let (name, unit) = (&axis.name, axis.effort_unit());
+        write!(text, "  {name:<12} to {:.4} {unit} rms, {:.4} at worst", rms[joint], worst[joint])?;
+        if let Some(deviation) = deviation {
+            write!(text, "; their own standard deviation {:.4}", deviation[joint])?;
+        }
+        if let Some(cells) = cells {
+            write!(text, ", repeatability {:.4}", cells.repeatability[joint])?;
+        }
+        writeln!(text)?;
     }
     Ok(())
 }

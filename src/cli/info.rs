@@ -23,13 +23,14 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut json = serde_json::to_value(&summary)?;
     json["file"] = path.display().to_string().into();
     json["file_bytes"] = file_bytes.into();
+    json["absent"] = dataset.absent().into();
     let mut text = String::new();
     writeln!(text, "{}: {} points, {:.1} MB, sound", path.display(), summary.points, file_bytes as f64 / 1e6)?;
-    describe(&mut text, &summary)?;
+    describe(&mut text, &summary, &dataset.absent())?;
     Ok(Report { text, json, whole: true })
 }
 
-fn describe(text: &mut String, summary: &Summary) -> fmt::Result {
+fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Result {
     for (axis, [least, greatest]) in summary.axes.iter().zip(&summary.torque) {
         let Axis { name, unit, start, step, count } = axis;
         let last = axis.coordinate(count - 1);
@@ -62,10 +63,14 @@ fn describe(text: &mut String, summary: &Summary) -> fmt::Result {
     if let Some([nodes, triangles]) = summary.surface {
         writeln!(text, "  surface      {nodes} nodes, {triangles} triangles")?;
     }
+    if !absent.is_empty() {
+        writeln!(text, "  not there    {}", absent.join(", "))?;
+    }
     let from = &summary.provenance;
-    writeln!(
-        text,
-        "  made         {} by haptize {}: {} to {:.0e} on {} ({})",
-        from.date, from.version, from.algorithm, from.tolerance, from.backend, from.adapter
-    )
+    write!(text, "  made         {} by haptize {}: {}", from.date, from.version, from.algorithm)?;
+    // Measured torques were not solved for: they have no residual.
+    if from.tolerance > 0.0 {
+        write!(text, " to {:.0e}", from.tolerance)?;
+    }
+    writeln!(text, " on {} ({})", from.backend, from.adapter)
 }

@@ -4,6 +4,7 @@ use super::{Failure, Report};
 use clap::ValueEnum;
 use glam::DVec3;
 use haptize::{
+    JointVector,
     contact::Model,
     dataset::{self, Dataset},
     haptize::Inspection,
@@ -42,7 +43,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let names: Vec<_> = chain.joints.iter().map(|joint| joint.name.as_str()).collect();
         return Err(format!("--q must be {} finite numbers: {}", names.len(), names.join(",")).into());
     }
-    let inspection = Inspection::new(&Model::new(&object, &chain, scene.contact), q);
+    let model = Model::reaching(&object, &chain, scene.contact, &[JointVector::from_slice(q)])?;
+    let inspection = Inspection::new(&model, q);
     let mut json = serde_json::to_value(&inspection)?;
     let mut text = String::new();
     describe(&mut text, &inspection)?;

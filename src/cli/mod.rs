@@ -10,15 +10,19 @@
 //!
 //! Exit codes: 0 the work is whole, 1 it failed or is not whole, 2 the command line itself is wrong (given by clap).
 
+mod accuracy;
 mod bake;
 mod demo;
 mod doctor;
 mod export;
+mod felt;
 mod gridize;
 mod info;
 mod inspect;
 mod play;
 mod scan;
+mod stability;
+mod view;
 
 use clap::{Parser, Subcommand};
 use std::{
@@ -40,6 +44,8 @@ struct CommandLine {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Show what accuracy costs in time: error against spacing, interpolation, tolerance and more, with figures.
+    Accuracy(accuracy::Arguments),
     /// Haptize a scene: solve contact at every point of its grid.
     Bake(bake::Arguments),
     /// Say what this machine offers: threads, graphics adapters, real-time rights.
@@ -56,11 +62,16 @@ enum Command {
     Play(play::Arguments),
     /// Haptize a real object by touching it on a rig (the one that ships is simulated).
     Scan(scan::Arguments),
+    /// Run the hard cases of every room on this machine, and say what stayed within its bound.
+    Stability(stability::Arguments),
+    /// See and press a dataset in a window.
+    View(view::Arguments),
 }
 
 impl Command {
     fn run(&self) -> Result<Report, Failure> {
         match self {
+            Self::Accuracy(arguments) => accuracy::run(arguments),
             Self::Bake(arguments) => bake::run(arguments),
             Self::Doctor(arguments) => doctor::run(arguments),
             Self::Export(arguments) => export::run(arguments),
@@ -69,6 +80,8 @@ impl Command {
             Self::Inspect(arguments) => inspect::run(arguments),
             Self::Play(arguments) => play::run(arguments),
             Self::Scan(arguments) => scan::run(arguments),
+            Self::Stability(arguments) => stability::run(arguments),
+            Self::View(arguments) => view::run(arguments),
         }
     }
 }

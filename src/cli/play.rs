@@ -1,19 +1,20 @@
 //! `haptize play`: a dataset felt by a simulated hand, and the object seen to deform; traces and figures of it.
 
-use super::{Failure, Report};
+use super::{Failure, Report, felt::Felt};
 use haptize::{
     dataset::{Dataset, replace_file},
-    device::Motion,
+    device::{Device, Motion, Recorded},
     render::{
         realtime,
+        recording::Recording,
         session::{self, SessionError},
-        setup::Setup,
+        setup::{Setup, labels},
         timing::{Percentiles, Timing},
         trace::{Summary, Trace},
     },
     report,
 };
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::{
     fmt::{self, Write},
     path::{Path, PathBuf},
@@ -30,12 +31,24 @@ pub struct Arguments {
     /// How long; by default as long as the motion [s].
     #[arg(long)]
     seconds: Option<f64>,
+    /// The device moves exactly as the motion says, whatever the torque, instead of being held by a simulated hand.
+    #[arg(long)]
+    exact: bool,
     /// Against the clock, in a real-time thread where permitted, instead of as fast as it goes.
     #[arg(long)]
     realtime: bool,
+    /// Records the session into this file: all that the loop was told, and what it answered.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Has the session in this file again and compares it bit for bit; differences are an error.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "seconds", "exact", "realtime", "record"])]
+    replay: Option<PathBuf>,
     /// The folder to write traces and figures to.
     #[arg(short, long, default_value = "out")]
     output: PathBuf,
+    /// Another dataset, felt by the same motion: the forces at the end of both proxies are drawn in one figure.
+    #[arg(long, value_name = "DATASET", conflicts_with = "replay")]
+    beside: Option<PathBuf>,
 }
 
 /// Shapes of the object that are kept.
@@ -48,31 +61,96 @@ const LONGEST: f64 = 3600.0;
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let dataset = Dataset::open(&arguments.dataset)?;
     let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
-    let motion = motion(&setup, &arguments.motion)?;
+    for exceeded in &setup.exceeded {
+        eprintln!("haptize: note: {exceeded}");
+    }
+    let (played, told) = match &arguments.replay {
+        Some(file) => replay(&setup, &dataset, file)?,
+        None => (perform(&setup, &dataset, arguments)?, None),
+    };
+    if let Some(timing) = &played.timing {
+        timing.refused.iter().for_each(|refused| eprintln!("haptize: note: {refused}"));
+    }
+    let mut files = Vec::new();
+    if let Some(file) = &arguments.record {
+        record(&played, file)?;
+        files.push(file.clone());
+    }
+    files.extend(write(&setup, &dataset, &played, &arguments.output)?);
+    let mut felt = Felt::new(&arguments.dataset, &dataset, &setup, &played.trace);
+    if let Some(path) = &arguments.beside {
+        felt.beside(path, motion(&setup, &arguments.motion)?, played.trace.summary().seconds)?;
+        felt.draw(&arguments.output, &played.trace)?;
+    }
+    let summary = played.trace.summary();
+    let fault = played.trace.ticks.iter().find_map(|tick| Some((tick.time, tick.fault?.to_string())));
+    let mut json = serde_json::to_value(summary)?;
+    felt.tell(&mut json);
+    json["notes"] = setup.exceeded.iter().map(ToString::to_string).collect();
+    json["bounds"] = serde_json::to_value(&setup.bounds)?;
+    json["timing"] = serde_json::to_value(&played.timing)?;
+    json["fault"] = fault.as_ref().map(|(time, reason)| json!({ "time": time, "reason": reason })).into();
+    json["replayed"] = told.is_some().into();
+    json["files"] = files.iter().map(|file| Value::from(file.display().to_string())).collect();
+    let mut text = told.unwrap_or_default();
+    describe(&mut text, &summary)?;
+    felt.describe(&mut text)?;
+    if let Some((time, reason)) = &fault {
+        writeln!(text, "  fault        at {time:.4} s the torque went to zero: {reason}; play again to clear it")?;
+    }
+    if let Some(timing) = &played.timing {
+        describe_timing(&mut text, timing)?;
+    }
+    if let Some(file) = &arguments.record {
+        writeln!(text, "recorded in {}", file.display())?;
+    }
+    writeln!(text, "traces and figures in {}", arguments.output.display())?;
+    Ok(Report { text, json, whole: fault.is_none() })
+}
+
+/// The session that `arguments` ask for.
+fn perform(setup: &Setup, dataset: &Dataset, arguments: &Arguments) -> Result<Played, Failure> {
+    let motion = motion(setup, &arguments.motion)?;
     let seconds = arguments.seconds.unwrap_or_else(|| motion.duration());
     if !(seconds > 0.0 && seconds <= LONGEST) {
         return Err(format!("cannot play {seconds} s: give --seconds between 0 and {LONGEST}").into());
     }
-    for exceeded in &setup.exceeded {
-        eprintln!("haptize: note: {exceeded}");
+    let mut device: Box<dyn Device> =
+        if arguments.exact { Box::new(Recorded::new(motion)) } else { Box::new(setup.hand(motion)?) };
+    play(setup, dataset, device.as_mut(), seconds, arguments.realtime)
+}
+
+/// Has the session in `file` again. Its figures, and a line that says that it was the same.
+fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Option<String>), Failure> {
+    let recording = Recording::read(file, setup.chain.joints.len())?;
+    let mut graphics = setup.graphics(dataset)?;
+    let trace = recording.replay(&setup.haptics, graphics.as_mut(), labels(&dataset.grid))?;
+    if let Some(tick) = recording.first_difference(&trace) {
+        let time = trace.ticks.get(tick).map_or(0.0, |tick| tick.time);
+        let why = "the dataset, its scene or the version of haptize is another one than when it was recorded";
+        return Err(
+            format!("{}: the session differs from tick {tick}, at {time:.4} s, on: {why}", file.display()).into()
+        );
     }
-    let played = play(&setup, &dataset, motion, seconds, arguments.realtime)?;
-    if let Some(timing) = &played.timing {
-        timing.refused.iter().for_each(|refused| eprintln!("haptize: note: {refused}"));
+    let told = format!("{} ticks replayed, torque and proxy equal to the last bit\n", recording.ticks());
+    Ok((Played { trace, timing: None }, Some(told)))
+}
+
+/// Writes what `played` recorded to `file`.
+fn record(played: &Played, file: &Path) -> Result<(), Failure> {
+    let lost = played.timing.as_ref().map_or(0, |timing| timing.unrecorded);
+    if lost > 0 {
+        return Err(
+            format!("{lost} ticks were not recorded, the machine is too busy: nothing is written; try again").into()
+        );
     }
-    let files = write(&setup, &dataset, &played, &arguments.output)?;
-    let summary = played.trace.summary();
-    let mut json = serde_json::to_value(summary)?;
-    json["notes"] = setup.exceeded.iter().map(ToString::to_string).collect();
-    json["timing"] = serde_json::to_value(&played.timing)?;
-    json["files"] = files.iter().map(|file| Value::from(file.display().to_string())).collect();
-    let mut text = String::new();
-    describe(&mut text, &summary)?;
-    if let Some(timing) = &played.timing {
-        describe_timing(&mut text, timing)?;
-    }
-    writeln!(text, "{} files in {}", files.len(), arguments.output.display())?;
-    Ok(Report { text, json, whole: true })
+    let recording = Recording::of(&played.trace);
+    replace_file(file, |out| recording.write(&played.trace.joints, out)).map_err(|error| unwritten(file, error))?;
+    Ok(())
+}
+
+fn unwritten(path: &Path, error: impl fmt::Display) -> String {
+    format!("cannot write {}: {error}; free some space or give another place", path.display())
 }
 
 /// A session that was played.
@@ -83,22 +161,21 @@ pub struct Played {
     pub timing: Option<Timing>,
 }
 
-/// Plays `motion` for `seconds`, by a simulated hand.
+/// Plays for `seconds` what `device` does.
 pub fn play(
     setup: &Setup,
     dataset: &Dataset,
-    motion: Motion,
+    device: &mut dyn Device,
     seconds: f64,
     against_the_clock: bool,
 ) -> Result<Played, Failure> {
-    let mut hand = setup.hand(motion)?;
     let mut graphics = setup.graphics(dataset)?;
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
     if against_the_clock {
-        let (trace, timing) = realtime::run(&setup.haptics, &mut hand, graphics.as_mut(), &plan)?;
+        let (trace, timing) = realtime::run(&setup.haptics, device, graphics.as_mut(), &plan)?;
         return Ok(Played { trace, timing: Some(timing) });
     }
-    let played: Result<Trace, SessionError> = session::run(&setup.haptics, &mut hand, graphics.as_mut(), &plan);
+    let played: Result<Trace, SessionError> = session::run(&setup.haptics, device, graphics.as_mut(), &plan);
     Ok(Played { trace: played?, timing: None })
 }
 
@@ -106,8 +183,6 @@ pub fn play(
 pub fn write(setup: &Setup, dataset: &Dataset, played: &Played, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| format!("cannot make the folder {}: {error}; give another by -o", folder.display()))?;
-    let unwritten =
-        |path: &Path, error| format!("cannot write {}: {error}; free some space or give -o", path.display());
     let ticks = folder.join("trace.csv");
     replace_file(&ticks, |out| played.trace.write_ticks(out)).map_err(|error| unwritten(&ticks, error))?;
     let mut files = vec![ticks];
@@ -162,7 +237,7 @@ pub fn describe(text: &mut String, s: &Summary) -> fmt::Result {
         (s.absent, "beside absent grid points"),
         (s.unconverged, "beside unconverged grid points"),
         (s.limited, "with the device's torque limited"),
-        (s.faults, "with a fault of the device"),
+        (s.faults, "without torque, after a fault"),
     ] {
         if count > 0 {
             writeln!(text, "  note         {count} ticks {what}")?;

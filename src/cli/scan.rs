@@ -4,7 +4,8 @@ use super::{Failure, Report};
 use haptize::{
     JointVector,
     haptize::scan::{
-        LogHeader, LogWriter, Plan, Rig, ScanProgress, ScanReport, ScanRow, Session, labels, simulated::SimulatedRig,
+        LogHeader, LogWriter, Plan, Rig, ScanProgress, ScanReport, ScanRow, Session, labels,
+        simulated::{Hand, SimulatedRig},
     },
     proxy::Chain,
     scene::ScanScene,
@@ -27,7 +28,14 @@ pub struct Arguments {
     /// Continue a log that was interrupted.
     #[arg(long)]
     resume: bool,
+    /// Instead of going through the plan, log for so many seconds wherever a hand leads the device to and lets go of it. The
+    /// simulated rig is led by a simulated hand, to places of the plan.
+    #[arg(long, value_name = "SECONDS")]
+    guided: Option<f64>,
 }
+
+/// Longest guided scan [s].
+const LONGEST: f64 = 36_000.0;
 
 /// Seed of the simulated rig's noise.
 const SEED: u64 = 1;
@@ -38,6 +46,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let chain = Chain::new(&scene.proxy);
     let plan = Plan::new(&scene.scan.plan, &chain)?;
     let first = plan.stops.first().map_or_else(|| JointVector::zeros(chain.joints.len()), |stop| stop.q);
+    if let Some(seconds) = arguments.guided.filter(|seconds| !(*seconds > 0.0 && *seconds <= LONGEST)) {
+        return Err(format!("cannot log for {seconds} s: give --guided between 0 and {LONGEST}").into());
+    }
     let mut rig = SimulatedRig::new(&scene.proxy, &scene.scan.simulated, first, SEED);
     let output = match &arguments.output {
         Some(output) => output.clone(),
@@ -47,6 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let header = LogHeader {
         rig: rig.description(),
         simulated: rig.is_simulated(),
+        guided: arguments.guided.is_some(),
         joints: labels(&chain),
         scene: scene.text.clone(),
     };
@@ -55,6 +67,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     } else {
         (LogWriter::create(&output, &header)?, Vec::new())
     };
+    if let Some(seconds) = arguments.guided {
+        rig = rig.led_by(Hand::new(plan.spread(logged.len(), Hand::visits_within(seconds))));
+    }
     let stop = Arc::new(AtomicBool::new(false));
     let flag = stop.clone();
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))?;
@@ -73,7 +88,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         stop: &stop,
         progress: &mut progress,
     };
-    let result = session.scan(&plan, &logged);
+    let result = match arguments.guided {
+        Some(seconds) => session.guided(seconds, &logged),
+        None => session.scan(&plan, &logged),
+    };
     bar.finish_and_clear();
     let report = result?;
     let mut json = serde_json::to_value(&report)?;

@@ -34,6 +34,8 @@ pub struct Contact {
     pub normal: DVec3,
     /// r + s, positive in contact [m].
     pub depth: f64,
+    /// How often the spring counts: one, or what [`super::features`] says of nodes with a radius.
+    pub share: f64,
     /// Force lambda by which the curvature counts; kc depth at the solution [N].
     pub multiplier: f64,
     /// Second derivative of s.
@@ -135,7 +137,7 @@ pub fn hessian_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3] 
     }
     let mut product = second_variation(contact, v);
     for j in 0..3 {
-        product[j] = *normal * (kc * deepening * weights[j]) + product[j] * contact.multiplier;
+        product[j] = (*normal * (kc * deepening * weights[j]) + product[j] * contact.multiplier) * contact.share;
     }
     product
 }
@@ -168,6 +170,7 @@ mod tests {
                 weights: point.weights,
                 normal,
                 depth,
+                share: 1.0,
                 curvature,
                 multiplier: 3.0 * depth,
             },

@@ -11,6 +11,7 @@
 
 use super::closest_point::{ClosestPoint, Feature, closest_point, point_at};
 use super::depth::{Contact, measure};
+use super::features::{Features, Felt};
 use super::model::Model;
 use super::surface;
 use glam::DVec3;
@@ -61,8 +62,9 @@ impl Closest {
         Self { distance_squared: f64::MAX, triangle: u32::MAX, point }
     }
 
-    /// Takes triangle `t` instead if it is nearer to `x`, or as near with a lower number.
-    pub fn consider(&mut self, x: DVec3, positions: &[DVec3], triangles: &[[u32; 3]], t: u32) {
+    /// Takes triangle `t` instead if it is nearer to `x`, or as near with a lower number; its closest point, and the squared
+    /// distance of that [m^2].
+    pub fn consider(&mut self, x: DVec3, positions: &[DVec3], triangles: &[[u32; 3]], t: u32) -> (ClosestPoint, f64) {
         let corners = surface::corners(positions, triangles[t as usize]);
         let point = closest_point(x, corners);
         let distance_squared = x.distance_squared(point_at(corners, point.weights));
@@ -70,7 +72,17 @@ impl Closest {
         {
             *self = Self { distance_squared, triangle: t, point };
         }
+        (point, distance_squared)
     }
+}
+
+/// Which walls a node with a radius feels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Walls {
+    /// The closest one.
+    Closest,
+    /// All within its radius: see [`super::features`].
+    All,
 }
 
 /// Detection for one thread: node positions of the current configuration and reusable lists.
@@ -81,6 +93,8 @@ pub struct Detection {
     candidates: Vec<Candidate>,
     /// |u_j| of each surface node [m].
     moved: Vec<f64>,
+    /// Of the node at hand.
+    features: Features,
     /// Depth of the deepest node at rest, which the surface is expected to move by [m].
     expected: f64,
 }
@@ -95,6 +109,7 @@ impl Detection {
             standings: vec![Standing::default(); count],
             candidates: Vec::new(),
             moved: vec![0.0; model.rest.len()],
+            features: Features::default(),
             expected: 0.0,
         }
     }
@@ -103,6 +118,23 @@ impl Detection {
     #[must_use]
     pub fn nodes(&self) -> &[DVec3] {
         &self.nodes
+    }
+
+    /// A lower bound of the signed distance of each proxy node to the surface at rest, in the configuration taken up [m].
+    pub fn distances(&self) -> impl Iterator<Item = f64> {
+        self.standings.iter().map(|standing| if standing.inside { -standing.distance } else { standing.distance })
+    }
+
+    /// Depth at rest of the node with a radius that lies deepest, in radii; zero where there is none inside [1].
+    #[must_use]
+    pub fn depth_in_radii(&self, model: &Model) -> f64 {
+        let mut deepest = 0.0f64;
+        for (standing, node) in self.standings.iter().zip(&model.chain.nodes) {
+            if standing.inside && node.radius > 0.0 {
+                deepest = deepest.max((standing.distance + node.radius) / node.radius);
+            }
+        }
+        deepest
     }
 
     /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns its gap: the smallest signed
@@ -136,7 +168,14 @@ impl Detection {
     /// Contacts with the surface displaced by `displacement`, i.e. at `positions` relative to the model's centre [m], in
     /// ascending order of proxy nodes. Nodes that touched before in this configuration are included with a depth below zero
     /// when they do not touch now, because they are the ones that may touch again.
-    pub fn deformed(&mut self, model: &Model, displacement: &[f64], positions: &[DVec3], contacts: &mut Vec<Contact>) {
+    pub fn deformed(
+        &mut self,
+        model: &Model,
+        displacement: &[f64],
+        positions: &[DVec3],
+        walls: Walls,
+        contacts: &mut Vec<Contact>,
+    ) {
         contacts.clear();
         let mut moved = 0.0f64;
         for (node, length) in self.moved.iter_mut().enumerate() {
@@ -159,7 +198,7 @@ impl Detection {
             if standing.margin < moved {
                 standing.margin = (2.0 * moved).max(self.expected);
                 standing.from = self.candidates.len();
-                let reach = standing.distance + 2.0 * standing.margin;
+                let reach = (standing.distance + 2.0 * standing.margin).max(radius + standing.margin);
                 let candidates = &mut self.candidates;
                 model.bounds.search(x, reach * reach, |triangle, square| {
                     candidates.push(Candidate { triangle, rest_distance: square.sqrt() });
@@ -167,14 +206,35 @@ impl Detection {
                 });
                 standing.to = self.candidates.len();
             }
-            let closest = closest_deformed(model, x, standing, &self.candidates, &self.moved, positions);
+            self.features.clear();
+            let felt = (walls == Walls::All && radius > 0.0).then_some((radius, &mut self.features));
+            let closest = closest_deformed(model, x, standing, &self.candidates, &self.moved, positions, felt);
             standing.last = closest.triangle;
-            if let Some(contact) = contact_at(model, i, x, radius, positions, &closest)
-                && (contact.depth > 0.0 || standing.watched)
-            {
-                standing.watched = true;
-                contacts.push(contact);
+            let Some(contact) = contact_at(model, i, x, radius, positions, closest.triangle, closest.point) else {
+                continue;
+            };
+            standing.watched |= contact.depth > 0.0;
+            if !standing.watched {
+                continue;
             }
+            let (triangles, topology) = (&model.object.triangles, &model.object.topology);
+            let felt = self.features.gather(x, radius, positions, triangles, topology);
+            let inner = felt.iter().filter(|felt| !felt.outer && felt.share > 0);
+            let inner = inner.min_by(|a, b| a.distance.total_cmp(&b.distance));
+            let outer = felt.iter().any(|felt| felt.outer && felt.share > 0);
+            let wall = |felt: &Felt| {
+                let contact = contact_at(model, i, x, radius, positions, felt.triangle, felt.point)?;
+                Some(Contact { share: felt.share.into(), ..contact })
+            };
+            match inner {
+                // Between two walls, one of them seen from inside: the closer one need not be the one that decides.
+                Some(inner) if outer && surface::winding_number(positions, triangles, x) > 0.5 => {
+                    contacts.extend(wall(inner));
+                }
+                _ if !outer => contacts.push(contact),
+                _ => {}
+            }
+            contacts.extend(felt.iter().filter(|felt| felt.outer).filter_map(wall));
         }
     }
 
@@ -190,7 +250,7 @@ impl Detection {
                 continue;
             }
             let closest = find_standing(model, x, standing);
-            if let Some(mut contact) = contact_at(model, i, x, radius, &model.rest, &closest)
+            if let Some(mut contact) = contact_at(model, i, x, radius, &model.rest, closest.triangle, closest.point)
                 && contact.depth >= -reach
             {
                 contact.curvature = Default::default();
@@ -231,6 +291,7 @@ fn closest_deformed(
     candidates: &[Candidate],
     moved: &[f64],
     positions: &[DVec3],
+    mut felt: Option<(f64, &mut Features)>,
 ) -> Closest {
     let triangles = &model.object.triangles;
     let slack = model.bounds.slack(x);
@@ -241,29 +302,38 @@ fn closest_deformed(
     for candidate in &candidates[standing.from..standing.to] {
         let [a, b, c] = triangles[candidate.triangle as usize].map(|node| moved[node as usize]);
         let nearest = (candidate.rest_distance - a.max(b).max(c)).max(0.0);
-        if nearest * nearest <= closest.distance_squared + slack {
+        let nearest = nearest * nearest - slack;
+        if let Some((radius, features)) = &mut felt
+            && nearest < *radius * *radius
+        {
+            let (point, distance_squared) = closest.consider(x, positions, triangles, candidate.triangle);
+            if distance_squared < *radius * *radius {
+                features.push(candidate.triangle, point);
+            }
+        } else if nearest <= closest.distance_squared {
             closest.consider(x, positions, triangles, candidate.triangle);
         }
     }
     closest
 }
 
-/// The contact (or near miss, with depth <= 0) of proxy node `i` with its closest feature.
+/// The contact (or near miss, with depth <= 0) of proxy node `i` with a feature of `triangle`.
 fn contact_at(
     model: &Model,
     i: usize,
     x: DVec3,
     radius: f64,
     positions: &[DVec3],
-    closest: &Closest,
+    triangle: u32,
+    point: ClosestPoint,
 ) -> Option<Contact> {
-    let t = closest.triangle as usize;
+    let t = triangle as usize;
     let nodes = *model.object.triangles.get(t)?;
-    let ClosestPoint { weights, feature } = closest.point;
+    let ClosestPoint { weights, feature } = point;
     let pseudonormal = surface::pseudonormal(positions, &model.object.triangles, &model.object.topology, t, feature);
     let (normal, depth, curvature) =
         measure(x, radius, surface::corners(positions, nodes), weights, feature, pseudonormal);
-    Some(Contact { proxy_node: i as u32, nodes, weights, normal, depth, curvature, multiplier: 0.0 })
+    Some(Contact { proxy_node: i as u32, nodes, weights, normal, depth, share: 1.0, curvature, multiplier: 0.0 })
 }
 
 #[cfg(test)]
@@ -272,8 +342,8 @@ mod tests {
     use crate::object::Object;
     use crate::proxy::Chain;
     use crate::scene::{
-        Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, ObjectSpec, ProxyNodeSpec, ProxySpec,
-        Shape, SpringKind, SpringSpec,
+        Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
+        ProxySpec, Shape, SpringKind, SpringSpec,
     };
 
     /// A fixed pseudo-random sequence in [-1, 1).
@@ -288,7 +358,7 @@ mod tests {
     fn ball() -> Object {
         Object::build(&ObjectSpec {
             shape: Shape::Sphere { centre: DVec3::new(1.0, -2.0, 0.5), radius: 0.05, rings: 10, segments: 10 },
-            springs: SpringSpec { kind: SpringKind::Isotropic, stiffness: 300.0 },
+            material: Material::Springs(SpringSpec { kind: SpringKind::Isotropic, stiffness: 300.0 }),
             ground: GroundSpec { stiffness: 100.0, nodes: GroundNodes::All },
             node_mass: 0.01,
             node_damping: 0.1,
@@ -322,7 +392,8 @@ mod tests {
             for t in 0..model.object.triangles.len() {
                 closest.consider(x, positions, &model.object.triangles, t as u32);
             }
-            let contact = contact_at(model, i, x, model.chain.nodes[i].radius, positions, &closest).unwrap();
+            let radius = model.chain.nodes[i].radius;
+            let contact = contact_at(model, i, x, radius, positions, closest.triangle, closest.point).unwrap();
             if contact.depth > 0.0 {
                 contacts.push(contact);
             }
@@ -359,7 +430,7 @@ mod tests {
                         .map(|j| model.rest[j] + DVec3::from_slice(&displacement[3 * j..]))
                         .collect();
                     let mut found = Vec::new();
-                    detection.deformed(&model, &displacement, &positions, &mut found);
+                    detection.deformed(&model, &displacement, &positions, Walls::Closest, &mut found);
                     found.retain(|contact| contact.depth > 0.0);
                     let expected = brute_force(&model, &x, &positions);
                     assert_eq!(found.len(), expected.len());

@@ -13,13 +13,14 @@
 //! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`.
 
 use super::depth::Contact;
-use super::detection::Detection;
+use super::detection::{Detection, Walls};
 use super::model::Model;
 use super::support::{Support, dot, root};
 use super::trust_region::{Springs, TrustRegion, add_contact_forces};
 use crate::tolerances::{
     ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GIVE_UP_RADIUS,
-    GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, SHRINK, STAGE_TOLERANCE, WIDEN,
+    GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, SHRINK, STAGE_TOLERANCE,
+    STALLED_RADIUS, WIDEN,
 };
 use glam::DVec3;
 
@@ -69,8 +70,6 @@ pub struct EnergySearch {
     pub support: Support,
     /// Contact stiffness of the current stage [N/m].
     kc: f64,
-    /// Predicted multiplier of each proxy node [N].
-    multipliers: Vec<f64>,
     slots: Vec<[usize; 3]>,
     contact_forces: Vec<f64>,
     residual: Vec<f64>,
@@ -97,7 +96,6 @@ impl EnergySearch {
             support: Support::new(model.rest.len()),
             slots: Vec::new(),
             kc: 0.0,
-            multipliers: vec![0.0; model.chain.nodes.len()],
             contact_forces: Vec::new(),
             residual: Vec::new(),
             product: Vec::new(),
@@ -110,7 +108,10 @@ impl EnergySearch {
     /// Searches from the rest state, for the configuration that `detection` has taken up.
     pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> Outcome {
         self.kc = match geometry {
-            Geometry::Deformed => model.kc.min(CONTINUATION_START / model.softest),
+            // A spring pressed in beyond a node's radius would pull the node's centre through the surface.
+            Geometry::Deformed => {
+                model.kc.min(CONTINUATION_START / model.softest * detection.depth_in_radii(model).max(1.0))
+            }
             Geometry::Frozen => model.kc,
         };
         self.start(model, detection, geometry);
@@ -118,17 +119,16 @@ impl EnergySearch {
         let mut first_radius = self.begin_stage(model, &mut outcome);
         let mut radius = first_radius;
         while outcome.residual.is_finite() {
-            if self.kc < model.kc && outcome.residual <= STAGE_TOLERANCE {
+            let stuck = radius < GIVE_UP_RADIUS * first_radius;
+            let stalled = radius < STALLED_RADIUS * first_radius;
+            if self.kc < model.kc && (outcome.residual <= STAGE_TOLERANCE || stalled) {
                 self.kc = model.kc.min(CONTINUATION_FACTOR * self.kc);
                 first_radius = self.begin_stage(model, &mut outcome);
                 radius = first_radius;
                 continue;
             }
             outcome.converged = self.kc == model.kc && outcome.residual <= model.contact.tolerance;
-            if outcome.converged
-                || outcome.iterations >= model.contact.max_iterations
-                || radius < GIVE_UP_RADIUS * first_radius
-            {
+            if outcome.converged || outcome.iterations >= model.contact.max_iterations || stuck {
                 break;
             }
             outcome.iterations += 1;
@@ -177,7 +177,13 @@ impl EnergySearch {
         self.state.elastic = 0.0;
         self.state.displacement.fill(0.0);
         self.state.positions.copy_from_slice(&model.rest);
-        detection.deformed(model, &self.state.displacement, &self.state.positions, &mut self.state.contacts);
+        detection.deformed(
+            model,
+            &self.state.displacement,
+            &self.state.positions,
+            Walls::All,
+            &mut self.state.contacts,
+        );
         if geometry == Geometry::Frozen {
             // 1/2 |u|^2 <= E <= E(0) in the energy norm and |u_j|^2 <= trace(C_jj) |u|^2, all along the search: nodes
             // farther from the surface than this can never touch.
@@ -191,7 +197,7 @@ impl EnergySearch {
     /// Brings the support, the contact forces and the residual force r = c - f up to date with the current state; returns
     /// the relative residual sqrt(r . C r) / sqrt(c . C c).
     fn balance(&mut self, model: &Model) -> f64 {
-        let Self { state, support, slots, contact_forces, residual, product, .. } = self;
+        let Self { state, support, slots, contact_forces, residual, product, kc, .. } = self;
         slots.clear();
         for contact in &state.contacts {
             let mut contact_slots = [0; 3];
@@ -203,12 +209,12 @@ impl EnergySearch {
             }
             slots.push(contact_slots);
         }
-        support.gather(&model.object.compliance);
+        support.gather(&model.compliance);
         let order = support.order();
         state.forces.resize(order, 0.0);
         contact_forces.clear();
         contact_forces.resize(order, 0.0);
-        add_contact_forces(Springs { contacts: &state.contacts, slots, kc: self.kc }, contact_forces);
+        add_contact_forces(Springs { contacts: &state.contacts, slots, kc: *kc }, contact_forces);
         residual.clear();
         residual.extend(contact_forces.iter().zip(&state.forces).map(|(c, f)| c - f));
         product.resize(order, 0.0);
@@ -218,32 +224,44 @@ impl EnergySearch {
         let scale = dot(contact_forces, product);
         // Forces of depths too small to be known to the tolerance are measured against the smallest that is.
         let resolved_depth = DEPTH_ROUNDING * model.extent / model.contact.tolerance;
-        let floor = self.kc * resolved_depth * model.softest.sqrt();
+        let floor = *kc * resolved_depth * model.softest.sqrt();
         root(out_of_balance) / root(scale).max(floor).max(RESIDUAL_FLOOR)
     }
 
     /// The state that the last trust-region step leads to.
     fn try_step(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
-        let Self { state, trial, support, trust_region, multipliers, .. } = self;
+        let Self { state, trial, support, trust_region, .. } = self;
         trial.forces.clear();
         trial.forces.extend(state.forces.iter().zip(&trust_region.force).map(|(f, df)| f + df));
-        support.displace(&model.object.compliance, &trial.forces, &mut trial.displacement);
+        support.displace(&model.compliance, &trial.forces, &mut trial.displacement);
         match geometry {
             Geometry::Deformed => {
                 for (node, position) in trial.positions.iter_mut().enumerate() {
                     *position = model.rest[node] + DVec3::from_slice(&trial.displacement[3 * node..]);
                 }
-                detection.deformed(model, &trial.displacement, &trial.positions, &mut trial.contacts);
+                detection.deformed(model, &trial.displacement, &trial.positions, Walls::All, &mut trial.contacts);
             }
             Geometry::Frozen => frozen_contacts(&self.frozen, &trial.displacement, &mut trial.contacts),
         }
-        // Multipliers as the step predicted them; zero for a node that it did not know of.
-        multipliers.fill(0.0);
-        for (contact, deepening) in state.contacts.iter().zip(&trust_region.deepening) {
-            multipliers[contact.proxy_node as usize] = self.kc * (contact.depth + deepening).max(0.0);
-        }
+        // Multipliers as the step predicted them, of the wall that faces the same way; zero for a node that it did not
+        // know of. Both lists ascend by proxy node.
+        let mut first = 0;
         for contact in &mut trial.contacts {
-            contact.multiplier = multipliers[contact.proxy_node as usize];
+            while first < state.contacts.len() && state.contacts[first].proxy_node < contact.proxy_node {
+                first += 1;
+            }
+            let mut likest = -2.0;
+            contact.multiplier = 0.0;
+            for (before, deepening) in state.contacts[first..].iter().zip(&trust_region.deepening[first..]) {
+                if before.proxy_node != contact.proxy_node {
+                    break;
+                }
+                let alike = before.normal.dot(contact.normal);
+                if alike > likest {
+                    likest = alike;
+                    contact.multiplier = self.kc * (before.depth + deepening).max(0.0);
+                }
+            }
         }
         let mut work = 0.0;
         for (slot, &node) in support.nodes().iter().enumerate() {
@@ -270,7 +288,7 @@ pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
     let mut sum = 0.0;
     for contact in contacts {
         let depth = contact.depth.max(0.0);
-        sum += depth * depth;
+        sum += contact.share * depth * depth;
     }
     0.5 * kc * sum
 }

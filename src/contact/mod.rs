@@ -8,16 +8,20 @@ use glam::DVec3;
 mod bounding_volumes;
 pub(crate) mod closest_point;
 pub(crate) mod depth;
-mod detection;
+pub(crate) mod detection;
 mod energy;
+mod features;
 mod model;
 mod paper;
+mod proximity;
+mod reach;
 mod solver;
-mod support;
+pub(crate) mod support;
 pub(crate) mod surface;
 mod trust_region;
 
 pub use model::Model;
+pub use proximity::Proximity;
 pub use solver::Solver;
 
 /// What became of one configuration.
@@ -30,7 +34,7 @@ pub enum Status {
     Contact = 1,
     /// In contact, not converged: torque and forces are the last iterate's and are not to be trusted.
     Unconverged = 2,
-    /// More contacts than the solver has room for.
+    /// More contacts than the solver has room for, or contact beyond the surface whose compliance was formed.
     Overflow = 3,
     /// Not computed, or outside the measured region.
     Outside = 4,
@@ -51,7 +55,7 @@ pub struct Equilibrium {
     pub status: Status,
     /// Steps tried (`energy`, `linearised`) or passes (`paper`).
     pub iterations: u32,
-    /// Relative residual of the force balance, in the energy norm [1].
+    /// Relative residual of the force balance, in the energy norm; one where nothing could be computed [1].
     pub residual: f64,
     /// Stored energy U: elastic and contact springs [J].
     pub energy: f64,
@@ -74,7 +78,10 @@ pub struct NodeForce {
     pub force: DVec3,
 }
 
-/// One proxy node in contact: pushed by `force` at x_i, pushing back on three object nodes.
+/// One proxy node in contact with one feature of the surface: pushed by `force` at x_i, pushing back on three object nodes.
+///
+/// A point node has at most one. A node with a radius has one for each wall that it touches, and in a crease one of opposite
+/// sign for the edge between two (`features.rs`): the node's force is their sum.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
     /// Number of the proxy's node.

@@ -2,10 +2,13 @@
 
 use super::bounding_volumes::BoundingVolumes;
 use super::closest_point::Feature;
+use super::reach;
 use super::surface;
-use crate::object::Object;
+use crate::JointVector;
+use crate::object::{Compliance, Object, ObjectError};
 use crate::proxy::Chain;
 use crate::scene::ContactSpec;
+use crate::tolerances::RIGID_STIFFNESS;
 use glam::DVec3;
 
 /// An object and a proxy, prepared for contact.
@@ -14,10 +17,13 @@ pub struct Model<'a> {
     pub object: &'a Object,
     /// The proxy.
     pub chain: &'a Chain,
-    /// How equation (2) is solved.
+    /// C = K^-1 on the surface nodes that can be reached.
+    pub compliance: Compliance,
+    /// How equation (2) is solved; its stiffness is finite.
     pub contact: ContactSpec,
     /// Stiffness kc = 3 Kc at a contact point of the energy form: three springs Kc on the nodes of a triangle act along the
-    /// normal like one spring of this stiffness at the contact point [N/m].
+    /// normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
+    /// [`RIGID_STIFFNESS`] [N/m].
     pub kc: f64,
     /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
     /// loses no digits.
@@ -26,7 +32,7 @@ pub struct Model<'a> {
     pub extent: f64,
     /// Rest positions of the surface nodes, relative to the centre [m].
     pub rest: Vec<DVec3>,
-    /// Largest trace of a node's own block C_jj: no node moves farther than sqrt(softest) times |u| in the energy norm [m/N].
+    /// Largest trace of a covered node's own block C_jj: no node moves farther than sqrt(softest) times |u| in the energy norm [m/N].
     pub softest: f64,
     /// The triangles at rest, for closest-point queries.
     pub bounds: BoundingVolumes,
@@ -37,9 +43,36 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// Prepares `object` and `chain` for contact as `contact` says.
+    /// Prepares `object` and `chain` for contact as `contact` says, wherever it may be.
     #[must_use]
     pub fn new(object: &'a Object, chain: &'a Chain, contact: ContactSpec) -> Self {
+        Self::with_compliance(object, chain, contact, Compliance::new(object))
+    }
+
+    /// The same for contact at or near `configurations`: of an object with more than [`Model::WHOLE`] surface nodes, only the
+    /// compliance of those within the proxy's reach is formed. A configuration that reaches farther is flagged
+    /// [`super::Status::Overflow`].
+    ///
+    /// # Errors
+    /// When the compliance would not fit in memory.
+    pub fn reaching(
+        object: &'a Object,
+        chain: &'a Chain,
+        contact: ContactSpec,
+        configurations: &[JointVector],
+    ) -> Result<Self, ObjectError> {
+        if object.surface_nodes <= Self::WHOLE {
+            return Ok(Self::new(object, chain, contact));
+        }
+        let blind = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
+        let compliance = Compliance::on(object, reach::reached(&blind, configurations))?;
+        Ok(Self::with_compliance(object, chain, contact, compliance))
+    }
+
+    /// Surface nodes up to which all of the compliance is formed: 0.3 GB, in some seconds.
+    pub const WHOLE: usize = 2048;
+
+    fn with_compliance(object: &'a Object, chain: &'a Chain, contact: ContactSpec, compliance: Compliance) -> Self {
         let surface_rest = &object.rest[..object.surface_nodes];
         let low = surface_rest.iter().copied().fold(DVec3::MAX, DVec3::min);
         let high = surface_rest.iter().copied().fold(DVec3::MIN, DVec3::max);
@@ -57,15 +90,16 @@ impl<'a> Model<'a> {
                     surface::pseudonormal(&rest, triangles, &object.topology, t, Feature::Vertex(k));
             }
         }
-        let compliance = &object.compliance;
         let diagonal = |k: usize| compliance.entries[k * compliance.order + k];
-        let softest = (0..rest.len()).map(|j| (3 * j..3 * j + 3).map(diagonal).sum::<f64>()).fold(0.0, f64::max);
+        let softest =
+            (0..compliance.nodes.len()).map(|j| (3 * j..3 * j + 3).map(diagonal).sum::<f64>()).fold(0.0, f64::max);
         let bounds = BoundingVolumes::new(&rest, triangles);
-        Self {
+        let mut model = Self {
             object,
             chain,
+            compliance,
             contact,
-            kc: 3.0 * contact.stiffness,
+            kc: 0.0,
             centre,
             extent,
             rest,
@@ -73,7 +107,16 @@ impl<'a> Model<'a> {
             bounds,
             rest_normals,
             rest_pseudonormals,
-        }
+        };
+        model.set_stiffness(contact.stiffness);
+        model
+    }
+
+    /// Takes another contact stiffness Kc; infinity is rigid [N/m].
+    pub fn set_stiffness(&mut self, stiffness: f64) {
+        self.contact.stiffness =
+            if stiffness.is_infinite() { RIGID_STIFFNESS / (3.0 * self.softest) } else { stiffness };
+        self.kc = 3.0 * self.contact.stiffness;
     }
 
     /// Pseudonormal of a feature of triangle `t` at rest, outward, not of length one.

@@ -16,7 +16,7 @@
 //! point x_i - r_i N_i.
 
 use super::depth::Contact;
-use super::detection::Detection;
+use super::detection::{Detection, Walls};
 use super::energy::Outcome;
 use super::model::Model;
 use super::support::{Support, dot, root};
@@ -120,7 +120,7 @@ impl PaperIteration {
     /// Step 1: proxy nodes inside, each tied to the three closest object nodes.
     fn tie(&mut self, model: &Model, detection: &mut Detection) {
         self.place(model);
-        detection.deformed(model, &self.displacement, &self.positions, &mut self.contacts);
+        detection.deformed(model, &self.displacement, &self.positions, Walls::Closest, &mut self.contacts);
         self.support.clear();
         self.ties.clear();
         for contact in self.contacts.iter().filter(|contact| contact.depth > 0.0) {
@@ -133,7 +133,7 @@ impl PaperIteration {
             let forces = [DVec3::ZERO; 3];
             self.ties.push(Tie { proxy_node: contact.proxy_node, target, nodes, slots, forces });
         }
-        self.support.gather(&model.object.compliance);
+        self.support.gather(&model.compliance);
     }
 
     /// Step 2: n from equation (2), all ties being springs Kc.
@@ -160,7 +160,7 @@ impl PaperIteration {
             }
         }
         self.conjugate_gradients(PAPER_INNER_SHARE * model.contact.tolerance);
-        self.support.displace(&model.object.compliance, &self.tied_forces, &mut self.displacement);
+        self.support.displace(&model.compliance, &self.tied_forces, &mut self.displacement);
         self.place(model);
     }
 
@@ -187,7 +187,7 @@ impl PaperIteration {
                 }
             }
         }
-        self.support.displace(&model.object.compliance, &self.forces, &mut self.displacement);
+        self.support.displace(&model.compliance, &self.forces, &mut self.displacement);
     }
 
     /// Relative change of the forces (and so of n = n0 + C f) since the last pass, in the energy norm; one when S changed [1].

@@ -4,6 +4,7 @@ use super::detection::Detection;
 use super::energy::{EnergySearch, Geometry, Outcome};
 use super::model::Model;
 use super::paper::PaperIteration;
+use super::reach;
 use super::support::dot;
 use super::{Equilibrium, NodeForce, Status, Touch};
 use crate::JointVector;
@@ -49,19 +50,20 @@ impl<'a> Solver<'a> {
 
     /// Equilibrium at the joint coordinates `q`, one per joint [rad or m].
     ///
-    /// Numbers that are not finite, or fewer than there are joints, give [`Status::Unconverged`] with zeros.
+    /// Numbers that are not finite, or fewer than there are joints, give [`Status::Unconverged`] with zeros and a residual of
+    /// one: nothing is balanced.
     #[must_use]
     pub fn solve(&mut self, q: &[f64]) -> Equilibrium {
         let model = self.model;
         self.displacement.fill(0.0);
         let joints = model.chain.joints.len();
         if q.len() != joints || !q.iter().all(|x| x.is_finite()) {
-            return nothing(Status::Unconverged, joints);
+            return unknown(joints);
         }
         model.chain.pose(q, &mut self.pose);
         let gap = self.detection.take_up(model, &self.pose.nodes);
         if !gap.is_finite() {
-            return nothing(Status::Unconverged, joints);
+            return unknown(joints);
         }
         let mut equilibrium = nothing(Status::Free, joints);
         equilibrium.gap = gap;
@@ -78,10 +80,24 @@ impl<'a> Solver<'a> {
         equilibrium.status = if outcome.converged { Status::Contact } else { Status::Unconverged };
         self.account(&mut equilibrium);
         if is_finite(&equilibrium) && self.displacement.iter().all(|u| u.is_finite()) {
+            if !reach::covers(model, &self.detection, &equilibrium, &self.displacement) {
+                equilibrium.status = Status::Overflow;
+            }
             return equilibrium;
         }
         self.displacement.fill(0.0);
-        Equilibrium { gap, iterations: outcome.iterations, ..nothing(Status::Unconverged, joints) }
+        Equilibrium { gap, iterations: outcome.iterations, ..unknown(joints) }
+    }
+
+    /// Smallest signed distance of the proxy's nodes to the surface at rest, less their radius, at the joint coordinates `q`,
+    /// without solving; NaN where those are not finite or not one per joint [m].
+    #[must_use]
+    pub fn gap(&mut self, q: &[f64]) -> f64 {
+        if q.len() != self.model.chain.joints.len() || !q.iter().all(|x| x.is_finite()) {
+            return f64::NAN;
+        }
+        self.model.chain.pose(q, &mut self.pose);
+        self.detection.take_up(self.model, &self.pose.nodes)
     }
 
     /// Displacement u of the surface nodes at the last configuration solved, three numbers a node [m].
@@ -113,7 +129,7 @@ impl<'a> Solver<'a> {
             proxy_node: contact.proxy_node,
             nodes: contact.nodes,
             weights: contact.weights,
-            force: contact.normal * (self.model.kc * contact.depth),
+            force: contact.normal * (self.model.kc * contact.share * contact.depth),
         }));
         for touch in &equilibrium.touches {
             for (&node, weight) in touch.nodes.iter().zip(touch.weights) {
@@ -190,6 +206,11 @@ fn nothing(status: Status, joints: usize) -> Equilibrium {
         forces: Vec::new(),
         touches: Vec::new(),
     }
+}
+
+/// No result: nothing is known to be balanced.
+fn unknown(joints: usize) -> Equilibrium {
+    Equilibrium { residual: 1.0, ..nothing(Status::Unconverged, joints) }
 }
 
 /// True when every number is finite.

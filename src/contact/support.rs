@@ -58,7 +58,8 @@ impl Support {
         3 * self.nodes.len()
     }
 
-    /// Brings C_AA up to date with the nodes.
+    /// Brings C_AA up to date with the nodes. A node that the compliance does not cover does not give way: what touches it is
+    /// flagged at the end.
     pub fn gather(&mut self, compliance: &Compliance) {
         if self.gathered == self.nodes.len() {
             return;
@@ -66,12 +67,16 @@ impl Support {
         self.gathered = self.nodes.len();
         self.compliance.clear();
         for &row_node in &self.nodes {
+            let row_place = compliance.place(row_node);
             for a in 0..3 {
-                let start = (3 * row_node as usize + a) * compliance.order;
-                let row = &compliance.entries[start..start + compliance.order];
                 for &column_node in &self.nodes {
-                    let column = 3 * column_node as usize;
-                    self.compliance.extend_from_slice(&row[column..column + 3]);
+                    match (row_place, compliance.place(column_node)) {
+                        (Some(row), Some(column)) => {
+                            let row = compliance.row(3 * row + a);
+                            self.compliance.extend_from_slice(&row[3 * column..3 * column + 3]);
+                        }
+                        _ => self.compliance.extend_from_slice(&[0.0; 3]),
+                    }
                 }
             }
         }
@@ -89,16 +94,25 @@ impl Support {
         }
     }
 
-    /// `displacement = C forces` on all surface nodes, `forces` being on A.
+    /// `displacement = C forces` on all surface nodes that the compliance covers, zero on others; `forces` are on A.
     pub fn displace(&self, compliance: &Compliance, forces: &[f64], displacement: &mut [f64]) {
         displacement.fill(0.0);
         for (slot, &node) in self.nodes.iter().enumerate() {
+            let Some(place) = compliance.place(node) else { continue };
             for a in 0..3 {
-                let start = (3 * node as usize + a) * compliance.order;
-                let row = &compliance.entries[start..start + compliance.order];
+                let row = compliance.row(3 * place + a);
                 let scale = forces[3 * slot + a];
-                for (entry, &c) in displacement.iter_mut().zip(row) {
-                    *entry += scale * c;
+                if compliance.is_whole() {
+                    for (entry, &c) in displacement.iter_mut().zip(row) {
+                        *entry += scale * c;
+                    }
+                } else {
+                    for (&node, c) in compliance.nodes.iter().zip(row.chunks_exact(3)) {
+                        let at = 3 * node as usize;
+                        for (entry, c) in displacement[at..at + 3].iter_mut().zip(c) {
+                            *entry += scale * c;
+                        }
+                    }
                 }
             }
         }

@@ -64,6 +64,20 @@ pub fn vertex_normal(positions: &[DVec3], triangles: &[[u32; 3]], topology: &Top
     unit_or_zero(sum)
 }
 
+/// How often the surface winds around `x`: the solid angles of all triangles over 4 pi (Van Oosterom & Strackee 1983). One
+/// inside, zero outside; it changes nowhere but on the surface, also where deformation has folded that over itself [1].
+#[must_use]
+pub fn winding_number(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3) -> f64 {
+    let mut sum = 0.0;
+    for triangle in triangles {
+        let [a, b, c] = corners(positions, *triangle).map(|corner| corner - x);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        sum += a.dot(b.cross(c)).atan2(below);
+    }
+    sum / std::f64::consts::TAU
+}
+
 /// Triangles around `node`.
 fn triangles_around(topology: &Topology, node: u32) -> &[u32] {
     let node = node as usize;

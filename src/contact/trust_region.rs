@@ -207,7 +207,7 @@ impl TrustRegion {
             for (v, bend) in v.into_iter().zip(second_variation(contact, v)) {
                 bending += v.dot(bend);
             }
-            decrease -= 0.5 * (springs.kc * stretch + contact.multiplier * bending);
+            decrease -= 0.5 * contact.share * (springs.kc * stretch + contact.multiplier * bending);
         }
         decrease
     }
@@ -233,7 +233,8 @@ impl TrustRegion {
             let push = springs.kc * ((contact.depth + self.deepening[k]).max(0.0) - contact.depth.max(0.0));
             let mut force = second_variation(contact, v);
             for j in 0..3 {
-                force[j] = -(contact.normal * (push * contact.weights[j]) + force[j] * contact.multiplier);
+                force[j] =
+                    -(contact.normal * (push * contact.weights[j]) + force[j] * contact.multiplier) * contact.share;
             }
             add_on_nodes(force, springs.slots[k], &mut self.residual);
         }
@@ -253,7 +254,7 @@ pub fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], produ
 /// Adds the forces of the contact springs on the object's nodes, -kc depth_i w_ij N_i, to `forces` on the support.
 pub fn add_contact_forces(springs: Springs, forces: &mut [f64]) {
     for (k, contact) in springs.contacts.iter().enumerate() {
-        let push = contact.normal * (-springs.kc * contact.depth.max(0.0));
+        let push = contact.normal * (-springs.kc * contact.share * contact.depth.max(0.0));
         add_on_nodes(contact.weights.map(|weight| push * weight), springs.slots[k], forces);
     }
 }

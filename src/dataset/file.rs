@@ -11,7 +11,7 @@
 //! |---|---|---|---|
 //! | `torque` | f64 | n1 .. nd, d | tau [N m; N at prismatic joints] |
 //! | `energy` | f64 | n1 .. nd | U [J] |
-//! | `gap` | f32 | n1 .. nd | smallest signed distance at rest [m] |
+//! | `gap` | f32 | n1 .. nd | smallest signed distance at rest, or farther than two grid steps from contact a positive lower bound of it [m] |
 //! | `residual`, `iterations` | f32, u32 | n1 .. nd | of the contact solver |
 //! | `status` | u8 | n1 .. nd | [`crate::contact::Status`] |
 //! | `contact_offsets` | u64 | points + 1 | rows of the next two |

@@ -32,6 +32,13 @@ impl Axis {
         self.start + k as f64 * self.step
     }
 
+    /// Number of the grid line nearest to `coordinate`, at the axis's ends beyond them.
+    #[must_use]
+    pub fn nearest_line(&self, coordinate: f64) -> usize {
+        // What is not a number becomes 0.
+        ((coordinate - self.start) / self.step).round().clamp(0.0, self.count.saturating_sub(1) as f64) as usize
+    }
+
     /// Unit of what acts along the axis: a torque, or a force where the joint is prismatic.
     #[must_use]
     pub fn effort_unit(&self) -> &'static str {

@@ -33,7 +33,8 @@ pub struct Dataset {
     pub torque: Column<f64>,
     /// U [J]; absent in scanned datasets.
     pub energy: Option<Column<f64>>,
-    /// Smallest signed distance of the proxy to the surface at rest [m]; absent in scanned datasets.
+    /// Smallest signed distance of the proxy to the surface at rest [m]; more than two grid steps away from every point in
+    /// contact it may be a positive lower bound of that, where nothing was solved. Absent in scanned datasets.
     pub gap: Option<Column<f32>>,
     /// [`Status`] as its number.
     pub status: Column<u8>,
@@ -84,6 +85,9 @@ pub struct Provenance {
     pub adapter: String,
     /// Date of the bake, ISO 8601, UTC.
     pub date: String,
+    /// What happened on the way, such as a GPU that was lost and from which grid point on the CPU solved instead.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notices: Vec<String>,
 }
 
 impl Dataset {

@@ -8,37 +8,31 @@
 use super::{Device, Motion, Reading};
 use crate::{JointVector, scene::HapticsSpec};
 
-/// The device in the hand.
+/// The device in a hand that follows a motion.
 #[derive(Clone, Debug)]
 pub struct SimulatedHand {
     motion: Motion,
-    /// Hand and device together [kg m^2].
-    inertia: JointVector,
-    /// Kh [N m/rad], Bh [N m s/rad].
-    stiffness: JointVector,
-    damping: JointVector,
-    /// bd [N m s/rad].
-    device_damping: JointVector,
+    arm: Arm,
     time: f64,
-    position: JointVector,
-    velocity: JointVector,
-    torque: JointVector,
 }
 
 /// A hand cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HandError {
-    /// The scene's haptics have another number of joints than the motion.
-    #[error("the motion has {motion} joints and the haptic device {device}")]
+    /// The scene's haptics have another number of joints than what the hand is to follow.
+    #[error("the hand is told {told} joints and the haptic device has {device}")]
     Joints {
-        /// Of the motion.
-        motion: usize,
+        /// Of the motion or the pointer.
+        told: usize,
         /// Of the scene's device.
         device: usize,
     },
     /// Hand and device have no inertia at a joint.
     #[error("hand and device have no inertia at joint {0}: give the device or the hand a positive one")]
     Inertia(usize),
+    /// The pointer is told a place that is none.
+    #[error("{0:?} is no place for a hand: its coordinates must be finite and within reach")]
+    Place(JointVector),
 }
 
 impl SimulatedHand {
@@ -47,9 +41,45 @@ impl SimulatedHand {
     /// # Errors
     /// When the joints do not fit, or hand and device have no inertia.
     pub fn new(spec: &HapticsSpec, motion: Motion) -> Result<Self, HandError> {
+        let arm = Arm::new(spec, &motion.at(0.0).0)?;
+        Ok(Self { motion, arm, time: 0.0 })
+    }
+}
+
+impl Device for SimulatedHand {
+    fn read(&mut self, elapsed: f64) -> Reading {
+        let (goal, velocity) = self.motion.at(self.time + 0.5 * elapsed);
+        self.arm.step(&goal, &velocity, elapsed);
+        self.time += elapsed;
+        Reading { position: *self.arm.position(), age: 0.0, hand: self.motion.at(self.time).0 }
+    }
+
+    fn apply(&mut self, torque: &JointVector) {
+        self.arm.hold(torque);
+    }
+}
+
+/// Arm and device: mass, spring and damper of each joint, and their state.
+#[derive(Clone, Debug)]
+pub(super) struct Arm {
+    /// Hand and device together [kg m^2].
+    inertia: JointVector,
+    /// Kh [N m/rad], Bh [N m s/rad].
+    stiffness: JointVector,
+    damping: JointVector,
+    /// bd [N m s/rad].
+    device_damping: JointVector,
+    position: JointVector,
+    velocity: JointVector,
+    torque: JointVector,
+}
+
+impl Arm {
+    /// The hand and device of `spec`, at rest at `position`.
+    pub(super) fn new(spec: &HapticsSpec, position: &JointVector) -> Result<Self, HandError> {
         let mut inertia = spec.device_inertia;
-        if motion.joints() != inertia.len() {
-            return Err(HandError::Joints { motion: motion.joints(), device: inertia.len() });
+        if position.len() != inertia.len() {
+            return Err(HandError::Joints { told: position.len(), device: inertia.len() });
         }
         for (a, (inertia, hand)) in inertia.iter_mut().zip(spec.hand.inertia.iter()).enumerate() {
             *inertia += hand;
@@ -57,26 +87,31 @@ impl SimulatedHand {
                 return Err(HandError::Inertia(a));
             }
         }
-        let position = motion.at(0.0).0;
         let zero = JointVector::zeros(position.len());
         Ok(Self {
-            motion,
             inertia,
             stiffness: spec.hand.stiffness,
             damping: spec.hand.damping,
             device_damping: spec.device_damping,
-            time: 0.0,
-            position,
+            position: *position,
             velocity: zero,
             torque: zero,
         })
     }
-}
 
-impl Device for SimulatedHand {
-    fn read(&mut self, elapsed: f64) -> Reading {
+    /// y [rad or m].
+    pub(super) fn position(&self) -> &JointVector {
+        &self.position
+    }
+
+    /// Holds `torque` from now on.
+    pub(super) fn hold(&mut self, torque: &JointVector) {
+        self.torque = *torque;
+    }
+
+    /// Moves on by `elapsed` [s]; `goal` and `goal_velocity` are those of the hand in the middle of it.
+    pub(super) fn step(&mut self, goal: &JointVector, goal_velocity: &JointVector, elapsed: f64) {
         let half = 0.5 * elapsed;
-        let (goal, goal_velocity) = self.motion.at(self.time + half);
         for a in 0..self.position.len() {
             let torque = self.torque[a] + self.damping[a] * goal_velocity[a];
             let spring = self.stiffness[a] * (goal[a] - self.position[a]);
@@ -86,11 +121,5 @@ impl Device for SimulatedHand {
             self.position[a] += elapsed * midpoint;
             self.velocity[a] = 2.0 * midpoint - self.velocity[a];
         }
-        self.time += elapsed;
-        Reading { position: self.position, age: 0.0, hand: self.motion.at(self.time).0 }
-    }
-
-    fn apply(&mut self, torque: &JointVector) {
-        self.torque = *torque;
     }
 }

@@ -2,10 +2,12 @@
 
 mod hand;
 mod motion;
+mod pointer;
 mod recorded;
 
 pub use hand::{HandError, SimulatedHand};
 pub use motion::{Motion, MotionError};
+pub use pointer::{Pointer, PointerInput};
 pub use recorded::Recorded;
 
 use crate::JointVector;

@@ -5,7 +5,10 @@
 //! store the first message, [`Context::check`] returns it, and every wait has a limit.
 
 use std::{
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        mpsc::{self, RecvTimeoutError},
+    },
     time::Duration,
 };
 
@@ -56,6 +59,14 @@ pub enum GpuError {
         needed: u64,
         /// The limit [B].
         limit: u64,
+    },
+    /// Of a large object only a part of the compliance is formed, which the kernels cannot address.
+    #[error("the GPU takes objects of at most {limit} surface nodes, not {nodes}. Use --backend cpu for this scene")]
+    TooManyNodes {
+        /// Nodes on the surface.
+        nodes: usize,
+        /// Nodes that are taken.
+        limit: usize,
     },
     /// Outputs that no invocation wrote: a dispatch was cut short.
     #[error(
@@ -161,8 +172,10 @@ struct Failures {
 
 /// An open device.
 pub struct Context {
-    pub(super) device: wgpu::Device,
-    pub(super) queue: wgpu::Queue,
+    instance: wgpu::Instance,
+    opened: wgpu::Adapter,
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
     choice: AdapterChoice,
     adapter: AdapterSummary,
     failures: Arc<Mutex<Failures>>,
@@ -179,7 +192,8 @@ impl Context {
     /// # Errors
     /// [`GpuError::NoAdapter`] with what was found; [`GpuError::NoDevice`] when none of them gives a device.
     pub fn open(choice: AdapterChoice) -> Result<Self, GpuError> {
-        let found = candidates(&instance());
+        let instance = instance();
+        let found = candidates(&instance);
         let names: Vec<String> = found.iter().map(|adapter| AdapterSummary::of(adapter).to_string()).collect();
         let mut refusal = None;
         for adapter in &found {
@@ -187,7 +201,7 @@ impl Context {
             if choice == AdapterChoice::Hardware && !summary.hardware {
                 continue;
             }
-            match Self::open_on(adapter, summary, choice) {
+            match Self::open_on(&instance, adapter, summary, choice) {
                 Ok(context) => return Ok(context),
                 Err(error) => refusal = refusal.or(Some(error)),
             }
@@ -198,7 +212,12 @@ impl Context {
         }))
     }
 
-    fn open_on(adapter: &wgpu::Adapter, summary: AdapterSummary, choice: AdapterChoice) -> Result<Self, GpuError> {
+    fn open_on(
+        instance: &wgpu::Instance,
+        adapter: &wgpu::Adapter,
+        summary: AdapterSummary,
+        choice: AdapterChoice,
+    ) -> Result<Self, GpuError> {
         let offered = adapter.limits();
         // WebGPU's defaults, which every device has, but for the two sizes that decide which objects fit.
         let limits = wgpu::Limits {
@@ -219,7 +238,15 @@ impl Context {
         device.on_uncaptured_error(Arc::new(move |error| {
             lock(&on_error).error.get_or_insert_with(|| GpuError::from(error));
         }));
-        Ok(Self { device, queue, choice, adapter: summary, failures })
+        Ok(Self {
+            instance: instance.clone(),
+            opened: adapter.clone(),
+            device,
+            queue,
+            choice,
+            adapter: summary,
+            failures,
+        })
     }
 
     /// A new device by the same choice: what is left to do once this one is lost.
@@ -234,6 +261,12 @@ impl Context {
     #[must_use]
     pub fn adapter(&self) -> &AdapterSummary {
         &self.adapter
+    }
+
+    /// Instance, adapter, device and queue, for a window that draws on the device which computes.
+    #[must_use]
+    pub fn shared(&self) -> (wgpu::Instance, wgpu::Adapter, wgpu::Device, wgpu::Queue) {
+        (self.instance.clone(), self.opened.clone(), self.device.clone(), self.queue.clone())
     }
 
     /// Largest buffer that one binding reaches [B].
@@ -270,8 +303,34 @@ impl Context {
         }
     }
 
+    /// Maps the first `bytes` bytes of `buffer` for reading once `submission` is done, and waits for it. Not only for the
+    /// submission: of several threads that poll one device, the one that finds the mapping complete runs its callback,
+    /// and that may be another one, a little later.
+    ///
+    /// # Errors
+    /// When the device was lost, refused a command, or does not answer.
+    pub(crate) fn map(
+        &self,
+        buffer: &wgpu::Buffer,
+        bytes: u64,
+        submission: &wgpu::SubmissionIndex,
+    ) -> Result<wgpu::BufferView, GpuError> {
+        let (sender, receiver) = mpsc::channel();
+        buffer.map_async(wgpu::MapMode::Read, ..bytes, move |outcome| {
+            // The receiver waits below; if it is gone, so is the need.
+            let _ = sender.send(outcome);
+        });
+        self.wait(submission)?;
+        match receiver.recv_timeout(WAIT_LIMIT) {
+            Ok(outcome) => outcome.map_err(|error| GpuError::Lost(error.to_string()))?,
+            Err(RecvTimeoutError::Timeout) => return Err(GpuError::TimedOut(WAIT_LIMIT)),
+            Err(RecvTimeoutError::Disconnected) => return Err(GpuError::Lost("a mapping was dropped".to_owned())),
+        }
+        buffer.get_mapped_range(..bytes).map_err(|error| GpuError::Refused(error.to_string()))
+    }
+
     /// Runs `work`, which creates objects on the device, and turns what the device refuses into an error.
-    pub(super) fn scoped<T>(&self, work: impl FnOnce(&wgpu::Device) -> T) -> Result<T, GpuError> {
+    pub(crate) fn scoped<T>(&self, work: impl FnOnce(&wgpu::Device) -> T) -> Result<T, GpuError> {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);

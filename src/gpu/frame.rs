@@ -4,6 +4,11 @@
 //! The state stays on the device, in a buffer that a viewer draws from. Small objects multiply by the inverse of the
 //! matrix, computed once in f64; large ones, whose inverse would not fit, take a fixed number of conjugate-gradient
 //! iterations, which keeps the step passive however few they are (see `shaders/frame_iterative.wgsl`).
+//!
+//! Effects, as in `render/object_motion.rs`, which is the twin: under gravity and with stiffening the nodes' loads are a
+//! buffer of their own, forces and weight from the host; stiffening adds its part to it, in a stage of its own, and puts
+//! K1 in the place of K; quasi-static graphics is an override constant, without velocities and masses. What the scene
+//! does not name is not there.
 
 use super::{
     context::{Context, GpuError},
@@ -11,7 +16,8 @@ use super::{
     layout::FrameParameters,
     shaders,
 };
-use crate::object::{Factor, FactorError, Object};
+use crate::object::{Factor, FactorError, Object, Stiffening, Stiffness, settled};
+use crate::scene::GraphicsEffects;
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -64,52 +70,126 @@ pub struct FrameUpdate {
     nodes: usize,
     state: StorageBuffer,
     forces: StorageBuffer,
+    /// Forces, weight and what stiffening adds; absent without such effects.
+    loads: Option<StorageBuffer>,
+    /// M g of each node [N]; none without gravity.
+    weight: Vec<DVec3>,
     /// The forces as the shader reads them.
     padded_forces: Vec<[f32; 4]>,
     stages: Vec<Stage>,
+    takes: FrameCost,
+}
+
+/// What a frame update takes of the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameCost {
+    /// Memory of all its buffers [B].
+    pub bytes: u64,
+    /// Number of its buffers.
+    pub buffers: usize,
+    /// Dispatches a frame.
+    pub dispatches: usize,
+    /// Compiled pipelines.
+    pub pipelines: usize,
 }
 
 impl FrameUpdate {
-    /// The object at rest, to be advanced by `period` [s] a frame.
+    /// The object in equilibrium under no forces but its weight, where there is one, to be advanced by `period` [s] a
+    /// frame. Smoothing is no matter of the device: forces are filtered before they come here.
     ///
     /// # Errors
     /// When the matrix is not positive definite (masses, damping or period are not positive) or the device refuses.
-    pub fn new(context: Arc<Context>, object: &Object, period: f64, method: FrameMethod) -> Result<Self, FrameError> {
+    pub fn new(
+        context: Arc<Context>,
+        object: &Object,
+        period: f64,
+        method: FrameMethod,
+        effects: &GraphicsEffects,
+    ) -> Result<Self, FrameError> {
         if !(period > 0.0 && period.is_finite()) {
             return Err(FrameError::Period(period));
         }
         let nodes = object.rest.len();
         let gpu = context.as_ref();
-        let state = StorageBuffer::from_slice(gpu, "frame state", &vec![[0.0f32; 4]; 2 * nodes])?;
-        let forces = StorageBuffer::from_slice(gpu, "frame forces", &vec![[0.0f32; 4]; nodes])?;
-        let stiffness = &object.stiffness;
+        let stiffening = effects.stiffening.map(|spec| Stiffening::new(object, spec.factor, spec.strain));
+        let weight: Vec<DVec3> =
+            effects.gravity.map_or_else(Vec::new, |g| object.mass.iter().map(|m| *m * g).collect());
+        let mut start = vec![[0.0f32; 4]; if effects.quasi_static { nodes } else { 2 * nodes }];
+        if !weight.is_empty() {
+            for (start, u) in start.iter_mut().zip(settled(object, &weight, stiffening.as_ref())?) {
+                *start = u.as_vec3().extend(0.0).to_array();
+            }
+        }
+        let zero = vec![[0.0f32; 4]; nodes];
+        let state = StorageBuffer::from_slice(gpu, "frame state", &start)?;
+        let forces = StorageBuffer::from_slice(gpu, "frame forces", &zero)?;
+        let loads = (!weight.is_empty() || stiffening.is_some())
+            .then(|| StorageBuffer::from_slice(gpu, "frame loads", &zero))
+            .transpose()?;
+        let stiffness = stiffening.as_ref().map_or(&object.stiffness, Stiffening::bound);
         let mut structure: Vec<u32> = stiffness.offsets.iter().map(|&offset| offset as u32).collect();
         structure.extend(&stiffness.columns);
         let blocks: Vec<f32> =
             stiffness.blocks.iter().flat_map(|block| block.to_cols_array()).map(|entry| entry as f32).collect();
-        let inertia: Vec<[f32; 2]> =
-            object.mass.iter().zip(&object.damping).map(|(&mass, &damping)| [mass as f32, damping as f32]).collect();
         let structure = StorageBuffer::from_slice(gpu, "stiffness structure", &structure)?;
         let blocks = StorageBuffer::from_slice(gpu, "stiffness blocks", &blocks)?;
-        let inertia = StorageBuffer::from_slice(gpu, "masses and damping", &inertia)?;
+        let inertia: Vec<[f32; 2]> =
+            object.mass.iter().zip(&object.damping).map(|(&mass, &damping)| [mass as f32, damping as f32]).collect();
+        let inertia = (!effects.quasi_static)
+            .then(|| StorageBuffer::from_slice(gpu, "masses and damping", &inertia))
+            .transpose()?;
         let groups = (nodes as u32).div_ceil(WORKGROUP);
         let parameters = |odd: u32| FrameParameters { nodes: nodes as u32, period: period as f32, odd, groups };
         let even = StorageBuffer::uniform(gpu, "frame parameters", &parameters(0))?;
-        let common = [&structure, &blocks, &inertia, &forces, &state];
-        let stages = match method {
+        // Nothing reads masses where there are none: the binding takes any buffer.
+        let masses = inertia.as_ref().unwrap_or(&forces);
+        let common = [&structure, &blocks, masses, loads.as_ref().unwrap_or(&forces), &state];
+        let overrides: &[(&str, f64)] = if effects.quasi_static { &[("QUASI_STATIC", 1.0)] } else { &[] };
+        let mut stages = Vec::new();
+        let mut buffers = vec![state.size(), forces.size(), structure.size(), blocks.size(), even.size()];
+        buffers.extend(inertia.iter().chain(&loads).map(StorageBuffer::size));
+        if let (Some(stiffening), Some(loads), Some(spec)) = (&stiffening, &loads, effects.stiffening) {
+            let reach: Vec<f32> = stiffening.reach().iter().map(|&reach| reach as f32).collect();
+            let reach = StorageBuffer::from_slice(gpu, "reach of the springs", &reach)?;
+            buffers.push(reach.size());
+            let constants = [("FACTOR", spec.factor), ("STRAIN", spec.strain)];
+            let kernel = Arc::new(Kernel::new(gpu, &shaders::FRAME_STIFFENING, &constants, &DENSE)?);
+            let bound = kernel.bind(gpu, &[&even, &structure, &blocks, masses, &forces, &state, &reach, loads])?;
+            stages.push((kernel, bound, groups));
+        }
+        match method {
             FrameMethod::Inverse => {
-                let inverse = StorageBuffer::from_slice(gpu, "inverse", &inverse(object, period)?)?;
+                let inverse = inverse(object, stiffness, period, effects)?;
+                let inverse = StorageBuffer::from_slice(gpu, "inverse", &inverse)?;
                 let right = StorageBuffer::new(gpu, "right-hand side", 12 * nodes as u64)?;
-                dense_stages(gpu, &even, common, [&inverse, &right], groups, nodes as u32)?
+                buffers.extend([inverse.size(), right.size()]);
+                stages.extend(dense_stages(gpu, &even, common, [&inverse, &right], [groups, nodes as u32], overrides)?);
             }
             FrameMethod::Iterations(iterations) => {
                 let odd = StorageBuffer::uniform(gpu, "frame parameters", &parameters(1))?;
                 let work = StorageBuffer::new(gpu, "conjugate gradients", 5 * 16 * nodes as u64)?;
                 let sums = StorageBuffer::new(gpu, "sums", 3 * 4 * u64::from(groups))?;
-                iterative_stages(gpu, [&even, &odd], common, [&work, &sums], groups, iterations)?
+                buffers.extend([odd.size(), work.size(), sums.size()]);
+                let (own, uniforms) = ([&work, &sums], [&even, &odd]);
+                stages.extend(iterative_stages(gpu, uniforms, common, own, [groups, iterations], overrides)?);
             }
+        }
+        let mut pipelines: Vec<_> = stages.iter().map(|(kernel, ..)| Arc::as_ptr(kernel)).collect();
+        pipelines.sort_unstable();
+        pipelines.dedup();
+        let takes = FrameCost {
+            bytes: buffers.iter().sum(),
+            buffers: buffers.len(),
+            dispatches: stages.len(),
+            pipelines: pipelines.len(),
         };
-        Ok(Self { nodes, state, forces, padded_forces: vec![[0.0; 4]; nodes], stages, context })
+        Ok(Self { nodes, state, forces, loads, weight, padded_forces: zero, stages, takes, context })
+    }
+
+    /// What the update takes of the device.
+    #[must_use]
+    pub fn takes(&self) -> FrameCost {
+        self.takes
     }
 
     /// Advances by one frame under `forces`, one per node [N]; missing ones count as zero. Does not wait for the device.
@@ -122,6 +202,13 @@ impl FrameUpdate {
             *padded = force.as_vec3().extend(0.0).to_array();
         }
         self.forces.write(&self.context, &self.padded_forces);
+        if let Some(loads) = &self.loads {
+            for (node, (padded, weight)) in self.padded_forces.iter_mut().zip(&self.weight).enumerate() {
+                let force = forces.get(node).copied().unwrap_or(DVec3::ZERO);
+                *padded = (force + *weight).as_vec3().extend(0.0).to_array();
+            }
+            loads.write(&self.context, &self.padded_forces);
+        }
         let mut encoder = self.context.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -133,31 +220,46 @@ impl FrameUpdate {
         self.context.check()
     }
 
-    /// Displacements u = n - n0 [m] and velocities [m/s] of all nodes. Waits for the device.
+    /// Displacements u = n - n0 [m] and velocities [m/s] of all nodes; of quasi-static graphics no velocities. Waits for the
+    /// device.
     ///
     /// # Errors
     /// When the device has failed.
     pub fn read(&self) -> Result<(Vec<DVec3>, Vec<DVec3>), GpuError> {
-        let state: Vec<[f32; 4]> = self.state.read(&self.context, 2 * self.nodes)?;
+        let state: Vec<[f32; 4]> = self.state.read(&self.context, self.state.size() as usize / 16)?;
         let mut vectors: Vec<DVec3> =
             state.iter().map(|&[x, y, z, _]| DVec3::new(x.into(), y.into(), z.into())).collect();
         let velocities = vectors.split_off(self.nodes);
         Ok((vectors, velocities))
     }
 
-    /// Displacements, then velocities, four numbers a node: what a viewer binds to draw the object.
+    /// Displacements, then velocities where there are any, four numbers a node: what a viewer binds to draw the object.
     #[must_use]
     pub fn state_buffer(&self) -> &wgpu::Buffer {
         &self.state.raw
     }
+
+    /// Contact forces of the last frame, four numbers a node [N].
+    #[must_use]
+    pub fn force_buffer(&self) -> &wgpu::Buffer {
+        &self.forces.raw
+    }
 }
 
-/// Inverse of 2M/T + B + (T/2) K, row-major.
-fn inverse(object: &Object, period: f64) -> Result<Vec<f32>, FactorError> {
+/// Inverse of 2M/T + B + (T/2) K, row-major; of (T/2) K in quasi-static graphics.
+fn inverse(
+    object: &Object,
+    stiffness: &Stiffness,
+    period: f64,
+    effects: &GraphicsEffects,
+) -> Result<Vec<f32>, FactorError> {
     let nodes = object.rest.len();
-    let diagonal: Vec<f64> =
-        object.mass.iter().zip(&object.damping).map(|(mass, damping)| 2.0 * mass / period + damping).collect();
-    let factor = Factor::of(&object.stiffness, period / 2.0, &diagonal)?;
+    let inertia = object.mass.iter().zip(&object.damping);
+    let mut diagonal: Vec<f64> = inertia.map(|(mass, damping)| 2.0 * mass / period + damping).collect();
+    if effects.quasi_static {
+        diagonal.fill(0.0);
+    }
+    let factor = Factor::of(stiffness, period / 2.0, &diagonal)?;
     let mut inverse = Vec::with_capacity(9 * nodes * nodes);
     let mut unit = vec![DVec3::ZERO; nodes];
     for row in 0..3 * nodes {
@@ -185,13 +287,13 @@ fn dense_stages(
     parameters: &StorageBuffer,
     [structure, blocks, inertia, forces, state]: [&StorageBuffer; 5],
     [inverse, right]: [&StorageBuffer; 2],
-    groups: u32,
-    nodes: u32,
+    [groups, nodes]: [u32; 2],
+    overrides: &[(&str, f64)],
 ) -> Result<Vec<Stage>, GpuError> {
     let buffers = [parameters, structure, blocks, inertia, forces, state, inverse, right];
     let mut stages = Vec::new();
     for (shader, workgroups) in [(&shaders::FRAME_LOAD, groups), (&shaders::FRAME_ADVANCE, nodes)] {
-        let kernel = Arc::new(Kernel::new(context, shader, &[], &DENSE)?);
+        let kernel = Arc::new(Kernel::new(context, shader, overrides, &DENSE)?);
         let bound = kernel.bind(context, &buffers)?;
         stages.push((kernel, bound, workgroups));
     }
@@ -203,11 +305,11 @@ fn iterative_stages(
     parameters: [&StorageBuffer; 2],
     [structure, blocks, inertia, forces, state]: [&StorageBuffer; 5],
     [work, sums]: [&StorageBuffer; 2],
-    groups: u32,
-    iterations: u32,
+    [groups, iterations]: [u32; 2],
+    overrides: &[(&str, f64)],
 ) -> Result<Vec<Stage>, GpuError> {
     let stage = |shader, odd: u32| -> Result<Stage, GpuError> {
-        let kernel = Arc::new(Kernel::new(context, shader, &[], &ITERATIVE)?);
+        let kernel = Arc::new(Kernel::new(context, shader, overrides, &ITERATIVE)?);
         let buffers = [parameters[odd as usize], structure, blocks, inertia, forces, state, work, sums];
         let bound = kernel.bind(context, &buffers)?;
         Ok((kernel, bound, groups))

@@ -8,7 +8,6 @@ use super::{
     shaders::Shader,
 };
 use bytemuck::Pod;
-use std::sync::mpsc;
 
 /// Every byte of an output before the dispatch that writes it. As u32 it is no status, count or node number in use; as
 /// f32 it is -1.2e13, no length, force or energy of a haptic scene.
@@ -255,19 +254,7 @@ impl Staging {
         bytes: u64,
         use_bytes: impl FnOnce(&[u8]) -> T,
     ) -> Result<T, GpuError> {
-        let (sender, receiver) = mpsc::channel();
-        let bytes = bytes.next_multiple_of(4);
-        self.raw.map_async(wgpu::MapMode::Read, ..bytes, move |outcome| {
-            // The receiver outlives the wait below; without it nobody needs the outcome.
-            let _ = sender.send(outcome);
-        });
-        context.wait(submission)?;
-        match receiver.try_recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => return Err(GpuError::Lost(error.to_string())),
-            Err(_) => return Err(GpuError::Lost("the read-back was never answered".to_owned())),
-        }
-        let view = self.raw.get_mapped_range(..bytes).map_err(|error| GpuError::Refused(error.to_string()))?;
+        let view = context.map(&self.raw, bytes.next_multiple_of(4), submission)?;
         let used = use_bytes(&view);
         drop(view);
         self.raw.unmap();

@@ -198,6 +198,7 @@ fn depth_and_its_derivatives_are_the_twins() {
             weights: point.weights,
             normal,
             depth,
+            share: 1.0,
             multiplier: 0.0,
             curvature,
         };
@@ -330,4 +331,19 @@ fn what_no_kernel_wrote_is_found_out() {
     assert!(matches!(unpack(written, unwritten), Err(GpuError::NeverWritten { .. })));
     let beyond = super::layout::Outcome { touches: 2, ..written };
     assert!(unpack(beyond, touch).is_err(), "more touches than there is room for");
+}
+
+#[test]
+fn threads_that_share_a_device_each_read_back_what_is_theirs() {
+    std::thread::scope(|scope| {
+        for thread in 0..8u32 {
+            scope.spawn(move || {
+                for round in 0..200 {
+                    let values = [1000 * thread + round; 5];
+                    let buffer = StorageBuffer::from_slice(&context(), "shared", &values).unwrap();
+                    assert_eq!(buffer.read::<u32>(&context(), values.len()).unwrap(), values);
+                }
+            });
+        }
+    });
 }

@@ -8,6 +8,7 @@
 //! | `model` | object, proxy and contact law as buffers |
 //! | `pipeline` | the stages of a batch and their buffers |
 //! | `solver` | the backend of a sweep: chunks, batches, retries |
+//! | `refinement` | the energy form's results settled in f64 |
 //! | `unpack` | from what the kernels wrote to equilibria, in f64 |
 //! | `frame` | the object's nodes, one passive step a frame |
 //! | `kernel` | one compute pipeline with its bindings; buffers, poison, read-back |
@@ -24,11 +25,12 @@ pub mod layout;
 mod leaf_tests;
 mod model;
 mod pipeline;
+mod refinement;
 pub mod shaders;
 mod solver;
 mod unpack;
 
 pub use context::{AdapterChoice, AdapterSummary, Context, GpuError, adapters};
-pub use frame::{FrameError, FrameMethod, FrameUpdate};
+pub use frame::{FrameCost, FrameError, FrameMethod, FrameUpdate};
 pub use pipeline::Room;
 pub use solver::GpuSolver;

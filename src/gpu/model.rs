@@ -34,19 +34,22 @@ impl DeviceModel {
     /// # Errors
     /// When a buffer exceeds the device's limits or memory.
     pub fn new(context: &Context, model: &contact::Model<'_>) -> Result<Self, GpuError> {
-        let contact::Model { object, chain, contact, .. } = model;
+        let contact::Model { object, chain, compliance, contact, .. } = model;
+        if !compliance.is_whole() {
+            return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });
+        }
         let extent = model.rest.iter().map(|n| n.length()).fold(0.0, f64::max);
         let corners = |t: &[u32; 3]| t.map(|j| model.rest[j as usize]);
         let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
         let longest_edge = object.triangles.iter().map(|t| edge(corners(t))).fold(0.0, f64::max);
-        let compliance: Vec<f32> = object.compliance.entries.iter().map(|&entry| entry as f32).collect();
+        let compliance: Vec<f32> = compliance.entries.iter().map(|&entry| entry as f32).collect();
         Ok(Self {
             parameters: Parameters {
                 joints: chain.joints.len() as u32,
                 proxy_nodes: chain.nodes.len() as u32,
                 surface_nodes: object.surface_nodes as u32,
                 triangles: object.triangles.len() as u32,
-                max_iterations: contact.max_iterations,
+                max_iterations: contact.max_iterations.min(tolerances::GPU_MAX_ITERATIONS),
                 stiffness: contact.stiffness as f32,
                 kc: model.kc as f32,
                 tolerance: contact.tolerance.max(tolerances::GPU_LEAST_TOLERANCE) as f32,

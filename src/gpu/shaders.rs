@@ -85,20 +85,31 @@ pub static PAPER: Shader = Shader {
     overrides: &[&[], CRAMPED],
 };
 
+/// Graphics with dynamics, and without.
+const MOTIONS: &[&[(&str, f64)]] = &[&[], &[("QUASI_STATIC", 1.0)]];
+
+/// Frame update: what stiffening springs add to the loads.
+pub static FRAME_STIFFENING: Shader = Shader {
+    name: "frame_stiffening",
+    entry: "relieve",
+    parts: &[TYPES, FRAME_COMMON, include_str!("../../shaders/frame_stiffening.wgsl")],
+    overrides: &[&[("FACTOR", 8.0), ("STRAIN", 0.1)]],
+};
+
 /// Frame update by the inverse: right-hand side.
 pub static FRAME_LOAD: Shader =
-    Shader { name: "frame", entry: "load", parts: &[TYPES, FRAME_COMMON, FRAME], overrides: &[&[]] };
+    Shader { name: "frame", entry: "load", parts: &[TYPES, FRAME_COMMON, FRAME], overrides: MOTIONS };
 
 /// Frame update by the inverse: new state.
 pub static FRAME_ADVANCE: Shader =
-    Shader { name: "frame", entry: "advance", parts: &[TYPES, FRAME_COMMON, FRAME], overrides: &[&[]] };
+    Shader { name: "frame", entry: "advance", parts: &[TYPES, FRAME_COMMON, FRAME], overrides: MOTIONS };
 
 /// Frame update by conjugate gradients: first residual and direction.
 pub static FRAME_BEGIN: Shader = Shader {
     name: "frame_iterative",
     entry: "begin",
     parts: &[TYPES, FRAME_COMMON, FRAME_ITERATIVE],
-    overrides: &[&[]],
+    overrides: MOTIONS,
 };
 
 /// Frame update by conjugate gradients: matrix times direction.
@@ -106,7 +117,7 @@ pub static FRAME_PRODUCT: Shader = Shader {
     name: "frame_iterative",
     entry: "product",
     parts: &[TYPES, FRAME_COMMON, FRAME_ITERATIVE],
-    overrides: &[&[]],
+    overrides: MOTIONS,
 };
 
 /// Frame update by conjugate gradients: step along the direction.
@@ -114,7 +125,7 @@ pub static FRAME_CORRECT: Shader = Shader {
     name: "frame_iterative",
     entry: "correct",
     parts: &[TYPES, FRAME_COMMON, FRAME_ITERATIVE],
-    overrides: &[&[]],
+    overrides: MOTIONS,
 };
 
 /// Frame update by conjugate gradients: next direction.
@@ -122,7 +133,7 @@ pub static FRAME_TURN: Shader = Shader {
     name: "frame_iterative",
     entry: "turn",
     parts: &[TYPES, FRAME_COMMON, FRAME_ITERATIVE],
-    overrides: &[&[]],
+    overrides: MOTIONS,
 };
 
 /// Frame update by conjugate gradients: new state.
@@ -130,7 +141,7 @@ pub static FRAME_FINISH: Shader = Shader {
     name: "frame_iterative",
     entry: "finish",
     parts: &[TYPES, FRAME_COMMON, FRAME_ITERATIVE],
-    overrides: &[&[]],
+    overrides: MOTIONS,
 };
 
 /// Every shader of the engine.
@@ -141,6 +152,7 @@ pub static ALL: &[&Shader] = &[
     &COMPACTION,
     &ENERGY,
     &PAPER,
+    &FRAME_STIFFENING,
     &FRAME_LOAD,
     &FRAME_ADVANCE,
     &FRAME_BEGIN,
@@ -175,6 +187,7 @@ fn constants() -> String {
         ("CONTINUATION_START", tolerances::CONTINUATION_START as f32),
         ("CONTINUATION_FACTOR", tolerances::CONTINUATION_FACTOR as f32),
         ("STAGE_TOLERANCE", tolerances::STAGE_TOLERANCE as f32),
+        ("STALLED_RADIUS", tolerances::STALLED_RADIUS as f32),
         ("ENERGY_ROUNDING", tolerances::GPU_ENERGY_ROUNDING),
         ("GIVE_UP_RADIUS", tolerances::GPU_GIVE_UP_RADIUS),
         ("PAPER_INNER_TOLERANCE", tolerances::GPU_PAPER_INNER_TOLERANCE),

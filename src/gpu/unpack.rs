@@ -4,6 +4,7 @@ use super::{
     context::GpuError,
     kernel::POISON,
     layout::{Outcome, Touch},
+    refinement::Refinement,
     solver::free,
 };
 use crate::{
@@ -33,8 +34,10 @@ pub(super) fn unpack(
     let unpacked: Vec<Option<Equilibrium>> = (members.par_iter(), outcomes, lists)
         .into_par_iter()
         .map_init(
-            || model.chain.new_pose(),
-            |pose, (&member, outcome, list)| equilibrium(model, &chunk[member as usize], pose, outcome, list),
+            || (model.chain.new_pose(), Refinement::new(model)),
+            |(pose, refinement), (&member, outcome, list)| {
+                equilibrium(model, &chunk[member as usize], pose, refinement, outcome, list)
+            },
         )
         .collect();
     let total = unpacked.len();
@@ -50,6 +53,7 @@ fn equilibrium(
     model: &contact::Model<'_>,
     q: &[f64],
     pose: &mut Pose,
+    refinement: &mut Refinement,
     outcome: &Outcome,
     list: &[Touch],
 ) -> Option<Equilibrium> {
@@ -64,11 +68,25 @@ fn equilibrium(
     }
     result.energy = f64::from(outcome.elastic);
     model.chain.pose(q, pose);
+    let list = list.get(..outcome.touches as usize)?;
+    if list.iter().any(|touch| touch.proxy_node == UNWRITTEN) {
+        return None;
+    }
     let mut parts = Vec::new();
-    for touch in list.get(..outcome.touches as usize)? {
-        if touch.proxy_node == UNWRITTEN {
-            return None;
+    if model.contact.algorithm == Algorithm::Energy && status == Status::Contact {
+        // Without a result in f64 nothing is known to be balanced.
+        let refined = refinement.find(model, pose, list);
+        (result.energy, result.residual) = refined.map_or((0.0, 1.0), |refined| (refined.energy, refined.residual));
+        for touch in refinement.touches() {
+            model.chain.add_torque(pose, touch.proxy_node as usize, touch.force, &mut result.torque);
+            let shares = touch.nodes.into_iter().zip(touch.weights).map(|(node, w)| (node, touch.force * -w));
+            parts.extend(shares.filter(|(_, part)| *part != DVec3::ZERO));
+            result.touches.push(touch);
         }
+        add_up(parts, &mut result);
+        return Some(result);
+    }
+    for touch in list {
         let forces = [touch.force_0, touch.force_1, touch.force_2].map(|f| DVec3::from(f.map(f64::from)));
         let force = -(forces[0] + forces[1] + forces[2]);
         if force == DVec3::ZERO {
@@ -90,6 +108,12 @@ fn equilibrium(
     }
     // The kernel lists contacts in the order of their first touch.
     result.touches.sort_by_key(|touch| touch.proxy_node);
+    add_up(parts, &mut result);
+    Some(result)
+}
+
+/// Forces on the object's nodes, each node once, ascending.
+fn add_up(mut parts: Vec<(u32, DVec3)>, result: &mut Equilibrium) {
     parts.sort_by_key(|&(node, _)| node);
     for (node, part) in parts {
         match result.forces.last_mut() {
@@ -97,5 +121,4 @@ fn equilibrium(
             _ => result.forces.push(NodeForce { node, force: part }),
         }
     }
-    Some(result)
 }

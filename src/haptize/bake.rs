@@ -2,6 +2,7 @@
 
 use super::{BackendChoice, BackendError, ChosenBackend, Progress, Run, Sweep, SweepError, SweepReport};
 use crate::{
+    JointVector,
     contact::Model,
     dataset::Dataset,
     object::{Object, ObjectError},
@@ -66,13 +67,40 @@ impl Bake<'_> {
         let Self { scene, backend, date, stop, progress } = self;
         let object = Object::build(&scene.object)?;
         let chain = Chain::new(&scene.proxy);
-        let model = Model::new(&object, &chain, scene.contact);
+        let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
         let mut backend = ChosenBackend::open(backend, &model)?;
-        let sweep = Sweep::new(scene, &object, backend.name(), &backend.adapter(), date)?;
+        let mut sweep = Sweep::new(scene, &object, backend.name(), &backend.adapter(), date)?;
+        sweep.skip_free_space(&model)?;
         let run = Run { chunk: backend.chunk(), stop, progress };
         Ok(match destination {
             Destination::Memory => sweep.run(&mut backend, run),
             Destination::File { output, resume } => sweep.bake(&mut backend, output, resume, run),
         }?)
     }
+}
+
+/// Grid points at which the proxy's reach is looked up, at most: between them it grows by less than what is added to it.
+const SAMPLES: usize = 1 << 16;
+
+/// Configurations spread over the scene's grid, all of them where they are few: what [`Model::reaching`] looks at.
+#[must_use]
+pub fn sample(scene: &Scene) -> Vec<JointVector> {
+    let axes = &scene.grid.axes;
+    let points: usize = axes.iter().map(|axis| axis.count).fold(1, usize::saturating_mul);
+    // The same stride along each axis, the last line always included.
+    let stride = (1..).find(|stride| points / usize::pow(*stride, axes.len() as u32).max(1) <= SAMPLES).unwrap_or(1);
+    let mut configurations = vec![JointVector::zeros(axes.len())];
+    for (j, axis) in axes.iter().enumerate() {
+        let lines = (0..axis.count - 1).step_by(stride).chain([axis.count - 1]);
+        let values: Vec<f64> = lines.map(|k| axis.start + k as f64 * axis.step).collect();
+        let grown = configurations.iter().flat_map(|q| {
+            values.iter().map(move |&value| {
+                let mut q = *q;
+                q[j] = value;
+                q
+            })
+        });
+        configurations = grown.collect();
+    }
+    configurations
 }

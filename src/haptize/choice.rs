@@ -1,6 +1,6 @@
 //! Which backend solves: one place for `bake`, the demo and programs that use this library.
 
-use super::{Backend, CpuBackend};
+use super::{Backend, CpuBackend, WithFallback};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model},
@@ -24,8 +24,13 @@ pub enum BackendChoice {
 pub enum ChosenBackend<'a> {
     /// All cores, f64.
     Cpu(CpuBackend<'a>),
-    /// Thousands of configurations at a time, f32.
-    Gpu(Box<GpuSolver<'a>>),
+    /// Thousands of configurations at a time, f32; the CPU once the device is lost for good.
+    Gpu {
+        /// What solves.
+        solver: Box<WithFallback<'a, GpuSolver<'a>>>,
+        /// A good number of configurations for one call.
+        chunk: usize,
+    },
 }
 
 /// No backend could be opened.
@@ -59,7 +64,14 @@ impl<'a> ChosenBackend<'a> {
 
     fn gpu(choice: AdapterChoice, model: &'a Model<'a>) -> Result<Self, GpuError> {
         let context = Arc::new(Context::open(choice)?);
-        Ok(Self::Gpu(Box::new(GpuSolver::new(context, model)?)))
+        Ok(Self::on(GpuSolver::new(context, model)?, model))
+    }
+
+    /// A device that is open already, to solve `model`, with the CPU behind it.
+    #[must_use]
+    pub fn on(device: GpuSolver<'a>, model: &'a Model<'a>) -> Self {
+        let (chunk, name) = (device.chunk(), device.adapter().to_string());
+        Self::Gpu { solver: Box::new(WithFallback::new(device, name, model)), chunk }
     }
 
     /// `cpu` or `gpu`, as a dataset's provenance says it.
@@ -67,7 +79,7 @@ impl<'a> ChosenBackend<'a> {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Cpu(_) => "cpu",
-            Self::Gpu(_) => "gpu",
+            Self::Gpu { .. } => "gpu",
         }
     }
 
@@ -76,7 +88,7 @@ impl<'a> ChosenBackend<'a> {
     pub fn adapter(&self) -> String {
         match self {
             Self::Cpu(_) => CpuBackend::adapter(),
-            Self::Gpu(gpu) => gpu.adapter().to_string(),
+            Self::Gpu { solver, .. } => solver.name().to_owned(),
         }
     }
 
@@ -85,18 +97,25 @@ impl<'a> ChosenBackend<'a> {
     pub fn chunk(&self) -> usize {
         match self {
             Self::Cpu(cpu) => cpu.chunk(),
-            Self::Gpu(gpu) => gpu.chunk(),
+            Self::Gpu { chunk, .. } => *chunk,
         }
     }
 }
 
 impl Backend for ChosenBackend<'_> {
-    type Error = GpuError;
+    type Error = BackendError;
 
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Self::Error> {
         match self {
             Self::Cpu(cpu) => cpu.solve(configurations).map_err(|never| match never {}),
-            Self::Gpu(gpu) => gpu.solve(configurations),
+            Self::Gpu { solver, .. } => Ok(solver.solve(configurations)?),
+        }
+    }
+
+    fn notices(&mut self) -> Vec<String> {
+        match self {
+            Self::Cpu(cpu) => cpu.notices(),
+            Self::Gpu { solver, .. } => solver.notices(),
         }
     }
 }

@@ -90,8 +90,21 @@ impl Columns {
         }
     }
 
-    /// Adds the points of `chunk` behind these.
-    pub fn append(&mut self, chunk: &Self) {
+    /// Adds a point at which nothing touches and nothing was solved, with a lower bound of its gap [m].
+    pub fn push_free(&mut self, gap: f32, joints: usize) {
+        self.torque.resize(self.torque.len() + joints, 0.0);
+        self.energy.push(0.0);
+        self.gap.push(gap);
+        self.residual.push(0.0);
+        self.iterations.push(0);
+        self.status.push(Status::Free as u8);
+        self.contacts.push(0);
+    }
+
+    /// Adds the points of `chunk` behind these; an error where there is no memory for their contacts.
+    pub fn append(&mut self, chunk: &Self) -> Result<(), std::collections::TryReserveError> {
+        self.nodes.try_reserve(chunk.nodes.len())?;
+        self.forces.try_reserve(chunk.forces.len())?;
         self.torque.extend_from_slice(&chunk.torque);
         self.energy.extend_from_slice(&chunk.energy);
         self.gap.extend_from_slice(&chunk.gap);
@@ -101,6 +114,7 @@ impl Columns {
         self.contacts.extend_from_slice(&chunk.contacts);
         self.nodes.extend_from_slice(&chunk.nodes);
         self.forces.extend_from_slice(&chunk.forces);
+        Ok(())
     }
 
     /// The block of these points, of which the first has number `first`.

@@ -14,11 +14,12 @@ pub enum SweepError {
     #[error("the scene's grid: {0}; correct [[grid.axes]] in the scene")]
     Grid(String),
     /// The columns do not fit in memory.
-    #[error("the grid's {points} points need {} MB of memory ({source}); take a coarser grid", bytes / 1_000_000)]
+    #[error("the grid's {points} points need {} MB of memory ({source}); take a coarser grid, or continue on a \
+             machine with more memory with --resume", bytes / 1_000_000)]
     Memory {
         /// Grid points.
         points: usize,
-        /// Memory of their columns, contacts aside [bytes].
+        /// Memory of their columns [bytes].
         bytes: usize,
         /// What the allocator said.
         source: TryReserveError,
@@ -82,8 +83,13 @@ pub enum SweepError {
         difference: &'static str,
     },
     /// The finished dataset could not be written; its points are in the part.
-    #[error(transparent)]
-    Dataset(#[from] dataset::Error),
+    #[error("{source}; all points are kept in {part}: continue with the same command and --resume")]
+    Dataset {
+        /// Where the points are.
+        part: PathBuf,
+        /// Why it could not be written.
+        source: dataset::Error,
+    },
 }
 
 fn remedy(part: Option<&Path>) -> String {

@@ -5,6 +5,8 @@ mod choice;
 mod columns;
 mod cpu;
 mod error;
+mod fallback;
+mod free_space;
 pub mod gridize;
 pub mod import;
 mod inspection;
@@ -13,13 +15,15 @@ mod report;
 pub mod scan;
 mod sweep;
 
-pub use bake::{Bake, BakeError};
+pub use bake::{Bake, BakeError, sample};
 pub use choice::{BackendChoice, BackendError, ChosenBackend};
 pub use cpu::CpuBackend;
 pub use error::SweepError;
+pub use fallback::WithFallback;
+pub use free_space::FreeSpace;
 pub use inspection::{Contact, Inspection, ObjectNode, ProxyNode};
 pub use report::{Iterations, SweepReport};
-pub use sweep::{Progress, Run, Sweep};
+pub use sweep::{Memory, Progress, Run, Sweep};
 
 use crate::{JointVector, contact::Equilibrium};
 
@@ -35,4 +39,10 @@ pub trait Backend {
     /// # Errors
     /// When the device fails; nothing of the batch is returned then.
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Self::Error>;
+
+    /// What happened since the last call that whoever uses the results should know, a sentence without its full stop each. It
+    /// holds from the first configuration of the last batch on, and goes into the dataset's provenance.
+    fn notices(&mut self) -> Vec<String> {
+        Vec::new()
+    }
 }

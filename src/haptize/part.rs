@@ -4,7 +4,7 @@
 //! "haptize part 1\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
 //! ```
 //!
-//! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`]. Frames are only ever appended. What
+//! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`], or [`NOTICE`] and a text. Frames are only ever appended. What
 //! a crash leaves at the end (half a frame, or a wrong checksum) is cut off and computed again: a part never adds a wrong
 //! number to a dataset, and the finished file is the same, bit for bit, as without the interruption.
 
@@ -20,6 +20,9 @@ use std::{
 const MAGIC: &[u8] = b"haptize part 1\n";
 /// Length and checksum before each body [bytes].
 const FRAME: usize = 8 + 4;
+
+/// How the body of a notice begins: as no block of columns does, whose first point has no such number.
+const NOTICE: [u8; 8] = [u8::MAX; 8];
 
 /// Everything that a sweep's numbers depend on: a part may only be continued by the sweep that began it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,6 +82,12 @@ impl Part {
         self.write(&chunk.encode(first)).map_err(|source| SweepError::Part { path: self.path.clone(), source })
     }
 
+    /// Adds something that provenance will tell.
+    pub fn note(&mut self, notice: &str) -> Result<(), SweepError> {
+        let body = [&NOTICE, notice.as_bytes()].concat();
+        self.write(&body).map_err(|source| SweepError::Part { path: self.path.clone(), source })
+    }
+
     /// Removes the part, whose points are all in a finished file now.
     pub fn remove(self) -> Result<(), SweepError> {
         let Self { path, file } = self;
@@ -130,9 +139,16 @@ impl Part {
         let (points, joints) = (binding.grid.points(), binding.grid.joints());
         loop {
             let before = whole;
-            let chunk = next(&mut whole)?.and_then(|body| Columns::decode(&body, columns.points(), joints));
-            match chunk {
-                Some(chunk) if chunk.points() <= points - columns.points() => columns.append(&chunk),
+            let Some(body) = next(&mut whole)? else { break };
+            if let Some(notice) = body.strip_prefix(&NOTICE) {
+                binding.provenance.notices.push(String::from_utf8_lossy(notice).into_owned());
+                continue;
+            }
+            match Columns::decode(&body, columns.points(), joints) {
+                Some(chunk) if chunk.points() <= points - columns.points() => {
+                    let bytes = Columns::bytes(points, joints, columns.nodes.len() + chunk.nodes.len());
+                    columns.append(&chunk).map_err(|source| SweepError::Memory { points, bytes, source })?;
+                }
                 _ => {
                     whole = before;
                     break;

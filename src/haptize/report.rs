@@ -1,5 +1,6 @@
 //! What a sweep did, in numbers.
 
+use super::Memory;
 use crate::{contact::Status, dataset::Dataset};
 use serde::Serialize;
 use std::time::Duration;
@@ -19,6 +20,8 @@ pub struct SweepReport {
     pub max_residual: f64,
     /// Iterations of the points in contact.
     pub iterations: Iterations,
+    /// Points that were proven free of contact without being solved.
+    pub skipped_points: usize,
     /// Points that were taken over from an interrupted sweep.
     pub resumed_points: usize,
     /// Wall time of this run [s].
@@ -31,7 +34,9 @@ pub struct SweepReport {
     pub adapter: String,
     /// `energy`, `paper` or `linearised`.
     pub algorithm: String,
-    /// What was noticed about the object while it was built.
+    /// Memory of the results, as it was stated before the sweep.
+    pub memory: Memory,
+    /// What was noticed about the object while it was built, and what happened on the way.
     pub warnings: Vec<String>,
 }
 
@@ -45,7 +50,14 @@ pub struct Iterations {
 }
 
 impl SweepReport {
-    pub(super) fn of(dataset: &Dataset, resumed_points: usize, time: Duration, warnings: Vec<String>) -> Self {
+    pub(super) fn of(
+        dataset: &Dataset,
+        memory: Memory,
+        skipped_points: usize,
+        resumed_points: usize,
+        time: Duration,
+        warnings: Vec<String>,
+    ) -> Self {
         let points = dataset.grid.points();
         let counts = dataset.status_counts();
         let contact_points = counts.contact + counts.unconverged + counts.overflow;
@@ -62,6 +74,7 @@ impl SweepReport {
             overflowed: counts.overflow,
             max_residual: dataset.max_residual().unwrap_or(0.0),
             iterations: Iterations { mean: sum as f64 / contact_points.max(1) as f64, max },
+            skipped_points,
             resumed_points,
             seconds,
             // A clock that did not move is taken for its own resolution.
@@ -70,6 +83,7 @@ impl SweepReport {
             backend: dataset.provenance.backend.clone(),
             adapter: dataset.provenance.adapter.clone(),
             algorithm: dataset.provenance.algorithm.clone(),
+            memory,
             warnings,
         }
     }

@@ -4,13 +4,13 @@
 //! is cut into chunks, and an interrupted sweep continues where it stopped (see [`Sweep::bake`]).
 
 use super::{
-    Backend, SweepError, SweepReport,
+    Backend, FreeSpace, SweepError, SweepReport,
     columns::Columns,
     part::{Binding, Part},
 };
 use crate::{
     JointVector,
-    contact::Status,
+    contact::{Model, Status},
     dataset::{Axis, Contacts, Dataset, Grid, Provenance, Surface},
     object::Object,
     scene::{JointKind, Scene},
@@ -20,11 +20,11 @@ use std::{
     ffi::OsString,
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 /// How far a sweep has come.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Progress {
     /// Points done, those taken over from a part included.
     pub done: usize,
@@ -34,6 +34,17 @@ pub struct Progress {
     pub contact_points: usize,
     /// Points a second, of this run; 0 before the first chunk [1/s].
     pub rate: f64,
+    /// Memory that the sweep takes.
+    pub memory: Memory,
+}
+
+/// Memory of a sweep's results, known before it begins; chunks in flight and the object's compliance come on top.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Memory {
+    /// Where nothing touches anywhere [bytes].
+    pub least: usize,
+    /// Where every node of the proxy touches three nodes of the object everywhere [bytes].
+    pub most: usize,
 }
 
 /// How a sweep is run; nothing of it changes the result.
@@ -55,7 +66,15 @@ pub struct Sweep {
     provenance: Provenance,
     with_forces: bool,
     warnings: Vec<String>,
+    free_space: Option<FreeSpace>,
+    /// Most object nodes that one configuration touches.
+    most_contacts: usize,
+    /// Time that finding it took.
+    preparation: Duration,
 }
+
+/// Most points of a chunk, skipped ones included: they cost little time, but the part should not wait for millions of them.
+const LARGEST_CHUNK: usize = 1 << 16;
 
 impl Sweep {
     /// The sweep that `scene` asks for, over `object`, which was built from it.
@@ -98,10 +117,33 @@ impl Sweep {
                 backend: backend.into(),
                 adapter: adapter.into(),
                 date: date.into(),
+                notices: Vec::new(),
             },
-            with_forces: scene.graphics.is_some(),
+            with_forces: scene.graphics.is_some() || scene.haptics.effects.at_contacts().is_some(),
             warnings: object.warnings.clone(),
+            free_space: None,
+            most_contacts: scene
+                .proxy
+                .joints
+                .iter()
+                .map(|joint| 3 * joint.nodes.len())
+                .sum::<usize>()
+                .min(object.surface_nodes),
+            preparation: Duration::ZERO,
         })
+    }
+
+    /// Skips the points that [`FreeSpace`] proves free: `model` is that of the scene. Nothing is changed but gaps farther than
+    /// [`FreeSpace::MARGIN`] grid steps from any contact, which become lower bounds.
+    ///
+    /// # Errors
+    /// [`SweepError::Memory`].
+    pub fn skip_free_space(&mut self, model: &Model<'_>) -> Result<(), SweepError> {
+        let start = Instant::now();
+        let free_space = FreeSpace::find(model, &self.grid).map_err(|source| self.out_of_memory(source))?;
+        self.free_space = Some(free_space);
+        self.preparation = start.elapsed();
+        Ok(())
     }
 
     /// The grid.
@@ -116,6 +158,15 @@ impl Sweep {
         let points = self.grid.points();
         let contacts = if self.with_forces { points.saturating_mul(contacts) } else { 0 };
         Columns::bytes(points, self.grid.joints(), contacts)
+    }
+
+    /// Memory of this sweep.
+    #[must_use]
+    pub fn memory(&self) -> Memory {
+        let points = self.grid.points();
+        let skipping = if self.free_space.is_some() { 4 * points } else { 0 };
+        let needed = |contacts| self.memory_needed(contacts).saturating_add(skipping);
+        Memory { least: needed(0), most: needed(self.most_contacts) }
     }
 
     /// Where [`Sweep::bake`] keeps what it has of `output`.
@@ -160,19 +211,28 @@ impl Sweep {
         };
         let mut columns = self.empty_columns()?;
         let mut part = Part::open(&Self::part_of(output), resume, &mut binding, &mut columns)?;
+        if !binding.provenance.notices.is_empty() {
+            let Provenance { backend, adapter, .. } = &self.provenance;
+            let notice = format!("from grid point {} on: resumed on {backend} ({adapter})", columns.points());
+            part.note(&notice)?;
+            binding.provenance.notices.push(notice);
+        }
         let finished = self.finish(backend, run, columns, binding.provenance, Some(&mut part))?;
-        finished.0.save(output)?;
+        finished.0.save(output).map_err(|source| SweepError::Dataset { part: part.path().into(), source })?;
         part.remove()?;
         Ok(finished)
     }
 
     fn empty_columns(&self) -> Result<Columns, SweepError> {
-        let points = self.grid.points();
-        Columns::with_room(points, self.grid.joints()).map_err(|source| SweepError::Memory {
-            points,
-            bytes: self.memory_needed(0),
-            source,
-        })
+        Columns::with_room(self.grid.points(), self.grid.joints()).map_err(|source| self.out_of_memory(source))
+    }
+
+    fn out_of_memory(&self, source: std::collections::TryReserveError) -> SweepError {
+        SweepError::Memory { points: self.grid.points(), bytes: self.memory().least, source }
+    }
+
+    fn free_gap(&self, point: usize) -> Option<f32> {
+        self.free_space.as_ref()?.gap(point)
     }
 
     /// Solves the points that `columns` lacks.
@@ -181,13 +241,13 @@ impl Sweep {
         backend: &mut B,
         run: Run<'_>,
         mut columns: Columns,
-        provenance: Provenance,
+        mut provenance: Provenance,
         mut part: Option<&mut Part>,
     ) -> Result<(Dataset, SweepReport), SweepError> {
         let (points, joints, resumed) = (self.grid.points(), self.grid.joints(), columns.points());
-        let start = Instant::now();
+        let (start, memory) = (Instant::now(), self.memory());
         let mut contact_points = in_contact(&columns);
-        (run.progress)(Progress { done: resumed, points, contact_points, rate: 0.0 });
+        (run.progress)(Progress { done: resumed, points, contact_points, rate: 0.0, memory });
         let mut configurations: Vec<JointVector> = Vec::new();
         while columns.points() < points {
             let first = columns.points();
@@ -195,9 +255,18 @@ impl Sweep {
                 let part = part.map(|part| part.path().to_path_buf());
                 return Err(SweepError::Stopped { done: first, points, part });
             }
-            let last = points.min(first + run.chunk.max(1)) - 1;
             configurations.clear();
-            configurations.extend((first..=last).map(|point| self.grid.configuration(point)));
+            let most = run.chunk.max(1);
+            let mut last = first;
+            for point in first..points.min(first.saturating_add(most.max(LARGEST_CHUNK))) {
+                if self.free_gap(point).is_none() {
+                    if configurations.len() == most {
+                        break;
+                    }
+                    configurations.push(self.grid.configuration(point));
+                }
+                last = point;
+            }
             let equilibria = backend.solve(&configurations).map_err(|source| SweepError::Backend {
                 first,
                 last,
@@ -206,18 +275,34 @@ impl Sweep {
             if equilibria.len() != configurations.len() {
                 return Err(SweepError::Miscount { asked: configurations.len(), found: equilibria.len() });
             }
+            for notice in backend.notices() {
+                let notice = format!("from grid point {first} on: {notice}");
+                if let Some(part) = &mut part {
+                    part.note(&notice)?;
+                }
+                provenance.notices.push(notice);
+            }
             let mut chunk = Columns::default();
-            equilibria.iter().for_each(|equilibrium| chunk.push(equilibrium, joints, self.with_forces));
+            let mut solved = equilibria.iter();
+            for point in first..=last {
+                match self.free_gap(point) {
+                    Some(gap) => chunk.push_free(gap, joints),
+                    None => solved.next().into_iter().for_each(|solved| chunk.push(solved, joints, self.with_forces)),
+                }
+            }
             if let Some(part) = &mut part {
                 part.append(first, &chunk)?;
             }
-            columns.append(&chunk);
+            columns.append(&chunk).map_err(|source| self.out_of_memory(source))?;
             contact_points += in_contact(&chunk);
             let rate = (columns.points() - resumed) as f64 / start.elapsed().as_secs_f64().max(f64::MIN_POSITIVE);
-            (run.progress)(Progress { done: columns.points(), points, contact_points, rate });
+            (run.progress)(Progress { done: columns.points(), points, contact_points, rate, memory });
         }
         let dataset = self.dataset(columns, provenance);
-        let report = SweepReport::of(&dataset, resumed, start.elapsed(), self.warnings.clone());
+        let skipped = self.free_space.as_ref().map_or(0, FreeSpace::skipped);
+        let time = start.elapsed() + self.preparation;
+        let warnings = self.warnings.iter().chain(&dataset.provenance.notices).cloned().collect();
+        let report = SweepReport::of(&dataset, memory, skipped, resumed, time, warnings);
         Ok((dataset, report))
     }
 

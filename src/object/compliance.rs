@@ -1,62 +1,105 @@
-//! The compliance C = K^-1 on the surface nodes.
+//! The compliance C = K^-1 on surface nodes.
 //!
-//! Contact acts on surface nodes only, so the rows and columns of K^-1 at those nodes are all that it needs: leaving out
-//! the others is exact static condensation, not an approximation. K is fixed per object: one factorisation, then one
-//! solve a column, in blocks of columns on all cores.
+//! Contact acts on surface nodes only, and only on those that the proxy can reach, so the rows and columns of K^-1 at these
+//! nodes are all that it needs: leaving out the others is exact static condensation, not an approximation. K is fixed per
+//! object: one factorisation, then one solve a column, in blocks of columns on all cores.
 
-use super::Factor;
+use super::{Factor, Object, ObjectError};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// Dense symmetric matrix over the 3S surface coordinates, row-major: entry (3i + a, 3j + b) [m/N].
+/// Dense symmetric matrix over the coordinates of R covered surface nodes, row-major: entry (3i + a, 3j + b) is for coordinates
+/// a and b of the nodes in places i and j [m/N].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compliance {
-    /// 3S.
+    /// The covered surface nodes, ascending.
+    pub nodes: Vec<u32>,
+    /// Place in `nodes` of each surface node, or [`ABSENT`].
+    places: Vec<u32>,
+    /// 3R.
     pub order: usize,
     /// `order * order` numbers [m/N].
     pub entries: Vec<f64>,
 }
 
+/// No place.
+const ABSENT: u32 = u32::MAX;
+
 /// Right-hand sides solved at once: enough for the factor to be read once for many columns, few enough that a block of
 /// columns stays in cache.
 const COLUMNS_PER_SOLVE: usize = 32;
 
+/// Most memory that the dense compliance may take [B]: it is what a laptop can hold beside everything else.
+const MAX_BYTES: usize = 4 << 30;
+
 impl Compliance {
-    /// The part of K^-1 at the first `surface_nodes` of `nodes` nodes.
-    pub(super) fn of(factor: &Factor, nodes: usize, surface_nodes: usize) -> Self {
-        let order = 3 * surface_nodes;
+    /// The compliance on all surface nodes of `object`.
+    #[must_use]
+    pub fn new(object: &Object) -> Self {
+        let nodes = (0..object.surface_nodes as u32).collect();
+        Self::of(&object.factor, object.rest.len(), object.surface_nodes, nodes)
+    }
+
+    /// The compliance on some surface nodes of `object`, ascending and each once.
+    ///
+    /// # Errors
+    /// When it would not fit in memory; nothing has been allocated then.
+    pub fn on(object: &Object, nodes: Vec<u32>) -> Result<Self, ObjectError> {
+        let order = nodes.len().saturating_mul(3);
+        let bytes = order.saturating_mul(order).saturating_mul(size_of::<f64>());
+        if bytes > MAX_BYTES {
+            return Err(ObjectError::TooLarge { nodes: nodes.len(), bytes, limit: MAX_BYTES });
+        }
+        Ok(Self::of(&object.factor, object.rest.len(), object.surface_nodes, nodes))
+    }
+
+    /// The part of K^-1 at `covered` ones of the first `surface_nodes` of `nodes` nodes.
+    fn of(factor: &Factor, nodes: usize, surface_nodes: usize, covered: Vec<u32>) -> Self {
+        let order = 3 * covered.len();
+        let mut places = vec![ABSENT; surface_nodes];
+        covered.iter().zip(0..).for_each(|(&node, place)| places[node as usize] = place);
+        let row_of = |k: usize| 3 * covered[k / 3] as usize + k % 3;
         let mut entries = vec![0.0; order * order];
         entries.par_chunks_mut((COLUMNS_PER_SOLVE * order).max(1)).enumerate().for_each(|(chunk, rows)| {
             let width = rows.len() / order;
             let first = chunk * COLUMNS_PER_SOLVE;
             let mut columns = faer::Mat::zeros(3 * nodes, width);
             for k in 0..width {
-                columns[(first + k, k)] = 1.0;
+                columns[(row_of(first + k), k)] = 1.0;
             }
             factor.solve_columns(columns.as_mut());
             for (k, row) in rows.chunks_exact_mut(order).enumerate() {
-                for (entry, value) in row.iter_mut().zip(columns.col(k).iter()) {
-                    *entry = *value;
+                for (i, entry) in row.iter_mut().enumerate() {
+                    *entry = columns[(row_of(i), k)];
                 }
             }
         });
         symmetrise(&mut entries, order);
-        Self { order, entries }
+        Self { nodes: covered, places, order, entries }
     }
 
-    /// Row 3i + a of coordinate a at node i, one number per surface coordinate [m/N].
+    /// Whether all surface nodes are covered.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.nodes.len() == self.places.len()
+    }
+
+    /// Place of surface node `node`, if it is covered.
+    #[must_use]
+    pub fn place(&self, node: u32) -> Option<usize> {
+        self.places.get(node as usize).filter(|&&place| place != ABSENT).map(|&place| place as usize)
+    }
+
+    /// Row 3i + a of coordinate a at the node in place i, one number per covered coordinate [m/N].
     #[must_use]
     pub fn row(&self, row: usize) -> &[f64] {
         &self.entries[row * self.order..(row + 1) * self.order]
     }
 
-    /// Displacement of surface node i per force on surface node j [m/N].
+    /// Displacement of the node in place i per force on the node in place j [m/N].
     #[must_use]
     pub fn block(&self, i: usize, j: usize) -> DMat3 {
-        let row = |a: usize| {
-            let start = (3 * i + a) * self.order + 3 * j;
-            DVec3::from_slice(&self.entries[start..start + 3])
-        };
+        let row = |a: usize| DVec3::from_slice(&self.row(3 * i + a)[3 * j..3 * j + 3]);
         DMat3::from_cols(row(0), row(1), row(2)).transpose()
     }
 }
@@ -96,7 +139,7 @@ mod tests {
     fn condensation_leaves_interior_nodes_without_force() {
         let stiffness = stiffness();
         let factor = Factor::of(&stiffness, 1.0, &[0.0; 6]).unwrap();
-        let compliance = Compliance::of(&factor, 6, 4);
+        let compliance = Compliance::of(&factor, 6, 4, vec![0, 1, 2, 3]);
         assert_eq!((compliance.order, compliance.entries.len()), (12, 144));
         // The displacement that the whole object takes under a force on node 2 is, on the surface, C's column; and its
         // forces vanish everywhere else, interior nodes included.
@@ -110,6 +153,21 @@ mod tests {
         let mut resisted = [DVec3::NAN; 6];
         stiffness.apply(&displacement, &mut resisted);
         assert!(resisted.iter().zip(&force).all(|(a, b)| (*a - *b).length() < 1e-13), "{resisted:?}");
+    }
+
+    #[test]
+    fn covering_fewer_nodes_changes_no_entry() {
+        let factor = Factor::of(&stiffness(), 1.0, &[0.0; 6]).unwrap();
+        let whole = Compliance::of(&factor, 6, 4, vec![0, 1, 2, 3]);
+        let some = Compliance::of(&factor, 6, 4, vec![1, 3]);
+        assert!(whole.is_whole() && !some.is_whole());
+        assert_eq!([0, 1, 2, 3, 9].map(|node| some.place(node)), [None, Some(0), None, Some(1), None]);
+        for (i, a) in [1, 3].into_iter().enumerate() {
+            for (j, b) in [1, 3].into_iter().enumerate() {
+                let difference = some.block(i, j) - whole.block(a, b);
+                assert!(difference.to_cols_array().iter().all(|x| x.abs() < 1e-16), "{difference}");
+            }
+        }
     }
 
     #[test]

@@ -41,16 +41,46 @@ pub enum ObjectError {
     },
     /// The dense compliance would not fit in memory.
     #[error(
-        "an object of {nodes} surface nodes needs {} GiB of compliance, more than {} GiB: use a coarser surface",
-        .bytes >> 30, .limit >> 30
+        "the proxy reaches {nodes} surface nodes, which need {} GiB of compliance, more than {} GiB: use a coarser surface or \
+         a smaller grid", .bytes >> 30, .limit >> 30
     )]
     TooLarge {
-        /// Nodes on the surface.
+        /// Surface nodes that the proxy reaches.
         nodes: usize,
         /// Memory of the compliance [B].
         bytes: usize,
         /// Memory that it may take [B].
         limit: usize,
+    },
+    /// More nodes than the stiffness is made for.
+    #[error("an object of {nodes} nodes is more than the {limit} that are taken: use a coarser surface")]
+    TooManyNodes {
+        /// Nodes of the object.
+        nodes: usize,
+        /// Nodes that are taken.
+        limit: usize,
+    },
+    /// A tetrahedron without volume.
+    #[error("tetrahedron {number} (nodes {corners:?}, surface nodes counted first) has no volume: mesh the solid anew")]
+    FlatTetrahedron {
+        /// Its number in the file.
+        number: usize,
+        /// Its corners.
+        corners: [u32; 4],
+    },
+    /// The lattice that fills the surface would be too fine.
+    #[error("cells of this size make {cubes:.0} cubes, more than {limit:.0}: make object.elasticity.cell larger")]
+    TooManyCubes {
+        /// Cubes over the box around the surface.
+        cubes: f64,
+        /// Cubes that are taken.
+        limit: f64,
+    },
+    /// A surface has no tetrahedra to be elastic with.
+    #[error("an elastic {surface} is filled with a lattice: give its size as object.elasticity.cell")]
+    NoCell {
+        /// The mesh file, or `sphere`.
+        surface: String,
     },
     /// The ground names a node that is not there.
     #[error("ground names node {node}, but the object has nodes 0 to {}: correct the list", .count - 1)]

@@ -7,12 +7,14 @@
 
 use super::{ObjectError, Stiffness};
 use crate::tolerances::{MECHANISM_SHIFT, MIN_RECIPROCAL_CONDITION};
-use faer::linalg::solvers::{Solve, SolveCore};
-use faer::sparse::linalg::LltError;
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::solvers::LltError;
+use faer::perm::PermRef;
+use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Conj, Mat, MatMut, Side};
+use faer::{Conj, Mat, MatMut, Par, Side};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// A factorisation failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -27,7 +29,13 @@ pub enum FactorError {
 
 /// Cholesky factor of a symmetric positive definite matrix over the 3N node coordinates.
 #[derive(Clone, Debug)]
-pub struct Factor(Llt<usize, f64>);
+pub struct Factor {
+    symbolic: Arc<SymbolicCholesky<usize>>,
+    values: Arc<[f64]>,
+}
+
+/// One thread a factorisation or solve: many solves run side by side instead, which scales better.
+const PARALLELISM: Par = Par::Seq;
 
 impl Factor {
     /// Factorises `alpha` K + diag(`diagonal`); `diagonal` has one number per node, for its three coordinates.
@@ -35,20 +43,39 @@ impl Factor {
     /// # Errors
     /// When the matrix is not positive definite, or there is no memory for its factor.
     pub fn of(stiffness: &Stiffness, alpha: f64, diagonal: &[f64]) -> Result<Self, FactorError> {
+        let resources = |reason: &dyn std::fmt::Display| FactorError::Resources(reason.to_string());
         let matrix = lower_half(stiffness, alpha, diagonal);
-        let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower)
-            .map_err(|error| FactorError::Resources(error.to_string()))?;
-        match Llt::try_new_with_symbolic(symbolic, matrix.as_ref(), Side::Lower) {
-            Ok(factor) => Ok(Self(factor)),
-            Err(LltError::Numeric(_)) => Err(FactorError::NotPositiveDefinite),
-            Err(LltError::Generic(error)) => Err(FactorError::Resources(error.to_string())),
+        let order: Vec<usize> =
+            stiffness.ordering.iter().flat_map(|&n| (0..3).map(move |a| 3 * n as usize + a)).collect();
+        let mut rank = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(k, &row)| rank[row] = k);
+        let ordering = SymmetricOrdering::Custom(PermRef::new_checked(&order, &rank, order.len()));
+        let symbolic = factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, ordering, Default::default())
+            .map_err(|error| resources(&error))?;
+        let mut values = Vec::new();
+        values.try_reserve_exact(symbolic.len_val()).map_err(|error| resources(&error))?;
+        values.resize(symbolic.len_val(), 0.0);
+        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(PARALLELISM, Default::default());
+        let mut scratch = MemBuffer::try_new(scratch).map_err(|_| resources(&"out of memory"))?;
+        let outcome = symbolic.factorize_numeric_llt(
+            &mut values,
+            matrix.as_ref(),
+            Side::Lower,
+            Default::default(),
+            PARALLELISM,
+            MemStack::new(&mut scratch),
+            Default::default(),
+        );
+        match outcome.map(|_| ()) {
+            Ok(()) => Ok(Self { symbolic: Arc::new(symbolic), values: values.into() }),
+            Err(LltError::NonPositivePivot { .. }) => Err(FactorError::NotPositiveDefinite),
         }
     }
 
     /// Solves for one vector per node in place: forces [N] become displacements [m] if the matrix is K.
     pub fn solve(&self, vectors: &mut [DVec3]) {
         let mut column = Mat::from_fn(3 * vectors.len(), 1, |row, _| vectors[row / 3][row % 3]);
-        self.0.solve_in_place(column.as_mut());
+        self.solve_columns(column.as_mut());
         for (node, vector) in vectors.iter_mut().enumerate() {
             *vector = DVec3::new(column[(3 * node, 0)], column[(3 * node + 1, 0)], column[(3 * node + 2, 0)]);
         }
@@ -56,7 +83,15 @@ impl Factor {
 
     /// Solves for each column of a 3N x k matrix in place.
     pub(super) fn solve_columns(&self, columns: MatMut<'_, f64>) {
-        self.0.solve_in_place_with_conj(Conj::No, columns);
+        let mut scratch = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(columns.ncols(), PARALLELISM));
+        let factor = LltRef::new(&self.symbolic, &self.values);
+        factor.solve_in_place_with_conj(Conj::No, columns, PARALLELISM, MemStack::new(&mut scratch));
+    }
+
+    /// Memory of the factor [B].
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.values)
     }
 }
 

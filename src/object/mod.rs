@@ -1,27 +1,37 @@
-//! The deformable virtual object: surface, springs, and the compliance C = K^-1 that contact needs.
+//! The deformable virtual object: surface, springs, and the stiffness K with its factor.
 //!
-//! [`Object::build`] makes the surface that the scene names, checks it, joins its nodes by springs, proves
-//! K = Kn + Kg symmetric positive definite by factorising it (section 2.1, equation (2)), and inverts it on the
-//! surface nodes. An object that the ground does not hold, or a surface that is not closed, is refused with the reason.
+//! [`Object::build`] makes the surface that the scene names, checks it, joins its nodes by springs or fills it with an elastic
+//! solid, and proves K = Kn + Kg symmetric positive definite by factorising it (section 2.1, equation (2)). An object that the ground does not
+//! hold, or a surface that is not closed, is refused with the reason. The [`Compliance`] C = K^-1 is for contact alone, which
+//! forms it from the factor; graphics never does.
 
 mod compliance;
+mod elasticity;
 mod error;
 mod factor;
+mod fill;
 mod ground;
 mod import;
+mod ordering;
+mod settled;
 mod sphere;
 mod springs;
+mod stiffening;
 mod stiffness;
 mod topology;
 
 pub use compliance::Compliance;
 pub use error::{ObjectError, SurfaceDefect};
 pub use factor::{Factor, FactorError};
+pub use settled::settled;
+pub use stiffening::Stiffening;
 pub use stiffness::Stiffness;
 pub use topology::Topology;
 
-use crate::scene::{ObjectSpec, Shape};
-use glam::DVec3;
+use crate::scene::{ElasticSpec, Material, ObjectSpec, Shape};
+use elasticity::Solid;
+use glam::{DMat3, DVec3};
+use import::Body;
 
 /// A deformable object at rest.
 ///
@@ -38,8 +48,8 @@ pub struct Object {
     pub topology: Topology,
     /// K = Kn + Kg over all nodes [N/m].
     pub stiffness: Stiffness,
-    /// C = K^-1 on the surface nodes, exact static condensation [m/N].
-    pub compliance: Compliance,
+    /// Cholesky factor of K.
+    pub factor: Factor,
     /// Mass of each node [kg].
     pub mass: Vec<f64>,
     /// Damping of each node against the ground [N s/m].
@@ -56,64 +66,80 @@ impl Object {
     /// does not hold the object.
     pub fn build(spec: &ObjectSpec) -> Result<Self, ObjectError> {
         let mut warnings = Vec::new();
-        let (nodes, triangles) = match &spec.shape {
+        let body = match &spec.shape {
             Shape::Sphere { centre, radius, rings, segments } => {
-                check_order(rings.saturating_mul(*segments).saturating_add(2))?;
-                sphere::generate(*centre, *radius, *rings, *segments)?
+                check_count(rings.saturating_mul(*segments).saturating_add(2))?;
+                Body::shell(sphere::generate(*centre, *radius, *rings, *segments)?)
             }
-            Shape::Mesh { file, scale, centre } => import::read(file, *scale, *centre, &mut warnings)?,
+            Shape::Mesh { file, scale, centre } => Body::shell(import::read(file, *scale, *centre, &mut warnings)?),
+            Shape::Tetrahedra { file, scale, centre } => import::read_tetrahedra(file, *scale, *centre, &mut warnings)?,
         };
-        Self::assemble(spec, nodes, triangles, warnings)
+        Self::assemble(spec, body, warnings)
     }
 
-    /// The same object on a surface that is already at hand, such as the one stored in a dataset: the shape that the
-    /// scene names is not read.
+    /// The same object on a surface that is already at hand, such as the one stored in a dataset: the surface that the scene
+    /// names is not read. Tetrahedra are, because a surface does not tell what is inside.
     ///
     /// # Errors
-    /// As for [`Object::build`], except for the file.
+    /// As for [`Object::build`], except for the file of a surface.
     pub fn from_surface(spec: &ObjectSpec, nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, ObjectError> {
-        Self::assemble(spec, nodes, triangles, Vec::new())
+        match spec.shape {
+            Shape::Tetrahedra { .. } => Self::build(spec),
+            Shape::Sphere { .. } | Shape::Mesh { .. } => {
+                Self::assemble(spec, Body::shell((nodes, triangles)), Vec::new())
+            }
+        }
     }
 
-    fn assemble(
-        spec: &ObjectSpec,
-        nodes: Vec<DVec3>,
-        mut triangles: Vec<[u32; 3]>,
-        mut warnings: Vec<String>,
-    ) -> Result<Self, ObjectError> {
+    fn assemble(spec: &ObjectSpec, body: Body, mut warnings: Vec<String>) -> Result<Self, ObjectError> {
         check_parameters(spec)?;
-        check_order(nodes.len())?;
-        let surface = topology::close(&nodes, &mut triangles)
+        check_count(body.nodes.len())?;
+        let Body { mut nodes, surface_nodes, mut triangles, tetrahedra } = body;
+        let surface = topology::close(&nodes[..surface_nodes], &mut triangles)
             .map_err(|defect| ObjectError::Surface { surface: surface_name(spec), defect })?;
         warnings.extend(surface.warnings);
+        let mut solid = Solid { filled: vec![1.0; tetrahedra.len()], tetrahedra, ..Solid::default() };
+        if let (Material::Elastic(ElasticSpec { cell, .. }), true) = (spec.material, solid.tetrahedra.is_empty()) {
+            let cell = cell.ok_or_else(|| ObjectError::NoCell { surface: surface_name(spec) })?;
+            solid = fill::fill(&mut nodes, &triangles, cell)?;
+            check_count(nodes.len())?;
+        }
+        let edges = if solid.tetrahedra.is_empty() { surface.edges } else { solid.edges() };
         let grounded = ground::select(&spec.ground, &nodes)?;
-        ground::check_components(&surface.components, &grounded)?;
-        let stiffness = springs::assemble(spec, &nodes, &surface.edges, &grounded)?;
+        if solid.tetrahedra.is_empty() {
+            ground::check_components(&surface.components, &grounded)?;
+        }
+        let mut stiffness = Stiffness::with_pattern(nodes.len(), &edges);
+        stiffness.ordering = ordering::nested_dissection(&stiffness, &nodes);
+        for (node, _) in grounded.iter().enumerate().filter(|(_, held)| **held) {
+            stiffness.add(node, node, DMat3::from_diagonal(DVec3::splat(spec.ground.stiffness)));
+        }
+        match spec.material {
+            Material::Springs(springs) => springs::add(spec, springs, &nodes, &edges, &mut stiffness)?,
+            Material::Elastic(elastic) => solid.add(elastic, &nodes, &mut stiffness)?,
+        }
         let factor = factor::prove_positive_definite(&stiffness)?;
-        let compliance = Compliance::of(&factor, nodes.len(), nodes.len());
         Ok(Self {
-            surface_nodes: nodes.len(),
+            surface_nodes,
             mass: vec![spec.node_mass; nodes.len()],
             damping: vec![spec.node_damping; nodes.len()],
             rest: nodes,
             triangles,
             topology: surface.topology,
             stiffness,
-            compliance,
+            factor,
             warnings,
         })
     }
 }
 
-/// Most memory that the dense compliance may take [B]: it is what a laptop can hold beside everything else.
-const MAX_COMPLIANCE_BYTES: usize = 4 << 30;
+/// Most nodes of an object: its factor takes some GB then.
+const MAX_NODES: usize = 1 << 20;
 
-/// Refuses an object whose dense compliance of (3S)^2 numbers would not fit in memory, before anything is allocated.
-fn check_order(nodes: usize) -> Result<(), ObjectError> {
-    let order = nodes.saturating_mul(3);
-    let bytes = order.saturating_mul(order).saturating_mul(size_of::<f64>());
-    if bytes > MAX_COMPLIANCE_BYTES {
-        return Err(ObjectError::TooLarge { nodes, bytes, limit: MAX_COMPLIANCE_BYTES });
+/// Refuses an object whose stiffness and factor would not fit in memory, before anything is allocated.
+fn check_count(nodes: usize) -> Result<(), ObjectError> {
+    if nodes > MAX_NODES {
+        return Err(ObjectError::TooManyNodes { nodes, limit: MAX_NODES });
     }
     Ok(())
 }
@@ -121,13 +147,24 @@ fn check_order(nodes: usize) -> Result<(), ObjectError> {
 /// Numbers that a scene file has had checked already, and a specification made in code has not.
 fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {
     let positive = [
-        ("spring stiffness", spec.springs.stiffness),
+        match spec.material {
+            Material::Springs(springs) => ("spring stiffness", springs.stiffness),
+            Material::Elastic(elastic) => ("Young's modulus", elastic.young),
+        },
         ("ground stiffness", spec.ground.stiffness),
         ("node mass", spec.node_mass),
     ];
     for (name, value) in positive {
         if !(value > 0.0 && value.is_finite()) {
             return Err(ObjectError::Parameter { name, value, range: "positive and finite" });
+        }
+    }
+    if let Material::Elastic(ElasticSpec { poisson: value, cell, .. }) = spec.material {
+        if !(value > -1.0 && value < 0.5) {
+            return Err(ObjectError::Parameter { name: "Poisson's ratio", value, range: "above -1 and below 0.5" });
+        }
+        if let Some(value) = cell.filter(|cell| !(*cell > 0.0 && cell.is_finite())) {
+            return Err(ObjectError::Parameter { name: "cell", value, range: "positive and finite" });
         }
     }
     if !(spec.node_damping >= 0.0 && spec.node_damping.is_finite()) {
@@ -141,6 +178,6 @@ fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {
 fn surface_name(spec: &ObjectSpec) -> String {
     match &spec.shape {
         Shape::Sphere { .. } => "sphere".to_owned(),
-        Shape::Mesh { file, .. } => file.display().to_string(),
+        Shape::Mesh { file, .. } | Shape::Tetrahedra { file, .. } => file.display().to_string(),
     }
 }

@@ -6,30 +6,27 @@
 //! a mechanism is left free.
 
 use super::{ObjectError, Stiffness, SurfaceDefect};
-use crate::scene::{ObjectSpec, SpringKind};
+use crate::scene::{ObjectSpec, SpringKind, SpringSpec};
 use glam::{DMat3, DVec3};
 
-/// K over all nodes. `edges`: each edge once, as its two ends.
-pub(super) fn assemble(
+/// Adds Kn to `stiffness`, whose pattern holds `edges`: each edge once, as its two ends.
+pub(super) fn add(
     spec: &ObjectSpec,
+    springs: SpringSpec,
     nodes: &[DVec3],
     edges: &[[u32; 2]],
-    grounded: &[bool],
-) -> Result<Stiffness, ObjectError> {
-    let mut stiffness = Stiffness::with_pattern(nodes.len(), edges);
-    for (node, _) in grounded.iter().enumerate().filter(|(_, held)| **held) {
-        stiffness.add(node, node, DMat3::from_diagonal(DVec3::splat(spec.ground.stiffness)));
-    }
+    stiffness: &mut Stiffness,
+) -> Result<(), ObjectError> {
     for &[a, b] in edges {
         let (i, j) = (a as usize, b as usize);
-        let block = match spec.springs.kind {
-            SpringKind::Isotropic => DMat3::from_diagonal(DVec3::splat(spec.springs.stiffness)),
+        let block = match springs.kind {
+            SpringKind::Isotropic => DMat3::from_diagonal(DVec3::splat(springs.stiffness)),
             SpringKind::Axial => {
                 let direction = (nodes[j] - nodes[i]).try_normalize().ok_or_else(|| ObjectError::Surface {
                     surface: super::surface_name(spec),
                     defect: SurfaceDefect::CoincidentNodes { first: a, second: b },
                 })?;
-                spec.springs.stiffness * outer(direction)
+                springs.stiffness * outer(direction)
             }
         };
         stiffness.add(i, i, block);
@@ -37,7 +34,7 @@ pub(super) fn assemble(
         stiffness.add(i, j, -block);
         stiffness.add(j, i, -block);
     }
-    Ok(stiffness)
+    Ok(())
 }
 
 /// e e^T.

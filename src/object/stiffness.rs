@@ -11,6 +11,8 @@ pub struct Stiffness {
     pub columns: Vec<u32>,
     /// The blocks [N/m].
     pub blocks: Vec<DMat3>,
+    /// All nodes, in the order in which a factorisation takes them.
+    pub ordering: Vec<u32>,
 }
 
 impl Stiffness {
@@ -29,7 +31,7 @@ impl Stiffness {
             offsets.push(columns.len());
         }
         let blocks = vec![DMat3::ZERO; columns.len()];
-        Self { offsets, columns, blocks }
+        Self { offsets, columns, blocks, ordering: (0..nodes as u32).collect() }
     }
 
     /// Number of nodes N; the matrix is 3N x 3N.
@@ -59,6 +61,13 @@ impl Stiffness {
         for (node, out) in force.iter_mut().enumerate() {
             *out = self.row(node).map(|(column, block)| *block * displacement[column]).sum();
         }
+    }
+
+    /// Energy stored at `displacement` u, 1/2 u^T K u [J].
+    #[must_use]
+    pub fn energy(&self, displacement: &[DVec3]) -> f64 {
+        let force = |node: usize| self.row(node).map(|(column, block)| *block * displacement[column]).sum::<DVec3>();
+        0.5 * displacement.iter().enumerate().map(|(node, u)| u.dot(force(node))).sum::<f64>()
     }
 
     /// Largest sum of absolute values in a row: a bound on the largest eigenvalue (Gershgorin) [N/m].

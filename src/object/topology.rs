@@ -4,12 +4,13 @@
 //! around a node must form one fan, and every connected part must enclose a positive volume. A surface whose triangles
 //! merely point the wrong way is turned, with a warning; anything else is refused with the reason.
 //!
-//! Each connected part is taken as a body of its own: a shell inside another is not a cavity of it.
+//! A part inside another is the wall of a cavity, and faces into it; one inside a cavity is a body again, and so on: outward is
+//! away from the material, of which a point is part when an odd number of shells surround it.
 
 use super::SurfaceDefect;
 use crate::tolerances::MIN_TRIANGLE_ASPECT;
 use glam::DVec3;
-use std::collections::HashMap;
+use std::{collections::HashMap, f64::consts::PI};
 
 /// Who touches whom on the surface.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -215,7 +216,7 @@ fn runs_along(corners: [u32; 3], a: u32, b: u32) -> bool {
     (0..3).any(|k| corners[k] == a && corners[(k + 1) % 3] == b)
 }
 
-/// Turns the parts whose signed volume is negative.
+/// Turns the parts whose signed volume is negative, or positive where they bound a cavity.
 fn turn_outward(
     nodes: &[DVec3],
     triangles: &mut [[u32; 3]],
@@ -223,6 +224,7 @@ fn turn_outward(
     warnings: &mut Vec<String>,
 ) -> Result<(), SurfaceDefect> {
     let mut total_turned = 0;
+    let mut cavities = 0;
     for part in parts {
         let seed = triangles[part.triangles[0] as usize][0];
         let origin = nodes[seed as usize];
@@ -238,7 +240,11 @@ fn turn_outward(
             return Err(SurfaceDefect::NoVolume { node: seed });
         }
         let mut turned = part.turned;
-        if volume < 0.0 {
+        let around = parts.iter().filter(|other| !std::ptr::eq(part, *other));
+        let depth = around.filter(|other| surrounds(nodes, triangles, other, origin)).count();
+        let cavity = depth % 2 == 1;
+        cavities += usize::from(cavity);
+        if (volume < 0.0) != cavity {
             turned = part.triangles.len() - turned;
             for &triangle in &part.triangles {
                 triangles[triangle as usize].swap(1, 2);
@@ -248,9 +254,24 @@ fn turn_outward(
     }
     if total_turned > 0 {
         let all = triangles.len();
-        warnings.push(format!("{total_turned} of {all} triangles of the surface faced inward and were turned"));
+        warnings.push(format!("{total_turned} of {all} triangles of the surface faced the material and were turned"));
+    }
+    if cavities > 0 {
+        warnings.push(format!("{cavities} closed shells lie inside others and are taken as the walls of cavities"));
     }
     Ok(())
+}
+
+/// Whether the closed surface `part` winds around `point`: the solid angles of its triangles seen from there add up to 4 pi
+/// inside and to 0 outside (van Oosterom & Strackee, The solid angle of a plane triangle, 1983).
+fn surrounds(nodes: &[DVec3], triangles: &[[u32; 3]], part: &Part, point: DVec3) -> bool {
+    let half_angle = |triangle: u32| {
+        let [a, b, c] = triangles[triangle as usize].map(|node| nodes[node as usize] - point);
+        let [la, lb, lc] = [a, b, c].map(DVec3::length);
+        let product = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        a.dot(b.cross(c)).atan2(product)
+    };
+    part.triangles.iter().map(|&triangle| half_angle(triangle)).sum::<f64>().abs() > PI
 }
 
 /// Refuses nodes at which two sheets touch: walking from triangle to triangle must visit all triangles around the node.

@@ -104,19 +104,10 @@ impl Chain {
         pose.axes.resize(joints, DVec3::ZERO);
         pose.nodes.resize(self.nodes.len(), DVec3::ZERO);
 
-        let (mut origin, mut rotation) = (DVec3::ZERO, DMat3::IDENTITY);
-        for (index, joint) in self.joints.iter().enumerate() {
-            let coordinate = q.get(index).copied().unwrap_or(0.0);
-            let axis = rotation * joint.axis;
-            origin += rotation * joint.origin;
-            match joint.kind {
-                JointKind::Revolute => rotation *= DMat3::from_axis_angle(joint.axis, coordinate),
-                JointKind::Prismatic => origin += coordinate * axis,
-            }
-            pose.origins[index] = origin;
-            pose.rotations[index] = rotation;
-            pose.axes[index] = axis;
-        }
+        let links = self.links(q);
+        pose.origins.iter_mut().zip(links.origins).for_each(|(slot, origin)| *slot = origin);
+        pose.rotations.iter_mut().zip(links.rotations).for_each(|(slot, rotation)| *slot = rotation);
+        pose.axes.iter_mut().zip(links.axes).for_each(|(slot, axis)| *slot = axis);
         for (position, node) in pose.nodes.iter_mut().zip(&self.nodes) {
             *position = pose.origins[node.link] + pose.rotations[node.link] * node.position;
         }

@@ -5,11 +5,15 @@
 //! o_i += q_i R_(i-1) axis_i for a prismatic one. Nothing here allocates once a [`Pose`] has its size.
 
 mod chain;
+mod dynamics;
 mod gravity;
 mod inertia;
 mod jacobian;
+mod links;
 #[cfg(test)]
 mod random;
 
 pub use chain::{Chain, Joint, Node, Pose};
+pub use dynamics::Dynamics;
 pub use inertia::JointMatrix;
+pub use links::Links;

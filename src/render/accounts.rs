@@ -1,10 +1,15 @@
 //! Energy accounts of the haptic loop: who gave, who took, and whether anything came from nowhere.
 //!
 //! Over any sequence of steps T_k, the proxy with its coupling obeys to rounding
-//! `Delta(kinetic + spring) = coupling_work + field_work + stop_work - proxy_dissipation - coupling_dissipation`,
-//! so that `coupling_work + field_work >= 0` from rest: it never gives more than was put in (sections 3, 3.1).
-//! What the loop can still create lies outside this balance and is booked beside it: `leak`, by a torque field that
-//! is not exactly a gradient, and [`Accounts::hold_gain`], by holding the torque on the device between two ticks.
+//! `Delta(kinetic + spring + bristles) = coupling_work + channel_work + field_work + stop_work - proxy_dissipation -
+//! coupling_dissipation - friction_dissipation - contact_dissipation - control_dissipation`,
+//! so that `coupling_work + channel_work + field_work >= 0` from rest: it never gives more than was put in (sections 3,
+//! 3.1). Terms of effects that the scene does not name stay zero.
+//!
+//! *Passivity observers* (Hannaford and Ryu 2002) watch what the loop can still create, which lies outside this balance.
+//! At the object's port, [`Accounts::created`]: a torque field that is not exactly a gradient gives more than was stored. At
+//! the device's port, [`Accounts::device_port`]: the torque that is held between two ticks gives more than the hand put
+//! in ([`Accounts::hold_gain`]), which the device's own damping has to take.
 //!
 //! The device's end of the coupling moves in two ways. When y jumps from y_{k-1} to y_k with the proxy at x_k, the spring
 //! takes in `Kvc ((y_{k-1} + y_k)/2 - x_k) . (y_k - y_{k-1})`; during the step it is the damper's end that moves, at w_k,
@@ -24,6 +29,8 @@ pub struct Accounts {
     pub initial: f64,
     /// Work of the device's end of the coupling on the coupling, at the coupling's own torque.
     pub coupling_work: f64,
+    /// Work of the four-channel coupling's channels on the proxy.
+    pub channel_work: f64,
     /// Work of the contact torque on the proxy, sum of T v_hat . tau_bar.
     pub field_work: f64,
     /// Work of the joint stops on the proxy; never positive.
@@ -32,29 +39,63 @@ pub struct Accounts {
     pub proxy_dissipation: f64,
     /// Taken by the coupling's damping Bvc.
     pub coupling_dissipation: f64,
+    /// Kept in the bristles of contact friction.
+    pub bristles: f64,
+    /// Taken by contact friction.
+    pub friction_dissipation: f64,
+    /// Taken by contact damping.
+    pub contact_dissipation: f64,
+    /// Taken by the passivity controller at the object's port.
+    pub control_dissipation: f64,
     /// Energy U stored in the object, interpolated; zero for datasets without it.
     pub stored: f64,
+    /// What the object had stored at the first tick. Where the dataset does not tell: zero when the loop began out of
+    /// contact; else nothing is known until contact first ends, and what was given by then is taken for it.
+    pub first_stored: Option<f64>,
     /// Energy that the contact torque gave beyond what the object had stored, field_work + U - U_0; zero for datasets
     /// without energy.
     pub leak: f64,
     /// What the device's port took in: minus the sum of (torque on the device) . (device displacement).
     pub port_work: f64,
+    /// Least that the device's own damping bd took, sum of T bd w_k^2.
+    pub device_dissipation: f64,
     /// Sum of the magnitudes of everything booked: the scale of the rounding in [`Accounts::residual`].
     pub turnover: f64,
+}
+
+/// What acted on the proxy during a step beside coupling, contact torque and stops; zero where the scene names no such
+/// effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Extra {
+    /// Torque of the four-channel coupling's channels [N m].
+    pub channels: JointVector,
+    /// Work of contact friction on the proxy [J].
+    pub friction_work: f64,
+    /// Energy in the bristles after the step [J].
+    pub bristles: f64,
+    /// Taken by contact damping [J].
+    pub contact_dissipation: f64,
+    /// Taken by the passivity controller [J].
+    pub control_dissipation: f64,
 }
 
 impl Accounts {
     /// What the balance of proxy and coupling leaves unexplained: rounding, and nothing else [J].
     #[must_use]
     pub fn residual(&self) -> f64 {
-        let given = self.initial + self.coupling_work + self.field_work + self.stop_work;
-        given - self.proxy_dissipation - self.coupling_dissipation - self.kinetic - self.spring
+        let given = self.initial + self.absorbed() + self.stop_work;
+        let taken = self.proxy_dissipation
+            + self.coupling_dissipation
+            + self.friction_dissipation
+            + self.contact_dissipation
+            + self.control_dissipation;
+        given - taken - self.kinetic - self.spring - self.bristles
     }
 
     /// What the proxy and its coupling have taken in and not given back [J]: never less than `-initial`.
     #[must_use]
     pub fn absorbed(&self) -> f64 {
-        self.coupling_work + self.field_work
+        self.coupling_work + self.channel_work + self.field_work
     }
 
     /// Energy made by sampling: what reached the coupling beyond what the device's port took in [J]. Positive while
@@ -64,12 +105,42 @@ impl Accounts {
         self.coupling_work - self.port_work
     }
 
-    /// Books the device's move from y_{k-1} to y_k: the proxy is at `proxy` x_k, the device was under `held` torque.
+    /// The passivity observer of the device's port [J]: what there was at the beginning, and what came in through the port
+    /// or went into the device's own damping since. Negative: the hand has been given energy from nowhere. `None` while
+    /// it is not known what the object had stored at the beginning.
+    #[must_use]
+    pub fn device_port(&self) -> Option<f64> {
+        self.first_stored.map(|stored| self.initial + stored + self.port_work + self.device_dissipation)
+    }
+
+    /// The passivity observer of the object's port, turned round [J]: what the contact torque has given beyond what the
+    /// object had stored. Positive: energy from nowhere. With the dataset's energy U it is the leak; without, what is more
+    /// than the object can have had.
+    #[must_use]
+    pub fn created(&self) -> f64 {
+        self.first_stored.map_or(0.0, |first| self.field_work + self.stored - first)
+    }
+
+    /// Books the state at a tick: what the object has stored, if the dataset tells, and whether it is touched.
+    pub(super) fn at_tick(&mut self, kinetic: f64, spring: f64, stored: Option<f64>, touched: bool) {
+        self.kinetic = kinetic;
+        self.spring = spring;
+        self.stored = stored.unwrap_or(0.0);
+        if self.first_stored.is_none() {
+            self.first_stored = stored.or((!touched).then_some(self.field_work.max(0.0)));
+        }
+        if stored.is_some() {
+            self.leak = self.created();
+        }
+    }
+
+    /// Books the device's move from y_{k-1} to y_k in `elapsed` [s]: the proxy is at `proxy` x_k, the device was under
+    /// `held` torque.
     pub(super) fn device_moved(
         &mut self,
         coupling: &Coupling,
-        from: &JointVector,
-        to: &JointVector,
+        elapsed: f64,
+        [from, to]: [&JointVector; 2],
         proxy: &JointVector,
         held: &JointVector,
     ) {
@@ -78,12 +149,13 @@ impl Accounts {
             let work = coupling.stiffness[a] * (0.5 * (from[a] + to[a]) - proxy[a]) * moved;
             self.coupling_work += work;
             self.port_work -= held[a] * moved;
+            self.device_dissipation += coupling.device_damping[a] * moved * moved / elapsed;
             self.turnover += work.abs();
         }
     }
 
     /// Books a step of the proxy over `interval` T, the device's end of the damper moving at `velocity` w_k, under the
-    /// `contact` torque tau_bar.
+    /// `contact` torque tau_bar and what `extra` there was.
     pub(super) fn stepped(
         &mut self,
         coupling: &Coupling,
@@ -91,6 +163,7 @@ impl Accounts {
         velocity: &JointVector,
         contact: &JointVector,
         step: &Step,
+        extra: &Extra,
     ) {
         for a in 0..velocity.len() {
             let slip = velocity[a] - step.velocity[a];
@@ -98,13 +171,20 @@ impl Accounts {
             let heat = interval * coupling.damping[a] * slip * slip;
             let drag = interval * coupling.proxy_damping[a] * step.velocity[a] * step.velocity[a];
             let field = interval * contact[a] * step.velocity[a];
+            let channel = interval * extra.channels[a] * step.velocity[a];
             self.coupling_work += damper;
             self.coupling_dissipation += heat;
             self.proxy_dissipation += drag;
             self.field_work += field;
-            self.turnover += damper.abs() + heat + drag + field.abs();
+            self.channel_work += channel;
+            self.turnover += damper.abs() + heat + drag + field.abs() + channel.abs();
         }
         self.stop_work += step.stop_work;
-        self.turnover += step.stop_work.abs();
+        self.friction_dissipation += self.bristles - extra.bristles - extra.friction_work;
+        self.bristles = extra.bristles;
+        self.contact_dissipation += extra.contact_dissipation;
+        self.control_dissipation += extra.control_dissipation;
+        self.turnover +=
+            step.stop_work.abs() + extra.friction_work.abs() + extra.contact_dissipation + extra.control_dissipation;
     }
 }

@@ -3,10 +3,11 @@
 //! Device position y_k is read at t_k; `w_k = (y_k - y_{k-1})/T_{k-1}`. With `v_hat_{k-1} = (x_k - x_{k-1})/T_{k-1}`,
 //! `tau(t) = -bd ydot - Bvc (w_k - v_hat_{k-1}) - Kvc (y_k - x_k)`        on the device, held until t_{k+1};
 //! `tau_k  = -bv v_hat_k - Bvc (v_hat_k - w_k) - Kvc (x_hat_k - y_k)`     on the proxy, implicit in v_hat_k, x_hat_k.
-//! `bd ydot` is the damping that the device has of itself: it is no part of what the motors are told.
+//! `bd ydot` is the damping that the device has of itself: it is no part of what the motors are told. The alternative,
+//! four channels, adds to these torques (`channels.rs`).
 
 use super::npmi::Load;
-use crate::{JointVector, scene::HapticsSpec};
+use crate::{JointVector, MAX_JOINTS, scene::HapticsSpec};
 
 /// The coupling's gains, one per joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,13 +18,20 @@ pub struct Coupling {
     pub damping: JointVector,
     /// bv, between the proxy and the ground [N m s/rad].
     pub proxy_damping: JointVector,
+    /// bd, of the device itself [N m s/rad].
+    pub device_damping: JointVector,
 }
 
 impl Coupling {
     /// The gains of a scene.
     #[must_use]
     pub fn new(spec: &HapticsSpec) -> Self {
-        Self { stiffness: spec.coupling_stiffness, damping: spec.coupling_damping, proxy_damping: spec.proxy_damping }
+        Self {
+            stiffness: spec.coupling_stiffness,
+            damping: spec.coupling_damping,
+            proxy_damping: spec.proxy_damping,
+            device_damping: spec.device_damping,
+        }
     }
 
     /// Torque for the device at `position` y_k moving at `velocity` w_k, the proxy at `proxy` x_k having moved at
@@ -47,9 +55,9 @@ impl Coupling {
     /// What acts on the proxy: coupling, damping bv, and the `contact` torque tau_bar.
     #[must_use]
     pub fn proxy_load(&self, position: &JointVector, velocity: &JointVector, contact: &JointVector) -> Load {
-        let (mut damping, mut torque) = (self.proxy_damping, *contact);
+        let (mut damping, mut torque) = ([[0.0; MAX_JOINTS]; MAX_JOINTS], *contact);
         for a in 0..position.len() {
-            damping[a] += self.damping[a];
+            damping[a][a] = self.proxy_damping[a] + self.damping[a];
             torque[a] += self.damping[a] * velocity[a];
         }
         Load { stiffness: self.stiffness, target: *position, damping, torque }

@@ -4,17 +4,17 @@
 //! grid points `f_ex_bar(q) = share sum_c w_c f_ex(q_c)`, with the corners and weights of the torque and the factor that
 //! boundary layer and fade put on it, so that what is seen and what is felt stay `tau_bar = -sum_i J_i^T f`.
 //!
-//! *Motion.* Non-iterative passive mechanical integration with a constant time T between frames, u = n - n0:
-//! `(2M/T + B + (T/2) K) v_hat = (2M/T) v_k - K u_k + f`, `u_{k+1} = u_k + T v_hat`, `v_{k+1} = 2 v_hat - v_k`.
-//! The matrix is constant, symmetric and positive definite: factorised once. To rounding, for any T and stiffness,
-//! `Delta(1/2 v^T M v + 1/2 u^T K u) = T v_hat . f - T v_hat . B v_hat`: without forces energy never rises.
+//! *Smoothing*, where the scene names it: f_ex_bar passes a low-pass filter of time constant tau_s,
+//! `f_k = f_{k-1} + (1 - exp(-T/tau_s)) (f_ex_bar - f_{k-1})`. The object is passive towards the filtered forces.
 //!
-//! `ObjectMotion::load` and `ObjectMotion::advance` are the twins of the entry points in `shaders/frame.wgsl`.
+//! *Motion*: see [`ObjectMotion`].
 
+pub use super::object_motion::ObjectMotion;
 use super::stencil::{Lattice, LatticeError};
 use crate::{
     dataset::Dataset,
-    object::{Factor, FactorError, Object},
+    object::{FactorError, Object},
+    scene::GraphicsSpec,
 };
 use glam::DVec3;
 
@@ -89,79 +89,28 @@ impl ContactForces {
     }
 }
 
-/// The object in motion: displacements and velocities of all its nodes.
-pub struct ObjectMotion<'object> {
-    object: &'object Object,
-    factor: Factor,
-    period: f64,
-    /// u [m].
-    displacement: Vec<DVec3>,
-    /// v [m/s].
-    velocity: Vec<DVec3>,
-    /// Right-hand side, then v_hat.
-    right: Vec<DVec3>,
+/// A low-pass filter on the contact forces.
+#[derive(Clone, Debug)]
+pub struct Smoothing {
+    /// 1 - exp(-T/tau_s).
+    share: f64,
+    /// [N]
+    filtered: Vec<DVec3>,
 }
 
-impl<'object> ObjectMotion<'object> {
-    /// `object` at rest, to be moved by `period` T [s] at a time.
-    ///
-    /// # Errors
-    /// When `period` is not positive, or there is no memory for the factor.
-    pub fn new(object: &'object Object, period: f64) -> Result<Self, GraphicsError> {
-        if !(period > 0.0 && period.is_finite()) {
-            return Err(GraphicsError::Period(period));
-        }
-        let diagonal: Vec<f64> = object.mass.iter().zip(&object.damping).map(|(m, b)| 2.0 * m / period + b).collect();
-        let factor = Factor::of(&object.stiffness, 0.5 * period, &diagonal)?;
-        let zero = vec![DVec3::ZERO; object.rest.len()];
-        Ok(Self { object, factor, period, displacement: zero.clone(), velocity: zero.clone(), right: zero })
-    }
-
-    /// T [s].
+impl Smoothing {
+    /// A filter of `time_constant` tau_s [s], for frames every `period` T [s] of `nodes` nodes; zero at first.
     #[must_use]
-    pub fn period(&self) -> f64 {
-        self.period
+    pub fn new(time_constant: f64, period: f64, nodes: usize) -> Self {
+        Self { share: -(-period / time_constant).exp_m1(), filtered: vec![DVec3::ZERO; nodes] }
     }
 
-    /// Node positions n = n0 + u [m].
-    pub fn nodes(&self) -> impl ExactSizeIterator<Item = DVec3> {
-        self.object.rest.iter().zip(&self.displacement).map(|(rest, u)| rest + u)
-    }
-
-    /// Displacements u [m].
-    #[must_use]
-    pub fn displacement(&self) -> &[DVec3] {
-        &self.displacement
-    }
-
-    /// Velocities v [m/s].
-    #[must_use]
-    pub fn velocity(&self) -> &[DVec3] {
-        &self.velocity
-    }
-
-    /// One frame under `forces`, one per node [N]. Returns v_hat [m/s].
-    pub fn step(&mut self, forces: &[DVec3]) -> &[DVec3] {
-        self.load(forces);
-        self.advance();
-        &self.right
-    }
-
-    /// Right-hand side (2M/T) v - K u + f.
-    fn load(&mut self, forces: &[DVec3]) {
-        self.object.stiffness.apply(&self.displacement, &mut self.right);
-        for (node, right) in self.right.iter_mut().enumerate() {
-            *right = forces[node] + (2.0 * self.object.mass[node] / self.period) * self.velocity[node] - *right;
+    /// The filtered forces one frame later, `forces` having acted [N].
+    pub fn toward(&mut self, forces: &[DVec3]) -> &[DVec3] {
+        for (filtered, force) in self.filtered.iter_mut().zip(forces) {
+            *filtered += self.share * (*force - *filtered);
         }
-    }
-
-    /// v_hat from the right-hand side, and the new state.
-    fn advance(&mut self) {
-        self.factor.solve(&mut self.right);
-        for (node, v_hat) in self.right.iter().enumerate() {
-            self.displacement[node] += self.period * v_hat;
-            self.velocity[node] = 2.0 * v_hat - self.velocity[node];
-        }
+        &self.filtered
     }
 }
 
@@ -170,23 +119,30 @@ pub struct Graphics<'object> {
     contact: ContactForces,
     motion: ObjectMotion<'object>,
     forces: Vec<DVec3>,
+    smoothing: Option<Smoothing>,
 }
 
 impl<'object> Graphics<'object> {
-    /// `object`, deformed by the forces of `dataset`, at `rate` frames a second [Hz].
+    /// `object`, deformed by the forces of `dataset`, at the rate and with the effects of `spec`.
     ///
     /// # Errors
     /// When forces, object and rate do not make a loop.
-    pub fn new(dataset: &Dataset, object: &'object Object, rate: f64) -> Result<Self, GraphicsError> {
-        let contact = ContactForces::new(dataset, object.rest.len())?;
-        let motion = ObjectMotion::new(object, 1.0 / rate)?;
-        Ok(Self { contact, motion, forces: vec![DVec3::ZERO; object.rest.len()] })
+    pub fn new(dataset: &Dataset, object: &'object Object, spec: &GraphicsSpec) -> Result<Self, GraphicsError> {
+        let nodes = object.rest.len();
+        let contact = ContactForces::new(dataset, nodes)?;
+        let motion = ObjectMotion::new(object, 1.0 / spec.rate, &spec.effects)?;
+        let smoothing = spec.effects.smoothing.map(|time| Smoothing::new(time, motion.period(), nodes));
+        Ok(Self { contact, motion, forces: vec![DVec3::ZERO; nodes], smoothing })
     }
 
     /// One frame with the proxy at `q`, where the field puts `share` on the dataset's torque; zero out of contact.
     pub fn frame(&mut self, q: &[f64], share: f64) {
         self.contact.interpolate(q, share, &mut self.forces);
-        self.motion.step(&self.forces);
+        let forces = match &mut self.smoothing {
+            Some(smoothing) => smoothing.toward(&self.forces),
+            None => &self.forces,
+        };
+        self.motion.step(forces);
     }
 
     /// The object as it is now.

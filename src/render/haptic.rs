@@ -3,34 +3,44 @@
 //!
 //! At t_k: check the device's position; coupling torque for the device from y_k and x_k; contact torque tau_bar(x_k) from
 //! the dataset; one NPMI step of the proxy to x_{k+1}; energy accounts. The device's torque is limited in size, and in
-//! rate against the torque before it. On a fault (see [`Fault`]) its goal is zero, which it reaches at the greatest rate,
-//! without a jump; the proxy stays tied to the last good position meanwhile, and the loop goes on when the fault ends.
+//! rate against the torque before it. On a fault (see [`Watchdog`]) its goal is zero, which it reaches at the greatest rate,
+//! without a jump; the fault stays, the proxy tied to the last good position, until [`Haptics::restart`]. So it is when the
+//! passivity observer of the device's port finds that the hand has been given energy from nowhere ([`Fault::Energy`]).
+//!
+//! What the scene may name beside (channels, controller, effects at contacts) is decided once, in [`Haptics::new`] and
+//! [`Haptics::with_effects`]; what it does not name has no state and does no work.
 
 use super::{
-    accounts::Accounts,
+    accounts::{Accounts, Extra},
+    channels::{ChannelState, Channels},
+    control::PassivityControl,
     coupling::Coupling,
+    effects::{ContactEffects, EffectState},
     field::{Sample, TorqueField},
     flags::{Fault, Flags},
+    held::Held,
     npmi::{Motion, Npmi},
+    watchdog::{self, Watchdog},
 };
-use crate::{
-    JointVector,
-    scene::HapticsSpec,
-    tolerances::{GREATEST_INPUT, GREATEST_INTERVAL, GREATEST_POSITION_AGE, LEAST_INTERVAL},
-};
+use crate::{JointVector, scene::HapticsSpec, tolerances::GREATEST_GIVEN_ENERGY};
 
 /// Everything of the haptic loop that does not change from tick to tick.
 pub struct Haptics {
     field: TorqueField,
     npmi: Npmi,
     coupling: Coupling,
+    /// Absent unless the scene names them.
+    channels: Option<Channels>,
+    control: Option<PassivityControl>,
+    effects: Option<ContactEffects>,
+    watchdog: Watchdog,
     torque_limit: JointVector,
     torque_rate_limit: JointVector,
     period: f64,
 }
 
 /// What one tick hands to the next.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct State {
     /// Proxy.
     motion: Motion,
@@ -38,13 +48,13 @@ pub struct State {
     proxy_velocity: JointVector,
     /// Last good device position y [rad or m].
     device: JointVector,
-    /// Torque on the device since the last tick [N m or N].
-    torque: JointVector,
-    /// Whether the last tick had a fault.
-    faulty: bool,
-    /// U at the first tick [J].
-    first_stored: Option<f64>,
+    /// Torques on the device.
+    held: Held,
+    /// The first fault since the loop began.
+    fault: Option<Fault>,
     accounts: Accounts,
+    channels: Option<ChannelState>,
+    effects: Option<EffectState>,
 }
 
 /// What a tick is told.
@@ -73,7 +83,7 @@ pub struct Output {
     pub sample: Sample,
     /// The field's remarks and the loop's.
     pub flags: Flags,
-    /// Why the torque is being brought to zero, if it is.
+    /// Why the torque is being brought to zero or has been, if so.
     pub fault: Option<Fault>,
     /// At t_k.
     pub accounts: Accounts,
@@ -99,13 +109,49 @@ impl Haptics {
     pub fn new(field: TorqueField, npmi: Npmi, spec: &HapticsSpec) -> Result<Self, JointsError> {
         let coupling = Coupling::new(spec);
         let (torque_limit, torque_rate_limit) = (spec.torque_limit, spec.torque_rate_limit);
-        let lists = [coupling.stiffness, coupling.damping, coupling.proxy_damping, torque_limit, torque_rate_limit]
-            .map(|v| v.len());
+        let lists = [
+            coupling.stiffness,
+            coupling.damping,
+            coupling.proxy_damping,
+            coupling.device_damping,
+            spec.device_inertia,
+            torque_limit,
+            torque_rate_limit,
+            spec.speed_limit,
+        ];
+        let lists = lists.map(|list| list.len());
         let gains = lists.into_iter().find(|&len| len != field.joints()).unwrap_or(lists[0]);
         if gains != field.joints() || npmi.joints() != field.joints() {
             return Err(JointsError { field: field.joints(), proxy: npmi.joints(), gains });
         }
-        Ok(Self { field, npmi, coupling, torque_limit, torque_rate_limit, period: 1.0 / spec.rate })
+        let period = 1.0 / spec.rate;
+        let watchdog = Watchdog::new(period, spec.speed_limit);
+        let channels = spec.effects.four_channel.map(|channels| Channels::new(channels, spec));
+        let control = PassivityControl::new(spec);
+        Ok(Self {
+            field,
+            npmi,
+            coupling,
+            channels,
+            control,
+            effects: None,
+            watchdog,
+            torque_limit,
+            torque_rate_limit,
+            period,
+        })
+    }
+
+    /// The same loop with `effects` at the contacts.
+    #[must_use]
+    pub fn with_effects(self, effects: Option<ContactEffects>) -> Self {
+        Self { effects, ..self }
+    }
+
+    /// The effects at the contacts, if the scene names any.
+    #[must_use]
+    pub fn effects(&self) -> Option<&ContactEffects> {
+        self.effects.as_ref()
     }
 
     /// Number of joints d.
@@ -131,89 +177,151 @@ impl Haptics {
     /// # Errors
     /// When `position` is not a position of the device.
     pub fn start(&self, position: &JointVector) -> Result<State, Fault> {
-        self.check_position(position)?;
-        let motion =
-            Motion { position: self.npmi.within_limits(position), velocity: JointVector::zeros(self.joints()) };
-        let initial = self.coupling.spring_energy(&motion.position, position);
-        Ok(State {
-            motion,
-            proxy_velocity: JointVector::zeros(self.joints()),
+        self.watchdog.check_position(position)?;
+        let joints = self.joints();
+        let mut state = State {
+            motion: Motion::at_rest(position),
+            proxy_velocity: JointVector::zeros(joints),
             device: *position,
-            torque: JointVector::zeros(self.joints()),
-            faulty: false,
-            first_stored: None,
-            accounts: Accounts { initial, ..Accounts::default() },
-        })
+            held: Held::new(joints, self.period),
+            fault: None,
+            accounts: Accounts::default(),
+            channels: None,
+            effects: self.effects.as_ref().map(ContactEffects::start),
+        };
+        self.begin(&mut state, position);
+        Ok(state)
+    }
+
+    /// Ends a fault: begins anew at `position` as [`Haptics::start`] does, accounts included, but from the torque that the
+    /// device is under, so that there is no jump. Never allocates.
+    ///
+    /// # Errors
+    /// When `position` is not a position of the device; the fault then stays.
+    pub fn restart(&self, state: &mut State, position: &JointVector) -> Result<(), Fault> {
+        self.watchdog.check_position(position)?;
+        self.begin(state, position);
+        Ok(())
+    }
+
+    /// Device and proxy at rest at `position`.
+    fn begin(&self, state: &mut State, position: &JointVector) {
+        state.motion = Motion::at_rest(&self.npmi.within_limits(position));
+        state.proxy_velocity = JointVector::zeros(self.joints());
+        state.device = *position;
+        state.fault = None;
+        let initial = self.coupling.spring_energy(&state.motion.position, position);
+        state.accounts = Accounts { initial, ..Accounts::default() };
+        state.channels = self.channels.as_ref().map(Channels::start);
+        if let Some(effects) = &mut state.effects {
+            effects.release();
+        }
     }
 
     /// One tick.
     pub fn tick(&self, state: &mut State, inputs: &Inputs) -> Output {
-        let fault = self.check(inputs).err();
+        let mut fault = state.fault.or_else(|| self.watchdog.check(inputs, &state.device).err());
         let mut velocity = JointVector::zeros(self.joints());
+        let proxy = state.motion.position;
         if fault.is_none() {
-            // After a fault the last good position is older than one tick: no velocity can be told from it.
-            if !state.faulty {
-                for (a, velocity) in velocity.iter_mut().enumerate() {
-                    *velocity = (inputs.position[a] - state.device[a]) / inputs.elapsed;
-                }
+            for (a, velocity) in velocity.iter_mut().enumerate() {
+                *velocity = (inputs.position[a] - state.device[a]) / inputs.elapsed;
             }
-            let proxy = &state.motion.position;
-            state.accounts.device_moved(&self.coupling, &state.device, &inputs.position, proxy, &state.torque);
+            let moved = [&state.device, &inputs.position];
+            let torque = state.held.before(inputs.age);
+            state.accounts.device_moved(&self.coupling, inputs.elapsed, moved, &proxy, torque);
             state.device = inputs.position;
         }
-        state.faulty = fault.is_some();
-
-        let proxy = state.motion.position;
-        let wanted = match fault {
-            None => self.coupling.device_torque(&state.device, &velocity, &proxy, &state.proxy_velocity),
-            Some(_) => JointVector::zeros(self.joints()),
-        };
-        let elapsed = if fault.is_none() { inputs.elapsed } else { self.period };
-        let (torque, limited) = self.limit(&wanted, &state.torque, elapsed);
-        state.torque = torque;
-
         let sample = self.field.sample(&proxy);
-        let accounts = &mut state.accounts;
-        accounts.kinetic = self.npmi.kinetic_energy(&state.motion.velocity);
-        accounts.spring = self.coupling.spring_energy(&proxy, &state.device);
-        accounts.stored = sample.energy;
-        if self.field.has_energy() {
-            accounts.leak = accounts.field_work + sample.energy - *state.first_stored.get_or_insert(sample.energy);
+        let stored = self.field.has_energy().then_some(sample.energy);
+        let spring = self.coupling.spring_energy(&proxy, &state.device);
+        state.accounts.at_tick(state.motion.kinetic_energy(), spring, stored, sample.index > 0.0);
+        let accounts = state.accounts;
+        if fault.is_none() && accounts.device_port().is_some_and(|port| port < -GREATEST_GIVEN_ENERGY) {
+            fault = Some(Fault::Energy);
         }
-        let accounts_now = *accounts;
 
-        let interval = if is_interval(inputs.interval) { inputs.interval } else { self.period };
-        let load = self.coupling.proxy_load(&state.device, &velocity, &sample.torque);
-        let step = self.npmi.step(&mut state.motion, interval, &load);
-        state.proxy_velocity = step.velocity;
-        state.accounts.stepped(&self.coupling, interval, &velocity, &sample.torque, &step);
+        let mut wanted = JointVector::zeros(self.joints());
+        if fault.is_none() {
+            let torque = self.device_torque(state, inputs, &velocity, &sample);
+            if torque.is_finite() {
+                wanted = torque;
+            } else {
+                fault = Some(Fault::Torque);
+            }
+        }
+        state.fault = fault;
+        let elapsed = if fault.is_none() { inputs.elapsed } else { self.period };
+        let (torque, limited) = self.limit(&wanted, state.held.now(), elapsed);
+        state.held.push(&torque);
 
-        let stopped = if step.stopped.contains(&true) { Flags::STOPPED } else { Flags::empty() };
+        let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
+        let stopped = self.move_proxy(state, interval, &velocity, &sample);
         Output {
             torque,
             device: state.device,
             proxy,
             sample,
-            flags: sample.flags | limited | stopped,
+            flags: sample.flags | limited | if stopped { Flags::STOPPED } else { Flags::empty() },
             fault,
-            accounts: accounts_now,
+            accounts,
         }
     }
 
-    fn check(&self, inputs: &Inputs) -> Result<(), Fault> {
-        self.check_position(&inputs.position)?;
-        if inputs.age > GREATEST_POSITION_AGE || inputs.age.is_nan() {
-            return Err(Fault::Stale);
+    /// What the device should be told, moving at `velocity`: coupling, channels, controller [N m or N].
+    fn device_torque(
+        &self,
+        state: &mut State,
+        inputs: &Inputs,
+        velocity: &JointVector,
+        sample: &Sample,
+    ) -> JointVector {
+        let mut torque =
+            self.coupling.device_torque(&state.device, velocity, &state.motion.position, &state.proxy_velocity);
+        if let (Some(channels), Some(memory)) = (&self.channels, &mut state.channels) {
+            let held = state.held.before(inputs.age);
+            channels.observe(memory, inputs.elapsed, velocity, &state.proxy_velocity, held);
+            let added = channels.device_torque(memory, &sample.torque);
+            torque.iter_mut().zip(added.iter()).for_each(|(torque, added)| *torque += added);
         }
-        if is_interval(inputs.elapsed) && is_interval(inputs.interval) { Ok(()) } else { Err(Fault::Interval) }
+        if let Some(control) = &self.control {
+            control.brake_device(&state.accounts, inputs.elapsed, velocity, &mut torque);
+        }
+        torque
     }
 
-    fn check_position(&self, position: &JointVector) -> Result<(), Fault> {
-        if position.len() != self.joints() {
-            return Err(Fault::Joints);
+    /// One step of the proxy over `interval` [s], booked; whether it ended at a limit. The device moves at `velocity`.
+    fn move_proxy(&self, state: &mut State, interval: f64, velocity: &JointVector, sample: &Sample) -> bool {
+        let stage = self.npmi.stage(&state.motion, interval);
+        let mut load = self.coupling.proxy_load(&state.device, velocity, &sample.torque);
+        let mut extra = Extra {
+            channels: JointVector::zeros(self.joints()),
+            friction_work: 0.0,
+            bristles: 0.0,
+            contact_dissipation: 0.0,
+            control_dissipation: 0.0,
+        };
+        // After a fault nothing is known of the hand any more: its channel falls silent.
+        if let (Some(channels), Some(memory), None) = (&self.channels, &state.channels, state.fault) {
+            extra.channels = channels.proxy_torque(memory, &stage);
+            load.torque.iter_mut().zip(extra.channels.iter()).for_each(|(torque, added)| *torque += added);
         }
-        // Comparisons are false for what is not a number.
-        if position.iter().all(|y| y.abs() <= GREATEST_INPUT) { Ok(()) } else { Err(Fault::NotFinite) }
+        let mut rate = 0.0;
+        if let Some(control) = &self.control {
+            rate = control.proxy_rate(&state.accounts, interval, &state.motion);
+            stage.add_inertia(rate, &mut load.damping);
+        }
+        let step = match (&self.effects, &mut state.effects) {
+            (Some(effects), Some(memory)) => {
+                let share = if sample.contact { sample.share } else { 0.0 };
+                effects.step(&self.npmi, &stage, memory, &mut state.motion, interval, &load, share, &mut extra)
+            }
+            _ => self.npmi.advance(&stage, &mut state.motion, interval, &load),
+        };
+        extra.control_dissipation = interval * rate * stage.twice_kinetic_energy(&step.velocity);
+        state.proxy_velocity = step.velocity;
+        state.accounts.stepped(&self.coupling, interval, velocity, &sample.torque, &step, &extra);
+        step.stopped.contains(&true)
     }
 
     /// `wanted`, limited in size and in rate of change from `before` over `elapsed` [s].
@@ -234,14 +342,16 @@ impl Haptics {
     }
 }
 
-fn is_interval(seconds: f64) -> bool {
-    (LEAST_INTERVAL..=GREATEST_INTERVAL).contains(&seconds)
-}
-
 impl State {
     /// Proxy position x at the next tick [rad or m].
     #[must_use]
     pub fn proxy(&self) -> &JointVector {
         &self.motion.position
+    }
+
+    /// The first fault since the loop began or was restarted.
+    #[must_use]
+    pub fn fault(&self) -> Option<Fault> {
+        self.fault
     }
 }

@@ -2,20 +2,27 @@
 
 pub mod accounts;
 pub mod boundary;
-mod clock;
+pub mod channels;
+pub(crate) mod clock;
+pub mod control;
 pub mod coupling;
+pub mod effects;
 pub mod field;
 pub mod flags;
 pub mod graphics;
 pub mod haptic;
+mod held;
 pub mod npmi;
+pub mod object_motion;
 pub mod passivity;
 pub mod realtime;
+pub mod recording;
 pub mod session;
 pub mod setup;
 pub mod stencil;
 pub mod timing;
 pub mod trace;
+pub mod watchdog;
 
 #[cfg(test)]
 use crate as engine;

@@ -1,75 +1,138 @@
-//! Which gains are safe: passivity bounds of the loop, computed before it starts, with the value that would do.
+//! Which gains are safe: passivity bounds of the loop, computed from the scene before it starts, with the value that would
+//! do.
 //!
 //! - Boundary layer and object, per joint: `Ks <= mu bv / T` (section 3.1); by the discrete energy balance of the step it
-//!   is sharp at mu = 2 (`npmi.rs`). The same bound holds for the stiffness of the dataset's torque itself.
-//! - Coupling, per joint, against the device's own damping: Colgate's wall, `bd > Kvc T/2 + |Bvc|`. It does without the
-//!   hand; a hand that holds the device adds its damping to bd.
+//!   is sharp at mu = 2 (`npmi/mod.rs`). The same bound holds for the stiffness of the dataset's torque itself.
+//! - Device, per joint, against its own damping: Colgate's wall, `bd > K T/2 + |Bvc|`, with `K = Kvc`, and `Kvc + c2 Ks` where
+//!   four channels hand the object's stiffness to the device. It does without the hand; a hand that holds the device adds
+//!   its damping to bd.
+//! - Encoder, per joint, where its step Delta is told: `K <= 2 fc / Delta`, fc the device's dry friction (Diolaiti,
+//!   Niemeyer, Barbagli and Salisbury 2006; Abbott and Okamura 2005).
 
 use super::{field::TorqueField, trace::JointLabel};
 use crate::scene::HapticsSpec;
+use serde::Serialize;
 
-/// A gain beyond its passivity bound: the loop runs, and may create energy.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Exceeded {
-    /// What is too large, in words, with its joint.
+/// A gain and its passivity bound. Beyond it the loop runs, and may create energy.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Bound {
+    /// What is bounded, in words, with its joint.
     pub what: String,
     /// Its value [N m/rad; 1 for a ratio].
     pub value: f64,
     /// Largest value that is safe, in the same unit.
     pub safe: f64,
-    /// How to make it so.
+    /// How to come below the bound.
     pub remedy: String,
 }
 
-impl std::fmt::Display for Exceeded {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} is {:.4}, beyond the passive {:.4}: {}", self.what, self.value, self.safe, self.remedy)
+impl Bound {
+    /// Whether the value is beyond the bound.
+    #[must_use]
+    pub fn is_exceeded(&self) -> bool {
+        self.value > self.safe
     }
 }
 
-/// All gains of `spec` that exceed their bound, with `field` and the names of the joints.
+impl std::fmt::Display for Bound {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.is_exceeded() {
+            write!(f, "{} is {:.4}, beyond the passive {:.4}: {}", self.what, self.value, self.safe, self.remedy)
+        } else {
+            write!(f, "{} is {:.4}, within the passive {:.4}", self.what, self.value, self.safe)
+        }
+    }
+}
+
+/// Greatest passive slope Ks of the boundary layer at `joint`, mu bv / T [N m/rad].
 #[must_use]
-pub fn exceeded(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) -> Vec<Exceeded> {
+pub fn greatest_slope(spec: &HapticsSpec, joint: usize) -> f64 {
+    spec.passivity_factor * spec.proxy_damping[joint] * spec.rate
+}
+
+/// Greatest passive stiffness Kvc of the coupling at `joint`, the device in nobody's hand [N m/rad].
+#[must_use]
+pub fn greatest_stiffness(spec: &HapticsSpec, joint: usize) -> f64 {
+    let encoder = if spec.encoder_step[joint] > 0.0 { encoder_bound(spec, joint) } else { f64::INFINITY };
+    (wall_bound(spec, joint).min(encoder) - handed_stiffness(spec, joint)).max(0.0)
+}
+
+/// Colgate's wall, 2 (bd - Bvc) / T [N m/rad].
+fn wall_bound(spec: &HapticsSpec, joint: usize) -> f64 {
+    (2.0 * (spec.device_damping[joint] - spec.coupling_damping[joint]) * spec.rate).max(0.0)
+}
+
+/// 2 fc / Delta [N m/rad], for an encoder whose step is told.
+fn encoder_bound(spec: &HapticsSpec, joint: usize) -> f64 {
+    2.0 * spec.device_friction[joint] / spec.encoder_step[joint]
+}
+
+/// c2 Ks, the stiffness of the object that four channels hand to the device; none without them [N m/rad].
+fn handed_stiffness(spec: &HapticsSpec, joint: usize) -> f64 {
+    spec.effects.four_channel.map_or(0.0, |channels| channels.channels[1] * spec.boundary_slope[joint])
+}
+
+/// All bounds on the gains of `spec`, with `field` and the names of the joints.
+#[must_use]
+pub fn bounds(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) -> Vec<Bound> {
     let period = 1.0 / spec.rate;
     let mut found = Vec::new();
     let mut safe_slopes = spec.proxy_damping;
     for (a, joint) in joints.iter().enumerate().take(field.joints()) {
-        let slope = spec.passivity_factor * spec.proxy_damping[a] / period;
+        let (torque, angle) = if joint.unit == "m" { ("N", "m") } else { ("N m", "rad") };
+        let slope = greatest_slope(spec, a);
         safe_slopes[a] = slope;
-        if spec.boundary_slope[a] > slope {
-            found.push(Exceeded {
-                what: format!("boundary slope Ks of joint {}", joint.name),
-                value: spec.boundary_slope[a],
-                safe: slope,
+        found.push(Bound {
+            what: format!("boundary slope Ks of joint {}", joint.name),
+            value: spec.boundary_slope[a],
+            safe: slope,
+            remedy: format!(
+                "lower Ks to {slope:.4} {torque}/{angle}, or raise the proxy's damping bv to {:.4} {torque} s/{angle}",
+                spec.boundary_slope[a] * period / spec.passivity_factor
+            ),
+        });
+        let stiffness = spec.coupling_stiffness[a] + handed_stiffness(spec, a);
+        let name = if spec.effects.four_channel.is_some() {
+            "stiffness Kvc + c2 Ks on the device"
+        } else {
+            "coupling stiffness Kvc"
+        };
+        found.push(Bound {
+            what: format!("{name} of joint {}", joint.name),
+            value: stiffness,
+            safe: wall_bound(spec, a),
+            remedy: format!(
+                "lower it, or give the device a damping bd of {:.4} {torque} s/{angle} (a hand on the device adds to it)",
+                0.5 * stiffness * period + spec.coupling_damping[a]
+            ),
+        });
+        if spec.encoder_step[a] > 0.0 {
+            found.push(Bound {
+                what: format!("{name} of joint {}, against the encoder's step,", joint.name),
+                value: stiffness,
+                safe: encoder_bound(spec, a),
                 remedy: format!(
-                    "lower Ks to {slope:.4} N m/rad, or raise the proxy's damping bv to {:.4} N m s/rad",
-                    spec.boundary_slope[a] * period / spec.passivity_factor
-                ),
-            });
-        }
-        let stiffness = 2.0 * (spec.device_damping[a] - spec.coupling_damping[a]) / period;
-        if spec.coupling_stiffness[a] > stiffness {
-            found.push(Exceeded {
-                what: format!("coupling stiffness Kvc of joint {}", joint.name),
-                value: spec.coupling_stiffness[a],
-                safe: stiffness.max(0.0),
-                remedy: format!(
-                    "lower it, or give the device a damping bd of {:.4} N m s/rad (a hand on the device adds to it)",
-                    0.5 * spec.coupling_stiffness[a] * period + spec.coupling_damping[a]
+                    "lower it, or take an encoder of {:.2e} {angle} for the device's friction of {:.4} {torque}",
+                    2.0 * spec.device_friction[a] / stiffness,
+                    spec.device_friction[a]
                 ),
             });
         }
     }
     if safe_slopes.iter().all(|slope| *slope > 0.0) {
         let ratio = field.relative_stiffness(&safe_slopes);
-        if ratio > 1.0 {
-            found.push(Exceeded {
-                what: "stiffness of the dataset's torque over mu bv / T".into(),
-                value: ratio,
-                safe: 1.0,
-                remedy: format!("raise the proxy's damping bv {ratio:.2}-fold, or keep to a slope Ks that is passive"),
-            });
-        }
+        found.push(Bound {
+            what: "stiffness of the dataset's torque over mu bv / T".into(),
+            value: ratio,
+            safe: 1.0,
+            remedy: format!("raise the proxy's damping bv {ratio:.2}-fold, or keep to a slope Ks that is passive"),
+        });
     }
     found
+}
+
+/// The bounds that are exceeded.
+#[must_use]
+pub fn exceeded(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) -> Vec<Bound> {
+    bounds(spec, field, joints).into_iter().filter(Bound::is_exceeded).collect()
 }

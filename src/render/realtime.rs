@@ -9,12 +9,15 @@ use super::{
     graphics::Graphics,
     haptic::Haptics,
     session::{Driver, Frames, Latest, Plan, SessionError},
-    timing::{Durations, Timing},
+    timing::{Durations, Percentiles, Timing},
     trace::{Frame, Tick, Trace},
 };
 use crate::device::Device;
 use std::{
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     thread,
     time::Duration,
 };
@@ -24,6 +27,9 @@ const RING: usize = 4096;
 
 /// How often the recorder empties the ring.
 const RECORDER_PERIOD: Duration = Duration::from_millis(5);
+
+/// How often the graphics thread looks for the first tick.
+const FIRST_TICK_PERIOD: Duration = Duration::from_millis(1);
 
 /// The haptic thread's body: everything that a tick touches, allocated beforehand.
 pub struct HapticLoop<'session> {
@@ -40,6 +46,7 @@ pub struct HapticLoop<'session> {
     next: u32,
     missed: u64,
     unrecorded: u64,
+    clear: Arc<AtomicBool>,
 }
 
 /// The other ends of a [`HapticLoop`].
@@ -48,6 +55,20 @@ pub struct Ends {
     pub ticks: rtrb::Consumer<Tick>,
     /// The latest tick.
     pub latest: triple_buffer::Output<Latest>,
+    /// Clears a fault.
+    pub clear: ClearFault,
+}
+
+/// A way to clear the haptic loop's fault from any thread: its next tick begins anew where the device is, unless the
+/// device still fails.
+#[derive(Clone, Debug)]
+pub struct ClearFault(Arc<AtomicBool>);
+
+impl ClearFault {
+    /// Asks for it. Never waits.
+    pub fn ask(&self) {
+        self.0.store(true, Ordering::Release);
+    }
 }
 
 impl<'session> HapticLoop<'session> {
@@ -60,7 +81,8 @@ impl<'session> HapticLoop<'session> {
         let (recorder, ticks) = rtrb::RingBuffer::new(RING);
         let start = crate::JointVector::zeros(haptics.joints());
         let (latest, reader) =
-            triple_buffer::triple_buffer(&Latest { time: 0.0, proxy: start, device: start, share: 0.0 });
+            triple_buffer::triple_buffer(&Latest { time: -1.0, proxy: start, device: start, share: 0.0 });
+        let clear = Arc::new(AtomicBool::new(false));
         let histogram = || Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()));
         let this = Self {
             driver,
@@ -74,8 +96,9 @@ impl<'session> HapticLoop<'session> {
             next: 0,
             missed: 0,
             unrecorded: 0,
+            clear: Arc::clone(&clear),
         };
-        Ok((this, Ends { ticks, latest: reader }))
+        Ok((this, Ends { ticks, latest: reader, clear: ClearFault(clear) }))
     }
 
     /// Waits for the next deadline and does its tick. Allocates, locks and prints nothing.
@@ -93,6 +116,9 @@ impl<'session> HapticLoop<'session> {
         let elapsed = self.last.map_or(self.period, |last| now - last);
         let interval = (self.began + self.period * self.next).saturating_sub(now);
         self.last = Some(now);
+        if self.clear.swap(false, Ordering::Acquire) {
+            self.driver.clear_fault();
+        }
         let (tick, latest) = self.driver.tick(elapsed.as_secs_f64(), interval.as_secs_f64());
         self.cost.record(clock::now() - now);
         self.latest.write(latest);
@@ -117,7 +143,8 @@ pub fn run(
     graphics: Option<&mut Graphics<'_>>,
     plan: &Plan,
 ) -> Result<(Trace, Timing), SessionError> {
-    let (mut body, Ends { mut ticks, latest }) = HapticLoop::new(haptics, device)?;
+    let (mut body, Ends { mut ticks, latest, .. }) = HapticLoop::new(haptics, device)?;
+    let start = *body.driver.start();
     let frame_cost = Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()))?;
     let mut recorded = plan.new_ticks()?;
     let over = AtomicBool::new(false);
@@ -161,7 +188,7 @@ pub fn run(
         let drawn = drawing.map(|thread| thread.join().map_err(|_| SessionError::Thread("graphics"))).transpose()?;
         clock::unlock_memory();
         let (refused, lateness, cost, missed_deadlines, unrecorded) = felt;
-        let (frames, frame_cost, missed_frames) = drawn.unwrap_or_default();
+        let Drawn { frames, shown, cost: frame_cost, missed: missed_frames } = drawn.unwrap_or_default();
         let timing = Timing {
             refused,
             lateness: lateness.percentiles(),
@@ -172,18 +199,30 @@ pub fn run(
             missed_frames,
             unrecorded,
         };
-        Ok((Trace { joints: plan.joints.clone(), ticks: recorded, frames }, timing))
+        Ok((Trace { joints: plan.joints.clone(), start, ticks: recorded, frames, shown }, timing))
     })
 }
 
-/// The graphics thread: a frame whenever one is due, until the session is over. When it falls behind by more than a frame
-/// it draws the frames that it owes, without waiting: the object's time must not slow down.
+/// What the graphics thread leaves.
+#[derive(Default)]
+struct Drawn {
+    frames: Vec<Frame>,
+    shown: Vec<f64>,
+    cost: Percentiles,
+    missed: u64,
+}
+
+/// The graphics thread: a frame whenever one is due, from the first tick on, until the session is over. When it falls behind
+/// by more than a frame it draws the frames that it owes, without waiting: the object's time must not slow down.
 fn draw(
     mut frames: Frames<'_, '_>,
     mut latest: triple_buffer::Output<Latest>,
     mut cost: Durations,
     over: &AtomicBool,
-) -> (Vec<Frame>, super::timing::Percentiles, u64) {
+) -> Drawn {
+    while latest.read().time < 0.0 && !over.load(Ordering::Acquire) {
+        thread::sleep(FIRST_TICK_PERIOD);
+    }
     let began = clock::now();
     let mut missed = 0;
     while !over.load(Ordering::Acquire) {
@@ -197,5 +236,6 @@ fn draw(
             missed += 1;
         }
     }
-    (frames.kept(), cost.percentiles(), missed)
+    let (frames, shown) = frames.kept();
+    Drawn { frames, shown, cost: cost.percentiles(), missed }
 }

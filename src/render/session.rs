@@ -43,7 +43,7 @@ pub enum SessionError {
 /// What graphics needs to know of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Latest {
-    /// Time of the tick [s].
+    /// Time of the tick [s]; negative before the first.
     pub time: f64,
     /// Proxy x [rad or m].
     pub proxy: JointVector,
@@ -60,6 +60,8 @@ pub struct Driver<'session> {
     state: State,
     time: f64,
     ticks: usize,
+    restart: bool,
+    start: JointVector,
 }
 
 impl Plan {
@@ -89,18 +91,33 @@ impl<'session> Driver<'session> {
     pub fn new(haptics: &'session Haptics, device: &'session mut dyn Device) -> Result<Self, Fault> {
         let position = device.read(0.0).position;
         let state = haptics.start(&position)?;
-        Ok(Self { haptics, device, state, time: 0.0, ticks: 0 })
+        Ok(Self { haptics, device, state, time: 0.0, ticks: 0, restart: false, start: position })
+    }
+
+    /// Asks for a fault to be cleared at the next tick: the loop then begins anew where the device is. Nothing happens
+    /// where there is no fault, or the device still reports no position.
+    pub fn clear_fault(&mut self) {
+        self.restart = true;
+    }
+
+    /// Where the device was when the session began [rad or m].
+    #[must_use]
+    pub fn start(&self) -> &JointVector {
+        &self.start
     }
 
     /// One tick, `elapsed` after the one before and `interval` before the next [s]: read, compute, apply. Answers with the
-    /// record and what graphics needs of it. Never
-    /// allocates.
+    /// record and what graphics needs of it. Never allocates.
     pub fn tick(&mut self, elapsed: f64, interval: f64) -> (Tick, Latest) {
         // The first tick follows the reading in `new` at once.
         let since = if self.ticks == 0 { 0.0 } else { elapsed };
         self.ticks += 1;
         self.time += since;
         let reading = self.device.read(since);
+        // A device that still fails keeps its fault.
+        let restart = std::mem::take(&mut self.restart)
+            && self.state.fault().is_some()
+            && self.haptics.restart(&mut self.state, &reading.position).is_ok();
         let inputs = Inputs { position: reading.position, age: reading.age, elapsed, interval };
         let output = self.haptics.tick(&mut self.state, &inputs);
         self.device.apply(&output.torque);
@@ -108,6 +125,8 @@ impl<'session> Driver<'session> {
         let latest = Latest { time: self.time, proxy: output.proxy, device: output.device, share };
         let tick = Tick {
             time: self.time,
+            inputs,
+            restart,
             hand: reading.hand,
             device: output.device,
             proxy: output.proxy,
@@ -134,26 +153,27 @@ impl Drop for Driver<'_> {
 pub(super) struct Frames<'session, 'object> {
     graphics: &'session mut Graphics<'object>,
     snapshots: std::iter::Peekable<std::vec::IntoIter<f64>>,
-    drawn: usize,
     kept: Vec<Frame>,
+    /// Time of the tick that each frame showed [s].
+    shown: Vec<f64>,
 }
 
 impl<'session, 'object> Frames<'session, 'object> {
     pub(super) fn new(graphics: &'session mut Graphics<'object>, plan: &Plan) -> Self {
         let snapshots = plan.snapshots.clone().into_iter().peekable();
-        Self { graphics, snapshots, drawn: 0, kept: Vec::with_capacity(plan.snapshots.len()) }
+        Self { graphics, snapshots, kept: Vec::with_capacity(plan.snapshots.len()), shown: Vec::new() }
     }
 
     /// When the next frame is due [s].
     pub(super) fn due(&self) -> f64 {
-        self.drawn as f64 * self.graphics.motion().period()
+        self.shown.len() as f64 * self.graphics.motion().period()
     }
 
     /// Draws the next frame.
     pub(super) fn draw(&mut self, latest: &Latest) {
         let time = self.due();
         self.graphics.frame(&latest.proxy, latest.share);
-        self.drawn += 1;
+        self.shown.push(latest.time);
         let mut wanted = false;
         while self.snapshots.next_if(|&instant| instant <= time).is_some() {
             wanted = true;
@@ -164,8 +184,9 @@ impl<'session, 'object> Frames<'session, 'object> {
         }
     }
 
-    pub(super) fn kept(self) -> Vec<Frame> {
-        self.kept
+    /// The frames that were kept, and the time of the tick that each frame showed.
+    pub(super) fn kept(self) -> (Vec<Frame>, Vec<f64>) {
+        (self.kept, self.shown)
     }
 }
 
@@ -191,5 +212,6 @@ pub fn run(
         }
         ticks.push(tick);
     }
-    Ok(Trace { joints: plan.joints.clone(), ticks, frames: frames.map(Frames::kept).unwrap_or_default() })
+    let (frames, shown) = frames.map(Frames::kept).unwrap_or_default();
+    Ok(Trace { joints: plan.joints.clone(), start: *driver.start(), ticks, frames, shown })
 }

@@ -2,11 +2,12 @@
 //! surface the object.
 
 use super::{
+    effects::{ContactEffects, EffectError},
     field::{FieldError, TorqueField},
     graphics::{Graphics, GraphicsError},
     haptic::{Haptics, JointsError},
     npmi::{InertiaError, Npmi},
-    passivity::{self, Exceeded},
+    passivity::{self, Bound},
     session::Plan,
     trace::JointLabel,
 };
@@ -16,7 +17,7 @@ use crate::{
     device::{HandError, Motion, SimulatedHand},
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{Rendering, SceneError},
+    scene::{HapticsSpec, ProxyInertia, Rendering, SceneError},
 };
 use glam::DVec3;
 
@@ -30,8 +31,10 @@ pub struct Setup {
     pub haptics: Haptics,
     /// The object; absent where the scene has no graphics or the dataset no surface.
     pub object: Option<Object>,
-    /// Gains beyond their passivity bound.
-    pub exceeded: Vec<Exceeded>,
+    /// All passivity bounds of the scene's gains.
+    pub bounds: Vec<Bound>,
+    /// Those that are exceeded.
+    pub exceeded: Vec<Bound>,
 }
 
 /// A dataset cannot be rendered.
@@ -54,6 +57,9 @@ pub enum SetupError {
     /// Scene and dataset do not make a loop.
     #[error(transparent)]
     Loop(#[from] JointsError),
+    /// An effect that the scene names cannot act.
+    #[error("the scene in the dataset: {0}")]
+    Effect(#[from] EffectError),
     /// The torques cannot be interpolated.
     #[error(transparent)]
     Field(#[from] FieldError),
@@ -72,7 +78,7 @@ pub enum SetupError {
 }
 
 impl Setup {
-    /// Builds all that rendering `dataset` needs. The proxy's inertia is constant: that at the grid's centre.
+    /// Builds all that rendering `dataset` needs.
     ///
     /// # Errors
     /// When the dataset has no valid scene, or its parts do not fit.
@@ -86,13 +92,8 @@ impl Setup {
         if grid != joints {
             return Err(SetupError::Joints { grid, chain: joints });
         }
-        let field = TorqueField::new(dataset, scene.haptics.threshold, &scene.haptics.boundary_slope)?;
-        let mut pose = chain.new_pose();
-        chain.pose(&centre(&dataset.grid), &mut pose);
-        let limits: Vec<[f64; 2]> = chain.joints.iter().map(|joint| joint.limits).collect();
-        let npmi = Npmi::new(&chain.inertia(&pose), &limits)?;
-        let exceeded = passivity::exceeded(&scene.haptics, &field, &labels(&dataset.grid));
-        let haptics = Haptics::new(field, npmi, &scene.haptics)?;
+        let (haptics, bounds) = haptic_loop(dataset, &chain, &scene, &scene.haptics)?;
+        let exceeded = bounds.iter().filter(|bound| bound.is_exceeded()).cloned().collect();
         let object = match (&scene.object, &scene.graphics, &dataset.contacts, &dataset.surface) {
             (Some(object), Some(_), Some(_), Some(surface)) => {
                 let nodes = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
@@ -101,7 +102,17 @@ impl Setup {
             }
             _ => None,
         };
-        Ok(Self { scene, chain, haptics, object, exceeded })
+        Ok(Self { scene, chain, haptics, object, bounds, exceeded })
+    }
+
+    /// The haptic loop of `dataset`, from which this was made, with `gains` in the place of the scene's; and which of them
+    /// are beyond their passivity bound.
+    ///
+    /// # Errors
+    /// When they do not make a loop.
+    pub fn retuned(&self, dataset: &Dataset, gains: &HapticsSpec) -> Result<(Haptics, Vec<Bound>), SetupError> {
+        let (haptics, bounds) = haptic_loop(dataset, &self.chain, &self.scene, gains)?;
+        Ok((haptics, bounds.into_iter().filter(Bound::is_exceeded).collect()))
     }
 
     /// A simulated device in a hand that follows `motion`.
@@ -118,7 +129,7 @@ impl Setup {
     /// When the dataset's contact forces do not fit the object.
     pub fn graphics(&self, dataset: &Dataset) -> Result<Option<Graphics<'_>>, SetupError> {
         match (&self.object, &self.scene.graphics) {
-            (Some(object), Some(graphics)) => Ok(Some(Graphics::new(dataset, object, graphics.rate)?)),
+            (Some(object), Some(graphics)) => Ok(Some(Graphics::new(dataset, object, graphics)?)),
             _ => Ok(None),
         }
     }
@@ -128,6 +139,28 @@ impl Setup {
     pub fn plan(&self, dataset: &Dataset, seconds: f64, snapshots: usize) -> Plan {
         Plan::new(labels(&dataset.grid), self.haptics.period(), seconds, snapshots)
     }
+}
+
+/// The haptic loop over `dataset`, with `gains` in the place of those of its `scene`; and their passivity bounds.
+fn haptic_loop(
+    dataset: &Dataset,
+    chain: &Chain,
+    scene: &Rendering,
+    gains: &HapticsSpec,
+) -> Result<(Haptics, Vec<Bound>), SetupError> {
+    let field = TorqueField::interpolated(dataset, gains.interpolation, gains.threshold, &gains.boundary_slope)?;
+    let npmi = match gains.proxy_inertia {
+        ProxyInertia::Configuration => Npmi::of_chain(chain)?,
+        ProxyInertia::Constant => {
+            let mut pose = chain.new_pose();
+            chain.pose(&centre(&dataset.grid), &mut pose);
+            let limits: Vec<[f64; 2]> = chain.joints.iter().map(|joint| joint.limits).collect();
+            Npmi::new(&chain.inertia(&pose), &limits)?
+        }
+    };
+    let bounds = passivity::bounds(gains, &field, &labels(&dataset.grid));
+    let effects = ContactEffects::new(&gains.effects, dataset, chain, &scene.text, &scene.path)?;
+    Ok((Haptics::new(field, npmi, gains)?.with_effects(effects), bounds))
 }
 
 /// Names and units of the grid's joints.

@@ -35,6 +35,8 @@ pub struct Stencil {
     pub points: [usize; MAX_CORNERS],
     /// Interpolation weight of each corner; they sum to one.
     pub weights: [f64; MAX_CORNERS],
+    /// Fraction of the cell along each axis, 0 to 1. Bit a of a corner's number tells its side along axis a.
+    pub fractions: [f64; MAX_JOINTS],
     /// One inside the grid, falling to zero one cell outside.
     pub fade: f64,
 }
@@ -102,18 +104,35 @@ impl Lattice {
         self.axes[..self.joints].iter().map(|line| (line.count, line.step, line.stride))
     }
 
+    /// Coordinates of the grid lines of each axis [rad or m].
+    pub(super) fn grid_lines(&self) -> impl Iterator<Item = impl Iterator<Item = f64>> {
+        self.axes[..self.joints].iter().map(|line| (0..line.count).map(|k| line.start + k as f64 * line.step))
+    }
+
     /// Position of `point` along the axis with `count` points and `stride`.
     pub(super) fn position(point: usize, count: usize, stride: usize) -> usize {
         point / stride % count
+    }
+
+    /// The points before and after `point` along the axis with `count` points and `stride`.
+    pub(super) fn neighbours(point: usize, count: usize, stride: usize) -> [Option<usize>; 2] {
+        let position = Self::position(point, count, stride);
+        [(position > 0).then(|| point - stride), (position + 1 < count).then(|| point + stride)]
     }
 
     /// The cell around `q`, which has one entry per joint. A configuration that is not finite is outside, with `fade`
     /// zero.
     #[must_use]
     pub fn locate(&self, q: &[f64]) -> Stencil {
-        let mut stencil = Stencil { count: 1, points: [0; MAX_CORNERS], weights: [0.0; MAX_CORNERS], fade: 1.0 };
+        let mut stencil = Stencil {
+            count: 1,
+            points: [0; MAX_CORNERS],
+            weights: [0.0; MAX_CORNERS],
+            fractions: [0.0; MAX_JOINTS],
+            fade: 1.0,
+        };
         stencil.weights[0] = 1.0;
-        for (line, &coordinate) in self.axes[..self.joints].iter().zip(q) {
+        for ((line, &coordinate), kept) in self.axes[..self.joints].iter().zip(q).zip(&mut stencil.fractions) {
             let cells = (coordinate - line.start) / line.step;
             let last = (line.count - 1) as f64;
             let inside = if cells.is_finite() { cells.clamp(0.0, last) } else { 0.0 };
@@ -122,6 +141,7 @@ impl Lattice {
             // The last point belongs to the last cell; an axis of one point is a cell without extent.
             let low = (inside as usize).min(line.count.saturating_sub(2));
             let fraction = inside - low as f64;
+            *kept = fraction;
             let stride = if line.count > 1 { line.stride } else { 0 };
             let half = stencil.count;
             for corner in 0..half {

@@ -7,6 +7,7 @@
 use super::{
     accounts::Accounts,
     flags::{Fault, Flags},
+    haptic::Inputs,
 };
 use crate::JointVector;
 use glam::DVec3;
@@ -18,6 +19,10 @@ use std::io::{self, Write};
 pub struct Tick {
     /// Since the start [s].
     pub time: f64,
+    /// What the loop was told, as it was.
+    pub inputs: Inputs,
+    /// Whether a fault was cleared before the tick.
+    pub restart: bool,
     /// Where the hand wants the device; the device's own position where no hand is simulated [rad or m].
     pub hand: JointVector,
     /// Device position y [rad or m].
@@ -67,10 +72,14 @@ pub struct JointLabel {
 pub struct Trace {
     /// One per joint.
     pub joints: Vec<JointLabel>,
+    /// Position at which the proxy was put [rad or m].
+    pub start: JointVector,
     /// Ascending in time.
     pub ticks: Vec<Tick>,
     /// Ascending in time; empty without graphics.
     pub frames: Vec<Frame>,
+    /// Time of the tick that each frame showed, kept or not [s]; ascending.
+    pub shown: Vec<f64>,
 }
 
 /// What one wants to know of a session at a glance.
@@ -241,7 +250,7 @@ impl Trace {
 }
 
 /// A joint's name without the characters that structure a CSV file.
-fn plain(name: &str) -> String {
+pub(super) fn plain(name: &str) -> String {
     name.chars().map(|c| if matches!(c, ',' | '"' | '\n' | '\r') { '_' } else { c }).collect()
 }
 
@@ -258,6 +267,8 @@ mod tests {
         let one = JointVector::from_slice(&[torque]);
         Tick {
             time,
+            inputs: Inputs { position: one, age: 0.0, elapsed: 1e-3, interval: 1e-3 },
+            restart: false,
             hand: one,
             device: one,
             proxy: one,
@@ -274,7 +285,8 @@ mod tests {
 
     fn trace() -> Trace {
         let joints = vec![JointLabel { name: "base, left".into(), unit: "rad".into() }];
-        Trace { joints, ticks: vec![tick(0.0, 0.0), tick(0.002, 0.5), tick(0.003, 0.25)], frames: vec![] }
+        let ticks = vec![tick(0.0, 0.0), tick(0.002, 0.5), tick(0.003, 0.25)];
+        Trace { joints, ticks, ..Trace::default() }
     }
 
     #[test]

@@ -4,17 +4,23 @@
 //! it, [`raster`] draws solid bodies. The figures themselves are functions of the library's types; none of them knows
 //! how the data came about.
 
+pub mod accuracy;
 pub mod canvas;
 pub mod chart;
 pub mod colour;
 mod font;
+pub mod force;
+pub mod gridized;
+pub mod hysteresis;
 pub mod jitter;
 pub mod object;
 pub mod plot;
+pub mod prediction;
 pub mod press;
 pub mod raster;
 pub mod slices;
 pub mod space;
+pub mod stability;
 mod ticks;
 
 use crate::{dataset::Dataset, proxy::Chain, render::trace::Trace};
@@ -61,7 +67,7 @@ const INSTANTS: usize = 6;
 /// Writes all figures that the data allow into `folder`, which is made if it is missing, and returns their paths.
 ///
 /// `cspace.png` (Fig. 3) and `torque.{svg,png}` show the dataset; with a recording of the proxy `chain` also
-/// `press.{svg,png}` (Fig. 5), `energy.{svg,png}` and, where it has frames and the dataset a surface, `object.png`
+/// `press.{svg,png}` (Fig. 5), `energy.{svg,png}`, with three joints `force.{svg,png}` (Fig. 8) and, where it has frames and the dataset a surface, `object.png`
 /// (Fig. 6).
 ///
 /// # Errors
@@ -77,6 +83,9 @@ pub fn write_figures(
     if let Some((chain, trace)) = recording {
         written.extend(write_both(folder, "press", &press::press(trace))?);
         written.extend(write_both(folder, "energy", &press::energy(trace))?);
+        if let Some(force) = force::EndForce::new("", chain, trace) {
+            written.extend(write_both(folder, "force", &force::force(&[force], trace))?);
+        }
         if !trace.frames.is_empty() && dataset.surface.is_some() {
             let instants = object::instants(dataset, chain, trace, INSTANTS)?;
             written.push(write_png(folder, "object", &object::object(dataset, chain, &instants)?)?);

@@ -22,13 +22,16 @@ pub fn press(trace: &Trace) -> Canvas {
     });
     lanes.extend(per_joint(trace, ["Torque on the device", "Force on the device"], true, |tick| &tick.device_torque));
     lanes.extend(per_joint(trace, ["Proxy configuration"; 2], false, |tick| &tick.proxy));
-    let nodes = curve(trace, "", colour::series(0), |tick| f64::from(tick.contact_nodes));
-    lanes.push(Lane {
-        title: "Contacting object nodes [1]".to_owned(),
-        curves: vec![nodes],
-        height: 90.0,
-        counts: true,
-    });
+    // A measured dataset knows no nodes.
+    if trace.ticks.iter().all(|tick| !tick.contact) || trace.ticks.iter().any(|tick| tick.contact_nodes > 0) {
+        let nodes = curve(trace, "", colour::series(0), |tick| f64::from(tick.contact_nodes));
+        lanes.push(Lane {
+            title: "Contacting object nodes [1]".to_owned(),
+            curves: vec![nodes],
+            height: 90.0,
+            counts: true,
+        });
+    }
     stack("Multi-point contact felt through the 1 kHz loop".to_owned(), trace, lanes)
 }
 
@@ -48,15 +51,15 @@ pub fn energy(trace: &Trace) -> Canvas {
         height: 130.0,
         counts: false,
     };
-    let lanes = vec![
-        lane(
-            "Kept [mJ]",
-            &[
-                ("stored in the object, U", |accounts| accounts.stored),
-                ("coupling spring", |accounts| accounts.spring),
-                ("kinetic", |accounts| accounts.kinetic),
-            ],
-        ),
+    let kept: [Account; 3] = [
+        ("stored in the object, U", |accounts| accounts.stored),
+        ("coupling spring", |accounts| accounts.spring),
+        ("kinetic", |accounts| accounts.kinetic),
+    ];
+    // A measured dataset knows no stored energy, and so no leak.
+    let knows_energy = trace.ticks.iter().any(|tick| tick.accounts.stored != 0.0 || tick.accounts.leak != 0.0);
+    let mut lanes = vec![
+        lane("Kept [mJ]", &kept[usize::from(!knows_energy)..]),
         lane(
             "Exchanged [mJ]",
             &[
@@ -66,9 +69,11 @@ pub fn energy(trace: &Trace) -> Canvas {
                 ("lost in the proxy", |accounts| accounts.proxy_dissipation),
             ],
         ),
-        lane("Created by interpolating the torque [mJ]", &[("", |accounts| accounts.leak)]),
-        Lane { height: 70.0, ..lane("Unexplained in the balance [mJ]", &[("", Accounts::residual)]) },
     ];
+    if knows_energy {
+        lanes.push(lane("Created by interpolating the torque [mJ]", &[("", |accounts| accounts.leak)]));
+    }
+    lanes.push(Lane { height: 70.0, ..lane("Unexplained in the balance [mJ]", &[("", Accounts::residual)]) });
     stack("Energy accounts of proxy and coupling".to_owned(), trace, lanes)
 }
 
@@ -111,7 +116,7 @@ fn curve(trace: &Trace, name: &str, colour: colour::Colour, value: impl Fn(&Tick
 }
 
 /// Begin and end of each uninterrupted contact [s].
-fn contact_intervals(ticks: &[Tick]) -> Vec<[f64; 2]> {
+pub(super) fn contact_intervals(ticks: &[Tick]) -> Vec<[f64; 2]> {
     ticks
         .chunk_by(|a, b| a.contact == b.contact)
         .filter(|run| run[0].contact)

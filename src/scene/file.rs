@@ -2,7 +2,7 @@
 //!
 //! Unknown keys are refused with the list of the known ones. Nothing is checked here beyond types; see [`super::convert`].
 
-use super::{Algorithm, Cover, JointKind, SpringKind};
+use super::{Algorithm, Cover, Interpolation, JointKind, ProxyInertia, SpringKind};
 use serde::Deserialize;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 use toml::Spanned;
@@ -31,7 +31,9 @@ pub(super) struct SceneTable {
 pub(super) struct ObjectTable {
     pub sphere: Option<SphereTable>,
     pub mesh: Option<MeshTable>,
-    pub springs: SpringsTable,
+    pub tetrahedra: Option<MeshTable>,
+    pub springs: Option<Spanned<SpringsTable>>,
+    pub elasticity: Option<Spanned<ElasticityTable>>,
     pub ground: GroundTable,
     pub node_mass: Option<Number>,
     pub node_damping: Option<Number>,
@@ -59,6 +61,14 @@ pub(super) struct MeshTable {
 pub(super) struct SpringsTable {
     pub kind: SpringKind,
     pub stiffness: Number,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ElasticityTable {
+    pub young: Number,
+    pub poisson: Number,
+    pub cell: Option<Number>,
 }
 
 #[derive(Deserialize)]
@@ -105,7 +115,7 @@ pub(super) struct NodesTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ContactTable {
-    pub stiffness: Number,
+    pub stiffness: Spanned<ContactStiffness>,
     pub algorithm: Option<Algorithm>,
     pub tolerance: Option<Number>,
     pub max_iterations: Option<Spanned<u32>>,
@@ -132,17 +142,42 @@ pub(super) struct AxisTable {
 pub(super) struct HapticsTable {
     pub rate: Option<Number>,
     pub threshold: Option<Number>,
+    pub interpolation: Option<Interpolation>,
     pub boundary_slope: Option<Spanned<PerJoint>>,
     pub passivity_factor: Option<Number>,
     pub proxy_damping: Option<Spanned<PerJoint>>,
+    pub proxy_inertia: Option<ProxyInertia>,
     pub coupling_stiffness: Option<Spanned<PerJoint>>,
     pub coupling_damping: Option<Spanned<PerJoint>>,
     pub device_damping: Option<Spanned<PerJoint>>,
     pub device_inertia: Option<Spanned<PerJoint>>,
     pub torque_limit: Option<Spanned<PerJoint>>,
     pub torque_rate_limit: Option<Spanned<PerJoint>>,
+    pub speed_limit: Option<Spanned<PerJoint>>,
+    pub encoder_step: Option<Spanned<PerJoint>>,
+    pub device_friction: Option<Spanned<PerJoint>>,
+    pub friction: Option<Spanned<FrictionTable>>,
+    pub contact_damping: Option<Number>,
+    pub four_channel: Option<FourChannelTable>,
+    pub passivity_control: Option<bool>,
     #[serde(default)]
     pub hand: HandTable,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FrictionTable {
+    pub coefficient: Number,
+    pub static_coefficient: Option<Number>,
+    pub stiffness: Option<Number>,
+    pub damping: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FourChannelTable {
+    pub channels: Option<Spanned<[f64; 4]>>,
+    pub filter: Option<Number>,
 }
 
 #[derive(Default, Deserialize)]
@@ -157,6 +192,17 @@ pub(super) struct HandTable {
 #[serde(deny_unknown_fields)]
 pub(super) struct GraphicsTable {
     pub rate: Option<Number>,
+    pub gravity: Option<Vector>,
+    pub stiffening: Option<Spanned<StiffeningTable>>,
+    pub smoothing: Option<Number>,
+    pub quasi_static: Option<Spanned<bool>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StiffeningTable {
+    pub factor: Number,
+    pub strain: Number,
 }
 
 #[derive(Default, Deserialize)]
@@ -215,6 +261,7 @@ pub(super) struct ControlTable {
     pub drift: Option<Number>,
     pub timeout: Option<Number>,
     pub average: Option<Number>,
+    pub epsilon: Option<Number>,
 }
 
 #[derive(Deserialize)]
@@ -235,6 +282,44 @@ pub(super) struct SimulatedTable {
     pub encoder: Option<Number>,
     pub noise: Option<Number>,
     pub joint_friction: Option<Number>,
+}
+
+/// A number, or "rigid".
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum ContactStiffness {
+    Springs(f64),
+    Rigid,
+}
+
+impl<'de> Deserialize<'de> for ContactStiffness {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NumberOrRigid;
+
+        impl Visitor<'_> for NumberOrRigid {
+            type Value = ContactStiffness;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a number or \"rigid\"")
+            }
+
+            fn visit_f64<E>(self, value: f64) -> Result<ContactStiffness, E> {
+                Ok(ContactStiffness::Springs(value))
+            }
+
+            fn visit_i64<E>(self, value: i64) -> Result<ContactStiffness, E> {
+                Ok(ContactStiffness::Springs(value as f64))
+            }
+
+            fn visit_str<E: serde::de::Error>(self, value: &str) -> Result<ContactStiffness, E> {
+                match value {
+                    "rigid" => Ok(ContactStiffness::Rigid),
+                    _ => Err(E::invalid_value(serde::de::Unexpected::Str(value), &self)),
+                }
+            }
+        }
+
+        deserializer.deserialize_any(NumberOrRigid)
+    }
 }
 
 /// One number for all joints, or a list with one for each.

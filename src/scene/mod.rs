@@ -13,8 +13,10 @@ mod spec;
 pub use error::{Diagnostic, SceneError};
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
 pub use spec::{
-    Algorithm, AxisSpec, ContactSpec, GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticsSpec,
-    JointKind, JointSpec, MotionSpec, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec, Waypoint,
+    Algorithm, AxisSpec, ContactDampingSpec, ContactSpec, ElasticSpec, FourChannelSpec, FrictionSpec, GraphicsEffects,
+    GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects, HapticsSpec, Interpolation, JointKind,
+    JointSpec, Material, MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
+    StiffeningSpec, Waypoint,
 };
 
 use check::Checker;
@@ -94,8 +96,9 @@ impl Scene {
         let text = read_text(path)?;
         let (checker, table) = table(&text, path)?;
         let scene = convert::scene(&checker, &table)?;
-        let mesh = table.object.as_ref().and_then(|object| object.get_ref().mesh.as_ref());
-        if let (Shape::Mesh { file, .. }, Some(mesh)) = (&scene.object.shape, mesh)
+        let object = table.object.as_ref().map(toml::Spanned::get_ref);
+        let mesh = object.and_then(|object| object.mesh.as_ref().or(object.tetrahedra.as_ref()));
+        if let (Shape::Mesh { file, .. } | Shape::Tetrahedra { file, .. }, Some(mesh)) = (&scene.object.shape, mesh)
             && let Err(error) = std::fs::metadata(file)
         {
             let message = format!("the mesh file {} cannot be opened: {error}", file.display());

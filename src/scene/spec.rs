@@ -6,6 +6,7 @@
 use crate::JointVector;
 use glam::DVec3;
 use serde::Deserialize;
+use std::ops::Range;
 use std::path::PathBuf;
 
 /// The deformable virtual object (section 2.1).
@@ -13,8 +14,8 @@ use std::path::PathBuf;
 pub struct ObjectSpec {
     /// Where the surface comes from.
     pub shape: Shape,
-    /// Springs Kn between its nodes.
-    pub springs: SpringSpec,
+    /// What resists deformation, Kn.
+    pub material: Material,
     /// Springs Kg to the mechanical ground.
     pub ground: GroundSpec,
     /// Mass of each node [kg].
@@ -47,9 +48,38 @@ pub enum Shape {
         /// [m]
         centre: DVec3,
     },
+    /// The tetrahedra of a Gmsh file, whose surface is touched; otherwise as `Mesh`.
+    Tetrahedra {
+        /// See `Mesh`.
+        file: PathBuf,
+        /// [1]
+        scale: f64,
+        /// [m]
+        centre: DVec3,
+    },
 }
 
-/// Springs along the edges of the surface.
+/// What resists deformation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Material {
+    /// Springs along the edges of the surface, or of the tetrahedra.
+    Springs(SpringSpec),
+    /// A linearly elastic solid.
+    Elastic(ElasticSpec),
+}
+
+/// A homogeneous, isotropic, linearly elastic solid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ElasticSpec {
+    /// Young's modulus E [Pa].
+    pub young: f64,
+    /// Poisson's ratio nu, above -1 and below 1/2 [1].
+    pub poisson: f64,
+    /// Size of the cubes of the lattice that fills a surface; none where the shape is tetrahedra [m].
+    pub cell: Option<f64>,
+}
+
+/// Springs along edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpringSpec {
     /// How each spring resists.
@@ -144,7 +174,7 @@ pub struct ProxyNodeSpec {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSpec {
     /// Contact stiffness: of one spring Kc between a proxy node and an object node; the energy form's stiffness at a
-    /// contact point is kc = 3 Kc (three nodes of a triangle) [N/m].
+    /// contact point is kc = 3 Kc (three nodes of a triangle). Infinity is rigid contact [N/m].
     pub stiffness: f64,
     /// How equation (2) is solved.
     pub algorithm: Algorithm,
@@ -191,12 +221,16 @@ pub struct HapticsSpec {
     pub rate: f64,
     /// Contact where the interpolated contact index exceeds this, Ith [1].
     pub threshold: f64,
+    /// How the torque is interpolated between grid points.
+    pub interpolation: Interpolation,
     /// Slope Ks of the boundary layer at each joint [N m/rad].
     pub boundary_slope: JointVector,
     /// mu of the passivity condition Ks <= mu bv / T [1].
     pub passivity_factor: f64,
     /// Extra damping bv of the proxy at each joint [N m s/rad].
     pub proxy_damping: JointVector,
+    /// Which inertia the proxy moves with.
+    pub proxy_inertia: ProxyInertia,
     /// Stiffness Kvc of the virtual coupling at each joint [N m/rad].
     pub coupling_stiffness: JointVector,
     /// Damping Bvc of the virtual coupling at each joint [N m s/rad].
@@ -209,8 +243,109 @@ pub struct HapticsSpec {
     pub torque_limit: JointVector,
     /// Greatest rate of change of each joint's torque, in size [N m/s].
     pub torque_rate_limit: JointVector,
+    /// Greatest speed of each joint of the device; what moves faster is taken for a fault of the device [rad/s].
+    pub speed_limit: JointVector,
+    /// Resolution of each joint's encoder; zero where it is not told [rad].
+    pub encoder_step: JointVector,
+    /// Dry friction of each joint of the device; zero where it is not told [N m].
+    pub device_friction: JointVector,
+    /// What the tick does beyond the paper's, if anything.
+    pub effects: HapticEffects,
     /// The hand that holds the device.
     pub hand: HandSpec,
+}
+
+/// Effects of the tick: each absent unless the scene names it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HapticEffects {
+    /// Friction between the proxy and the object.
+    pub friction: Option<FrictionSpec>,
+    /// Damping along the contact normals.
+    pub contact_damping: Option<ContactDampingSpec>,
+    /// Force channels beside the spring and damper of the virtual coupling.
+    pub four_channel: Option<FourChannelSpec>,
+    /// Whether a passivity controller acts when the passivity observer is negative.
+    pub passivity_control: bool,
+}
+
+impl HapticEffects {
+    /// The first effect that acts at contacts, and so needs their forces: its key, and where the scene's text names it.
+    #[must_use]
+    pub fn at_contacts(&self) -> Option<(&'static str, &Range<usize>)> {
+        let friction = self.friction.as_ref().map(|friction| ("friction", &friction.place));
+        friction.or(self.contact_damping.as_ref().map(|damping| ("contact_damping", &damping.place)))
+    }
+}
+
+/// Coulomb friction of elastic-plastic bristles, one at each proxy node in contact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrictionSpec {
+    /// Tangential over normal force while slipping [1].
+    pub coefficient: f64,
+    /// Tangential over normal force at which sticking ends; at least `coefficient` [1].
+    pub static_coefficient: f64,
+    /// Of a bristle: how fast friction builds up while sticking [N/m].
+    pub stiffness: f64,
+    /// Of a bristle while sticking [N s/m].
+    pub damping: f64,
+    /// Where the scene's text names it [bytes].
+    pub place: Range<usize>,
+}
+
+/// Dampers along the normals of the contacts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactDampingSpec {
+    /// c of one contact [N s/m].
+    pub damping: f64,
+    /// Where the scene's text names it [bytes].
+    pub place: Range<usize>,
+}
+
+/// Four-channel coupling (Lawrence 1993).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FourChannelSpec {
+    /// C1 to C4 as shares of their ideal values Zs, 1, 1 and -Zm, from 0 to 1 [1].
+    pub channels: [f64; 4],
+    /// Time constant of the low-pass filter on accelerations and on the estimated force of the hand [s].
+    pub filter: f64,
+}
+
+/// Which inertia the proxy moves with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ProxyInertia {
+    /// That of the chain in the middle of the grid, everywhere.
+    Constant,
+    /// That of the chain in each configuration.
+    Configuration,
+}
+
+/// How the torque is interpolated between grid points.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Interpolation {
+    /// Multilinear torque behind the boundary of the contact index (section 3.1).
+    #[default]
+    Linear,
+    /// Multilinear torque behind the boundary where the gap is zero.
+    GapField,
+    /// Minus the gradient of a smoothly interpolated energy: makes no energy around any loop.
+    Potential,
+}
+
+impl Interpolation {
+    /// All of them, from the roughest on.
+    pub const ALL: [Self; 3] = [Self::Linear, Self::GapField, Self::Potential];
+
+    /// As the scene names it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::GapField => "gap-field",
+            Self::Potential => "potential",
+        }
+    }
 }
 
 /// The simulated hand: a mass on the device, pulled along the motion by a spring and a damper at each joint.
@@ -229,6 +364,30 @@ pub struct HandSpec {
 pub struct GraphicsSpec {
     /// Frames per second [Hz].
     pub rate: f64,
+    /// What it does beyond the paper's.
+    pub effects: GraphicsEffects,
+}
+
+/// Effects of the graphics loop: each absent unless the scene names it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GraphicsEffects {
+    /// Acceleration of gravity on the object's nodes [m/s^2].
+    pub gravity: Option<DVec3>,
+    /// Springs stiffen with strain.
+    pub stiffening: Option<StiffeningSpec>,
+    /// Time constant of a low-pass filter on the contact forces that move the object [s].
+    pub smoothing: Option<f64>,
+    /// The object has no dynamics: n = n0 + C f.
+    pub quasi_static: bool,
+}
+
+/// How springs stiffen with strain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StiffeningSpec {
+    /// Stiffness at large strains over that at rest, kappa; more than 1 [1].
+    pub factor: f64,
+    /// Strain around which it rises, eps [1].
+    pub strain: f64,
 }
 
 /// Named motions of the hand, as waypoints in C-space.

@@ -3,6 +3,7 @@
 use crate::fixture::{contact, octahedron, probe};
 use glam::DVec3;
 use haptize::contact::{Model, Solver, Status};
+use haptize::object::Compliance;
 use haptize::scene::Algorithm;
 
 /// A node pressed into the middle of a face of a regular octahedron: by its threefold symmetry the face moves along its normal
@@ -14,10 +15,11 @@ fn a_node_on_the_middle_of_a_symmetric_face_feels_two_springs_in_series() {
     let normal = DVec3::ONE.normalize();
     let middle = (object.rest[0] + object.rest[1] + object.rest[2]) / 3.0;
     let chain = probe(middle, -normal);
+    let compliance = Compliance::new(&object);
     let mut c = 0.0;
     for i in 0..3 {
         for j in 0..3 {
-            c += normal.dot(object.compliance.block(i, j) * normal) / 9.0;
+            c += normal.dot(compliance.block(i, j) * normal) / 9.0;
         }
     }
     for algorithm in [Algorithm::Energy, Algorithm::Linearised] {
@@ -75,4 +77,56 @@ fn symmetric_positions_give_finite_numbers() {
             }
         }
     }
+}
+
+/// The stored energy and the force on a ball of radius 20 mm at `centre`, slid along x, in an almost rigid trough: a block
+/// with a groove of 90 degrees along y, edges at z = 0, bottom 50 mm below.
+fn in_the_trough(height: f64, aside: f64) -> (f64, f64, Status) {
+    let profile = [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.0), (0.05, 0.0), (0.0, -0.05), (-0.05, 0.0), (-0.1, 0.0)];
+    let mut nodes = Vec::new();
+    for y in [-0.2, 0.2] {
+        nodes.extend(profile.map(|(x, z)| DVec3::new(x, y, z)));
+    }
+    let count = profile.len() as u32;
+    let mut triangles = Vec::new();
+    for k in 0..count {
+        let next = (k + 1) % count;
+        triangles.extend([[k, k + count, next], [next, k + count, next + count]]);
+    }
+    for [a, b, c] in [[0, 1, 4], [1, 2, 3], [1, 3, 4], [0, 4, 5], [0, 5, 6]] {
+        triangles.extend([[a, b, c], [a + count, c + count, b + count]]);
+    }
+    let mut object = crate::fixture::object(nodes, triangles);
+    // Almost rigid: what is tested is the ball's law, not the block's springs.
+    let rigid = object.rest.len();
+    object = crate::fixture::grounded(&object, 1e12);
+    assert_eq!(object.rest.len(), rigid);
+    let chain = crate::fixture::ball(DVec3::new(0.0, 0.0, height), DVec3::X, 0.02);
+    let model = Model::new(&object, &chain, contact(Algorithm::Energy, 1e3));
+    let equilibrium = Solver::new(&model).solve(&[aside]);
+    (equilibrium.energy, equilibrium.torque[0], equilibrium.status)
+}
+
+/// Both walls of a groove push a ball, each by its own spring; the edge between them counts against them once it is within
+/// reach; and aside of the middle each wall pushes by its own depth.
+#[test]
+fn a_ball_in_a_groove_touches_both_walls() {
+    let (kc, r) = (3e3, 0.02f64);
+    for height in [-0.0245, -0.025, -0.03, -0.035] {
+        for aside in [0.0, 1e-4, 0.002, 0.006] {
+            let above = height + 0.05;
+            let root = 2.0f64.sqrt();
+            let distances = [(above - aside) / root, (above + aside) / root];
+            let depths = distances.map(|d| (r - d).max(0.0));
+            let edge = (r - above.hypot(aside)).max(0.0);
+            let energy = 0.5 * kc * (depths[0].powi(2) + depths[1].powi(2) - edge.powi(2));
+            let mut torque = kc * (depths[1] - depths[0]) / root;
+            torque -= kc * edge * aside / above.hypot(aside);
+            let (found, along, status) = in_the_trough(height, aside);
+            assert_eq!(status, Status::Contact, "{height} {aside}");
+            assert!((found - energy).abs() < 1e-6 * energy, "{height} {aside}: U {found}, expected {energy}");
+            assert!((along - torque).abs() < 1e-6 * kc * r, "{height} {aside}: {along}, expected {torque}");
+        }
+    }
+    assert_eq!(in_the_trough(-0.0, 0.0).2, Status::Free);
 }

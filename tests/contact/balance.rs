@@ -69,16 +69,19 @@ fn balance_and_contact_law_hold_at_every_contact_stiffness() {
         check_share(&object, &chain, stiffness, &configurations, 15, 1.0);
     }
     for stiffness in [1e5, 1e6] {
-        check_share(&object, &chain, stiffness, &configurations, 15, 0.8);
+        check_share(&object, &chain, stiffness, &configurations, 15, 0.95);
     }
 }
 
-/// Spheres instead of points. Where a node would rest in a fold, between two facets, the distance has a convex kink that the
-/// search cannot sit on: such configurations must be flagged.
+/// Spheres instead of points: in a dent they touch several facets at once.
 #[test]
 fn balance_and_contact_law_hold_for_nodes_with_a_radius() {
-    let chain = Chain::new(&arm(0.008));
-    check_share(&sphere(SpringKind::Isotropic), &chain, 100.0, &random_configurations(4, 100), 30, 0.9);
+    for radius in [0.003, 0.008] {
+        for stiffness in [100.0, 1e4] {
+            let chain = Chain::new(&arm(radius));
+            check_share(&sphere(SpringKind::Isotropic), &chain, stiffness, &random_configurations(4, 100), 30, 0.9);
+        }
+    }
 }
 
 #[test]
@@ -113,9 +116,9 @@ fn touched(touch: &Touch) -> Vec<u32> {
 /// where the derivative does not exist; those are counted and must be rare.
 #[test]
 fn torque_is_minus_the_gradient_of_stored_energy() {
-    let chain = Chain::new(&arm(0.0));
     let h = 2e-6;
-    for kind in [SpringKind::Isotropic, SpringKind::Axial] {
+    for (kind, radius) in [(SpringKind::Isotropic, 0.0), (SpringKind::Axial, 0.0), (SpringKind::Isotropic, 0.008)] {
+        let chain = Chain::new(&arm(radius));
         let object = sphere(kind);
         let model = Model::new(&object, &chain, contact(Algorithm::Energy, 500.0));
         let mut solver = Solver::new(&model);

@@ -4,8 +4,8 @@ use glam::DVec3;
 use haptize::object::Object;
 use haptize::proxy::Chain;
 use haptize::scene::{
-    Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape,
-    SpringKind, SpringSpec,
+    Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
+    ProxySpec, Shape, SpringKind, SpringSpec,
 };
 
 /// A fixed pseudo-random sequence in [-1, 1).
@@ -31,7 +31,7 @@ impl Sequence {
 pub fn spec(shape: Shape, kind: SpringKind) -> ObjectSpec {
     ObjectSpec {
         shape,
-        springs: SpringSpec { kind, stiffness: 300.0 },
+        material: Material::Springs(SpringSpec { kind, stiffness: 300.0 }),
         ground: GroundSpec { stiffness: 100.0, nodes: GroundNodes::All },
         node_mass: 0.01,
         node_damping: 0.1,
@@ -50,6 +50,14 @@ pub fn sphere(kind: SpringKind) -> Object {
 pub fn object(nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Object {
     let shape = Shape::Sphere { centre: DVec3::ZERO, radius: 1.0, rings: 3, segments: 3 };
     Object::from_surface(&spec(shape, SpringKind::Isotropic), nodes, triangles).unwrap()
+}
+
+/// The same object held at every node by springs of this stiffness [N/m].
+pub fn grounded(object: &Object, stiffness: f64) -> Object {
+    let shape = Shape::Sphere { centre: DVec3::ZERO, radius: 1.0, rings: 3, segments: 3 };
+    let mut spec = spec(shape, SpringKind::Isotropic);
+    spec.ground.stiffness = stiffness;
+    Object::from_surface(&spec, object.rest.clone(), object.triangles.clone()).unwrap()
 }
 
 /// A torus around z in place of the sphere: a surface with concave parts. Radii 35 and 16 mm.
@@ -128,7 +136,12 @@ pub fn arm_of_six() -> ProxySpec {
 
 /// A single node that slides from `from` along `axis`: depth is the joint's coordinate where `axis` is a face's inward normal.
 pub fn probe(from: DVec3, axis: DVec3) -> Chain {
-    let node = ProxyNodeSpec { position: DVec3::ZERO, radius: 0.0 };
+    ball(from, axis, 0.0)
+}
+
+/// The same with a radius.
+pub fn ball(from: DVec3, axis: DVec3, radius: f64) -> Chain {
+    let node = ProxyNodeSpec { position: DVec3::ZERO, radius };
     Chain::new(&ProxySpec { joints: vec![joint(JointKind::Prismatic, from, axis, vec![node])] })
 }
 

@@ -75,14 +75,14 @@ fn results_do_not_depend_on_what_was_solved_before() {
 
 fn assert_harmless(equilibrium: &Equilibrium) {
     assert_eq!(equilibrium.status, Status::Unconverged);
-    assert!(equilibrium.energy == 0.0 && equilibrium.residual.is_finite() && equilibrium.gap.is_finite());
+    assert!(equilibrium.energy == 0.0 && equilibrium.residual == 1.0 && equilibrium.gap.is_finite());
     assert!(equilibrium.torque.iter().all(|&t| t == 0.0));
     assert!(equilibrium.forces.is_empty() && equilibrium.touches.is_empty());
 }
 
 #[test]
 fn broken_numbers_are_flagged_and_never_come_out() {
-    let mut object = sphere(SpringKind::Isotropic);
+    let object = sphere(SpringKind::Isotropic);
     let chain = Chain::new(&arm(0.0));
     let q = [0.0, 0.25, 0.1];
     for algorithm in [Algorithm::Energy, Algorithm::Linearised, Algorithm::Paper] {
@@ -100,9 +100,9 @@ fn broken_numbers_are_flagged_and_never_come_out() {
         let absurd = solver.solve(&[1e300, -1e300, 1e300]);
         assert!(absurd.torque.is_finite() && absurd.energy.is_finite() && absurd.gap.is_finite());
     }
-    object.compliance.entries.fill(f64::NAN);
     for algorithm in [Algorithm::Energy, Algorithm::Linearised, Algorithm::Paper] {
-        let model = Model::new(&object, &chain, contact(algorithm, 500.0));
+        let mut model = Model::new(&object, &chain, contact(algorithm, 500.0));
+        model.compliance.entries.fill(f64::NAN);
         assert_harmless(&Solver::new(&model).solve(&q));
     }
 }

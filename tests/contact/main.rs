@@ -5,6 +5,7 @@
 mod analytic;
 mod balance;
 mod comparison;
+mod convex;
 mod fixture;
 mod invariance;
 mod oracle;

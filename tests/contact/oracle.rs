@@ -147,8 +147,9 @@ pub fn check_account(object: &Object, chain: &Chain, q: &[f64], equilibrium: &Eq
 }
 
 /// Balance and contact law: with u = K^-1 (stored forces), every proxy node's force is kc times its depth below the
-/// displaced surface along the normal there, and the object's nodes carry it by the weights of the closest point. `tolerance`
-/// is relative to the largest force.
+/// displaced surface along the normal there, and the object's nodes carry it by the weights of the closest point. Of a node
+/// with a radius each touch is checked as a spring; that none is missing shows in tau = -dU/dq. `tolerance` is relative to
+/// the largest force.
 pub fn check_contact_law(
     object: &Object,
     chain: &Chain,
@@ -167,7 +168,29 @@ pub fn check_contact_law(
     let mut expected = vec![DVec3::ZERO; object.rest.len()];
     for (i, x) in pose(chain, q).nodes.iter().enumerate() {
         let below = depth(&positions, &object.triangles, *x);
-        let lambda = kc * (below.depth + chain.nodes[i].radius).max(0.0);
+        let radius = chain.nodes[i].radius;
+        let mut touches = equilibrium.touches.iter().filter(|touch| touch.proxy_node as usize == i).peekable();
+        if radius > 0.0 && touches.peek().is_some() {
+            for touch in touches {
+                // Each wall, and each edge between two, is a spring kc of its own along the line to its closest point,
+                // counted a whole number of times.
+                let foot = touch.nodes.iter().zip(touch.weights).map(|(node, w)| positions[*node as usize] * w);
+                let offset = *x - foot.sum::<DVec3>();
+                let distance = offset.length();
+                let along = touch.force.dot(offset) / distance;
+                let side = if along.abs() >= kc * radius { -1.0 } else { 1.0 };
+                let times = along / (kc * (side * radius - distance));
+                let lambda = offset / distance * (kc * times.round() * (side * radius - distance));
+                if (touch.force - lambda).length() > tolerance * scale || times.round() == 0.0 {
+                    return Err(format!("node {i}: force {}, law {lambda}, largest {scale}", touch.force));
+                }
+                for (node, weight) in touch.nodes.iter().zip(touch.weights) {
+                    expected[*node as usize] -= touch.force * weight;
+                }
+            }
+            continue;
+        }
+        let lambda = kc * (below.depth + radius).max(0.0);
         let touch = equilibrium.touches.iter().find(|touch| touch.proxy_node as usize == i);
         let force = touch.map_or(DVec3::ZERO, |touch| touch.force);
         if (force - below.normal * lambda).length() > tolerance * scale {

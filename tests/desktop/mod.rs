@@ -5,7 +5,7 @@
 use haptize::{
     JointVector, MAX_JOINTS,
     render::npmi::Npmi,
-    scene::{HandSpec, HapticsSpec},
+    scene::{HandSpec, HapticEffects, HapticsSpec, Interpolation, ProxyInertia},
 };
 
 /// Gains of a desktop device, alike at all `joints`.
@@ -14,15 +14,21 @@ pub fn haptics(joints: usize) -> HapticsSpec {
     HapticsSpec {
         rate: 1000.0,
         threshold: 0.5,
+        interpolation: Interpolation::Linear,
         boundary_slope: all(10.0),
         passivity_factor: 2.0,
         proxy_damping: all(0.02),
+        proxy_inertia: ProxyInertia::Constant,
         coupling_stiffness: all(15.0),
         coupling_damping: all(0.01),
         device_damping: all(0.02),
         device_inertia: all(1e-3),
         torque_limit: all(2.0),
         torque_rate_limit: all(500.0),
+        speed_limit: all(50.0),
+        encoder_step: all(0.0),
+        device_friction: all(0.0),
+        effects: HapticEffects::default(),
         hand: HandSpec { stiffness: all(20.0), damping: all(0.2), inertia: all(2e-3) },
     }
 }

@@ -262,9 +262,11 @@ fn grid(samples: &Samples, steps: &[f64]) -> Result<Grid, GridizeError> {
             return Err(GridizeError::Step { joint: label.name.clone(), step });
         }
         let column = || samples.configurations.iter().skip(joint).step_by(joints).copied();
-        let slack = tolerances::GRID_LINE;
-        let first = (column().fold(f64::INFINITY, f64::min) / step - slack).ceil();
-        let last = (column().fold(f64::NEG_INFINITY, f64::max) / step + slack).floor();
+        let [low, high] = [column().fold(f64::INFINITY, f64::min), column().fold(f64::NEG_INFINITY, f64::max)];
+        // Of a step beyond all reason the slack must not reach across the samples.
+        let slack = tolerances::GRID_LINE * ((high - low) / step).min(1.0);
+        let first = (low / step - slack).ceil();
+        let last = (high / step + slack).floor();
         let count = last - first + 1.0;
         if count < 1.0 {
             return Err(GridizeError::NoGridLine { joint: label.name.clone(), step });

@@ -1,5 +1,6 @@
 //! Scattered measurements of a contact torque: what a scan or an imported log hands to the gridization.
 
+use super::cloud::mix;
 use crate::MAX_JOINTS;
 
 /// Name and unit of one joint.
@@ -67,6 +68,29 @@ impl Samples {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.configurations.is_empty()
+    }
+
+    /// The samples in two: most, and a `share` chosen by chance, the same ones in every run.
+    #[must_use]
+    pub fn split(&self, share: f64) -> (Self, Self) {
+        let joints = self.joints.len();
+        let empty = || Self {
+            joints: self.joints.clone(),
+            deviations: self.deviations.as_ref().map(|_| Vec::new()),
+            ..Self::default()
+        };
+        let (mut most, mut chosen) = (empty(), empty());
+        for sample in 0..self.len() {
+            let chance = (mix(sample as u64) >> 11) as f64 / (1_u64 << 53) as f64;
+            let part = if chance < share { &mut chosen } else { &mut most };
+            let row = sample * joints..(sample + 1) * joints;
+            part.configurations.extend_from_slice(&self.configurations[row.clone()]);
+            part.torques.extend_from_slice(&self.torques[row.clone()]);
+            if let (Some(part), Some(all)) = (&mut part.deviations, &self.deviations) {
+                part.extend_from_slice(&all[row]);
+            }
+        }
+        (most, chosen)
     }
 
     /// Checks lengths and that every number is finite.

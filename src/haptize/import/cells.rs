@@ -5,7 +5,11 @@
 //! over the same place would give.
 
 use super::{ImportError, mapping::Keep};
-use crate::{JointVector, MAX_JOINTS, haptize::gridize::Samples, tolerances};
+use crate::{
+    JointVector, MAX_JOINTS,
+    haptize::gridize::{JointLabel, Samples},
+    tolerances,
+};
 use std::collections::BTreeMap;
 
 /// Cell number on each axis.
@@ -129,7 +133,8 @@ impl Cells {
     }
 
     /// One sample a cell that has what `keep` asks for.
-    pub fn samples(&self, keep: Keep, samples: &mut Samples) {
+    pub fn samples(&self, keep: Keep, joints: &[JointLabel]) -> Samples {
+        let mut samples = Samples { joints: joints.to_vec(), ..Samples::default() };
         let mut deviations = Vec::new();
         for [forward, backward] in self.cells.values() {
             let used: Vec<&Branch> = match keep {
@@ -152,6 +157,7 @@ impl Cells {
             }
         }
         samples.deviations = Some(deviations);
+        samples
     }
 
     pub fn report(&self) -> CellReport {

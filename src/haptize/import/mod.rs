@@ -106,6 +106,17 @@ pub struct ImportReport {
     pub cells: Option<CellReport>,
 }
 
+/// What was read from logs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Imported {
+    /// The torque that the mapping keeps.
+    pub samples: Samples,
+    /// Both branches, moving forward and backward, where rows were averaged by direction.
+    pub branches: Option<[Samples; 2]>,
+    /// What the import did.
+    pub report: ImportReport,
+}
+
 /// How far an import has come.
 #[derive(Clone, Copy, Debug)]
 pub struct ImportProgress {
@@ -123,7 +134,7 @@ pub fn import(
     mapping: &Mapping,
     files: &[PathBuf],
     progress: &mut dyn FnMut(ImportProgress),
-) -> Result<(Samples, ImportReport), ImportError> {
+) -> Result<Imported, ImportError> {
     let mut import = Import::new(mapping);
     let mut bytes = 0;
     for path in files {
@@ -288,11 +299,15 @@ impl<'a> Import<'a> {
         }
     }
 
-    fn finish(mut self) -> Result<(Samples, ImportReport), ImportError> {
+    fn finish(mut self) -> Result<Imported, ImportError> {
         let keep = self.mapping.torque.keep;
+        let mut branches = None;
         if keep != Keep::All {
-            self.cells.samples(keep, &mut self.samples);
+            self.samples = self.cells.samples(keep, &self.samples.joints);
             self.report.cells = Some(self.cells.report());
+        }
+        if !matches!(keep, Keep::All | Keep::Static) {
+            branches = Some([Keep::Forward, Keep::Backward].map(|keep| self.cells.samples(keep, &self.samples.joints)));
         }
         self.report.samples = self.samples.len();
         if self.samples.is_empty() {
@@ -301,7 +316,7 @@ impl<'a> Import<'a> {
                 self.report.rows
             )));
         }
-        Ok((self.samples, self.report))
+        Ok(Imported { samples: self.samples, branches, report: self.report })
     }
 }
 

@@ -155,8 +155,7 @@ impl<'a, R: BufRead> Rows<'a, R> {
             return self.refuse(Reason::Columns, message).map(Some);
         }
         if let Some((column, field)) = bad {
-            let message =
-                format!("column {} holds `{field}`, not a finite number{}", column + 1, self.decimal_hint(field));
+            let message = format!("column {} holds `{field}`, not a finite number{}", column + 1, self.hint(field));
             return self.refuse(Reason::NotANumber, message).map(Some);
         }
         let skip = usize::from(layout.time.is_some());
@@ -196,7 +195,11 @@ impl<'a, R: BufRead> Rows<'a, R> {
         }
     }
 
-    fn decimal_hint(&self, field: &str) -> &'static str {
+    fn hint(&self, field: &str) -> &'static str {
+        if self.mapping.table.delimiter != ';' && field.contains(';') {
+            return " (columns seem to be separated by semicolons: set `delimiter = \";\"`, and `decimal = \",\"` where \
+                    decimals are commas)";
+        }
         let comma_number = self.mapping.table.decimal == '.' && number(field, ',').is_some();
         if comma_number { " (decimals seem to be commas: set `decimal = \",\"`)" } else { "" }
     }
@@ -206,7 +209,8 @@ impl<'a, R: BufRead> Rows<'a, R> {
         let find = |column: &ColumnName| match column {
             ColumnName::Number(number) if *number <= columns => Ok(number - 1),
             ColumnName::Number(number) => {
-                Err(self.error(format!("the mapping names column {number}, the line has {columns}")))
+                let hint = names.first().map_or("", |field| self.hint(field));
+                Err(self.error(format!("the mapping names column {number}, the line has {columns}{hint}")))
             }
             ColumnName::Name(name) => {
                 let known = || format!("no column is called `{name}`; there are {}", names.join(", "));

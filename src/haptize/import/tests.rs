@@ -15,7 +15,7 @@ fn read(mapping: &str, log: &str) -> Result<(Samples, ImportReport), ImportError
     let mapping = Mapping::parse(mapping, "map.toml").unwrap();
     let mut import = Import::new(&mapping);
     import.read(log.as_bytes(), "log.csv", &mut |_, _| {})?;
-    import.finish()
+    import.finish().map(|imported| (imported.samples, imported.report))
 }
 
 fn refused(mapping: &str, log: &str) -> String {
@@ -83,6 +83,10 @@ fn comma_decimals_in_a_table_of_points_are_explained() {
     let spaced = TWO.replace("[time]", "[table]\ndelimiter = \" \"\n[time]");
     let error = refused(&spaced, "0 \t 1.5 2\n1 1,5 2");
     assert!(error.contains("log.csv:2") && error.contains("decimal = \",\""), "{error}");
+    for log in ["0;1,5;2", "0;1;2", "0;1;2;3;4"] {
+        let error = refused(TWO, log);
+        assert!(error.contains("log.csv:1") && error.contains("delimiter = \";\""), "{error}");
+    }
 }
 
 #[test]

@@ -62,6 +62,17 @@ impl PdControl {
         share >= 1.0
     }
 
+    /// Ends the motion of the command where it is.
+    pub fn rest(&mut self) {
+        self.commanded_speed = JointVector::zeros(self.commanded.len());
+    }
+
+    /// Gives way: the commanded position is the measured one, so that damping alone resists whoever moves the device.
+    pub fn follow(&mut self, position: &JointVector) {
+        self.commanded = *position;
+        self.rest();
+    }
+
     /// Torque for the measured `position`, read every `period` [s].
     pub fn torque(&mut self, position: &JointVector, period: f64) -> PdOutput {
         if self.history.len() > SPEED_TICKS {
@@ -110,5 +121,8 @@ mod tests {
         }
         let output = control.torque(&vector([0.03, -0.02]), 1e-3);
         assert!((output.speed[0] - 1.0).abs() < 1e-9, "{output:?}");
+        control.follow(&vector([0.03, -0.02]));
+        let output = control.torque(&vector([0.03, -0.02]), 1e-3);
+        assert!((output.torque[0] + output.speed[0]).abs() < 1e-12, "damping alone: {output:?}");
     }
 }

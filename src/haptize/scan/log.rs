@@ -21,6 +21,8 @@ use std::{
 pub const SIGNATURE: &str = "# haptize scan log, version 1";
 /// Before every line of the scene.
 const SCENE: &str = "#> ";
+/// After `# plan: `, where there was none but a hand's.
+const GUIDED: &str = "led by hand";
 /// Longest line and most rows that are read.
 const LONGEST_LINE: u64 = 1 << 16;
 const MOST_ROWS: usize = 5_000_000;
@@ -75,6 +77,8 @@ pub struct LogHeader {
     pub rig: String,
     /// True where no real object was touched.
     pub simulated: bool,
+    /// True where a hand led the device; rows are then numbered as they came.
+    pub guided: bool,
     /// Names and units.
     pub joints: Vec<JointLabel>,
     /// The scene's text.
@@ -112,7 +116,7 @@ pub enum LogError {
     #[error("{}: exists already; continue it with --resume, or name another file", .0.display())]
     Exists(PathBuf),
     /// Another scene's log.
-    #[error("{}: the log was made with another scene or rig; it cannot be continued with this one", .0.display())]
+    #[error("{}: the log was made with another scene or rig, or one with a plan and one led by hand; it cannot be continued with this one", .0.display())]
     OtherScene(PathBuf),
     /// Not a scan log.
     #[error("{}: not a scan log (its first line is not `{SIGNATURE}`); other tables need a column mapping", .0.display())]
@@ -147,8 +151,9 @@ impl LogHeader {
 
     fn text(&self) -> String {
         let kind = if self.simulated { "simulated" } else { "real" };
+        let plan = if self.guided { GUIDED } else { "the scene's" };
         let mut text = format!(
-            "{SIGNATURE}\n# kind: {kind}\n# rig: {}\n\
+            "{SIGNATURE}\n# kind: {kind}\n# plan: {plan}\n# rig: {}\n\
              # tau: contact torque on the proxy in steady contact, minus control torque, gravity subtracted\n\
              # std: standard deviation of a single tick's torque over the ticks that were averaged\n",
             self.rig
@@ -260,6 +265,8 @@ impl ScanLog {
                 log.header.scene.push('\n');
             } else if let Some(kind) = line.strip_prefix("# kind: ") {
                 log.header.simulated = kind == "simulated";
+            } else if let Some(plan) = line.strip_prefix("# plan: ") {
+                log.header.guided = plan == GUIDED;
             } else if let Some(rig) = line.strip_prefix("# rig: ") {
                 rig.clone_into(&mut log.header.rig);
             } else if line.starts_with('#') || line.is_empty() {
@@ -349,6 +356,7 @@ mod tests {
         LogHeader {
             rig: "a rig, on a table".to_owned(),
             simulated: true,
+            guided: true,
             joints: [("base yaw", "rad"), ("slide", "m")]
                 .map(|(name, unit)| JointLabel { name: name.to_owned(), unit: unit.to_owned() })
                 .into(),

@@ -1,5 +1,7 @@
 //! Haptization of a real object (section 2.2): a device, held by PD control, is led through a plan of configurations;
-//! where it is steady, the contact torque is minus the control torque, gravity subtracted.
+//! where it is steady, the contact torque is minus the control torque, gravity subtracted. Or a hand leads it: the device
+//! gives way while it is held, holds on where it is let go, and is measured there, so that no row contains the hand's
+//! own torque.
 //!
 //! Everything here drives a [`Rig`]. The one that ships is [`simulated`]: it touches no real object, and every log and
 //! dataset made with it says so.
@@ -7,7 +9,7 @@
 mod control;
 mod log;
 mod plan;
-mod reach;
+pub mod reach;
 mod rig;
 pub mod simulated;
 mod steady;
@@ -74,7 +76,7 @@ pub struct ScanProgress {
 /// What a scan did.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct ScanReport {
-    /// Points of the plan.
+    /// Points of the plan; where a hand led, those logged.
     pub points: usize,
     /// Points measured in steady contact or free space, earlier runs included.
     pub steady: usize,
@@ -86,7 +88,7 @@ pub struct ScanReport {
     pub unreachable: usize,
     /// Time on the rig's clock in this run [s].
     pub seconds: f64,
-    /// True when every point that can be reached was logged.
+    /// True when every point that can be reached was logged, or a hand led for the time that was asked for.
     pub whole: bool,
     /// The rig's own words.
     pub rig: String,
@@ -169,6 +171,44 @@ impl Session<'_> {
         }
         report.seconds = driver.reading.time - begun;
         report.whole = report.logged() >= reachable;
+        Ok(report)
+    }
+
+    /// Logs wherever a hand leads the device to and lets go of it, for `seconds`; rows are numbered on from those `logged`.
+    ///
+    /// While the hand holds the device ([`RigReading::held`]), damping alone resists it, and no limit applies: nothing
+    /// drives it. Once it is let go, PD control holds it where it is, under all limits; when it is steady, it is measured. A
+    /// hand that takes hold meanwhile ends the measurement without a row.
+    ///
+    /// # Errors
+    /// When the rig or the log fails, or a limit is exceeded; the log then holds all that was measured.
+    pub fn guided(&mut self, seconds: f64, logged: &[ScanRow]) -> Result<ScanReport, ScanError> {
+        let mut report = self.report(0);
+        logged.iter().for_each(|row| report.count(row.status));
+        let mut next = logged.iter().map(|row| row.point + 1).max().unwrap_or(0);
+        let mut driver = Driver::start(self.spec, self.chain, &mut *self.rig)?;
+        let begun = driver.reading.time;
+        let goes_on = |time: f64| time - begun < seconds && !self.stop.load(Ordering::Relaxed);
+        while goes_on(driver.reading.time) {
+            let row = match driver.be_led(next, &goes_on) {
+                Ok(row) => row,
+                Err(Interruption::Rig(error)) => return Err(error.into()),
+                Err(Interruption::Limit(what)) => {
+                    self.log.append(&driver.stopped(next)?)?;
+                    return Err(ScanError::Limit { point: next, what });
+                }
+            };
+            if let Some(row) = row {
+                self.log.append(&row)?;
+                next += 1;
+                report.count(row.status);
+                let done = report.logged();
+                (self.progress)(ScanProgress { done, points: done, time: row.time });
+            }
+        }
+        report.points = report.logged();
+        report.seconds = driver.reading.time - begun;
+        report.whole = true;
         Ok(report)
     }
 
@@ -285,23 +325,52 @@ impl<'a> Driver<'a> {
         while !self.control.advance(&stop.q, self.period) {
             self.tick()?;
         }
-        let Some(point) = stop.point else { return Ok(None) };
+        stop.point.map_or(Ok(None), |point| self.measure(point))
+    }
+
+    /// Waits for a hand, gives way to it, and measures where it lets go; `None` where it takes hold again before that, or
+    /// the time is over.
+    fn be_led(&mut self, point: usize, goes_on: &impl Fn(f64) -> bool) -> Result<Option<ScanRow>, Interruption> {
+        while !self.reading.held {
+            if !goes_on(self.reading.time) {
+                return Ok(None);
+            }
+            self.tick()?;
+        }
+        while self.reading.held {
+            if !goes_on(self.reading.time) {
+                return Ok(None);
+            }
+            self.control.follow(&self.reading.position);
+            let torque = self.control.torque(&self.reading.position, self.period).torque;
+            self.hold(&torque)?;
+        }
+        self.control.follow(&self.reading.position);
+        self.measure(point)
+    }
+
+    /// Waits where it is until the device is steady, and averages; `None` where a hand takes hold of it.
+    fn measure(&mut self, point: usize) -> Result<Option<ScanRow>, Interruption> {
+        self.control.rest();
         self.steady.restart();
         let arrived = self.reading.time;
         let status = loop {
-            self.control.advance(&stop.q, self.period);
-            if self.tick()? {
+            let steady = self.tick()?;
+            if self.reading.held {
+                return Ok(None);
+            }
+            if steady {
                 break RowStatus::Steady;
             }
             if self.reading.time - arrived > self.spec.control.timeout {
                 break RowStatus::Unsteady;
             }
         };
-        self.average(point, status).map(Some)
+        self.average(point, status)
     }
 
-    /// Averages position and contact torque.
-    fn average(&mut self, point: usize, status: RowStatus) -> Result<ScanRow, Interruption> {
+    /// Averages position and contact torque; `None` where a hand takes hold of the device.
+    fn average(&mut self, point: usize, status: RowStatus) -> Result<Option<ScanRow>, Interruption> {
         let joints = self.chain.degrees_of_freedom();
         let zero = JointVector::zeros(joints);
         let (mut q, mut torque, mut squares) = (zero, zero, zero);
@@ -316,12 +385,15 @@ impl<'a> Driver<'a> {
                 squares[joint] += before * (-output.torque[joint] - torque[joint]);
             }
             self.hold(&output.torque)?;
+            if self.reading.held {
+                return Ok(None);
+            }
         }
         let mut deviation = zero;
         for (deviation, sum) in deviation.iter_mut().zip(squares.iter()) {
             *deviation = (sum / f64::from((ticks - 1).max(1))).sqrt();
         }
-        Ok(ScanRow { point, time: self.reading.time, q, torque, deviation, ticks, status })
+        Ok(Some(ScanRow { point, time: self.reading.time, q, torque, deviation, ticks, status }))
     }
 
     /// After a limit: damping alone, until the device has come to rest; then the row that says where.
@@ -333,7 +405,7 @@ impl<'a> Driver<'a> {
             let torque = brake.torque(&self.reading.position, self.period).torque;
             self.hold(&torque)?;
         }
-        let RigReading { time, position } = self.reading;
+        let RigReading { time, position, .. } = self.reading;
         let zero = JointVector::zeros(joints);
         Ok(ScanRow { point, time, q: position, torque: zero, deviation: zero, ticks: 1, status: RowStatus::Limit })
     }

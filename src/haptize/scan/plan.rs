@@ -60,6 +60,24 @@ impl Plan {
     }
 }
 
+impl Plan {
+    /// `count` points of the plan, spread over it evenly however many follow (the golden ratio's multiples), from number
+    /// `first` of that order on: for each the way point that leads there, or itself, and its configuration.
+    #[must_use]
+    pub fn spread(&self, first: usize, count: usize) -> Vec<[JointVector; 2]> {
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
+        let measured: Vec<usize> = (0..self.stops.len()).filter(|&stop| self.stops[stop].point.is_some()).collect();
+        let approach = |stop: usize| self.stops[..stop].iter().rev().find(|before| before.point.is_none());
+        let visit = |number: usize| {
+            let place = ((number as f64 * GOLDEN).fract() * measured.len() as f64) as usize;
+            let stop = measured[place.min(measured.len() - 1)];
+            let q = self.stops[stop].q;
+            [approach(stop).map_or(q, |way_point| way_point.q), q]
+        };
+        if measured.is_empty() { Vec::new() } else { (first..first + count).map(visit).collect() }
+    }
+}
+
 fn checked_points(counts: &[usize]) -> Result<usize, ScanError> {
     let points = counts.iter().try_fold(1_usize, |product, &count| product.checked_mul(count));
     points

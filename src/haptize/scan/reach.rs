@@ -15,6 +15,13 @@ use glam::{DMat3, DVec3};
 /// the joints do not reach it.
 #[must_use]
 pub fn reach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) -> Option<JointVector> {
+    let (q, distance) = approach(chain, node, target, start);
+    (distance < tolerances::REACHED).then_some(q)
+}
+
+/// Configuration near `start` at which contact node `node` is as near to `target` as the joints let it, and how near [m].
+#[must_use]
+pub fn approach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) -> (JointVector, f64) {
     let mut q = *start;
     let mut pose = chain.new_pose();
     chain.pose(&q, &mut pose);
@@ -22,7 +29,7 @@ pub fn reach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) -> 
     let mut damping = tolerances::REACH_DAMPING;
     for _ in 0..tolerances::REACH_STEPS {
         if distance < tolerances::REACHED {
-            return Some(q);
+            break;
         }
         let next = step(chain, &pose, node, target, &q, damping);
         chain.pose(&next, &mut pose);
@@ -35,7 +42,7 @@ pub fn reach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) -> 
             chain.pose(&q, &mut pose);
         }
     }
-    None
+    (q, distance)
 }
 
 fn step(chain: &Chain, pose: &Pose, node: usize, target: DVec3, q: &JointVector, damping: f64) -> JointVector {

@@ -25,6 +25,9 @@ pub struct RigReading {
     pub time: f64,
     /// Measured joint positions [rad or m].
     pub position: JointVector,
+    /// Whether a hand holds the device: a button on its handle, as haptic devices have one. What is read meanwhile is not
+    /// the object's torque alone. Always false where there is no such button.
+    pub held: bool,
 }
 
 /// A rig failed.

@@ -1,6 +1,6 @@
 //! A scan against the simulated rig: what it logs is the block's own force, nothing else, and it stops and resumes.
 
-use super::simulated::{NodeContact, SimulatedRig, Sponge};
+use super::simulated::{Hand, NodeContact, SimulatedRig, Sponge};
 use super::*;
 use crate::scene::{PlanAxis, ScanScene, WorkspacePlan};
 use std::path::PathBuf;
@@ -48,6 +48,7 @@ impl Bench {
         LogHeader {
             rig: rig.description(),
             simulated: rig.is_simulated(),
+            guided: false,
             joints: labels(&self.chain),
             scene: self.scene.text.clone(),
         }
@@ -97,6 +98,17 @@ impl Bench {
     }
 }
 
+/// Whether a row's torque is the block's but for dry friction of the joints, tangential friction of the tip, and what has
+/// not relaxed (a `share` of the torque).
+fn is(row: &ScanRow, expected: &JointVector, share: f64) -> bool {
+    let slack = 0.004 + share * expected.norm();
+    row.torque.iter().zip(expected.iter()).all(|(measured, expected)| (measured - expected).abs() < slack)
+}
+
+fn assert_is(row: &ScanRow, expected: &JointVector, share: f64) {
+    assert!(is(row, expected, share), "{row:?} {expected:?}");
+}
+
 #[test]
 fn steady_torque_is_that_of_the_block_where_it_is_touched_and_nothing_elsewhere() {
     let bench = Bench::new(scene());
@@ -107,11 +119,7 @@ fn steady_torque_is_that_of_the_block_where_it_is_touched_and_nothing_elsewhere(
     for row in &rows {
         let expected = bench.relaxed_torque(&row.q);
         touched += usize::from(expected.norm() > 0.0);
-        for (joint, (measured, expected)) in row.torque.iter().zip(expected.iter()).enumerate() {
-            // Dry friction of the joint, tangential friction of the tip, and what has not relaxed.
-            let slack = 0.004 + 0.15 * bench.relaxed_torque(&row.q).norm();
-            assert!((measured - expected).abs() < slack, "{row:?} joint {joint}: {expected}");
-        }
+        assert_is(row, &expected, 0.15);
         // A joint held by friction within one encoder step is commanded a constant torque: no deviation.
         assert!(row.deviation.iter().all(|deviation| (0.0..0.05).contains(deviation)), "{row:?}");
     }
@@ -195,6 +203,66 @@ fn a_rig_that_fails_ends_the_scan_and_keeps_the_log() {
     let result = bench.session(&mut rig, &mut log, |session| session.scan(&bench.plan, &[]));
     assert!(result.err().unwrap().to_string().contains("no answer"));
     assert!(!ScanLog::read(&bench.path()).unwrap().rows.is_empty());
+}
+
+#[test]
+fn a_guided_scan_logs_the_object_alone_and_never_the_hand() {
+    let bench = Bench::new(scene());
+    let places = bench.plan.spread(0, 12);
+    let hand = Hand::new(places.clone());
+    let seconds = hand.duration();
+    let mut log = LogWriter::create(&bench.path(), &LogHeader { guided: true, ..bench.header() }).unwrap();
+    let report =
+        bench.session(&mut bench.rig().led_by(hand), &mut log, |session| session.guided(seconds, &[])).unwrap();
+    drop(log);
+    let ScanLog { header, rows } = ScanLog::read(&bench.path()).unwrap();
+    assert!(header.guided && report.whole && report.steady == 12 && rows.len() == 12, "{report:?}");
+    let mut touched = 0;
+    for (row, [_, place]) in rows.iter().zip(&places) {
+        let expected = bench.relaxed_torque(&row.q);
+        assert_is(row, &expected, 0.25);
+        touched += usize::from(expected.norm() > 0.0);
+        let off = row.q.iter().zip(place.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 0.1, "led there: {row:?} {place:?}");
+    }
+    assert!(touched >= 6);
+    let pulled = |row: &ScanRow| {
+        let mut torque = row.torque;
+        torque.iter_mut().for_each(|tau| *tau += 0.1);
+        ScanRow { torque, ..*row }
+    };
+    assert!(
+        rows.iter().all(|row| !is(&pulled(row), &bench.relaxed_torque(&row.q), 0.25)),
+        "a hand's torque would show"
+    );
+}
+
+#[test]
+fn a_hand_on_the_device_in_a_planned_scan_leaves_the_point_open() {
+    struct Held(SimulatedRig);
+    impl Rig for Held {
+        fn hold(&mut self, torque: &JointVector, period: f64) -> Result<RigReading, RigError> {
+            let reading = self.0.hold(torque, period)?;
+            Ok(RigReading { held: (2.0..3.5).contains(&reading.time), ..reading })
+        }
+        fn description(&self) -> String {
+            self.0.description()
+        }
+        fn is_simulated(&self) -> bool {
+            true
+        }
+    }
+    let bench = Bench::new(scene());
+    let mut log = LogWriter::create(&bench.path(), &bench.header()).unwrap();
+    let mut rig = Held(bench.rig());
+    let report = bench.session(&mut rig, &mut log, |session| session.scan(&bench.plan, &[])).unwrap();
+    assert!(!report.whole && report.steady < 16 && report.steady > 0, "{report:?}");
+    drop(log);
+    let (mut log, logged) = LogWriter::resume(&bench.path(), &bench.header()).unwrap();
+    let report = bench.session(&mut bench.rig(), &mut log, |session| session.scan(&bench.plan, &logged)).unwrap();
+    assert!(report.whole && report.steady == 16, "{report:?}");
+    let guided = LogHeader { guided: true, ..bench.header() };
+    assert!(matches!(LogWriter::resume(&bench.path(), &guided), Err(LogError::OtherScene(_))));
 }
 
 #[test]

@@ -1,11 +1,15 @@
-//! Surfaces from mesh files: OBJ, STL and PLY, chosen by the file's extension.
+//! Surfaces from mesh files (OBJ, STL and PLY, chosen by the file's extension), and tetrahedra from Gmsh files.
 //!
 //! Polygons are cut into triangle fans. Nodes at exactly the same point become one node (an STL file has no others, and
-//! grouped OBJ files repeat those on the seams). Nodes keep the order of a PLY file; in OBJ and STL files they are
+//! grouped OBJ files repeat those on the seams), and faces that are left with fewer than three are dropped. Nodes keep the order of a PLY file; in OBJ and STL files they are
 //! numbered in the order in which triangles first name them, and nodes that no triangle names are dropped. Coordinates
 //! become `scale * coordinate + centre`.
 
+mod boundary;
+mod msh;
 mod ply;
+
+pub(super) use boundary::Body;
 
 use super::{ObjectError, topology::place};
 use glam::DVec3;
@@ -33,20 +37,53 @@ pub(super) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<St
         "ply" => ply::read,
         _ => return Err(ObjectError::Format { file: file.to_owned() }),
     };
-    let stream = File::open(file).map_err(|error| unreadable(error.to_string()))?;
-    let attributes = stream.metadata().map_err(|error| unreadable(error.to_string()))?;
-    if !attributes.is_file() || attributes.len() > MAX_BYTES {
-        return Err(unreadable(format!("it is not a plain file of at most {MAX_BYTES} bytes")));
-    }
-    let (nodes, mut triangles) = reader(&mut BufReader::new(stream)).map_err(unreadable)?;
+    let (nodes, mut triangles) = reader(&mut BufReader::new(open(file)?)).map_err(unreadable)?;
     let count = nodes.len();
     let mut nodes = weld(nodes, &mut triangles);
     if nodes.len() < count && extension != "stl" {
         let (file, merged) = (file.display(), count - nodes.len());
         warnings.push(format!("{file}: {merged} of {count} nodes lay exactly on another and were merged with it"));
     }
+    let faces = triangles.len();
+    triangles.retain(|[a, b, c]| a != b && b != c && c != a);
+    if triangles.len() < faces {
+        let (file, dropped) = (file.display(), faces - triangles.len());
+        warnings.push(format!("{file}: {dropped} of {faces} faces had two corners in one place and were left out"));
+    }
     nodes.iter_mut().for_each(|node| *node = scale * *node + centre);
     Ok((nodes, triangles))
+}
+
+/// Reads the tetrahedra in a Gmsh file.
+pub(super) fn read_tetrahedra(
+    file: &Path,
+    scale: f64,
+    centre: DVec3,
+    warnings: &mut Vec<String>,
+) -> Result<Body, ObjectError> {
+    if !(scale > 0.0 && scale.is_finite()) {
+        return Err(ObjectError::Parameter { name: "scale", value: scale, range: "positive and finite" });
+    }
+    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+    let mesh = msh::read(&mut BufReader::new(open(file)?)).map_err(unreadable)?;
+    let nodes: Vec<DVec3> = mesh.nodes.iter().map(|node| scale * *node + centre).collect();
+    let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra);
+    if turned > 0 {
+        let (file, all) = (file.display(), ordered.tetrahedra.len());
+        warnings.push(format!("{file}: {turned} of {all} tetrahedra were numbered inside out and were turned"));
+    }
+    Ok(ordered)
+}
+
+/// Opens a plain file of bounded length.
+fn open(file: &Path) -> Result<File, ObjectError> {
+    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+    let stream = File::open(file).map_err(|error| unreadable(error.to_string()))?;
+    let attributes = stream.metadata().map_err(|error| unreadable(error.to_string()))?;
+    if !attributes.is_file() || attributes.len() > MAX_BYTES {
+        return Err(unreadable(format!("it is not a plain file of at most {MAX_BYTES} bytes")));
+    }
+    Ok(stream)
 }
 
 fn read_obj(stream: &mut BufReader<File>) -> Result<Surface, String> {

@@ -1,5 +1,6 @@
 //! From the tables of a scene file to a validated [`Scene`]: defaults filled, every number checked, one file per table.
 
+mod graphics;
 mod grid;
 mod haptics;
 mod motion;
@@ -9,17 +10,16 @@ mod scan;
 
 use super::check::Checker;
 use super::error::SceneError;
-use super::file::{ContactTable, GraphicsTable, SceneTable};
-use super::{Algorithm, ContactSpec, GraphicsSpec, Rendering, ScanScene, Scene};
+use super::file::{ContactStiffness, ContactTable, SceneTable};
+use super::{Algorithm, ContactSpec, Rendering, ScanScene, Scene};
+use toml::Spanned;
 
 /// Default relative residual of the contact solver, in the energy norm [1]. Forces are promised to balance K u to 1e-6 of the
 /// largest, node by node, which a residual of 1e-6 misses by a third; the last steps converge fast, so two digits more cost
 /// 8 % more iterations on the sphere (5.1 to 5.5).
 const CONTACT_TOLERANCE: f64 = 1e-8;
 /// Default cap on the contact solver's iterations [1].
-const CONTACT_ITERATIONS: u32 = 100;
-/// Default frame rate [Hz].
-const GRAPHICS_RATE: f64 = 60.0;
+const CONTACT_ITERATIONS: u32 = 400;
 
 /// Validates `table`, read from the checker's text, as a scene with a virtual object.
 pub(super) fn scene(checker: &Checker<'_>, table: &SceneTable) -> Result<Scene, SceneError> {
@@ -50,7 +50,11 @@ pub(super) fn scan_scene(checker: &Checker<'_>, table: &SceneTable) -> Result<Sc
                        haptized by `haptize bake`";
         return Err(checker.error(0..0, message));
     };
-    let Rendering { text, name, proxy, .. } = rendering(checker, table)?;
+    let Rendering { text, name, proxy, haptics, .. } = rendering(checker, table)?;
+    if let Some((effect, place)) = haptics.effects.at_contacts() {
+        let message = format!("{effect} needs the contact forces, which a real object does not tell: leave it out");
+        return Err(checker.error(place.clone(), message));
+    }
     Ok(ScanScene { text, name, scan: scan::convert(checker, scan, &proxy)?, proxy })
 }
 
@@ -58,14 +62,16 @@ pub(super) fn scan_scene(checker: &Checker<'_>, table: &SceneTable) -> Result<Sc
 pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Rendering, SceneError> {
     let proxy = proxy::convert(checker, &table.proxy)?;
     let joints = &proxy.joints;
+    let object = table.object.as_ref().map(|object| object::convert(checker, object)).transpose()?;
+    let graphics = table.graphics.as_ref().map(|own| graphics::convert(checker, own, object.as_ref())).transpose()?;
     let file_stem = checker.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     Ok(Rendering {
         path: checker.path.to_owned(),
         text: checker.text.to_owned(),
         name: table.name.clone().or(file_stem).unwrap_or_default(),
-        object: table.object.as_ref().map(|object| object::convert(checker, object)).transpose()?,
+        object,
         haptics: haptics::convert(checker, &table.haptics, joints)?,
-        graphics: table.graphics.as_ref().map(|table| graphics(checker, table)).transpose()?,
+        graphics,
         motion: motion::convert(checker, &table.motion, joints)?,
         proxy,
     })
@@ -81,14 +87,14 @@ fn contact(checker: &Checker<'_>, table: &ContactTable) -> Result<ContactSpec, S
         None => CONTACT_ITERATIONS,
     };
     Ok(ContactSpec {
-        stiffness: checker.positive("stiffness", &table.stiffness)?,
+        stiffness: match table.stiffness.get_ref() {
+            ContactStiffness::Springs(value) => {
+                checker.positive("stiffness", &Spanned::new(table.stiffness.span(), *value))?
+            }
+            ContactStiffness::Rigid => f64::INFINITY,
+        },
         algorithm: table.algorithm.unwrap_or(Algorithm::Energy),
         tolerance: tolerance.unwrap_or(Ok(CONTACT_TOLERANCE))?,
         max_iterations,
     })
-}
-
-fn graphics(checker: &Checker<'_>, table: &GraphicsTable) -> Result<GraphicsSpec, SceneError> {
-    let rate = table.rate.as_ref().map(|value| checker.between("rate", value, 0.0, 1e4));
-    Ok(GraphicsSpec { rate: rate.unwrap_or(Ok(GRAPHICS_RATE))? })
 }

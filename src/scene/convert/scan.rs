@@ -82,6 +82,7 @@ fn control(checker: &Checker<'_>, table: &ControlTable, proxy: &ProxySpec) -> Re
         drift: positive("drift", &table.drift, 5e-3)?,
         timeout: positive("timeout", &table.timeout, 5.0)?,
         average: positive("average", &table.average, 0.1)?,
+        epsilon: optional(&table.epsilon, 0.01, |value| checker.not_negative("epsilon", value))?,
     })
 }
 

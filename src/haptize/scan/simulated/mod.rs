@@ -2,14 +2,16 @@
 //! every log says so.
 //!
 //! `M(q) qddot = tau + noise + g(q) - b qdot - dry friction + sum_i J_i^T f_i`, M and g of the chain, f_i the forces of the
-//! sponge on its contact nodes. Coriolis terms are left out: at the speeds of a
+//! sponge on its contact nodes, plus a hand's torque where one leads the device. Coriolis terms are left out: at the speeds of a
 //! scan (0.5 rad/s, links of 0.14 m and 0.1 kg) they are below 1e-3 N m. Stepped by semi-implicit Euler at a quarter of the
 //! control period; dry friction is bounded by what stops the joint within a step, so that it never drives it.
 //! Positions are read in whole encoder counts.
 
+mod hand;
 mod noise;
 mod sponge;
 
+pub use hand::Hand;
 pub use sponge::{NodeContact, Sponge};
 
 use super::rig::{Rig, RigError, RigReading};
@@ -40,6 +42,7 @@ pub struct SimulatedRig {
     velocity: JointVector,
     time: f64,
     noise: Noise,
+    hand: Option<Hand>,
 }
 
 impl SimulatedRig {
@@ -57,10 +60,18 @@ impl SimulatedRig {
             position,
             time: 0.0,
             noise: Noise::new(seed),
+            hand: None,
             chain,
         };
         rig.chain.pose(&rig.position, &mut rig.pose);
         rig
+    }
+
+    /// The same rig, led by `hand`.
+    #[must_use]
+    pub fn led_by(mut self, hand: Hand) -> Self {
+        self.hand = Some(hand);
+        self
     }
 
     /// Contact nodes that touch the block now.
@@ -77,6 +88,9 @@ impl SimulatedRig {
             if force != DVec3::ZERO {
                 self.chain.add_torque(&self.pose, node, force, &mut load);
             }
+        }
+        if let Some(hand) = &mut self.hand {
+            hand.add_torque(self.time, &self.position, &self.velocity, &mut load);
         }
         let inertia = self.chain.inertia(&self.pose);
         let mut rate = JointVector::zeros(self.position.len());
@@ -130,7 +144,8 @@ impl Rig for SimulatedRig {
         for (joint, value) in position.iter_mut().enumerate() {
             *value = self.encoded(joint);
         }
-        Ok(RigReading { time: self.time, position })
+        let held = self.hand.as_ref().is_some_and(|hand| hand.holds(self.time));
+        Ok(RigReading { time: self.time, position, held })
     }
 
     fn description(&self) -> String {

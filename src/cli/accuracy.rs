@@ -1,0 +1,40 @@
+//! `haptize accuracy`: what accuracy costs in time, for one scene.
+
+use super::{Failure, Report};
+use haptize::{
+    report::accuracy::{self, Extent},
+    scene::Scene,
+};
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// What to measure, and how much.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The scene's file.
+    scene: PathBuf,
+    /// The folder to write figures, table and page to.
+    #[arg(short, long, default_value = "out/accuracy")]
+    output: PathBuf,
+    /// Random configurations that are solved as the reference.
+    #[arg(long, default_value_t = 2000)]
+    configurations: usize,
+    /// Grids with more points than this are left out.
+    #[arg(long, default_value_t = 100_000)]
+    points: usize,
+}
+
+/// Measures the scene and writes what was found.
+pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    let scene = Scene::load(&arguments.scene)?;
+    let extent = Extent { configurations: arguments.configurations.max(1), points: arguments.points };
+    let found = accuracy::measure(&scene, extent, &mut |what| eprintln!("haptize: {what} ..."))?;
+    let files = accuracy::write_all(&arguments.output, &found)?;
+    let mut json = serde_json::to_value(&found)?;
+    json["offers"] = serde_json::to_value(accuracy::offers(&found))?;
+    json["files"] = files.iter().map(|file| Value::from(file.display().to_string())).collect();
+    let mut text = String::new();
+    accuracy::describe(&mut text, &found)?;
+    text.push_str(&format!("{} files in {}\n", files.len(), arguments.output.display()));
+    Ok(Report { text, json, whole: true })
+}

@@ -1,0 +1,84 @@
+//! What `haptize play` tells of a session beside its traces: the force at the end of the proxy, of one dataset or of two
+//! felt by the same motion, where the torque came from, and what the dataset does not hold.
+
+use super::{Failure, play};
+use haptize::{
+    dataset::{Dataset, Provenance},
+    device::Motion,
+    render::{setup::Setup, trace::Trace},
+    report::{
+        self,
+        force::{EndForce, Held, force},
+    },
+};
+use serde_json::{Value, json};
+use std::{
+    fmt::{self, Write},
+    path::Path,
+};
+
+/// What was felt.
+pub struct Felt {
+    provenance: Provenance,
+    absent: Vec<&'static str>,
+    forces: Vec<EndForce>,
+}
+
+impl Felt {
+    /// What `trace` felt of the dataset at `path`.
+    pub fn new(path: &Path, dataset: &Dataset, setup: &Setup, trace: &Trace) -> Self {
+        Self {
+            provenance: dataset.provenance.clone(),
+            absent: dataset.absent(),
+            forces: EndForce::new(&name(path, dataset), &setup.chain, trace).into_iter().collect(),
+        }
+    }
+
+    /// Has the dataset at `path` felt by the same motion.
+    pub fn beside(&mut self, path: &Path, motion: Motion, seconds: f64) -> Result<(), Failure> {
+        let dataset = Dataset::open(path)?;
+        let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", path.display()))?;
+        let played = play::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, false)?;
+        self.forces.extend(EndForce::new(&name(path, &dataset), &setup.chain, &played.trace));
+        if self.forces.len() < 2 {
+            return Err("--beside compares the force at the end of arms of three joints with contact nodes".into());
+        }
+        Ok(())
+    }
+
+    /// Draws the forces of all datasets in one figure.
+    pub fn draw(&self, folder: &Path, trace: &Trace) -> Result<(), Failure> {
+        report::write_both(folder, "force", &force(&self.forces, trace))?;
+        Ok(())
+    }
+
+    /// For programs.
+    pub fn tell(&self, json: &mut Value) {
+        json["held_force"] =
+            self.forces.iter().map(|felt| json!({ "dataset": felt.name, "held": felt.held() })).collect();
+        json["absent"] = self.absent.clone().into();
+    }
+
+    /// For people.
+    pub fn describe(&self, text: &mut String) -> fmt::Result {
+        for felt in &self.forces {
+            if let Some(Held { axis, mean, variation }) = felt.held() {
+                let (percent, name) = (100.0 * variation, &felt.name);
+                write!(text, "  held force   {mean:.3} N along {axis} on {name}, ")?;
+                writeln!(text, "constant to {percent:.1} % over the middle half of the contact")?;
+            }
+        }
+        let Provenance { algorithm, backend, adapter, .. } = &self.provenance;
+        writeln!(text, "  torque from  {algorithm} on {backend} ({adapter})")?;
+        if !self.absent.is_empty() {
+            writeln!(text, "  not there    {}", self.absent.join(", "))?;
+        }
+        Ok(())
+    }
+}
+
+/// The file's name; a simulated specimen says so.
+fn name(path: &Path, dataset: &Dataset) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    if dataset.provenance.backend.starts_with("simulated") { format!("{stem} (simulated)") } else { stem.into_owned() }
+}

@@ -1,0 +1,114 @@
+//! `haptize stability`: the hard cases of contact, gridization, loops and graphics, on this machine and its adapter.
+
+use super::{Failure, Report};
+use haptize::{
+    gpu::{AdapterChoice, Context},
+    report::stability::{Bound, Case, Effort, Outcome, Setting, cases, table},
+};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::{
+    io::{IsTerminal, stderr},
+    sync::Arc,
+    time::Instant,
+};
+
+/// Which cases, on what.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Only the cases of these rooms: contact, gridization, loop, graphics.
+    rooms: Vec<String>,
+    /// A few seconds' sample of every case, as the tests run it.
+    #[arg(long)]
+    sample: bool,
+    /// Leave out what concerns the GPU.
+    #[arg(long)]
+    no_gpu: bool,
+}
+
+/// Runs the cases one after another; whole only if every figure keeps its bound.
+pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    let cases = chosen(arguments)?;
+    let (gpu, adapter) = adapter(arguments.no_gpu);
+    let effort = if arguments.sample { Effort::Sample } else { Effort::Full };
+    let setting = Setting { effort, gpu };
+    let bar = progress_bar(cases.len() as u64);
+    let started = Instant::now();
+    let mut outcomes = Vec::new();
+    for case in &cases {
+        bar.set_message(format!("{}: {}", case.room, case.name));
+        // A case that cannot be run has not passed.
+        let found = (case.run)(&setting).unwrap_or_else(|error| vec![not_run(case, &error)]);
+        outcomes.extend(found.into_iter().map(|outcome| (case.room, outcome)));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let seconds = started.elapsed().as_secs_f64();
+    let failed = outcomes.iter().filter(|(_, outcome)| !outcome.passed()).count();
+    let rows: Vec<_> = outcomes
+        .iter()
+        .map(|(room, outcome)| {
+            let mut row = serde_json::to_value(outcome)?;
+            row["room"] = (*room).into();
+            row["passed"] = outcome.passed().into();
+            Ok::<_, serde_json::Error>(row)
+        })
+        .collect::<Result<_, _>>()?;
+    let json = serde_json::json!({ "outcomes": rows, "failed": failed, "adapter": adapter, "seconds": seconds });
+    let mut text = String::new();
+    for room in ["contact", "gridization", "loop", "graphics"] {
+        let of_room = outcomes.iter().filter(|(of, _)| *of == room).map(|(_, outcome)| outcome.clone());
+        let of_room: Vec<Outcome> = of_room.collect();
+        if !of_room.is_empty() {
+            text += &format!("{room}\n{}\n", table(&of_room));
+        }
+    }
+    let count = outcomes.len();
+    text += &format!("{} of {count} figures keep their bounds; {seconds:.1} s, {adapter}\n", count - failed);
+    Ok(Report { text, json, whole: failed == 0 })
+}
+
+fn chosen(arguments: &Arguments) -> Result<Vec<Case>, Failure> {
+    let all = cases();
+    let known = |room: &String| all.iter().any(|case| case.room == *room);
+    if let Some(unknown) = arguments.rooms.iter().find(|room| !known(room)) {
+        let mut rooms: Vec<&str> = all.iter().map(|case| case.room).collect();
+        rooms.dedup();
+        return Err(format!("no hard case belongs to `{unknown}`; there are {}", rooms.join(", ")).into());
+    }
+    let wanted = |case: &Case| arguments.rooms.is_empty() || arguments.rooms.iter().any(|room| case.room == *room);
+    Ok(all.into_iter().filter(wanted).collect())
+}
+
+/// The adapter for the GPU's half, and what to say of it.
+fn adapter(left_out: bool) -> (Option<Arc<Context>>, String) {
+    if left_out {
+        return (None, "the GPU's half left out".to_owned());
+    }
+    match Context::open(AdapterChoice::Any) {
+        Ok(context) => {
+            let name = context.adapter().name.clone();
+            (Some(Arc::new(context)), name)
+        }
+        Err(error) => (None, format!("the GPU's half left out: {error}")),
+    }
+}
+
+fn not_run(case: &Case, error: &Failure) -> Outcome {
+    Outcome {
+        case: case.name.to_owned(),
+        varied: "not run".to_owned(),
+        measure: "errors".to_owned(),
+        worst: 1.0,
+        bound: Bound::AtMost(0.0),
+        note: error.to_string(),
+    }
+}
+
+/// A bar on standard error, hidden where that is no terminal.
+fn progress_bar(cases: u64) -> ProgressBar {
+    if !stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} cases, {msg}, {elapsed}");
+    ProgressBar::new(cases).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}

@@ -1,0 +1,65 @@
+//! `haptize view`: the window, or one picture of it.
+
+use super::{Failure, Report};
+use std::path::PathBuf;
+
+/// What to look at.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// A scene, which is baked first, or a dataset; without one the paper's sphere.
+    file: Option<PathBuf>,
+    /// Write the window to this PNG file instead of opening it: needs no display, but some Vulkan, software too.
+    #[arg(long, value_name = "PNG")]
+    screenshot: Option<PathBuf>,
+    /// The picture's size [points].
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x800", requires = "screenshot", value_parser = size)]
+    size: [f32; 2],
+    /// The picture in dark colours.
+    #[arg(long, requires = "screenshot")]
+    dark: bool,
+    /// The motion that the picture shows.
+    #[arg(long, default_value = "press", requires = "screenshot")]
+    motion: String,
+    /// When in that motion the picture is taken [s].
+    #[arg(long, default_value_t = 2.2, requires = "screenshot")]
+    time: f64,
+}
+
+/// Least and greatest side of a picture [points].
+const SIDES: std::ops::RangeInclusive<f32> = 400.0..=4000.0;
+
+fn size(text: &str) -> Result<[f32; 2], String> {
+    let sides = text.split_once('x').and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]));
+    let within = |sides: &[f32; 2]| sides.iter().all(|side| SIDES.contains(side));
+    sides.filter(within).ok_or_else(|| "give two sides from 400 to 4000 points, such as 1280x800".into())
+}
+
+/// Opens the window, or draws it.
+#[cfg(feature = "viewer")]
+pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    use haptize::viewer::{self, Picture, Start};
+    let start = arguments.file.clone().map_or(Start::Sphere, Start::File);
+    let Some(file) = &arguments.screenshot else {
+        viewer::open(start)?;
+        return Ok(Report { text: String::new(), json: serde_json::json!({}), whole: true });
+    };
+    if !(0.0..=60.0).contains(&arguments.time) {
+        return Err(format!("cannot play {} s: give --time from 0 to 60", arguments.time).into());
+    }
+    let picture = Picture {
+        size: arguments.size,
+        dark: arguments.dark,
+        motion: arguments.motion.clone(),
+        time: arguments.time,
+        ..Picture::default()
+    };
+    viewer::screenshot(&start, &picture, file)?;
+    let json = serde_json::json!({ "file": file.display().to_string() });
+    Ok(Report { text: format!("wrote {}\n", file.display()), json, whole: true })
+}
+
+/// Says how to get the viewer.
+#[cfg(not(feature = "viewer"))]
+pub fn run(_: &Arguments) -> Result<Report, Failure> {
+    Err("this haptize was built without its viewer: build it with default features (cargo install --path .)".into())
+}

@@ -1,0 +1,151 @@
+//! Which surface nodes the proxy can reach, and whether a result stays within them.
+//!
+//! With |u| <= m everywhere, the closest triangle of the deformed surface to a proxy node that is D from it at rest lies within
+//! D + 2 m of the node at rest (see `detection`). So a result is the same, whatever the compliance leaves out, if it covers all
+//! triangles so near to each touching node. Beforehand m is not known; a surface that gives way to a proxy whose deepest node
+//! is d below it moves by about d, hardly by more than [`EXPECTED_MOTION`] d. Results that need more are found and flagged.
+
+use super::detection::Detection;
+use super::model::Model;
+use super::{Equilibrium, Proximity};
+use crate::JointVector;
+use crate::tolerances::EXPECTED_MOTION;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Configurations that one thread takes at a time.
+const SHARE: usize = 256;
+
+/// Surface nodes of `model` that the proxy reaches in `configurations`, ascending.
+pub(super) fn reached(model: &Model<'_>, configurations: &[JointVector]) -> Vec<u32> {
+    let marked = configurations
+        .par_chunks(SHARE)
+        .map_init(
+            || Proximity::new(model),
+            |proximity, share| {
+                let mut marked = vec![false; model.rest.len()];
+                share.iter().for_each(|q| mark(model, proximity, q, &mut marked));
+                marked
+            },
+        )
+        .reduce(
+            || vec![false; model.rest.len()],
+            |mut all, some| {
+                all.iter_mut().zip(some).for_each(|(all, some)| *all |= some);
+                all
+            },
+        );
+    (0..).zip(marked).filter(|(_, marked)| *marked).map(|(node, _)| node).collect()
+}
+
+fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marked: &mut [bool]) {
+    let gap = proximity.gap(q);
+    if gap >= 0.0 {
+        return;
+    }
+    let motion = -EXPECTED_MOTION * gap;
+    for ((clearance, node), x) in proximity.clearances().zip(&model.chain.nodes).zip(&proximity.pose().nodes) {
+        if clearance > motion {
+            continue;
+        }
+        let radius = (clearance + node.radius).abs() + 2.0 * motion;
+        for_triangles_within(model, *x - model.centre, radius, |t| {
+            model.object.triangles[t as usize].iter().for_each(|&node| marked[node as usize] = true);
+        });
+    }
+}
+
+/// Whether the compliance covers all that the result depends on.
+pub(super) fn covers(
+    model: &Model<'_>,
+    detection: &Detection,
+    equilibrium: &Equilibrium,
+    displacement: &[f64],
+) -> bool {
+    if model.compliance.is_whole() {
+        return true;
+    }
+    let moved = displacement.chunks_exact(3).map(|u| DVec3::from_slice(u).length_squared()).fold(0.0, f64::max).sqrt();
+    let covered = |node: u32| model.compliance.place(node).is_some();
+    let mut within = equilibrium.forces.iter().all(|force| covered(force.node));
+    for (i, distance) in detection.distances().enumerate() {
+        if equilibrium.touches.iter().any(|touch| touch.proxy_node as usize == i) {
+            for_triangles_within(model, detection.nodes()[i], distance.abs() + 2.0 * moved, |t| {
+                within &= model.object.triangles[t as usize].iter().all(|&node| covered(node));
+            });
+        }
+    }
+    within
+}
+
+/// Visits the triangles whose boxes at rest are within `radius` of `x`.
+fn for_triangles_within(model: &Model<'_>, x: DVec3, radius: f64, mut visit: impl FnMut(u32)) {
+    model.bounds.search(x, radius * radius, |t, _| {
+        visit(t);
+        radius * radius
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::{Solver, Status};
+    use crate::object::{Compliance, Object};
+    use crate::proxy::Chain;
+    use crate::scene::Scene;
+
+    const SCENE: &str = r#"
+        [object]
+        sphere = { radius = 0.05, rings = 15, segments = 16 }
+        springs = { kind = "isotropic", stiffness = 300.0 }
+        ground = { stiffness = 100.0 }
+        [contact]
+        stiffness = 300.0
+        [grid]
+        axes = [{ start = -0.2, stop = 0.2, count = 5 }, { start = 0.0, stop = 0.004, count = 5 }]
+        [[proxy.joint]]
+        kind = "revolute"
+        axis = [0.0, 1.0, 0.0]
+        limits = [-4.0, 4.0]
+        [[proxy.joint]]
+        kind = "prismatic"
+        axis = [0.0, 0.0, -1.0]
+        limits = [-0.1, 0.1]
+        nodes = [{ from = [-0.004, 0.0, 0.05], to = [0.004, 0.0, 0.05], count = 3 }]
+    "#;
+
+    #[test]
+    fn what_is_out_of_reach_changes_no_result_and_reaching_farther_is_flagged() {
+        let scene = Scene::parse(SCENE, "reach.toml").unwrap();
+        let object = Object::build(&scene.object).unwrap();
+        let chain = Chain::new(&scene.proxy);
+        let whole = Model::new(&object, &chain, scene.contact);
+        let mut configurations = Vec::new();
+        for turn in 0..9 {
+            for depth in 0..9 {
+                configurations.push(JointVector::from_slice(&[0.05 * f64::from(turn - 4), 0.0005 * f64::from(depth)]));
+            }
+        }
+        let nodes = reached(&whole, &configurations);
+        assert!(nodes.len() > 10 && 2 * nodes.len() < object.surface_nodes, "{} nodes", nodes.len());
+        let mut some = Model::new(&object, &chain, scene.contact);
+        some.compliance = Compliance::on(&object, nodes).unwrap();
+        let (mut solver, mut reference) = (Solver::new(&some), Solver::new(&whole));
+        let mut touching = 0;
+        for q in &configurations {
+            let (found, expected) = (solver.solve(q), reference.solve(q));
+            assert_eq!(found.status, expected.status, "{:?}", &q[..]);
+            assert!((found.energy - expected.energy).abs() <= 1e-9 * expected.energy);
+            for (found, expected) in found.torque.iter().zip(expected.torque.iter()) {
+                assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+            }
+            touching += usize::from(found.status == Status::Contact);
+        }
+        assert!(touching > 30, "{touching}");
+        // On the other side of the object, and much deeper.
+        for q in [[3.0, 0.002], [0.0, 0.03]] {
+            assert_eq!(reference.solve(&q).status, Status::Contact);
+            assert_eq!(solver.solve(&q).status, Status::Overflow, "{q:?}");
+        }
+    }
+}

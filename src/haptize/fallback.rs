@@ -1,0 +1,66 @@
+//! A backend on a device that may fail for good, and the CPU in its place from then on.
+//!
+//! A GPU is lost by a driver's reset, by sleep, by being pulled out, or by other programs that take its memory. Its solver
+//! first tries again by itself with smaller batches; what it cannot mend ends here. The batch at hand and all that follow are
+//! then solved by the CPU, so that a sweep of hours goes on, and [`Backend::notices`] tells it.
+
+use super::{Backend, CpuBackend};
+use crate::{
+    JointVector,
+    contact::{Equilibrium, Model},
+};
+use std::fmt::Display;
+
+/// A backend with the CPU behind it.
+pub struct WithFallback<'a, B> {
+    model: &'a Model<'a>,
+    /// `None` once it has failed.
+    device: Option<B>,
+    cpu: Option<CpuBackend<'a>>,
+    /// What the device is called.
+    name: String,
+    notices: Vec<String>,
+}
+
+impl<'a, B: Backend> WithFallback<'a, B> {
+    /// `device`, called `name`, which solves `model`.
+    pub fn new(device: B, name: impl Display, model: &'a Model<'a>) -> Self {
+        Self { model, device: Some(device), cpu: None, name: name.to_string(), notices: Vec::new() }
+    }
+
+    /// What the device is called.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+}
+
+impl<B: Backend> Backend for WithFallback<'_, B> {
+    /// When the system gives no threads to the CPU backend.
+    type Error = rayon::ThreadPoolBuildError;
+
+    fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Self::Error> {
+        if let Some(device) = &mut self.device {
+            match device.solve(configurations) {
+                Ok(equilibria) => return Ok(equilibria),
+                Err(error) => {
+                    self.device = None;
+                    self.notices.push(format!(
+                        "solved by {}, since {} failed: {error}",
+                        CpuBackend::adapter(),
+                        self.name
+                    ));
+                }
+            }
+        }
+        let cpu = match &mut self.cpu {
+            Some(cpu) => cpu,
+            empty => empty.insert(CpuBackend::new(self.model, 0)?),
+        };
+        cpu.solve(configurations).map_err(|never| match never {})
+    }
+
+    fn notices(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notices)
+    }
+}

@@ -1,0 +1,379 @@
+//! Grid points that need no solve, because nothing can touch there: proven block by block.
+//!
+//! Along any path of q each proxy node moves by at most `sum_j |J_ij| |dq_j|`, and its signed distance to the surface changes
+//! by no more than it moves. So over a block of grid points around its centre c, with half-widths h,
+//!
+//! ```text
+//! gap(q) >= min_i ( clearance_i(c) - sum_j m_ij |q_j - c_j| ),     |J_ij| <= m_ij over the block,
+//! m_ij = min( r_ij, |J_ij(c)| + sum_k r_i,max(j,k) h_k )
+//! ```
+//!
+//! r_ij is the greatest distance that node i can have from the origin of joint j, by the lengths of the links between (1 for a
+//! prismatic joint): it bounds |J_ij| everywhere, and the derivative of J_ij in q_k is a cross product of a unit axis with
+//! column max(j, k). Blocks that are not proven free are halved along the joint that moves the proxy most, down to some points,
+//! which are left to the solver.
+//!
+//! A block counts as free only if it stays so when widened by [`FreeSpace::MARGIN`] grid steps all round. So every point within as many
+//! steps of a point in contact is solved for and has its exact gap; a skipped point has a positive lower bound of its gap.
+//! Blocks are cut from the grid alone, so that a point is skipped or not whatever chunks, threads and backend there are.
+
+use crate::{
+    JointVector, MAX_JOINTS,
+    contact::{Model, Proximity},
+    dataset::Grid,
+    proxy::Chain,
+    scene::JointKind,
+    tolerances::FREE_SPACE_ROUNDING,
+};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Blocks that threads take one after the other have at most as many points: many more blocks than threads, and far fewer than
+/// points.
+const SHARE: usize = 4096;
+
+/// Blocks of as many points are not cut any further: proving one of them free costs as much as the gaps of all of them do.
+const SMALLEST: usize = 4;
+
+/// What is known of every grid point's gap before anything is solved.
+pub struct FreeSpace {
+    /// Bits of a positive lower bound of the gap [m]; of NaN where the point is to be solved.
+    gaps: Vec<AtomicU32>,
+}
+
+/// Grid points `low..high` along each axis.
+#[derive(Clone, Copy)]
+struct Block {
+    low: [usize; MAX_JOINTS],
+    high: [usize; MAX_JOINTS],
+}
+
+impl FreeSpace {
+    /// Grid steps around contact within which gaps are exact: the cells that touch contact, and their neighbours.
+    pub const MARGIN: usize = 2;
+
+    /// Searches the grid for points at which nothing touches.
+    ///
+    /// # Errors
+    /// When there is no memory for four bytes a point.
+    pub fn find(model: &Model<'_>, grid: &Grid) -> Result<Self, std::collections::TryReserveError> {
+        let points = grid.points();
+        let mut gaps = Vec::new();
+        gaps.try_reserve_exact(points)?;
+        gaps.resize_with(points, || AtomicU32::new(f32::NAN.to_bits()));
+        let mut whole = Block { low: [0; MAX_JOINTS], high: [1; MAX_JOINTS] };
+        grid.axes.iter().zip(&mut whole.high).for_each(|(axis, high)| *high = axis.count);
+        let reach = Reach::new(model.chain, grid);
+        let mut blocks = vec![whole];
+        let mut shares = Vec::new();
+        while let Some(block) = blocks.pop() {
+            if block.points() <= SHARE {
+                shares.push(block);
+            } else {
+                blocks.extend(block.halves(grid, &reach));
+            }
+        }
+        let scene = Scene { model, grid, reach: &reach, gaps: &gaps };
+        shares.par_iter().for_each_init(|| Proximity::new(model), |proximity, block| scene.search(proximity, *block));
+        Ok(Self { gaps })
+    }
+
+    /// A positive lower bound of the gap at `point`, within `f32` rounding; `None` where the point is to be solved [m].
+    #[must_use]
+    pub fn gap(&self, point: usize) -> Option<f32> {
+        let gap = f32::from_bits(self.gaps.get(point)?.load(Ordering::Relaxed));
+        (!gap.is_nan()).then_some(gap)
+    }
+
+    /// Number of points that are skipped.
+    #[must_use]
+    pub fn skipped(&self) -> usize {
+        (0..self.gaps.len()).filter(|&point| self.gap(point).is_some()).count()
+    }
+}
+
+impl Block {
+    fn points(&self) -> usize {
+        self.low.iter().zip(&self.high).map(|(low, high)| high - low).product()
+    }
+
+    /// The two halves across the axis along which the block is widest in terms of the proxy's motion.
+    fn halves(self, grid: &Grid, reach: &Reach) -> [Self; 2] {
+        let width = |j: usize| (self.high[j] - self.low[j] - 1) as f64 * grid.axes[j].step * reach.greatest[j];
+        let wide = (0..grid.joints()).filter(|&j| self.high[j] - self.low[j] > 1);
+        let axis = wide.max_by(|&i, &j| width(i).total_cmp(&width(j))).unwrap_or(0);
+        let (mut left, mut right) = (self, self);
+        let middle = self.low[axis].midpoint(self.high[axis]);
+        left.high[axis] = middle;
+        right.low[axis] = middle;
+        [left, right]
+    }
+}
+
+/// Bounds on how far joints move nodes.
+struct Reach {
+    /// r_ij, joint fastest [m/rad, or 1].
+    bounds: Vec<JointVector>,
+    /// Greatest of each joint.
+    greatest: JointVector,
+    /// Sum of all lengths: no node is farther from the base [m].
+    length: f64,
+}
+
+impl Reach {
+    fn new(chain: &Chain, grid: &Grid) -> Self {
+        let joints = chain.joints.len();
+        // How far a joint's frame can be from its parent's.
+        let offsets: Vec<f64> = chain
+            .joints
+            .iter()
+            .zip(&grid.axes)
+            .map(|(joint, axis)| {
+                let slide = match joint.kind {
+                    JointKind::Revolute => 0.0,
+                    // The margin reaches beyond the grid.
+                    JointKind::Prismatic => {
+                        let far = FreeSpace::MARGIN as f64 * axis.step;
+                        let ends = [axis.coordinate(0) - far, axis.coordinate(axis.count - 1) + far];
+                        ends[0].abs().max(ends[1].abs())
+                    }
+                };
+                joint.origin.length() + slide
+            })
+            .collect();
+        let mut greatest = JointVector::zeros(joints);
+        let bounds = chain.nodes.iter().map(|node| {
+            let mut bound = JointVector::zeros(joints);
+            let mut distance = node.position.length();
+            for j in (0..=node.link).rev() {
+                bound[j] = match chain.joints[j].kind {
+                    JointKind::Revolute => distance,
+                    JointKind::Prismatic => 1.0,
+                };
+                greatest[j] = greatest[j].max(bound[j]);
+                distance += offsets[j];
+            }
+            bound
+        });
+        let bounds = bounds.collect();
+        let farthest = chain.nodes.iter().map(|node| node.position.length()).fold(0.0, f64::max);
+        Self { bounds, greatest, length: offsets.iter().sum::<f64>() + farthest }
+    }
+}
+
+/// What the search knows.
+struct Scene<'a> {
+    model: &'a Model<'a>,
+    grid: &'a Grid,
+    reach: &'a Reach,
+    gaps: &'a [AtomicU32],
+}
+
+impl Scene<'_> {
+    fn search(&self, proximity: &mut Proximity<'_>, block: Block) {
+        if block.points() <= SMALLEST {
+            return;
+        }
+        let joints = self.grid.joints();
+        let (mut centre, mut half, mut wide) =
+            (JointVector::zeros(joints), JointVector::zeros(joints), JointVector::zeros(joints));
+        for (j, axis) in self.grid.axes.iter().enumerate() {
+            let steps = 0.5 * (block.high[j] - block.low[j] - 1) as f64;
+            centre[j] = axis.coordinate(block.low[j]) + steps * axis.step;
+            half[j] = steps * axis.step;
+            wide[j] = (steps + FreeSpace::MARGIN as f64) * axis.step;
+        }
+        let gap = proximity.gap(&centre);
+        let (mut least, mut farthest) = (f64::INFINITY, 0.0_f64);
+        let mut slopes = JointVector::zeros(joints);
+        for (node, clearance) in proximity.clearances().enumerate() {
+            let mut motion = 0.0;
+            let mut inner = 0.0;
+            for j in 0..=self.model.chain.nodes[node].link {
+                let slope = self.slope(proximity, node, j, &wide);
+                slopes[j] = slopes[j].max(slope);
+                motion += slope * wide[j];
+                inner += slope * half[j];
+            }
+            least = least.min(clearance.max(gap) - motion);
+            farthest = farthest.max(inner);
+        }
+        let rounding = FREE_SPACE_ROUNDING * (self.reach.length + self.model.extent);
+        if least > rounding {
+            self.skip(block, &centre, gap - rounding, &slopes);
+        } else if gap + farthest >= 0.0 {
+            block.halves(self.grid, self.reach).into_iter().for_each(|half| self.search(proximity, half));
+        }
+    }
+
+    /// m_ij over the block of half-widths `wide` around the configuration measured last.
+    fn slope(&self, proximity: &Proximity<'_>, node: usize, joint: usize, wide: &JointVector) -> f64 {
+        let bounds = &self.reach.bounds[node];
+        let here = self.model.chain.jacobian_column(proximity.pose(), node, joint).length();
+        let turn: f64 = wide.iter().enumerate().map(|(k, h)| bounds[joint.max(k)] * h).sum();
+        bounds[joint].min(here + turn)
+    }
+
+    /// Notes lower bounds of the gaps of a free block, whose centre has the gap `gap`.
+    fn skip(&self, block: Block, centre: &JointVector, gap: f64, slopes: &JointVector) {
+        let joints = self.grid.joints();
+        let mut index = block.low;
+        loop {
+            let mut point = 0;
+            let mut motion = 0.0;
+            for (j, axis) in self.grid.axes.iter().enumerate() {
+                point = point * axis.count + index[j];
+                motion += slopes[j] * (axis.coordinate(index[j]) - centre[j]).abs();
+            }
+            // Rounded towards zero, but not to it: the point is free.
+            let bound = ((gap - motion) as f32).next_down().max(f32::MIN_POSITIVE);
+            self.gaps[point].store(bound.to_bits(), Ordering::Relaxed);
+            let Some(axis) = (0..joints).rev().find(|&j| index[j] + 1 < block.high[j]) else { return };
+            index[axis] += 1;
+            index[axis + 1..].copy_from_slice(&block.low[axis + 1..]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::object::Object;
+    use crate::scene::Scene as SceneFile;
+    use std::fmt::Write;
+
+    /// Numbers in 0..1 that depend on `seed` alone.
+    fn sequence(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+        move || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        }
+    }
+
+    /// A random chain of one to four joints of either kind, somewhere about a sphere, over a grid of some thousand points.
+    fn random_scene(seed: u64) -> String {
+        let mut next = sequence(seed);
+        let joints = 1 + seed as usize % 4;
+        let count = [2000, 60, 16, 8][joints - 1];
+        let mut axes = String::new();
+        let mut text = String::new();
+        for _ in 0..joints {
+            let mut vector = |size: f64| [0; 3].map(|_| size * (2.0 * next() - 1.0));
+            let (origin, axis, tip) = (vector(0.12), vector(1.0), vector(0.12));
+            let revolute = next() < 0.7;
+            let (kind, width) =
+                if revolute { ("revolute", 0.4 + 2.0 * next()) } else { ("prismatic", 0.02 + 0.2 * next()) };
+            let start = -width * next();
+            writeln!(
+                text,
+                "[[proxy.joint]]\nkind = \"{kind}\"\norigin = {origin:?}\naxis = {axis:?}\nlimits = [-9.0, 9.0]\n\
+                 nodes = [{{ from = [0.0, 0.0, 0.0], to = {tip:?}, count = 3, radius = {} }}]",
+                0.01 * next()
+            )
+            .unwrap();
+            write!(axes, "{{ start = {start}, stop = {}, count = {count} }},", start + width).unwrap();
+        }
+        format!(
+            "[object]\nsphere = {{ radius = 0.05, rings = 6, segments = 7, centre = [0.1, 0.1, 0.0] }}\n\
+             springs = {{ kind = \"isotropic\", stiffness = 300.0 }}\nground = {{ stiffness = 100.0 }}\n\
+             [contact]\nstiffness = 1000.0\n[grid]\naxes = [{axes}]\n{text}"
+        )
+    }
+
+    fn with_model<T>(text: &str, look: impl FnOnce(&Model<'_>, &Grid) -> T) -> T {
+        let scene = SceneFile::parse(text, "random.toml").unwrap_or_else(|error| panic!("{error}"));
+        let object = Object::build(&scene.object).unwrap();
+        let chain = Chain::new(&scene.proxy);
+        let sweep = crate::haptize::Sweep::new(&scene, &object, "cpu", "", "").unwrap();
+        look(&Model::new(&object, &chain, scene.contact), sweep.grid())
+    }
+
+    /// Against the gap of every point: what is skipped is free, and stays so [`FreeSpace::MARGIN`] steps all round; what is
+    /// stored is a lower bound.
+    #[test]
+    fn no_contact_is_missed_and_gaps_near_contact_are_left_to_the_solver() {
+        let (mut skipped, mut points, mut touching) = (0, 0, 0);
+        for seed in 0..40 {
+            with_model(&random_scene(seed), |model, grid| {
+                let free_space = FreeSpace::find(model, grid).unwrap();
+                let mut proximity = Proximity::new(model);
+                let counts = grid.counts();
+                let margin = FreeSpace::MARGIN as isize;
+                for point in 0..grid.points() {
+                    let gap = proximity.gap(&grid.configuration(point));
+                    points += 1;
+                    match free_space.gap(point) {
+                        Some(bound) => {
+                            assert!(
+                                0.0 < bound && f64::from(bound) <= gap,
+                                "seed {seed}, point {point}: {bound} {gap}"
+                            );
+                            skipped += 1;
+                        }
+                        None if gap < 0.0 => {
+                            touching += 1;
+                            let mut index = vec![0; counts.len()];
+                            let mut rest = point;
+                            for (j, count) in counts.iter().enumerate().rev() {
+                                index[j] = (rest % count) as isize;
+                                rest /= count;
+                            }
+                            for shift in 0..5_isize.pow(counts.len() as u32) {
+                                let (mut rest, mut neighbour, mut inside) = (shift, 0, true);
+                                for (j, &count) in counts.iter().enumerate() {
+                                    let line = index[j] + rest % 5 - margin;
+                                    rest /= 5;
+                                    inside &= (0..count as isize).contains(&line);
+                                    neighbour = neighbour * count as isize + line;
+                                }
+                                assert!(!inside || free_space.gap(neighbour as usize).is_none(), "seed {seed}");
+                            }
+                        }
+                        None => {}
+                    }
+                }
+            });
+        }
+        assert!(skipped > points / 10 && touching > points / 50, "{skipped} skipped, {touching} touch of {points}");
+    }
+
+    /// In random steps away from random configurations, and the bound is not idle: some steps nearly reach it.
+    #[test]
+    fn slopes_bound_the_motion_of_every_node() {
+        let mut sharpest = 0.0_f64;
+        for seed in 0..40 {
+            with_model(&random_scene(seed), |model, grid| {
+                let reach = Reach::new(model.chain, grid);
+                let scene = Scene { model, grid, reach: &reach, gaps: &[] };
+                let mut next = sequence(seed + 100);
+                let mut proximity = Proximity::new(model);
+                let joints = grid.joints();
+                for _ in 0..50 {
+                    let (mut centre, mut wide, mut q) =
+                        (JointVector::zeros(joints), JointVector::zeros(joints), JointVector::zeros(joints));
+                    for (j, axis) in grid.axes.iter().enumerate() {
+                        let size = axis.step * axis.count as f64;
+                        centre[j] = axis.start + size * next();
+                        wide[j] = 0.2 * size * next();
+                        q[j] = centre[j] + wide[j] * (2.0 * next() - 1.0);
+                    }
+                    proximity.gap(&q);
+                    let there = proximity.pose().nodes.clone();
+                    proximity.gap(&centre);
+                    for (node, there) in there.iter().enumerate() {
+                        let moved = there.distance(proximity.pose().nodes[node]);
+                        let bound: f64 = (0..=model.chain.nodes[node].link)
+                            .map(|j| scene.slope(&proximity, node, j, &wide) * (q[j] - centre[j]).abs())
+                            .sum();
+                        assert!(moved <= bound * (1.0 + 1e-12) + 1e-15, "seed {seed}: {moved} {bound}");
+                        sharpest = sharpest.max(moved / bound.max(1e-9));
+                    }
+                }
+            });
+        }
+        assert!(sharpest > 0.9, "the bound is nearly reached: {sharpest}");
+    }
+}

@@ -1,0 +1,177 @@
+//! Coulomb friction of the proxy: an elastic-plastic bristle at each proxy node in contact (Dupont et al. 2002; of the
+//! family of Dahl and LuGre), inside the cone `|friction| <= mu |normal force|` of the dataset's forces: mu is static for
+//! a node that stuck in the last step, which makes a soft hand drag the finger along in jerks, kinetic for one that slipped.
+//!
+//! *Stick.* The bristle of deflection z (tangential) is a spring k and a damper s along the tangential way
+//! `dx = P J T v_hat`, implicit in the step: friction `-(k (z + dx/2) + s dx/T)`, afterwards `z + dx`. Its work is
+//! minus the change of `1/2 k |z|^2` less what s takes, exactly.
+//! *Slip.* Where that leaves the cone, friction is `-mu N d` along d, the direction of the sticking force, and the step is
+//! solved again. It does the work `-mu N d . dx`; the bristle keeps of it what the cone lets it keep, the rest is heat.
+//! A node that comes out moving against d has not slipped: it is held by its bristle, as in stick.
+//! *Loss of pressure.* At the beginning of a tick each bristle is turned into the new tangent plane and shortened to the new
+//! cone: both only take energy.
+//!
+//! Every branch takes energy or keeps it, whatever T: friction is dissipative in every step, not on average. Each solve
+//! turns at least one node from stick to slip or from slip to held, so that there are at most twice as many as contacts,
+//! and one; in practice one or two.
+
+use super::{Bristle, EffectState, Patch, add};
+use crate::{
+    MAX_JOINTS,
+    proxy::JointMatrix,
+    render::{
+        accounts::Extra,
+        npmi::{Load, Motion, Npmi, Stage, Step},
+    },
+    scene::FrictionSpec,
+};
+use glam::DVec3;
+
+/// The constants of friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Friction {
+    /// Kinetic and static mu [1].
+    kinetic: f64,
+    stiction: f64,
+    /// k [N/m].
+    stiffness: f64,
+    /// s [N s/m].
+    damping: f64,
+}
+
+/// What a bristle does during a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Mode {
+    /// It holds, as far as is known.
+    Stick,
+    /// It slides against friction along this direction.
+    Slip(DVec3),
+    /// It holds, whatever the cone.
+    Held,
+}
+
+impl Friction {
+    /// The friction of a scene.
+    #[must_use]
+    pub fn new(spec: &FrictionSpec) -> Self {
+        Self {
+            kinetic: spec.coefficient,
+            stiction: spec.static_coefficient,
+            stiffness: spec.stiffness,
+            damping: spec.damping,
+        }
+    }
+
+    /// One step of the proxy under `load` and the friction at the patches of `state`.
+    #[expect(clippy::too_many_arguments)] // One step of everything that moves.
+    pub(super) fn step(
+        &self,
+        npmi: &Npmi,
+        stage: &Stage,
+        state: &mut EffectState,
+        motion: &mut Motion,
+        interval: f64,
+        load: &Load,
+        extra: &mut Extra,
+    ) -> Step {
+        for patch in &mut state.patches {
+            patch.bristle = patch.bristle.clamp_length_max(self.sticking_cone(patch) / self.stiffness);
+        }
+        let (end, step) = loop {
+            let mut trial = *motion;
+            let step = npmi.advance(stage, &mut trial, interval, &self.loaded(load, &state.patches, interval));
+            let mut settled = true;
+            for patch in &mut state.patches {
+                let slide = patch.slide(&step.velocity, interval);
+                let mode = self.next_mode(patch, slide, interval);
+                settled &= mode == patch.mode;
+                patch.mode = mode;
+            }
+            if settled {
+                break (trial, step);
+            }
+        };
+        *motion = end;
+        state.bristles.fill(Bristle::default());
+        for patch in &state.patches {
+            let slide = patch.slide(&step.velocity, interval);
+            let (bristle, work) = self.settle(patch, slide, interval);
+            extra.friction_work += work;
+            extra.bristles += 0.5 * self.stiffness * bristle.length_squared();
+            let slipped = matches!(patch.mode, Mode::Slip(_));
+            state.bristles[patch.node] = Bristle { deflection: bristle, slipped };
+        }
+        step
+    }
+
+    /// Tangential force while slipping [N].
+    fn cone(&self, patch: &Patch) -> f64 {
+        self.kinetic * patch.pressure
+    }
+
+    /// Tangential force at which sticking ends [N].
+    fn sticking_cone(&self, patch: &Patch) -> f64 {
+        if patch.slipped { self.cone(patch) } else { self.stiction * patch.pressure }
+    }
+
+    /// Force of the bristle that holds, opposed by friction [N].
+    fn holding(&self, patch: &Patch, slide: DVec3, interval: f64) -> DVec3 {
+        self.stiffness * (patch.bristle + 0.5 * slide) + self.damping / interval * slide
+    }
+
+    fn next_mode(&self, patch: &Patch, slide: DVec3, interval: f64) -> Mode {
+        match patch.mode {
+            Mode::Stick => {
+                let force = self.holding(patch, slide, interval);
+                let size = force.length();
+                if size > self.sticking_cone(patch) { Mode::Slip(force / size) } else { Mode::Stick }
+            }
+            Mode::Slip(direction) if direction.dot(slide) < 0.0 => Mode::Held,
+            settled => settled,
+        }
+    }
+
+    /// `load` and friction.
+    fn loaded(&self, load: &Load, patches: &[Patch], interval: f64) -> Load {
+        let mut loaded = *load;
+        let mut tangential = [[0.0; MAX_JOINTS]; MAX_JOINTS];
+        for patch in patches {
+            let force = match patch.mode {
+                Mode::Slip(direction) => self.cone(patch) * direction,
+                Mode::Stick | Mode::Held => {
+                    add_tangential(&mut tangential, patch);
+                    self.stiffness * patch.bristle
+                }
+            };
+            for (torque, column) in loaded.torque.iter_mut().zip(patch.columns) {
+                *torque -= column.dot(force);
+            }
+        }
+        add(&mut loaded.damping, 0.5 * interval * self.stiffness + self.damping, &tangential);
+        loaded
+    }
+
+    /// The bristle after the step, and the work of friction on the proxy [J].
+    fn settle(&self, patch: &Patch, slide: DVec3, interval: f64) -> (DVec3, f64) {
+        let moved = patch.bristle + slide;
+        match patch.mode {
+            Mode::Stick | Mode::Held => (moved, -self.holding(patch, slide, interval).dot(slide)),
+            Mode::Slip(direction) => {
+                let taken = self.cone(patch) * direction.dot(slide);
+                let kept = (patch.bristle.length_squared() + 2.0 * taken / self.stiffness).sqrt();
+                let reach = kept.min(self.cone(patch) / self.stiffness);
+                (reach * moved.try_normalize().unwrap_or(direction), -taken)
+            }
+        }
+    }
+}
+
+/// `tangential += J^T P J`.
+fn add_tangential(tangential: &mut JointMatrix, patch: &Patch) {
+    let columns = patch.columns.map(|column| column.reject_from_normalized(patch.normal));
+    for (row, a) in tangential.iter_mut().zip(columns) {
+        for (entry, b) in row.iter_mut().zip(columns) {
+            *entry += a.dot(b);
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Multilinear torque behind a boundary layer: the paper's interpolation, and the same with the boundary of the gap field.
+//!
+//! `tau(q) = sum_c w_c tau_c` over the 2^d corners of the cell around q, shortened to the depth below the boundary
+//! (`boundary.rs`). Component by component it is not the gradient of anything: it makes or takes energy around a loop.
+//!
+//! *`linear`* (section 3.1): tau_c = 0 at free points, the boundary where the contact index passes its threshold. Both the
+//! boundary and the torque beside it err with the spacing h.
+//!
+//! *`gap-field`*: the boundary is where the interpolated gap (smallest signed distance of the proxy's nodes to the surface
+//! at rest) is zero, which errs with h^2. There the torque of an object of finite stiffness begins at zero and grows in
+//! proportion to the depth, so that free points beside the boundary take the torque that the contact would have with
+//! their negative depth: `tau_c = s_c gap_c`, s the ratio tau / gap of the nearest points in contact [N]. The interpolated
+//! torque then passes zero at the boundary, where the layer cuts it off, and errs with h^2 in cells that the boundary
+//! crosses, too.
+//!
+//! Points that were not computed carry zero torque, so that the torque fades out over the cells towards them.
+
+use super::{
+    FieldError,
+    points::{Checked, Generations, plausible},
+};
+use crate::{
+    JointVector,
+    render::{
+        boundary::BoundaryLayer,
+        stencil::{Lattice, Stencil},
+    },
+    tolerances::LEAST_GAP,
+};
+
+/// Interleaved point by point, so that a corner is one stretch of memory.
+pub(super) struct Layered {
+    layer: BoundaryLayer,
+    /// `joints + 2` numbers a grid point: torque, depth (see `boundary.rs`), energy.
+    records: Vec<f64>,
+}
+
+/// The interpolated numbers of a record.
+pub(super) struct Interpolated {
+    pub torque: JointVector,
+    /// Below the boundary [sqrt(J)].
+    pub depth: f64,
+    /// U [J].
+    pub energy: f64,
+    /// Factor of the layer on the torque, 0 to 1.
+    pub held: f64,
+}
+
+impl Layered {
+    /// The paper's: contact where the index exceeds `threshold`.
+    pub fn linear(data: &Checked<'_>, threshold: f64, slope: &JointVector) -> Result<Self, FieldError> {
+        let layer = BoundaryLayer::new(data.lattice, slope);
+        let zeros = JointVector::zeros(data.lattice.joints());
+        let mut field = Self::gather(data, layer, |point| Ok(JointVector::from_slice(data.torque(point, &zeros)?)))?;
+        let free: Vec<bool> = data.points.iter().map(|point| !point.touching).collect();
+        let depths = field.layer.depths_behind_index(data.lattice, &free, threshold, field.greatest(data));
+        field.put_depths(&depths);
+        Ok(field)
+    }
+
+    /// Contact where the interpolated gap is negative.
+    pub fn gap_field(data: &Checked<'_>, slope: &JointVector) -> Result<Self, FieldError> {
+        let missing = FieldError::Missing { column: "gap", interpolation: "gap-field" };
+        let column = data.dataset.gap.as_ref().ok_or(missing)?;
+        let gap: Vec<f64> = data.nearest.iter().map(|&source| column[source].into()).collect();
+        gap.iter().zip(data.nearest).try_for_each(|(&gap, &source)| plausible("gap", source, gap))?;
+        let layer = BoundaryLayer::new(data.lattice, slope);
+        let torques = torques_by_gap(data, &gap)?;
+        let mut field = Self::gather(data, layer, |point| Ok(torques[point]))?;
+        let depths = field.layer.depths_behind_gap(data.lattice, &gap, field.greatest(data));
+        field.put_depths(&depths);
+        Ok(field)
+    }
+
+    fn gather(
+        data: &Checked<'_>,
+        layer: BoundaryLayer,
+        torque: impl Fn(usize) -> Result<JointVector, FieldError>,
+    ) -> Result<Self, FieldError> {
+        let mut records = Vec::with_capacity(data.points.len() * (data.lattice.joints() + 2));
+        for point in 0..data.points.len() {
+            records.extend_from_slice(&torque(point)?);
+            records.extend([0.0, data.energy(point)?]);
+        }
+        Ok(Self { layer, records })
+    }
+
+    /// Largest size of a torque [sqrt(J)].
+    fn greatest(&self, data: &Checked<'_>) -> f64 {
+        let joints = data.lattice.joints();
+        let sizes = self.records.chunks_exact(joints + 2).map(|record| self.layer.size(&record[..joints]));
+        sizes.fold(0.0, f64::max)
+    }
+
+    fn put_depths(&mut self, depths: &[f64]) {
+        let width = self.records.len() / depths.len().max(1);
+        for (record, &depth) in self.records.chunks_exact_mut(width).zip(depths) {
+            record[width - 2] = depth;
+        }
+    }
+
+    /// The field in the cell of `stencil`.
+    pub fn at<const D: usize>(&self, stencil: &Stencil) -> Interpolated {
+        let mut torque = [0.0; D];
+        let (mut depth, mut energy) = (0.0, 0.0);
+        for (point, weight) in stencil.corners() {
+            let record = &self.records[point * (D + 2)..(point + 1) * (D + 2)];
+            for (sum, tau) in torque.iter_mut().zip(record) {
+                *sum += weight * tau;
+            }
+            depth += weight * record[D];
+            energy += weight * record[D + 1];
+        }
+        let mut torque = JointVector::from_slice(&torque);
+        let held = self.layer.share(&torque, depth);
+        torque.iter_mut().for_each(|tau| *tau *= held);
+        Interpolated { torque, depth, energy, held }
+    }
+
+    /// Greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), before the layer. The gradient is affine
+    /// in each coordinate of a cell, so that its norm is greatest at a corner, where its columns are the differences along
+    /// the edges that meet there.
+    pub fn relative_stiffness(&self, lattice: &Lattice, slopes: &JointVector) -> f64 {
+        let joints = lattice.joints();
+        let torque = |point: usize| &self.records[point * (joints + 2)..point * (joints + 2) + joints];
+        let steepness = |p: usize, q: usize| {
+            let scaled = |((a, b), slope): ((&f64, &f64), &f64)| (a - b).powi(2) / slope;
+            torque(p).iter().zip(torque(q)).zip(slopes.iter()).map(scaled).sum::<f64>()
+        };
+        let norm = |point: usize| {
+            let along = |((count, step, stride), slope): ((usize, f64, usize), &f64)| {
+                let neighbours = Lattice::neighbours(point, count, stride).into_iter().flatten();
+                neighbours.map(|p| steepness(point, p)).fold(0.0, f64::max) / (step * step * slope)
+            };
+            lattice.lines().zip(slopes.iter()).map(along).sum::<f64>()
+        };
+        (0..lattice.points()).map(norm).fold(0.0, f64::max).sqrt()
+    }
+}
+
+/// Torque of each point, that of free points from the ratio of torque to gap at the nearest points in contact.
+fn torques_by_gap(data: &Checked<'_>, gap: &[f64]) -> Result<Vec<JointVector>, FieldError> {
+    let zeros = JointVector::zeros(data.lattice.joints());
+    let mut torques = Vec::with_capacity(gap.len());
+    for point in 0..gap.len() {
+        torques.push(JointVector::from_slice(data.torque(point, &zeros)?));
+    }
+    let is_source = |p: usize| data.points[p].in_contact && data.points[p].is_converged() && gap[p] < -LEAST_GAP;
+    let mut ratios = torques.clone();
+    for (point, ratio) in ratios.iter_mut().enumerate() {
+        let scale = if is_source(point) { 1.0 / gap[point] } else { 0.0 };
+        ratio.iter_mut().for_each(|tau| *tau *= scale);
+    }
+    let generations = Generations::new(data.lattice, is_source);
+    for &point in &generations.outwards {
+        // Cells that the boundary crosses have corners of as many steps as there are joints.
+        if generations.steps[point] as usize > data.lattice.joints() {
+            break;
+        }
+        let (mut sum, mut count) = (zeros, 0.0);
+        for (_, _, source) in generations.nearer(data.lattice, point) {
+            sum.iter_mut().zip(ratios[source].iter()).for_each(|(sum, ratio)| *sum += ratio);
+            count += 1.0;
+        }
+        sum.iter_mut().for_each(|ratio| *ratio /= count);
+        ratios[point] = sum;
+        let state = &data.points[point];
+        if state.is_present() && !state.in_contact {
+            torques[point] = sum;
+            torques[point].iter_mut().for_each(|tau| *tau *= gap[point].max(0.0));
+        }
+    }
+    Ok(torques)
+}

@@ -1,0 +1,206 @@
+//! The contact torque as a function of configuration: interpolation over the dataset's grid (section 3.1).
+//!
+//! Three ways, chosen by the scene ([`Interpolation`]): `linear` and `gap-field` (`layered.rs`) interpolate the torque and
+//! hold it behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient. All are
+//! continuous and without memory. What they share is here: the cell around q, the fade outside the grid (`stencil.rs`),
+//! what is said of points that were not computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`,
+//! I_c = 1 where a torque is stored (contact, unconverged, overflowed) and 0 at free points.
+//!
+//! A field owns a copy of what it needs, interleaved point by point. The real-time thread thus never touches a mapped file,
+//! which would end the process when somebody else truncates it.
+
+mod error;
+mod hermite;
+mod layered;
+mod points;
+mod potential;
+mod work;
+
+pub use error::FieldError;
+
+use super::{flags::Flags, stencil::Lattice};
+use crate::{JointVector, MAX_JOINTS, dataset::Dataset, scene::Interpolation};
+use layered::Layered;
+use points::{Checked, Point};
+use potential::Potential;
+
+/// The contact torque around one object.
+pub struct TorqueField {
+    lattice: Lattice,
+    points: Vec<Point>,
+    has_energy: bool,
+    interpolant: Interpolant,
+}
+
+/// What is interpolated.
+enum Interpolant {
+    Layered(Layered),
+    Potential(Potential),
+}
+
+/// The field at one configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// tau_bar on the proxy [N m or N].
+    pub torque: JointVector,
+    /// Interpolated contact index, 0 to 1.
+    pub index: f64,
+    /// Whether the proxy is beyond the object's boundary, beside at least one point that was computed.
+    pub contact: bool,
+    /// Object nodes in contact at the heaviest corner in contact; 0 out of contact.
+    pub contact_nodes: u32,
+    /// Interpolated energy U of the object [J]; zero for datasets without it.
+    pub energy: f64,
+    /// Factor on interpolated contact forces, 0 to 1, so that they begin at the boundary and fade with the torque.
+    pub share: f64,
+    /// [`Flags::OUTSIDE`], [`Flags::ABSENT`], [`Flags::UNCONVERGED`], [`Flags::LAYER`].
+    pub flags: Flags,
+}
+
+/// What the corners of a cell have in common, whatever is interpolated.
+#[derive(Default)]
+struct Corners {
+    flags: Flags,
+    /// Weight of those that were computed.
+    present: f64,
+    index: f64,
+    contact_nodes: u32,
+}
+
+impl TorqueField {
+    /// The paper's interpolation, [`Interpolation::Linear`], over `dataset`. `threshold`: Ith [1]; `slope`: Ks of the
+    /// boundary layer, one per joint [N m/rad].
+    ///
+    /// # Errors
+    /// When the dataset is not consistent, holds numbers that are not finite, or a parameter is out of its range.
+    pub fn new(dataset: &Dataset, threshold: f64, slope: &JointVector) -> Result<Self, FieldError> {
+        Self::interpolated(dataset, Interpolation::Linear, threshold, slope)
+    }
+
+    /// Any interpolation over `dataset`. `threshold` counts for `linear` alone, `slope` for all but `potential`.
+    ///
+    /// # Errors
+    /// As [`TorqueField::new`]; also when the dataset lacks the column that `interpolation` needs.
+    pub fn interpolated(
+        dataset: &Dataset,
+        interpolation: Interpolation,
+        threshold: f64,
+        slope: &JointVector,
+    ) -> Result<Self, FieldError> {
+        if !(0.0..1.0).contains(&threshold) {
+            return Err(FieldError::Threshold(threshold));
+        }
+        let lattice = Lattice::new(&dataset.grid)?;
+        if slope.len() != lattice.joints() || !slope.iter().all(|slope| *slope > 0.0 && slope.is_finite()) {
+            return Err(FieldError::Slope(*slope));
+        }
+        let (points, nearest) = points::survey(&lattice, dataset)?;
+        let data = Checked { lattice: &lattice, dataset, points: &points, nearest: &nearest };
+        let interpolant = match interpolation {
+            Interpolation::Linear => Interpolant::Layered(Layered::linear(&data, threshold, slope)?),
+            Interpolation::GapField => Interpolant::Layered(Layered::gap_field(&data, slope)?),
+            Interpolation::Potential => Interpolant::Potential(Potential::new(&data)?),
+        };
+        Ok(Self { lattice, points, has_energy: dataset.energy.is_some(), interpolant })
+    }
+
+    /// Number of joints d.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        self.lattice.joints()
+    }
+
+    /// The grid.
+    #[must_use]
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// Whether the dataset has the energy U.
+    #[must_use]
+    pub fn has_energy(&self) -> bool {
+        self.has_energy
+    }
+
+    /// Whether the torque is minus the gradient of [`Sample::energy`] inside the grid, away from absent points.
+    #[must_use]
+    pub fn is_potential(&self) -> bool {
+        matches!(self.interpolant, Interpolant::Potential(_))
+    }
+
+    /// Greatest stiffness of the interpolated torque inside the grid, before any boundary layer, relative to `slopes`,
+    /// one per joint [N m/rad]: the greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes). One or
+    /// less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
+    #[must_use]
+    pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
+        match &self.interpolant {
+            Interpolant::Layered(layered) => layered.relative_stiffness(&self.lattice, slopes),
+            Interpolant::Potential(potential) => potential.relative_stiffness(&self.lattice, slopes),
+        }
+    }
+
+    /// The field at `q`, one entry per joint. Never allocates; takes the same time wherever `q` is.
+    #[must_use]
+    pub fn sample(&self, q: &[f64]) -> Sample {
+        match self.joints() {
+            1 => self.sample_joints::<1, 1>(q),
+            2 => self.sample_joints::<2, 4>(q),
+            3 => self.sample_joints::<3, 16>(q),
+            4 => self.sample_joints::<4, 64>(q),
+            5 => self.sample_joints::<5, 256>(q),
+            _ => self.sample_joints::<MAX_JOINTS, 1024>(q),
+        }
+    }
+
+    /// `N = 4^(D-1)`.
+    fn sample_joints<const D: usize, const N: usize>(&self, q: &[f64]) -> Sample {
+        let stencil = self.lattice.locate(q);
+        let mut corners = Corners::default();
+        let mut heaviest = 0.0;
+        for (point, weight) in stencil.corners().filter(|(_, weight)| *weight > 0.0) {
+            let corner = self.points[point];
+            corners.flags |= corner.flags;
+            corners.present += if corner.is_present() { weight } else { 0.0 };
+            corners.index += if corner.touching { weight } else { 0.0 };
+            if corner.in_contact && weight > heaviest {
+                (corners.contact_nodes, heaviest) = (corner.contacts, weight);
+            }
+        }
+        if stencil.fade < 1.0 {
+            corners.flags |= Flags::OUTSIDE;
+        }
+        let (mut torque, energy, inside, share, fade);
+        match &self.interpolant {
+            Interpolant::Layered(layered) => {
+                // Absent points carry zero torque already.
+                let at = layered.at::<D>(&stencil);
+                fade = stencil.fade;
+                (torque, energy, inside, share) = (at.torque, at.energy, at.depth > 0.0, at.held);
+                if at.held < 1.0 {
+                    corners.flags |= Flags::LAYER;
+                }
+            }
+            Interpolant::Potential(potential) => {
+                let at = potential.at::<D, N>(&stencil);
+                // Exactly one away from absent points, whatever the rounding of the weights.
+                let present = if corners.flags.contains(Flags::ABSENT) { corners.present } else { 1.0 };
+                fade = stencil.fade * present;
+                (torque, energy, inside, share) = (at.torque, at.energy, at.contact, at.share);
+            }
+        }
+        torque.iter_mut().for_each(|tau| *tau *= fade);
+        let contact = inside && corners.present > 0.0 && stencil.fade > 0.0;
+        Sample {
+            torque,
+            index: corners.index,
+            contact,
+            contact_nodes: if contact { corners.contact_nodes } else { 0 },
+            energy,
+            share: share * stencil.fade,
+            flags: corners.flags,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,174 @@
+//! What a field knows of each grid point beside numbers that are interpolated, and what is known where nothing was computed.
+
+use super::FieldError;
+use crate::{
+    contact::Status,
+    dataset::Dataset,
+    render::{flags::Flags, stencil::Lattice},
+    tolerances::GREATEST_INPUT,
+};
+use std::collections::VecDeque;
+
+/// What is not interpolated.
+#[derive(Clone, Copy)]
+pub(super) struct Point {
+    /// Object nodes in contact.
+    pub contacts: u32,
+    pub flags: Flags,
+    /// A torque is stored: contact, unconverged or overflowed.
+    pub in_contact: bool,
+    /// Contact index Ic: that of the nearest point that was computed, lest a missing measurement be taken for a boundary
+    /// of the object.
+    pub touching: bool,
+}
+
+impl Point {
+    fn of(dataset: &Dataset, point: usize) -> Self {
+        let status = dataset.status(point);
+        let contacts = dataset.contacts.as_ref().map_or(0, |contacts| {
+            let count = contacts.offsets[point + 1].saturating_sub(contacts.offsets[point]);
+            u32::try_from(count).unwrap_or(u32::MAX)
+        });
+        let flags = match status {
+            Status::Free | Status::Contact => Flags::default(),
+            Status::Unconverged | Status::Overflow => Flags::UNCONVERGED,
+            Status::Outside => Flags::ABSENT,
+        };
+        let in_contact = matches!(status, Status::Contact | Status::Unconverged | Status::Overflow);
+        Self { contacts, flags, in_contact, touching: in_contact }
+    }
+
+    /// Whether the point was computed.
+    pub fn is_present(&self) -> bool {
+        !self.flags.contains(Flags::ABSENT)
+    }
+
+    /// Whether its torque is minus the gradient of its energy.
+    pub fn is_converged(&self) -> bool {
+        !self.flags.contains(Flags::UNCONVERGED)
+    }
+}
+
+/// A dataset whose columns have been checked, point by point.
+pub(super) struct Checked<'a> {
+    pub lattice: &'a Lattice,
+    pub dataset: &'a Dataset,
+    pub points: &'a [Point],
+    /// For each point the nearest one that was computed; itself if it was.
+    pub nearest: &'a [usize],
+}
+
+impl Checked<'_> {
+    /// tau of `point`; zeros where none is stored.
+    pub fn torque<'b>(&'b self, point: usize, zeros: &'b [f64]) -> Result<&'b [f64], FieldError> {
+        let torque = if self.points[point].in_contact { self.dataset.torque(point) } else { zeros };
+        torque.iter().try_for_each(|&tau| plausible("torque", point, tau))?;
+        Ok(torque)
+    }
+
+    /// U of `point`, or of the nearest that was computed; zero where the dataset has none [J].
+    pub fn energy(&self, point: usize) -> Result<f64, FieldError> {
+        let source = self.nearest[point];
+        let energy = self.dataset.energy.as_ref().map_or(0.0, |energy| energy[source]);
+        plausible("energy", source, energy)?;
+        Ok(energy)
+    }
+}
+
+/// Points of `dataset` on `lattice`, and for each the nearest one that was computed.
+pub(super) fn survey(lattice: &Lattice, dataset: &Dataset) -> Result<(Vec<Point>, Vec<usize>), FieldError> {
+    let count = lattice.points();
+    expect("torque", count.saturating_mul(lattice.joints()), dataset.torque.len())?;
+    expect("status", count, dataset.status.len())?;
+    if let Some(energy) = &dataset.energy {
+        expect("energy", count, energy.len())?;
+    }
+    if let Some(gap) = &dataset.gap {
+        expect("gap", count, gap.len())?;
+    }
+    if let Some(contacts) = &dataset.contacts {
+        expect("contact offsets", count + 1, contacts.offsets.len())?;
+    }
+    let mut points: Vec<Point> = (0..count).map(|point| Point::of(dataset, point)).collect();
+    let nearest = nearest_present(lattice, &points).ok_or(FieldError::Empty)?;
+    for (point, &source) in nearest.iter().enumerate() {
+        points[point].touching = points[source].in_contact;
+    }
+    Ok((points, nearest))
+}
+
+fn expect(column: &'static str, expected: usize, found: usize) -> Result<(), FieldError> {
+    if expected == found { Ok(()) } else { Err(FieldError::Length { column, expected, found }) }
+}
+
+/// Whether `value` of `column` may enter the loop.
+pub(super) fn plausible(column: &'static str, point: usize, value: f64) -> Result<(), FieldError> {
+    // False for what is not a number.
+    if value.abs() <= GREATEST_INPUT { Ok(()) } else { Err(FieldError::Value { column, point, value }) }
+}
+
+/// For each grid point the nearest one that was computed, in steps along the axes; itself if it was. `None` if none was.
+fn nearest_present(lattice: &Lattice, points: &[Point]) -> Option<Vec<usize>> {
+    let mut nearest: Vec<Option<usize>> = vec![None; points.len()];
+    let mut queue = VecDeque::new();
+    // Points in contact come first: where both are as near, the absent point counts as in contact.
+    for in_contact in [true, false] {
+        for (point, slot) in nearest.iter_mut().enumerate() {
+            if points[point].in_contact == in_contact && points[point].is_present() {
+                *slot = Some(point);
+                queue.push_back(point);
+            }
+        }
+    }
+    while let Some(point) = queue.pop_front() {
+        for (count, _, stride) in lattice.lines() {
+            for neighbour in Lattice::neighbours(point, count, stride).into_iter().flatten() {
+                if nearest[neighbour].is_none() {
+                    nearest[neighbour] = nearest[point];
+                    queue.push_back(neighbour);
+                }
+            }
+        }
+    }
+    nearest.into_iter().collect()
+}
+
+/// How far all points are from those that `known` marks, in steps along the axes.
+pub(super) struct Generations {
+    /// Steps to the nearest known point; `u32::MAX` where nothing is known.
+    pub steps: Vec<u32>,
+    /// The other points, nearest first.
+    pub outwards: Vec<usize>,
+}
+
+impl Generations {
+    /// Counts the steps, outwards from what is known.
+    pub fn new(lattice: &Lattice, known: impl Fn(usize) -> bool) -> Self {
+        let mut steps: Vec<u32> = (0..lattice.points()).map(|p| if known(p) { 0 } else { u32::MAX }).collect();
+        let mut queue: VecDeque<usize> = (0..lattice.points()).filter(|&p| steps[p] == 0).collect();
+        let mut outwards = Vec::new();
+        while let Some(point) = queue.pop_front() {
+            for (count, _, stride) in lattice.lines() {
+                for neighbour in Lattice::neighbours(point, count, stride).into_iter().flatten() {
+                    if steps[neighbour] == u32::MAX {
+                        steps[neighbour] = steps[point] + 1;
+                        queue.push_back(neighbour);
+                        outwards.push(neighbour);
+                    }
+                }
+            }
+        }
+        Self { steps, outwards }
+    }
+
+    /// The neighbours of `point` that are one step nearer to what is known: axis, distance of `point` from them along it
+    /// (with its sign), and point.
+    pub fn nearer<'a>(&'a self, lattice: &'a Lattice, point: usize) -> impl Iterator<Item = (usize, f64, usize)> + 'a {
+        lattice.lines().enumerate().flat_map(move |(axis, (count, step, stride))| {
+            let [before, after] = Lattice::neighbours(point, count, stride);
+            let nearer = move |p: &usize| self.steps[*p] < self.steps[point];
+            let before = before.filter(nearer).map(|p| (axis, step, p));
+            before.into_iter().chain(after.filter(nearer).map(|p| (axis, -step, p)))
+        })
+    }
+}

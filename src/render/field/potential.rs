@@ -1,0 +1,145 @@
+//! The potential: a torque field that is minus the gradient of one smooth energy, and so makes no energy around any loop.
+//!
+//! An object of finite stiffness stores `U = 1/2 k depth^2` where contact begins: U and its gradient vanish at the boundary,
+//! its curvature jumps there. So not U is interpolated but its signed root,
+//! `w = sqrt(2 (U - U_free))`, `dw/dq = -tau / w`, continued to negative values on the free side, which is smooth through the
+//! boundary and, for a linear object, linear. Then
+//!
+//! `U_bar = U_free + 1/2 max(0, w_bar)^2`,  `tau_bar = -dU_bar/dq = -max(0, w_bar) dw_bar/dq`.
+//!
+//! w_bar is the C1 tensor product of cubic Hermite polynomials (`hermite.rs`): U_bar is C1, tau_bar continuous, equal to the
+//! dataset's tau at its points, and errs with h^3 where the field is smooth. It begins at zero at the boundary
+//! w_bar = 0, without a jump and so without a boundary layer, which would break the gradient.
+//!
+//! *Mixed derivatives* of w, which a tensor product needs beside w and its gradient, are differences of the gradient between
+//! neighbouring points, the mean over the orders of differentiation. Whatever they are, w_bar stays C1.
+//!
+//! *Free points* take w and its gradient from the nearest points in contact by Taylor's formula, at most zero. Points that
+//! were not computed do so, too, but there the sign is not known; a factor (the weight of the computed corners) lets the
+//! torque fade out towards them, at the price of the gradient. *Unconverged points* have an energy and a torque that do not
+//! belong together: the energy is taken, the gradient from differences of w.
+//!
+//! Where equilibria change abruptly (the object snaps from one to another), U jumps between two grid points. The field then
+//! goes from one to the other within the cell, smoothly, with a torque of about the jump over h.
+
+use super::{
+    FieldError,
+    hermite::{self, Hermite},
+    points::{Checked, Generations},
+};
+use crate::{
+    JointVector,
+    render::stencil::{Lattice, Stencil},
+    tolerances::LEAST_ENERGY,
+};
+
+/// The potential of one dataset.
+pub(super) struct Potential {
+    root: Hermite,
+    /// U without contact [J].
+    free_energy: f64,
+}
+
+/// The potential at one configuration.
+pub(super) struct Gradient {
+    pub torque: JointVector,
+    /// U [J].
+    pub energy: f64,
+    /// Whether w is positive.
+    pub contact: bool,
+    /// What multilinear interpolation of w over the corners in contact is to be multiplied by to give w, 0 to 1: contact
+    /// forces, which grow like w, end with it at the boundary.
+    pub share: f64,
+}
+
+impl Potential {
+    /// Interpolates the energy of `data`.
+    pub fn new(data: &Checked<'_>) -> Result<Self, FieldError> {
+        if data.dataset.energy.is_none() {
+            return Err(FieldError::Missing { column: "energy", interpolation: "potential" });
+        }
+        let (lattice, count) = (data.lattice, data.points.len());
+        let is_free = |p: &usize| data.points[*p].is_present() && !data.points[*p].in_contact;
+        let free_energy = (0..count).find(is_free).map_or(Ok(0.0), |point| data.energy(point))?;
+        let zeros = JointVector::zeros(lattice.joints());
+        let mut root = vec![0.0; count];
+        let mut known = vec![false; count];
+        for point in 0..count {
+            // Checked whether or not it is used.
+            let excess = data.energy(point)? - free_energy;
+            data.torque(point, &zeros)?;
+            if data.points[point].in_contact && excess > LEAST_ENERGY {
+                root[point] = (2.0 * excess).sqrt();
+                known[point] = true;
+            }
+        }
+        let mut slopes = vec![zeros; count];
+        for point in (0..count).filter(|&point| known[point]) {
+            for (a, (lines, step, stride)) in lattice.lines().enumerate() {
+                slopes[point][a] = if data.points[point].is_converged() {
+                    -data.torque(point, &zeros)?[a] / root[point]
+                } else {
+                    let [before, after] = Lattice::neighbours(point, lines, stride).map(|p| p.filter(|&p| known[p]));
+                    let apart = f64::from(u8::from(before.is_some()) + u8::from(after.is_some()));
+                    let rise = root[after.unwrap_or(point)] - root[before.unwrap_or(point)];
+                    if apart > 0.0 { rise / (apart * step) } else { 0.0 }
+                };
+            }
+        }
+        let generations = Generations::new(lattice, |point| known[point]);
+        for &point in &generations.outwards {
+            let (mut value, mut slope, mut sources) = (0.0, zeros, 0.0);
+            for (axis, distance, source) in generations.nearer(lattice, point) {
+                value += root[source] + distance * slopes[source][axis];
+                slope.iter_mut().zip(slopes[source].iter()).for_each(|(sum, slope)| *sum += slope);
+                sources += 1.0;
+            }
+            slope.iter_mut().for_each(|slope| *slope /= sources);
+            value /= sources;
+            root[point] = if data.points[point].is_present() { value.min(0.0) } else { value };
+            slopes[point] = slope;
+        }
+        Ok(Self { root: Hermite::new(lattice, &root, &slopes), free_energy })
+    }
+
+    /// The potential in the cell of `stencil`. `N = 4^(D-1)`.
+    pub fn at<const D: usize, const N: usize>(&self, stencil: &Stencil) -> Gradient {
+        let (root, slopes) = self.root.at::<D, N>(stencil);
+        let depth = root.max(0.0);
+        let mut torque = JointVector::zeros(D);
+        torque.iter_mut().zip(slopes).for_each(|(tau, slope)| *tau = -depth * slope);
+        let linear: f64 = stencil.corners().map(|(point, weight)| weight * self.root.value(point).max(0.0)).sum();
+        let share = if depth < linear { depth / linear } else { 1.0 };
+        Gradient { torque, energy: self.free_energy + 0.5 * depth * depth, contact: root > 0.0, share }
+    }
+
+    /// Greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), at the grid points from all sides:
+    /// `d^2 U / dq_a dq_b = w_a w_b + w w_ab`. Second derivatives of a cubic are greatest at its ends; in between, cells add
+    /// little to their corners' greatest.
+    pub fn relative_stiffness(&self, lattice: &Lattice, slopes: &JointVector) -> f64 {
+        let norm = |point: usize| {
+            let root = self.root.value(point);
+            if root < 0.0 {
+                return 0.0;
+            }
+            let mut sum = 0.0;
+            for (a, (count, step, stride)) in lattice.lines().enumerate() {
+                let along = self.root.derivative(point, 1 << a);
+                let curvature = Lattice::neighbours(point, count, stride).into_iter().flatten().map(|other| {
+                    let (rise, far) = (self.root.value(other) - root, self.root.derivative(other, 1 << a));
+                    let towards = if other > point { step } else { -step };
+                    hermite::curvature_at_start(rise, along, far, towards)
+                });
+                let greatest = curvature.map(|w_aa| (along * along + root * w_aa).abs()).fold(along * along, f64::max);
+                sum += (greatest / slopes[a]).powi(2);
+                for b in 0..a {
+                    let across = along * self.root.derivative(point, 1 << b);
+                    let mixed = across + root * self.root.derivative(point, 1 << a | 1 << b);
+                    sum += 2.0 * mixed * mixed / (slopes[a] * slopes[b]);
+                }
+            }
+            sum
+        };
+        (0..lattice.points()).map(norm).fold(0.0, f64::max).sqrt()
+    }
+}

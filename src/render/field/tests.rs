@@ -1,0 +1,415 @@
+//! What must hold of the field whatever is interpolated, and of each interpolation.
+
+use super::*;
+use crate::contact::Status;
+use crate::render::synthetic::{dataset, grid, half_space};
+
+/// So steep a layer that it holds nothing back.
+const SOFT: f64 = 1e6;
+
+fn rendered(data: &Dataset, slope: f64) -> TorqueField {
+    TorqueField::new(data, 0.5, &vector(&vec![slope; data.grid.joints()])).unwrap()
+}
+
+fn vector(values: &[f64]) -> JointVector {
+    JointVector::from_slice(values)
+}
+
+/// `count` points 0.2 rad apart on every axis, centred on zero.
+fn centred(joints: usize, count: usize) -> crate::dataset::Grid {
+    grid(&vec![(-0.1 * (count - 1) as f64, 0.2, count); joints])
+}
+
+/// Every joint's torque a product of affine functions of all coordinates: what multilinear interpolation keeps.
+fn multilinear(q: &JointVector) -> JointVector {
+    let mut tau = *q;
+    for (a, tau) in tau.iter_mut().enumerate() {
+        *tau = q.iter().enumerate().map(|(b, x)| 1.0 + (0.3 + 0.1 * (a + b) as f64) * x).product();
+    }
+    tau
+}
+
+#[test]
+fn multilinear_fields_are_reproduced_in_one_to_six_joints() {
+    for joints in 1..=MAX_JOINTS {
+        let data = dataset(grid(&vec![(-0.4, 0.2, 5); joints]), |q| (multilinear(q), 1.0, Status::Contact));
+        let field = rendered(&data, SOFT);
+        let mut q = JointVector::zeros(joints);
+        for k in 0..50 {
+            for (a, x) in q.iter_mut().enumerate() {
+                *x = 0.39 * (1.0 + 1.7 * k as f64 + 2.3 * a as f64).sin();
+            }
+            let sample = field.sample(&q);
+            let exact = multilinear(&q);
+            for (tau, exact) in sample.torque.iter().zip(exact.iter()) {
+                assert!((tau - exact).abs() < 1e-13 * exact.abs().max(1.0), "{joints} joints: {tau} for {exact}");
+            }
+            assert!((sample.index - 1.0).abs() < 1e-14 && sample.contact && sample.flags.is_empty());
+            assert!((sample.energy - 1.0).abs() < 1e-14);
+        }
+    }
+}
+
+#[test]
+fn contact_begins_where_the_index_passes_its_threshold() {
+    let data = half_space(grid(&[(-1.0, 0.5, 5)]), 2.0);
+    let field = rendered(&data, SOFT);
+    // Free at 0, contact at 0.5: the index passes one half at 0.25.
+    assert!(!field.sample(&[0.249]).contact);
+    assert!(field.sample(&[0.251]).contact);
+    assert_eq!(field.sample(&[0.125]).index, 0.25);
+    assert_eq!(field.sample(&[0.2]).torque[0], 0.0);
+    assert_eq!(field.sample(&[0.75]).torque[0], -1.5);
+}
+
+/// Steepest change of torque along a winding path through and out of a grid of `count` points 0.2 apart an axis,
+/// centred on zero [N m/rad].
+fn steepest(field: &TorqueField, count: usize, reach: f64) -> f64 {
+    let half = 0.1 * (count - 1) as f64 * reach;
+    let place = |k: f64| {
+        let x = |a: usize| half * (0.11 * k + 1.3 * a as f64).sin() * (0.013 * k).cos();
+        vector(&(0..field.joints()).map(x).collect::<Vec<_>>())
+    };
+    let distance = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| (p - q).powi(2)).sum::<f64>().sqrt();
+    let slope = |k: i32| {
+        let (p, q) = (place(0.01 * f64::from(k)), place(0.01 * f64::from(k + 1)));
+        // Short steps would measure rounding.
+        let moved = distance(&p, &q).max(1e-6);
+        distance(&field.sample(&p).torque, &field.sample(&q).torque) / moved
+    };
+    (0..40_000).map(slope).fold(0.0, f64::max)
+}
+
+#[test]
+fn torque_is_continuous_with_the_stated_bound_whatever_the_data() {
+    for (joints, count) in [(1, 40), (2, 9), (3, 7), (6, 3)] {
+        let wild = dataset(centred(joints, count), |q| {
+            let noise = |a: usize| (q.iter().map(|x| 7e3 * x).sum::<f64>() + 5.0 * a as f64).sin();
+            let status = if noise(9) > -0.3 { Status::Contact } else { Status::Free };
+            (vector(&(0..joints).map(noise).collect::<Vec<_>>()), 0.0, status)
+        });
+        for slope in [0.1, 10.0, 1e4] {
+            let field = rendered(&wild, slope);
+            let slopes = vector(&vec![slope; joints]);
+            let stiffness = slope * field.relative_stiffness(&slopes);
+            let (steepest, bound) = (steepest(&field, count, 1.0), stiffness + slope);
+            assert!(steepest <= bound * (1.0 + 1e-6), "{joints} joints: {steepest} of {bound}");
+            assert!(steepest > 0.02 * stiffness.min(slope), "{joints} joints: {steepest} of {bound}");
+        }
+    }
+}
+
+#[test]
+fn a_jump_at_contact_is_felt_with_the_slope_of_the_layer_alone() {
+    for (joints, count) in [(1, 9), (2, 9), (3, 9), (6, 4)] {
+        // One newton metre at once, then 1 N m/rad in each joint: along a fixed direction.
+        let jump = dataset(centred(joints, count), |q| {
+            let depth = q.iter().sum::<f64>();
+            let inside = depth > 0.05;
+            let tau = vector(&vec![if inside { -1.0 - depth } else { 0.0 }; q.len()]);
+            (tau, 0.0, if inside { Status::Contact } else { Status::Free })
+        });
+        let slope = 2.0;
+        let field = rendered(&jump, slope);
+        let steepest = steepest(&field, count, 1.0);
+        let expected = slope.max(joints as f64);
+        assert!(steepest <= expected * (1.0 + 1e-6), "{joints} joints: {steepest} of {expected}");
+        // Without the layer the same path is steeper than the object: the test can fail.
+        let bare = rendered(&jump, SOFT);
+        assert!(self::steepest(&bare, count, 1.0) > 2.0 * expected, "{joints} joints");
+    }
+}
+
+#[test]
+fn the_layer_holds_a_jump_to_the_slope_and_leaves_a_soft_object_alone() {
+    let jump = dataset(grid(&[(-0.5, 0.1, 21)]), |q| {
+        let inside = q[0] > 0.01;
+        (vector(&[if inside { -1.0 } else { 0.0 }]), 0.0, if inside { Status::Contact } else { Status::Free })
+    });
+    let field = rendered(&jump, 2.0);
+    // Boundary at 0.05; 2 N m/rad from there until 1 N m is reached half a radian further on.
+    for (q, torque) in [(0.04, 0.0), (0.1, -0.1), (0.3, -0.5), (0.54, -0.98), (0.6, -1.0), (1.2, -1.0)] {
+        let sample = field.sample(&[q]);
+        assert!((sample.torque[0] - torque).abs() < 1e-12, "{} at {q}", sample.torque[0]);
+        assert_eq!(sample.flags.contains(Flags::LAYER), q < 0.55, "at {q}");
+    }
+    let soft = half_space(grid(&[(-0.5, 0.1, 21)]), 0.5);
+    let field = rendered(&soft, 2.0);
+    for k in 2..10 {
+        let q = 0.1 * k as f64;
+        assert!((field.sample(&[q]).torque[0] + 0.5 * q).abs() < 1e-12, "at {q}");
+    }
+}
+
+#[test]
+fn torque_fades_out_over_one_cell_beyond_the_grid() {
+    let data = dataset(grid(&[(0.0, 0.1, 3), (0.0, 0.1, 3)]), |_| (vector(&[1.0, -2.0]), 0.0, Status::Contact));
+    let field = rendered(&data, 1.0);
+    let at = |x: f64| field.sample(&[x, 0.05]);
+    assert!(!at(0.2).flags.contains(Flags::OUTSIDE));
+    assert_eq!(at(0.2).torque[1], -2.0);
+    assert!((at(0.25).torque[1] + 1.0).abs() < 1e-12);
+    assert!(at(0.25).flags.contains(Flags::OUTSIDE));
+    assert_eq!(*at(0.31).torque, [0.0, 0.0]);
+    assert!(!at(0.31).contact);
+    assert_eq!(*at(f64::NAN).torque, [0.0, 0.0]);
+}
+
+#[test]
+fn torque_fades_out_towards_absent_points_without_making_a_boundary_there() {
+    let data = dataset(grid(&[(0.0, 0.1, 8)]), |q| {
+        let status = if q[0] > 0.45 { Status::Outside } else { Status::Contact };
+        (vector(&[if q[0] > 0.45 { f64::NAN } else { 1.0 }]), q[0], status)
+    });
+    let field = rendered(&data, 0.1);
+    assert_eq!(field.sample(&[0.4]).torque[0], 1.0);
+    let fading = field.sample(&[0.45]);
+    assert!((fading.torque[0] - 0.5).abs() < 1e-12 && fading.flags.contains(Flags::ABSENT) && fading.contact);
+    let gone = field.sample(&[0.65]);
+    assert!(gone.torque[0] == 0.0 && gone.flags.contains(Flags::ABSENT) && !gone.contact);
+}
+
+#[test]
+fn unconverged_points_are_used_and_flagged() {
+    let data = dataset(grid(&[(0.0, 0.1, 3)]), |q| {
+        (vector(&[1.0]), 0.0, if q[0] > 0.15 { Status::Unconverged } else { Status::Contact })
+    });
+    let field = rendered(&data, SOFT);
+    assert!(field.sample(&[0.05]).flags.is_empty());
+    let sample = field.sample(&[0.15]);
+    assert!(sample.flags == Flags::UNCONVERGED && (sample.torque[0] - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn inconsistent_datasets_are_refused_with_the_reason() {
+    let good = || half_space(grid(&[(-1.0, 0.5, 5), (-1.0, 0.5, 3)]), 2.0);
+    let new = |data: Dataset, threshold: f64, slope: &[f64]| TorqueField::new(&data, threshold, &vector(slope)).err();
+    assert_eq!(new(good(), 0.5, &[1.0, 2.0]), None);
+    assert!(matches!(new(good(), 1.0, &[1.0, 2.0]), Some(FieldError::Threshold(_))));
+    assert!(matches!(new(good(), f64::NAN, &[1.0, 2.0]), Some(FieldError::Threshold(_))));
+    for slope in [&[0.0, 1.0][..], &[1.0, f64::NAN], &[1.0], &[1.0, 1.0, 1.0], &[1.0, f64::INFINITY]] {
+        assert!(matches!(new(good(), 0.5, slope), Some(FieldError::Slope(_))), "{slope:?}");
+    }
+    let mut short = good();
+    short.torque = vec![0.0; 29].into();
+    let expected = FieldError::Length { column: "torque", expected: 30, found: 29 };
+    assert_eq!(new(short, 0.5, &[1.0, 1.0]), Some(expected));
+    let mut wild = good();
+    wild.torque = vec![f64::NAN; 30].into();
+    assert!(matches!(new(wild, 0.5, &[1.0, 1.0]), Some(FieldError::Value { column: "torque", .. })));
+    let mut nothing = good();
+    nothing.status = vec![Status::Outside as u8; 15].into();
+    assert_eq!(new(nothing, 0.5, &[1.0, 1.0]), Some(FieldError::Empty));
+}
+
+#[test]
+fn relative_stiffness_of_a_half_space_is_its_stiffness() {
+    for joints in [1, 2, 4] {
+        let data = half_space(centred(joints, 5), 3.0);
+        let stiffness = rendered(&data, SOFT).relative_stiffness(&vector(&vec![1.5; joints]));
+        assert!((stiffness - 2.0).abs() < 1e-12, "{joints} joints: {stiffness}");
+    }
+}
+
+fn field_of(data: &Dataset, interpolation: Interpolation) -> TorqueField {
+    TorqueField::interpolated(data, interpolation, 0.5, &vector(&vec![SOFT; data.grid.joints()])).unwrap()
+}
+
+/// [`half_space`] with the gap that it would have in a model: minus the depth, negative outside.
+fn half_space_with_gap(grid: crate::dataset::Grid, stiffness: f64) -> Dataset {
+    let mut data = half_space(grid, stiffness);
+    let part = 1.0 / (data.grid.joints() as f64).sqrt();
+    let gap = |point: usize| -(data.grid.configuration(point).iter().sum::<f64>() * part) as f32;
+    data.gap = Some((0..data.grid.points()).map(gap).collect::<Vec<_>>().into());
+    data
+}
+
+/// A configuration within 0.36 of zero in each joint; the same for the same `k`.
+fn place(joints: usize, k: usize) -> JointVector {
+    let mut q = JointVector::zeros(joints);
+    q.iter_mut().enumerate().for_each(|(a, x)| *x = 0.36 * (0.7 + (1.9 + 0.83 * a as f64) * k as f64).sin());
+    q
+}
+
+#[test]
+fn a_linear_object_is_rendered_exactly_by_its_gap_and_by_its_potential() {
+    for joints in 1..=MAX_JOINTS {
+        // No grid point lies on the boundary.
+        let axes: Vec<_> = (0..joints).map(|a| (-0.43 + 0.01 * a as f64, 0.2, 5)).collect();
+        let data = half_space_with_gap(grid(&axes), 3.0);
+        let exact = half_space(grid(&axes), 3.0);
+        assert_eq!(exact.torque.len(), data.torque.len());
+        let part = 1.0 / (joints as f64).sqrt();
+        for interpolation in Interpolation::ALL {
+            let field = field_of(&data, interpolation);
+            let mut worst = 0.0_f64;
+            for k in 0..200 {
+                let q = place(joints, k);
+                let depth = (q.iter().sum::<f64>() * part).max(0.0);
+                let sample = field.sample(&q);
+                for tau in sample.torque.iter() {
+                    worst = worst.max((tau + 3.0 * depth * part).abs());
+                }
+                if interpolation == Interpolation::Potential {
+                    assert!((sample.energy - 1.5 * depth * depth).abs() < 1e-12, "{} at {q:?}", sample.energy);
+                    assert_eq!(sample.contact, depth > 0.0, "at {q:?}");
+                }
+            }
+            match interpolation {
+                // The paper's boundary and the kink behind it: a quarter of a cell's torque.
+                Interpolation::Linear => assert!(worst > 0.02, "{joints} joints: {worst}"),
+                // Gaps are stored in f32.
+                Interpolation::GapField => assert!(worst < 1e-6, "{joints} joints: {worst}"),
+                Interpolation::Potential => assert!(worst < 1e-12, "{joints} joints: {worst}"),
+            }
+        }
+    }
+}
+
+/// A curved potential that begins at the surface of a ball of radius 0.6.
+fn ball(grid: crate::dataset::Grid) -> Dataset {
+    dataset(grid, |q| {
+        let (tau, energy) = push(q);
+        (tau, energy, if energy > 0.0 { Status::Contact } else { Status::Free })
+    })
+}
+
+/// Torque and energy of [`ball`]: `1/2 k d^2 (1 + d)`, d the depth.
+fn push(q: &[f64]) -> (JointVector, f64) {
+    let radius = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let depth = (0.6 - radius).max(0.0);
+    let slope = 4.0 * (depth + 1.5 * depth * depth) / radius.max(1e-9);
+    (vector(&q.iter().map(|x| slope * x).collect::<Vec<_>>()), 2.0 * depth * depth * (1.0 + depth))
+}
+
+#[test]
+fn potential_passes_through_the_data_and_is_the_gradient_of_its_energy_wherever_it_is_looked_up() {
+    for (joints, count) in [(1, 21), (2, 9), (3, 7), (4, 5), (6, 4)] {
+        let data = ball(grid(&vec![(-0.401, 0.8 / (count - 1) as f64, count); joints]));
+        let field = field_of(&data, Interpolation::Potential);
+        for point in (0..data.grid.points()).step_by(1 + data.grid.points() / 300) {
+            let sample = field.sample(&data.grid.configuration(point));
+            let error = sample.torque.iter().zip(data.torque(point)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(error < 1e-12 && (sample.energy - data.energy.as_ref().unwrap()[point]).abs() < 1e-12);
+        }
+        let mut pushed = 0;
+        for k in 0..200 {
+            let q = place(joints, k);
+            let sample = field.sample(&q);
+            pushed += usize::from(sample.contact);
+            for a in 0..joints {
+                let at = |step: f64| {
+                    let mut q = q;
+                    q[a] += step;
+                    field.sample(&q).energy
+                };
+                let slope = (at(1e-6) - at(-1e-6)) / 2e-6;
+                assert!((sample.torque[a] + slope).abs() < 1e-6, "{joints} joints at {q:?}: {slope}");
+            }
+        }
+        assert!(pushed > 10, "{joints} joints: {pushed}");
+    }
+}
+
+#[test]
+fn every_interpolation_is_continuous_over_faces_edges_and_the_rim() {
+    for joints in [1, 2, 3] {
+        let mut data = half_space_with_gap(grid(&vec![(-0.43, 0.2, 5); joints]), 3.0);
+        // Noise, a hole and a point that did not converge.
+        let mut torque = data.torque.to_vec();
+        torque.iter_mut().enumerate().for_each(|(k, tau)| *tau *= 1.0 + 0.3 * (7.0 * k as f64).sin());
+        data.torque = torque.into();
+        let mut status = data.status.to_vec();
+        let last = status.len() - 1;
+        (status[last - 1], status[last]) = (Status::Outside as u8, Status::Unconverged as u8);
+        data.status = status.into();
+        for interpolation in Interpolation::ALL {
+            let field = TorqueField::interpolated(&data, interpolation, 0.5, &vector(&vec![50.0; joints])).unwrap();
+            let at = |k: f64| {
+                let q: Vec<f64> =
+                    (0..joints).map(|a| 0.7 * ((0.3 + 0.17 * a as f64) * k + 1.1 * a as f64).sin()).collect();
+                field.sample(&q).torque
+            };
+            let mut greatest = 0.0_f64;
+            for k in 0..40_000 {
+                let (p, q) = (at(0.002 * f64::from(k)), at(0.002 * f64::from(k + 1)));
+                greatest = p.iter().zip(q.iter()).map(|(p, q)| (p - q).abs()).fold(greatest, f64::max);
+            }
+            // 4e-4 rad at most 100 N m/rad.
+            assert!(greatest < 0.04 && greatest > 1e-4, "{joints} joints, {interpolation:?}: {greatest}");
+        }
+    }
+}
+
+#[test]
+fn potential_fades_out_towards_absent_points_and_beyond_the_grid() {
+    let data = dataset(grid(&[(0.0, 0.1, 8)]), |q| {
+        let absent = q[0] > 0.45;
+        let tau = if absent { f64::NAN } else { -2.0 * (q[0] + 0.1) };
+        (vector(&[tau]), (q[0] + 0.1).powi(2), if absent { Status::Outside } else { Status::Contact })
+    });
+    let field = field_of(&data, Interpolation::Potential);
+    let exact = |x: f64| -2.0 * (x + 0.1);
+    assert!((field.sample(&[0.37]).torque[0] - exact(0.37)).abs() < 1e-12);
+    let fading = field.sample(&[0.45]);
+    assert!((fading.torque[0] - 0.5 * exact(0.45)).abs() < 1e-12 && fading.flags.contains(Flags::ABSENT));
+    let gone = field.sample(&[0.65]);
+    assert!(gone.torque[0] == 0.0 && gone.flags.contains(Flags::ABSENT) && !gone.contact);
+    let outside = field.sample(&[-0.05]);
+    assert!((outside.torque[0] - 0.5 * exact(0.0)).abs() < 1e-12 && outside.flags.contains(Flags::OUTSIDE));
+    assert_eq!(field.sample(&[f64::NAN]).torque[0], 0.0);
+}
+
+#[test]
+fn contradictory_energies_and_torques_stay_bounded() {
+    // Overflowed and unconverged points may hold a torque without energy, or the other way round.
+    let data = dataset(grid(&[(0.0, 0.1, 9), (0.0, 0.1, 9)]), |q| {
+        let odd = ((q[0] + 3.0 * q[1]) * 10.0).round() as i64 % 3;
+        let depth = q[0] - 0.05;
+        let state = [Status::Contact, Status::Unconverged, Status::Overflow][odd as usize];
+        let energy = [0.5 * depth * depth, -1.0, 0.0][odd as usize];
+        (vector(&[-depth - 3.0 * odd as f64, 0.0]), energy, if q[0] < 0.05 { Status::Free } else { state })
+    });
+    let field = field_of(&data, Interpolation::Potential);
+    for k in 0..2000 {
+        let q = [0.8 * (0.37 * k as f64).sin().abs(), 0.8 * (0.11 * k as f64).sin().abs()];
+        let torque = field.sample(&q).torque;
+        assert!(torque.norm() < 10.0, "{torque:?} at {q:?}");
+    }
+}
+
+#[test]
+fn energy_is_counted_from_free_space() {
+    // A force on the object, gravity say, gives it energy without contact.
+    let mut data = half_space(grid(&[(-0.43, 0.1, 9), (-0.43, 0.1, 9)]), 3.0);
+    let plain = field_of(&data, Interpolation::Potential);
+    data.energy = Some(data.energy.unwrap().iter().map(|energy| energy - 0.7).collect::<Vec<_>>().into());
+    let shifted = field_of(&data, Interpolation::Potential);
+    for k in 0..50 {
+        let (a, b) = (plain.sample(&place(2, k)), shifted.sample(&place(2, k)));
+        assert!((a.torque[0] - b.torque[0]).abs() < 1e-9 && (a.energy - b.energy - 0.7).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn interpolations_name_the_column_that_a_dataset_lacks() {
+    let mut data = half_space(grid(&[(-0.43, 0.1, 9)]), 3.0);
+    let refused = |data: &Dataset, interpolation| {
+        TorqueField::interpolated(data, interpolation, 0.5, &vector(&[1.0])).err().unwrap().to_string()
+    };
+    assert!(refused(&data, Interpolation::GapField).contains("no gap"));
+    data.energy = None;
+    let message = refused(&data, Interpolation::Potential);
+    assert!(message.contains("no energy") && message.contains("interpolation = \"linear\""), "{message}");
+}
+
+#[test]
+fn stiffness_of_a_potential_is_that_of_its_object() {
+    for joints in [1, 2, 4] {
+        let data = half_space(grid(&vec![(-0.43, 0.2, 5); joints]), 3.0);
+        let field = field_of(&data, Interpolation::Potential);
+        let stiffness = field.relative_stiffness(&vector(&vec![1.5; joints]));
+        assert!((stiffness - 2.0).abs() < 1e-9, "{joints} joints: {stiffness}");
+        assert!(field.is_potential() && !field_of(&data, Interpolation::Linear).is_potential());
+    }
+}

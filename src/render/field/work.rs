@@ -1,0 +1,89 @@
+//! The work that the contact torque does along a path through C-space: zero around a loop if and only if it is a gradient.
+//!
+//! `W = int tau_bar . dq` along a straight line, cut at the faces of the grid. Between two faces a potential's torque is a
+//! polynomial of degree 6d - 1 at most, which Lobatto's formula of ten points integrates exactly up to three joints; where
+//! the formula and its two halves differ (a boundary crossed within the cell, more joints) the stretch is halved.
+
+use super::TorqueField;
+use crate::{
+    JointVector,
+    tolerances::{WORK_HALVINGS, WORK_ROUNDING, WORK_STRETCHES},
+};
+
+/// Nodes in (0, 1] and weights of Lobatto's formula of ten points on [-1, 1]. It looks at the ends, too: where the torque
+/// begins or ends within a stretch, the whole and its halves cannot agree by not seeing it.
+const LOBATTO: [(f64, f64); 5] = [
+    (0.165_278_957_666_387_02, 0.327_539_761_183_897_6),
+    (0.477_924_949_810_444_5, 0.292_042_683_679_683_8),
+    (0.738_773_865_105_505, 0.224_889_342_063_126_4),
+    (0.919_533_908_166_458_9, 0.133_305_990_851_070_1),
+    (1.0, 1.0 / 45.0),
+];
+
+impl TorqueField {
+    /// Work of the torque on the proxy along the straight line `from`..`to` [J]. Not for the haptic loop.
+    #[must_use]
+    pub fn work(&self, from: &JointVector, to: &JointVector) -> f64 {
+        let mut cuts = vec![0.0, 1.0];
+        for ((line, start), end) in self.lattice.grid_lines().zip(from.iter()).zip(to.iter()) {
+            let crossed = line.map(|coordinate| (coordinate - start) / (end - start));
+            cuts.extend(crossed.filter(|cut| *cut > 0.0 && *cut < 1.0));
+        }
+        cuts.sort_unstable_by(f64::total_cmp);
+        let stretches: Vec<_> =
+            cuts.windows(2).map(|cut| (cut[0], cut[1], self.lobatto(from, to, cut[0], cut[1]))).collect();
+        let tolerance = WORK_ROUNDING * stretches.iter().map(|(_, _, (_, size))| size).sum::<f64>();
+        stretches.into_iter().map(|stretch| self.stretch(from, to, stretch, tolerance)).sum()
+    }
+
+    /// Work around the closed polygon with corners `path` [J].
+    #[must_use]
+    pub fn work_around(&self, path: &[JointVector]) -> f64 {
+        let next = path.iter().cycle().skip(1);
+        path.iter().zip(next).map(|(from, to)| self.work(from, to)).sum()
+    }
+
+    /// The work of one stretch, halved until two halves differ from the whole by no more than `tolerance` [J].
+    fn stretch(
+        &self,
+        from: &JointVector,
+        to: &JointVector,
+        (start, end, whole): (f64, f64, (f64, f64)),
+        tolerance: f64,
+    ) -> f64 {
+        let (mut work, mut open, mut halved) = (0.0, vec![(start, end, whole.0, 0)], 0);
+        while let Some((start, end, whole, halvings)) = open.pop() {
+            let middle = start.midpoint(end);
+            let [first, second] = [(start, middle), (middle, end)].map(|(a, b)| self.lobatto(from, to, a, b).0);
+            let enough = halvings == WORK_HALVINGS || halved == WORK_STRETCHES;
+            if enough || (whole - first - second).abs() <= tolerance {
+                work += first + second;
+            } else {
+                halved += 1;
+                open.push((start, middle, first, halvings + 1));
+                open.push((middle, end, second, halvings + 1));
+            }
+        }
+        work
+    }
+
+    /// Integral of the power, and of the size of its summands, from `start` to `end` of the line. The summands' size, not
+    /// the power's: where torque and path are nearly perpendicular, rounding is as large as what cancels.
+    fn lobatto(&self, from: &JointVector, to: &JointVector, start: f64, end: f64) -> (f64, f64) {
+        let (middle, half) = (start.midpoint(end), 0.5 * (end - start));
+        let mut sums = (0.0, 0.0);
+        for (node, weight) in LOBATTO {
+            for x in [middle - half * node, middle + half * node] {
+                let (mut q, mut power, mut size) = (*from, 0.0, 0.0);
+                q.iter_mut().zip(to.iter()).for_each(|(q, to)| *q += x * (to - *q));
+                for ((tau, from), to) in self.sample(&q).torque.iter().zip(from.iter()).zip(to.iter()) {
+                    let summand = tau * (to - from);
+                    power += summand;
+                    size += summand.abs();
+                }
+                sums = (sums.0 + half * weight * power, sums.1 + half * weight * size);
+            }
+        }
+        sums
+    }
+}

@@ -1,0 +1,160 @@
+//! The object's nodes in motion, a step a frame (section 3.2), u = n - n0.
+//!
+//! *Dynamics.* Non-iterative passive mechanical integration with a constant time T between frames:
+//! `(2M/T + B + (T/2) K) v_hat = (2M/T) v_k - K u_k + f`, `u_{k+1} = u_k + T v_hat`, `v_{k+1} = 2 v_hat - v_k`.
+//! The matrix is constant, symmetric and positive definite: factorised once. To rounding, for any T and stiffness,
+//! `Delta(1/2 v^T M v + 1/2 u^T K u) = T v_hat . f - T v_hat . B v_hat`: without forces energy never rises.
+//!
+//! *Effects*, each absent unless it is named: gravity adds the nodes' weight to f, from the equilibrium under it on, and
+//! its potential to the energy. Stiffening puts K1 in the place of K on the left and grad W(u) in that of K u on the right,
+//! which keeps the step passive (see [`Stiffening`]). Quasi-static graphics has `u = K^-1 f` and neither M, B nor v.
+//!
+//! `ObjectMotion::load` and `ObjectMotion::advance` are the twins of the entry points in `shaders/frame.wgsl`.
+
+use super::graphics::GraphicsError;
+use crate::{
+    object::{Factor, Object, Stiffening, settled},
+    scene::GraphicsEffects,
+};
+use glam::DVec3;
+
+/// Displacements of all nodes, and their velocities where there are dynamics.
+pub struct ObjectMotion<'object> {
+    object: &'object Object,
+    period: f64,
+    /// Absent in quasi-static graphics.
+    dynamics: Option<Dynamics>,
+    stiffening: Option<Stiffening>,
+    /// M g of each node [N].
+    weight: Option<Vec<DVec3>>,
+    /// u [m].
+    displacement: Vec<DVec3>,
+    /// Right-hand side, then v_hat [m/s]; in quasi-static graphics u.
+    right: Vec<DVec3>,
+}
+
+/// What moves with inertia.
+struct Dynamics {
+    /// Of 2M/T + B + (T/2) K.
+    factor: Factor,
+    /// v [m/s].
+    velocity: Vec<DVec3>,
+}
+
+impl<'object> ObjectMotion<'object> {
+    /// `object` in equilibrium under no forces but its weight, where there is one, to be moved by `period` T [s] at a time.
+    ///
+    /// # Errors
+    /// When `period` is not positive, or there is no memory for the factor.
+    pub fn new(object: &'object Object, period: f64, effects: &GraphicsEffects) -> Result<Self, GraphicsError> {
+        if !(period > 0.0 && period.is_finite()) {
+            return Err(GraphicsError::Period(period));
+        }
+        let zero = vec![DVec3::ZERO; object.rest.len()];
+        let stiffening = effects.stiffening.map(|spec| Stiffening::new(object, spec.factor, spec.strain));
+        let dynamics = if effects.quasi_static {
+            None
+        } else {
+            let inertia = object.mass.iter().zip(&object.damping);
+            let diagonal: Vec<f64> = inertia.map(|(m, b)| 2.0 * m / period + b).collect();
+            let stiffness = stiffening.as_ref().map_or(&object.stiffness, Stiffening::bound);
+            Some(Dynamics { factor: Factor::of(stiffness, 0.5 * period, &diagonal)?, velocity: zero.clone() })
+        };
+        let weight: Option<Vec<DVec3>> = effects.gravity.map(|g| object.mass.iter().map(|m| *m * g).collect());
+        let displacement = match &weight {
+            Some(weight) => settled(object, weight, stiffening.as_ref())?,
+            None => zero.clone(),
+        };
+        Ok(Self { object, period, dynamics, stiffening, weight, displacement, right: zero })
+    }
+
+    /// T [s].
+    #[must_use]
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    /// Node positions n = n0 + u [m].
+    pub fn nodes(&self) -> impl ExactSizeIterator<Item = DVec3> {
+        self.object.rest.iter().zip(&self.displacement).map(|(rest, u)| rest + u)
+    }
+
+    /// Displacements u [m].
+    #[must_use]
+    pub fn displacement(&self) -> &[DVec3] {
+        &self.displacement
+    }
+
+    /// Velocities v [m/s]; none in quasi-static graphics.
+    #[must_use]
+    pub fn velocity(&self) -> &[DVec3] {
+        self.dynamics.as_ref().map_or(&[], |dynamics| &dynamics.velocity)
+    }
+
+    /// Kinetic, elastic and gravitational energy [J]: what no step raises without forces.
+    #[must_use]
+    pub fn energy(&self) -> f64 {
+        let moving = self.object.mass.iter().zip(self.velocity());
+        let kinetic = 0.5 * moving.map(|(m, v)| m * v.length_squared()).sum::<f64>();
+        let elastic = match &self.stiffening {
+            Some(stiffening) => stiffening.energy(self.object, &self.displacement),
+            None => self.object.stiffness.energy(&self.displacement),
+        };
+        let weight = self.weight.iter().flatten().zip(&self.displacement);
+        kinetic + elastic - weight.map(|(w, u)| w.dot(*u)).sum::<f64>()
+    }
+
+    /// Memory of the state and of what advances it, beside the object [B].
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let weight = self.weight.as_ref().map_or(0, Vec::len);
+        let vectors = self.displacement.len() + self.right.len() + self.velocity().len() + weight;
+        let factor = self.dynamics.as_ref().map_or(0, |dynamics| dynamics.factor.bytes());
+        let stiffening = self
+            .stiffening
+            .as_ref()
+            .map_or(0, |stiffening| size_of_val(&*stiffening.bound().blocks) + size_of_val(stiffening.reach()));
+        vectors * size_of::<DVec3>() + factor + stiffening
+    }
+
+    /// One frame under `forces`, one per node [N]. Returns v_hat [m/s]; in quasi-static graphics the displacements.
+    pub fn step(&mut self, forces: &[DVec3]) -> &[DVec3] {
+        self.load(forces);
+        self.advance();
+        &self.right
+    }
+
+    /// Right-hand side (2M/T) v - grad W(u) + f; in quasi-static graphics f.
+    fn load(&mut self, forces: &[DVec3]) {
+        match &self.dynamics {
+            None => self.right.copy_from_slice(forces),
+            Some(Dynamics { velocity, .. }) => {
+                let stiffness = self.stiffening.as_ref().map_or(&self.object.stiffness, Stiffening::bound);
+                stiffness.apply(&self.displacement, &mut self.right);
+                for (node, right) in self.right.iter_mut().enumerate() {
+                    *right = forces[node] + (2.0 * self.object.mass[node] / self.period) * velocity[node] - *right;
+                }
+            }
+        }
+        if let Some(stiffening) = &self.stiffening {
+            stiffening.relieve(&self.displacement, &mut self.right);
+        }
+        for (right, weight) in self.right.iter_mut().zip(self.weight.iter().flatten()) {
+            *right += *weight;
+        }
+    }
+
+    /// v_hat from the right-hand side, and the new state.
+    fn advance(&mut self) {
+        let Some(Dynamics { factor, velocity }) = &mut self.dynamics else {
+            self.object.factor.solve(&mut self.right);
+            self.displacement.copy_from_slice(&self.right);
+            return;
+        };
+        factor.solve(&mut self.right);
+        for (node, v_hat) in self.right.iter().enumerate() {
+            self.displacement[node] += self.period * v_hat;
+            velocity[node] = 2.0 * v_hat - velocity[node];
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! A session's recording: all that the haptic loop was told and what it answered, tick by tick. A file of it, read back,
+//! replays the session bit for bit, whether it ran against the clock or not, and finds the first tick that differs.
+//!
+//! CSV: comments (#), one of them with the device's first position and one with the instants of the frames that were kept; a
+//! header; one row a tick. `elapsed`, `interval`, `age` and
+//! position are the tick's inputs as in [`Inputs`]; `restart` is 1 where a fault was cleared; `frames` is how many frames of
+//! the object showed this tick; torque and proxy are the answer. Numbers are printed so that reading gives the same bits. A
+//! position of a wrong number of joints has empty fields.
+
+use super::{
+    graphics::Graphics,
+    haptic::{Haptics, Inputs},
+    session::{Driver, Frames, Plan, SessionError},
+    trace::{JointLabel, Tick, Trace, plain},
+};
+use crate::{
+    JointVector,
+    device::{Device, Reading},
+};
+use std::{
+    fs::File,
+    io::{self, BufRead, BufReader, Read, Write},
+    path::{Path, PathBuf},
+};
+
+/// All that a session needs to be had again.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Position at which the proxy was put [rad or m].
+    start: JointVector,
+    /// When the frames that were kept were drawn [s].
+    kept: Vec<f64>,
+    rows: Vec<Row>,
+}
+
+/// One tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Row {
+    inputs: Inputs,
+    restart: bool,
+    frames: u32,
+    hand: JointVector,
+    torque: JointVector,
+    proxy: JointVector,
+}
+
+/// A file is not a recording.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {source}", .file.display())]
+    Read {
+        /// The recording's file.
+        file: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A line is not what it should be.
+    #[error("{}:{line}: {what}; take a file that `haptize play --record` wrote for a proxy of {joints} joints", .file.display())]
+    Line {
+        /// The recording's file.
+        file: PathBuf,
+        /// Line number, from one.
+        line: usize,
+        /// What is wrong.
+        what: String,
+        /// Joints of the proxy.
+        joints: usize,
+    },
+}
+
+/// Largest file that is read [bytes]: two hours of six joints at 1 kHz.
+const GREATEST_FILE: u64 = 4 << 30;
+
+/// What the comment with the first position begins with.
+const START: &str = "# start";
+
+/// What the comment with the frames' instants begins with.
+const KEPT: &str = "# frames";
+
+/// Numbers of a row before its vectors: elapsed, interval, age, restart, frames.
+const SCALARS: usize = 5;
+
+impl Recording {
+    /// What `trace` recorded. Every tick of the session must be in it.
+    #[must_use]
+    pub fn of(trace: &Trace) -> Self {
+        let row = |tick: &Tick| Row {
+            inputs: tick.inputs,
+            restart: tick.restart,
+            frames: 0,
+            hand: tick.hand,
+            torque: tick.device_torque,
+            proxy: tick.proxy,
+        };
+        let mut rows: Vec<Row> = trace.ticks.iter().map(row).collect();
+        for shown in &trace.shown {
+            let tick = trace.ticks.partition_point(|tick| tick.time < *shown);
+            if let Some(row) = rows.get_mut(tick) {
+                row.frames += 1;
+            }
+        }
+        Self { start: trace.start, kept: trace.frames.iter().map(|frame| frame.time).collect(), rows }
+    }
+
+    /// Number of ticks.
+    #[must_use]
+    pub fn ticks(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Writes the recording, its `joints` named in the header.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write(&self, joints: &[JointLabel], out: &mut impl Write) -> io::Result<()> {
+        writeln!(out, "# a session of haptize {}; `haptize play --replay` gives it again", env!("CARGO_PKG_VERSION"))?;
+        write!(out, "{START}")?;
+        write_vector(out, &self.start, joints.len())?;
+        write!(out, "\n{KEPT}")?;
+        self.kept.iter().try_for_each(|time| write!(out, ",{time}"))?;
+        write!(out, "\nelapsed [s],interval [s],age [s],restart,frames")?;
+        for what in ["position", "hand", "torque", "proxy"] {
+            for joint in joints {
+                let unit = match (what, joint.unit.as_str()) {
+                    ("torque", "m") => "N",
+                    ("torque", _) => "N m",
+                    (_, unit) => unit,
+                };
+                write!(out, ",{what} {} [{unit}]", plain(&joint.name))?;
+            }
+        }
+        writeln!(out)?;
+        for row in &self.rows {
+            let Inputs { position, age, elapsed, interval } = &row.inputs;
+            write!(out, "{elapsed},{interval},{age},{},{}", u8::from(row.restart), row.frames)?;
+            for vector in [position, &row.hand, &row.torque, &row.proxy] {
+                write_vector(out, vector, joints.len())?;
+            }
+            writeln!(out)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the recording in `file`, of a proxy of `joints` joints.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is no such recording; the error names file and line.
+    pub fn read(file: &Path, joints: usize) -> Result<Self, RecordingError> {
+        let unreadable = |source| RecordingError::Read { file: file.into(), source };
+        let mut reader = BufReader::new(File::open(file).map_err(unreadable)?.take(GREATEST_FILE));
+        let mut recording = Self { start: JointVector::zeros(0), kept: Vec::new(), rows: Vec::new() };
+        let (mut bytes, mut line, mut header) = (Vec::new(), 0, false);
+        loop {
+            bytes.clear();
+            if reader.read_until(b'\n', &mut bytes).map_err(unreadable)? == 0 {
+                break;
+            }
+            line += 1;
+            let bad = |what: String| RecordingError::Line { file: file.into(), line, what, joints };
+            let text = std::str::from_utf8(&bytes).map_err(|_| bad("not text".into()))?.trim();
+            if let Some(start) = text.strip_prefix(START) {
+                let fields: Vec<&str> = start.split(',').skip(1).collect();
+                recording.start = vector(&fields, joints).map_err(bad)?;
+            } else if let Some(kept) = text.strip_prefix(KEPT) {
+                recording.kept = kept.split(',').skip(1).map(number).collect::<Result<_, _>>().map_err(bad)?;
+            } else if text.is_empty() || text.starts_with('#') {
+            } else if !header && text.starts_with("elapsed") {
+                header = true;
+            } else {
+                recording.rows.push(row(text, joints).map_err(bad)?);
+            }
+        }
+        if recording.start.len() != joints || recording.rows.is_empty() {
+            let what =
+                format!("{} ticks and a first position of {} joints", recording.rows.len(), recording.start.len());
+            return Err(RecordingError::Line { file: file.into(), line, what, joints });
+        }
+        Ok(recording)
+    }
+
+    /// Has the session again, with graphics where there is any, as fast as it goes; `joints` are the names in its trace.
+    ///
+    /// # Errors
+    /// When the recorded session could not start either, or there is no memory.
+    pub fn replay(
+        &self,
+        haptics: &Haptics,
+        graphics: Option<&mut Graphics<'_>>,
+        joints: Vec<JointLabel>,
+    ) -> Result<Trace, SessionError> {
+        let mut device = Playback { recording: self, next: None };
+        let mut driver = Driver::new(haptics, &mut device)?;
+        let plan = Plan { joints, ticks: self.rows.len(), snapshots: self.kept.clone() };
+        let mut frames = graphics.map(|graphics| Frames::new(graphics, &plan));
+        let mut ticks = plan.new_ticks()?;
+        for row in &self.rows {
+            if row.restart {
+                driver.clear_fault();
+            }
+            let (tick, latest) = driver.tick(row.inputs.elapsed, row.inputs.interval);
+            ticks.push(tick);
+            if let Some(frames) = &mut frames {
+                (0..row.frames).for_each(|_| frames.draw(&latest));
+            }
+        }
+        let (frames, shown) = frames.map(Frames::kept).unwrap_or_default();
+        Ok(Trace { joints: plan.joints, start: self.start, ticks, frames, shown })
+    }
+
+    /// Number of the first tick of `trace` whose torque or proxy is not that of the recording, to the last bit; none
+    /// where all are.
+    #[must_use]
+    pub fn first_difference(&self, trace: &Trace) -> Option<usize> {
+        let same = |a: &JointVector, b: &JointVector| a.iter().map(|x| x.to_bits()).eq(b.iter().map(|x| x.to_bits()));
+        let differs =
+            |(row, tick): (&Row, &Tick)| !(same(&row.torque, &tick.device_torque) && same(&row.proxy, &tick.proxy));
+        let length = self.rows.len().min(trace.ticks.len());
+        let unequal = (self.rows.len() != trace.ticks.len()).then_some(length);
+        self.rows.iter().zip(&trace.ticks).position(differs).or(unequal)
+    }
+}
+
+/// The device of a replay: it reports what was recorded, whatever torque it is given.
+struct Playback<'a> {
+    recording: &'a Recording,
+    /// None before the first reading, which is the start.
+    next: Option<usize>,
+}
+
+impl Device for Playback<'_> {
+    fn read(&mut self, _: f64) -> Reading {
+        let Some(next) = self.next.replace(self.next.map_or(0, |next| next + 1)) else {
+            let start = self.recording.start;
+            return Reading { position: start, age: 0.0, hand: start };
+        };
+        // No more readings than rows are asked for.
+        let row = &self.recording.rows[next.min(self.recording.rows.len() - 1)];
+        Reading { position: row.inputs.position, age: row.inputs.age, hand: row.hand }
+    }
+
+    fn apply(&mut self, _: &JointVector) {}
+}
+
+fn write_vector(out: &mut impl Write, vector: &JointVector, joints: usize) -> io::Result<()> {
+    for a in 0..joints {
+        if vector.len() == joints { write!(out, ",{}", vector[a])? } else { write!(out, ",")? }
+    }
+    Ok(())
+}
+
+fn row(text: &str, joints: usize) -> Result<Row, String> {
+    let fields: Vec<&str> = text.split(',').collect();
+    if fields.len() != SCALARS + 4 * joints {
+        return Err(format!("{} fields in the place of {}", fields.len(), SCALARS + 4 * joints));
+    }
+    let vector = |k: usize| vector(&fields[SCALARS + k * joints..][..joints], joints);
+    Ok(Row {
+        inputs: Inputs {
+            elapsed: number(fields[0])?,
+            interval: number(fields[1])?,
+            age: number(fields[2])?,
+            position: vector(0)?,
+        },
+        restart: number::<u8>(fields[3])? != 0,
+        frames: number(fields[4])?,
+        hand: vector(1)?,
+        torque: vector(2)?,
+        proxy: vector(3)?,
+    })
+}
+
+/// The numbers in `fields`, or no joints where all are empty.
+fn vector(fields: &[&str], joints: usize) -> Result<JointVector, String> {
+    if fields.iter().all(|field| field.trim().is_empty()) {
+        return Ok(JointVector::zeros(0));
+    }
+    if fields.len() != joints {
+        return Err(format!("{} coordinates", fields.len()));
+    }
+    let mut vector = JointVector::zeros(joints);
+    for (value, field) in vector.iter_mut().zip(fields) {
+        *value = number(field)?;
+    }
+    Ok(vector)
+}
+
+fn number<T: std::str::FromStr>(field: &str) -> Result<T, String> {
+    let shown = || field.trim().chars().take(40).collect::<String>();
+    field.trim().parse().map_err(|_| format!("\"{}\" is not such a number", shown()))
+}

@@ -1,0 +1,111 @@
+//! For a given error: which spacing and interpolation, and what it costs.
+
+use super::{Accuracy, Row, Study};
+use crate::{scene::Interpolation, tolerances::FARTHEST_EXTRAPOLATION};
+use serde::Serialize;
+
+/// Errors that are asked for, relative to the rms of the torque [1].
+pub(super) const TARGETS: [f64; 7] = [0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01];
+
+/// What to take for one error.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Offer {
+    /// Relative to the rms of the torque [1].
+    pub target: f64,
+    /// Interpolation.
+    pub series: String,
+    /// Spacing [rad or m].
+    pub spacing: f64,
+    /// Grid points.
+    pub points: f64,
+    /// Bake time over that of the scene as it is.
+    pub cost: f64,
+    /// Error, relative [1].
+    pub error: f64,
+    /// Whether it was measured; else it follows from the measured order of convergence.
+    pub measured: bool,
+}
+
+impl Accuracy {
+    /// Rows of one study.
+    pub fn of(&self, study: Study) -> impl Iterator<Item = &Row> {
+        self.rows.iter().filter(move |row| row.study == study)
+    }
+
+    /// Rows of the spacing study that no other beats in both points and error, coarsest first.
+    #[must_use]
+    pub fn front(&self) -> Vec<&Row> {
+        let beaten = |row: &&Row| {
+            self.of(Study::Spacing).any(|other| {
+                other.points <= row.points && other.rms <= row.rms && (other.points < row.points || other.rms < row.rms)
+            })
+        };
+        let mut front: Vec<&Row> = self.of(Study::Spacing).filter(|row| !beaten(row)).collect();
+        front.sort_by_key(|row| row.points);
+        front
+    }
+
+    /// Measured order p of `series`, error ~ h^p: the slope of a line through the logarithms. `None` for less than two
+    /// spacings.
+    #[must_use]
+    pub fn order(&self, series: &str) -> Option<f64> {
+        let points: Vec<(f64, f64)> = self
+            .of(Study::Spacing)
+            .filter(|row| row.series == series && row.rms > 0.0)
+            .map(|row| (row.value.ln(), row.rms.ln()))
+            .collect();
+        let count = points.len() as f64;
+        let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
+        let (across, along) = points
+            .iter()
+            .fold((0.0, 0.0), |sum, p| (sum.0 + (p.0 - mean.0) * (p.1 - mean.1), sum.1 + (p.0 - mean.0).powi(2)));
+        (points.len() > 1 && along > 0.0).then(|| across / along)
+    }
+}
+
+/// The cheapest way to each target: measured where a measured grid reaches it, else from the finest grid by the measured
+/// order. No offer where errors do not fall, or where the grid would be more than four times as fine as any measured.
+#[must_use]
+pub fn offers(accuracy: &Accuracy) -> Vec<Offer> {
+    let size = accuracy.torque.max(f64::MIN_POSITIVE);
+    let measured = |target: f64| {
+        let reaching = accuracy.of(Study::Spacing).filter(|row| row.rms <= target * size);
+        reaching.min_by(|a, b| (a.points, a.rms).partial_cmp(&(b.points, b.rms)).unwrap_or(std::cmp::Ordering::Equal))
+    };
+    let predicted = |target: f64| {
+        let from = |interpolation: Interpolation| {
+            let series = interpolation.name();
+            let rows = accuracy.of(Study::Spacing).filter(|row| row.series == series);
+            let finest = rows.min_by(|a, b| a.value.total_cmp(&b.value))?;
+            let order = accuracy.order(series).filter(|order| *order > 0.0)?;
+            let finer = (finest.rms / (target * size)).powf(1.0 / order);
+            if finer > FARTHEST_EXTRAPOLATION {
+                return None;
+            }
+            let more = finer.powi(accuracy.joints as i32);
+            Some(Offer {
+                target,
+                series: series.to_owned(),
+                spacing: finest.value / finer,
+                points: finest.points as f64 * more,
+                cost: finest.cost.least * more,
+                error: target,
+                measured: false,
+            })
+        };
+        Interpolation::ALL.into_iter().filter_map(from).min_by(|a, b| a.points.total_cmp(&b.points))
+    };
+    let offer = |target: f64| match measured(target) {
+        Some(row) => Some(Offer {
+            target,
+            series: row.series.clone(),
+            spacing: row.value,
+            points: row.points as f64,
+            cost: row.cost.least,
+            error: row.rms / size,
+            measured: true,
+        }),
+        None => predicted(target),
+    };
+    TARGETS.into_iter().filter_map(offer).collect()
+}

@@ -1,0 +1,217 @@
+//! Work-precision diagrams: error up, cost across, both logarithmic; every setting a dot, curves through one series.
+
+use super::{Accuracy, Row, Study};
+use crate::report::{
+    canvas::{Area, Canvas},
+    chart::{MARGIN, headline},
+    colour,
+    plot::{Entry, Mark, NOTE, Panel, Scale},
+};
+
+/// Width of a sheet with two panels side by side, in points.
+const WIDTH: f64 = 940.0;
+/// Height of a panel.
+const HEIGHT: f64 = 300.0;
+/// Room left of a panel for its tick labels.
+const LEFT: f64 = 56.0;
+/// Room between two panels.
+const BETWEEN: f64 = 40.0;
+
+/// One curve of a diagram.
+struct Series {
+    name: String,
+    points: Vec<(f64, f64)>,
+    dashed: bool,
+    colour: usize,
+}
+
+/// Whole decades around positive numbers; one decade where there are none.
+fn decades(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let (low, high) = values
+        .filter(|value| *value > 0.0 && value.is_finite())
+        .fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
+    if high == 0.0 {
+        return [0.1, 1.0];
+    }
+    let (low, high) = (low.log10().floor(), high.log10().ceil());
+    [10.0_f64.powf(low), 10.0_f64.powf(if high > low { high } else { low + 1.0 })]
+}
+
+fn panel(canvas: &mut Canvas, side: usize, across: &str, up: &str, curves: &[Series], front: &[(f64, f64)]) {
+    let width = (WIDTH - 2.0 * MARGIN - BETWEEN) / 2.0;
+    let x = MARGIN + side as f64 * (width + BETWEEN) + LEFT;
+    let area = Area { x, y: 108.0, width: width - LEFT, height: HEIGHT };
+    let all = || curves.iter().flat_map(|curve| &curve.points);
+    let panel = Panel {
+        area,
+        across: Scale::logarithmic(decades(all().map(|p| p.0)), across),
+        up: Scale::logarithmic(decades(all().map(|p| p.1)), up),
+    };
+    panel.grid(canvas, true);
+    for &point in front {
+        canvas.disc(panel.place(point), 8.0, colour::series(5).with_opacity(0.45));
+    }
+    for curve in curves {
+        let ink = colour::series(curve.colour);
+        let shown: Vec<(f64, f64)> =
+            curve.points.iter().map(|&(x, y)| if x > 0.0 && y > 0.0 { (x, y) } else { (f64::NAN, f64::NAN) }).collect();
+        panel.curve(canvas, &shown, ink, if curve.dashed { 1.4 } else { 1.9 }, curve.dashed);
+        if !curve.dashed {
+            shown.iter().filter(|p| p.0.is_finite()).for_each(|&point| canvas.disc(panel.place(point), 3.6, ink));
+        }
+    }
+    if all().next().is_none() {
+        panel.note(canvas, "not measured");
+    }
+}
+
+fn legend(canvas: &mut Canvas, curves: &[Series], more: Vec<Entry>) {
+    let mark = |curve: &Series| if curve.dashed { Mark::Dashes } else { Mark::Line };
+    let own = curves.iter().filter(|curve| !curve.name.is_empty()).map(|curve| Entry {
+        name: curve.name.clone(),
+        colour: colour::series(curve.colour),
+        mark: mark(curve),
+    });
+    let entries: Vec<Entry> = own.chain(more).collect();
+    let area = Area { x: MARGIN, y: 74.0, width: WIDTH - 2.0 * MARGIN, height: 0.0 };
+    Panel { area, across: Scale::linear([0.0, 1.0], ""), up: Scale::linear([0.0, 1.0], "") }.legend(canvas, &entries);
+}
+
+fn sheet(title: &str, note: &str) -> Canvas {
+    let mut canvas = Canvas::new(WIDTH, 108.0 + HEIGHT + 64.0);
+    headline(&mut canvas, title);
+    canvas.text((MARGIN, 60.0), note, NOTE);
+    canvas
+}
+
+/// Name and points of each series of `study`, in the order of the rows.
+fn series(accuracy: &Accuracy, study: Study, place: impl Fn(&Row) -> (f64, f64)) -> Vec<Series> {
+    let mut found: Vec<Series> = Vec::new();
+    for row in accuracy.of(study) {
+        let at = found.iter().position(|curve| curve.name == row.series).unwrap_or_else(|| {
+            found.push(Series { name: row.series.clone(), points: Vec::new(), dashed: false, colour: found.len() });
+            found.len() - 1
+        });
+        found[at].points.push(place(row));
+    }
+    found
+}
+
+fn worst_too(mut curves: Vec<Series>, worst: Vec<Series>) -> Vec<Series> {
+    curves.extend(worst.into_iter().map(|curve| Series { name: String::new(), dashed: true, ..curve }));
+    curves
+}
+
+/// Error against spacing and against grid points, with the Pareto front.
+#[must_use]
+pub(super) fn spacing(accuracy: &Accuracy) -> Canvas {
+    let mut canvas = sheet(
+        "Error of the rendered torque against grid spacing",
+        &format!(
+            "{} random configurations; rms torque {:.3} N m; the reference itself errs by {:.0e} N m",
+            accuracy.configurations, accuracy.torque, accuracy.reference_error
+        ),
+    );
+    let by = |place: fn(&Row) -> (f64, f64)| series(accuracy, Study::Spacing, place);
+    let across = worst_too(by(|row| (row.value, row.rms)), by(|row| (row.value, row.worst)));
+    panel(&mut canvas, 0, &format!("Grid spacing [{}]", accuracy.unit), "Error [N m]", &across, &[]);
+    let costs = by(|row| (row.points as f64, row.rms));
+    let front: Vec<(f64, f64)> = accuracy.front().iter().map(|row| (row.points as f64, row.rms)).collect();
+    panel(&mut canvas, 1, "Grid points [1]", "Rms error [N m]", &costs, &front);
+    let dashes = Entry { name: "worst".into(), colour: colour::SOFT_INK, mark: Mark::Dashes };
+    let best = Entry { name: "Pareto front".into(), colour: colour::series(5), mark: Mark::Dot };
+    legend(&mut canvas, &costs, vec![dashes, best]);
+    canvas
+}
+
+/// Work around loops against their size.
+#[must_use]
+pub(super) fn loops(accuracy: &Accuracy) -> Canvas {
+    let mut canvas = sheet(
+        "Work of the contact torque around closed loops, which a passive object never gives",
+        &format!(
+            "squares in the plane of two joints, rms over loops; the object stores {:.3} J at most; zero is drawn at the rounding of that",
+            accuracy.greatest_energy
+        ),
+    );
+    let mut curves: Vec<Series> = Vec::new();
+    for entry in &accuracy.loops {
+        let at = curves.iter().position(|curve| curve.name == entry.series).unwrap_or_else(|| {
+            curves.push(Series { name: entry.series.clone(), points: Vec::new(), dashed: false, colour: curves.len() });
+            curves.len() - 1
+        });
+        // Zero has no logarithm: the least that f64 tells from it, relative to the energy, stands for it.
+        let floor = f64::EPSILON * accuracy.greatest_energy;
+        curves[at].points.push((entry.side, entry.work.max(floor)));
+    }
+    panel(&mut canvas, 0, &format!("Side of the loop [{}]", accuracy.unit), "Work around the loop [J]", &curves, &[]);
+    let relative: Vec<Series> = curves
+        .iter()
+        .map(|curve| Series {
+            name: curve.name.clone(),
+            points: curve
+                .points
+                .iter()
+                .map(|&(x, y)| (x, y / accuracy.greatest_energy.max(f64::MIN_POSITIVE)))
+                .collect(),
+            ..*curve
+        })
+        .collect();
+    panel(
+        &mut canvas,
+        1,
+        &format!("Side of the loop [{}]", accuracy.unit),
+        "Work over the greatest energy [1]",
+        &relative,
+        &[],
+    );
+    legend(&mut canvas, &curves, Vec::new());
+    canvas
+}
+
+/// The contact solver: error against time over tolerances, algorithms and arithmetic; and against the object's nodes.
+#[must_use]
+pub(super) fn solver(accuracy: &Accuracy) -> Canvas {
+    let mut canvas = sheet(
+        "Error of a solved configuration against its time",
+        "left: tolerance of the residual, algorithm, arithmetic, time relative to the scene's own; right: nodes of the object",
+    );
+    let place = |row: &Row| (row.cost.least, row.rms);
+    let mut curves = series(accuracy, Study::Tolerance, place);
+    curves.iter_mut().for_each(|curve| curve.name = "tolerance".to_owned());
+    for study in [Study::Algorithm, Study::Arithmetic] {
+        for mut curve in series(accuracy, study, place) {
+            curve.colour = curves.len();
+            curves.push(curve);
+        }
+    }
+    // The tolerance of the energy form is the curve of the algorithm of that name.
+    curves.retain(|curve| curve.name != "energy" && curve.name != "cpu");
+    panel(&mut canvas, 0, "Time of a configuration [1]", "Rms error [N m]", &curves, &[]);
+    let nodes = series(accuracy, Study::Nodes, |row| (row.value, row.rms));
+    panel(&mut canvas, 1, "Nodes of the object [1]", "Rms distance from the finest object [N m]", &nodes, &[]);
+    legend(&mut canvas, &curves, Vec::new());
+    canvas
+}
+
+/// Look-up and graphics.
+#[must_use]
+pub(super) fn loop_costs(accuracy: &Accuracy) -> Canvas {
+    let mut canvas = sheet(
+        "What the loops pay",
+        "left: time of a look-up, relative to linear's; right: the object's nodes against the frame step",
+    );
+    let mut looked = Vec::new();
+    for (number, row) in accuracy.of(Study::Lookup).enumerate() {
+        let points = vec![(row.cost.least, row.rms)];
+        looked.push(Series { name: row.setting.clone(), points, dashed: false, colour: number });
+    }
+    panel(&mut canvas, 0, "Time of a look-up [1]", "Rms error [N m]", &looked, &[]);
+    let frames = worst_too(
+        series(accuracy, Study::Frame, |row| (row.value, row.rms)),
+        series(accuracy, Study::Frame, |row| (row.value, row.worst)),
+    );
+    panel(&mut canvas, 1, "Frame step [s]", "Error of the nodes, rms and worst [m]", &frames, &[]);
+    legend(&mut canvas, &looked, Vec::new());
+    canvas
+}

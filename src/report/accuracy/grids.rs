@@ -1,0 +1,176 @@
+//! Grids of other spacings over the scene's region, looked up by each interpolation: error, bake time, size, loops.
+
+use super::{Accuracy, AccuracyError, BACKEND, Cost, Loops, Row, Study, reference::Reference, timed};
+use crate::{
+    JointVector,
+    dataset::Dataset,
+    haptize::Bake,
+    render::field::{FieldError, TorqueField},
+    scene::{Interpolation, Scene},
+};
+use std::{hint::black_box, sync::atomic::AtomicBool};
+
+/// Spacings, relative to the scene's own: half an octave apart, from four times as coarse to half.
+const COARSER: [f64; 7] = [4.0, 2.828, 2.0, 1.414, 1.0, std::f64::consts::FRAC_1_SQRT_2, 0.5];
+
+/// Look-ups that are timed at once.
+const LOOK_UPS: usize = 20_000;
+
+/// Sides of loops, in grid steps.
+const SIDES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
+
+/// Loops of each size.
+const LOOPS: usize = 24;
+
+/// `scene` with its grid `coarser` times as coarse over the same region.
+#[must_use]
+pub(super) fn spaced(scene: &Scene, coarser: f64) -> Scene {
+    let mut scene = scene.clone();
+    for axis in &mut scene.grid.axes {
+        let cells = (axis.count - 1) as f64;
+        let new = (cells / coarser).round().max(1.0);
+        (axis.count, axis.step) = (new as usize + 1, axis.step * cells / new);
+    }
+    scene
+}
+
+fn points(scene: &Scene) -> usize {
+    scene.grid.axes.iter().map(|axis| axis.count).fold(1, usize::saturating_mul)
+}
+
+/// Geometric mean of the spacings [rad or m].
+fn spacing_of(scene: &Scene) -> f64 {
+    let axes = &scene.grid.axes;
+    (axes.iter().map(|axis| axis.step.ln()).sum::<f64>() / axes.len().max(1) as f64).exp()
+}
+
+fn baked(scene: &Scene) -> Result<Dataset, AccuracyError> {
+    let stop = AtomicBool::new(false);
+    let bake = Bake { scene, backend: BACKEND, date: "", stop: &stop, progress: &mut |_| () };
+    Ok(bake.in_memory()?.0)
+}
+
+fn field(scene: &Scene, dataset: &Dataset, interpolation: Interpolation) -> Result<TorqueField, FieldError> {
+    let spec = &scene.haptics;
+    TorqueField::interpolated(dataset, interpolation, spec.threshold, &spec.boundary_slope)
+}
+
+/// Errors at all spacings with at most `limit` grid points; the dataset of the scene's own.
+pub(super) fn spacing(
+    scene: &Scene,
+    reference: &Reference,
+    limit: usize,
+    study: &mut Accuracy,
+) -> Result<Dataset, AccuracyError> {
+    let (own_cost, own) = timed(|| baked(scene))?;
+    let mut before = 0;
+    for coarser in COARSER {
+        let spaced = spaced(scene, coarser);
+        let count = points(&spaced);
+        // Small grids cannot be cut much coarser.
+        if count == before {
+            continue;
+        }
+        before = count;
+        if count > limit && coarser != 1.0 {
+            study
+                .notes
+                .push(format!("the grid of {count} points is left out: more than {limit} (raise --points to have it)"));
+            continue;
+        }
+        let (cost, dataset) = timed(|| baked(&spaced))?;
+        for interpolation in Interpolation::ALL {
+            let field = field(&spaced, &dataset, interpolation)?;
+            let (rms, worst) = reference.errors(|q| field.sample(q).torque);
+            study.rows.push(Row {
+                study: Study::Spacing,
+                series: interpolation.name().to_owned(),
+                setting: format!("{:.4} {}", spacing_of(&spaced), study.unit),
+                value: spacing_of(&spaced),
+                points: count,
+                bytes: dataset.summary().bytes,
+                cost: cost.over(own_cost.least),
+                rms,
+                worst,
+            });
+        }
+    }
+    Ok(own)
+}
+
+/// Time of a look-up, relative to that of `linear`.
+pub(super) fn look_up(scene: &Scene, own: &Dataset, study: &mut Accuracy) -> Result<(), AccuracyError> {
+    let mut baseline = 0.0;
+    let errors = |series: &str, study: &Accuracy| {
+        let own = study.rows.iter().find(|row| row.series == series && row.points == own.grid.points());
+        own.map_or((0.0, 0.0), |row| (row.rms, row.worst))
+    };
+    for interpolation in Interpolation::ALL {
+        let field = field(scene, own, interpolation)?;
+        let places: Vec<JointVector> = (0..256).map(|k| own.grid.configuration(k * own.grid.points() / 256)).collect();
+        let (cost, ()) = timed(|| {
+            for k in 0..LOOK_UPS {
+                black_box(field.sample(black_box(&places[k % places.len()])));
+            }
+            Ok::<(), AccuracyError>(())
+        })?;
+        if baseline == 0.0 {
+            baseline = cost.least;
+        }
+        let (rms, worst) = errors(interpolation.name(), study);
+        study.rows.push(Row {
+            study: Study::Lookup,
+            series: "look-up".to_owned(),
+            setting: interpolation.name().to_owned(),
+            value: f64::from(u8::from(interpolation == Interpolation::Potential)) * 2.0 + 1.0,
+            points: own.grid.points(),
+            bytes: 0,
+            cost: Cost::over(cost, baseline),
+            rms,
+            worst,
+        });
+    }
+    Ok(())
+}
+
+/// Work around squares in the plane of the last two joints, about configurations in contact.
+pub(super) fn loops(
+    scene: &Scene,
+    own: &Dataset,
+    reference: &Reference,
+    study: &mut Accuracy,
+) -> Result<(), AccuracyError> {
+    let joints = own.grid.joints();
+    if joints < 2 {
+        study.notes.push("work around loops is not shown: one joint has no loops".to_owned());
+        return Ok(());
+    }
+    let pressed = reference.places.iter().zip(&reference.exact).filter(|(_, tau)| tau.norm() > 0.0);
+    let centres: Vec<&JointVector> = pressed.map(|(q, _)| q).take(LOOPS).collect();
+    for interpolation in Interpolation::ALL {
+        let field = field(scene, own, interpolation)?;
+        for side in SIDES {
+            let around = |centre: &JointVector| {
+                let corner = |a: f64, b: f64| {
+                    let mut q = *centre;
+                    for (axis, sign) in [(joints - 2, a), (joints - 1, b)] {
+                        let line = &own.grid.axes[axis];
+                        let half = 0.5 * side * line.step;
+                        // The whole square moves into the grid, where the field is not faded.
+                        let (first, last) = (line.coordinate(0) + half, line.coordinate(line.count - 1) - half);
+                        q[axis] = q[axis].min(last).max(first) + sign * half;
+                    }
+                    q
+                };
+                field.work_around(&[corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)])
+            };
+            let square: f64 = centres.iter().map(|centre| around(centre).powi(2)).sum();
+            study.loops.push(Loops {
+                series: interpolation.name().to_owned(),
+                side: side * own.grid.axes[joints - 1].step,
+                work: (square / centres.len().max(1) as f64).sqrt(),
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,242 @@
+//! What accuracy costs in time: work-precision diagrams of one scene against directly solved configurations.
+//!
+//! The reference is equation (2) in the energy form, in f64, with the geometry that follows the deformation, solved to
+//! [`REFERENCE_TOLERANCE`](crate::tolerances::REFERENCE_TOLERANCE) at random configurations of the scene's grid that no dataset holds. Its own error is how much it
+//! moves when it is asked for a hundredth of that. Errors are Euclidean norms over the joints; a prismatic joint counts with
+//! the lever arm of 0.1 m, so that all are N m. `rms` is over all configurations, in contact or not, and is set beside the
+//! rms of the reference torque itself. Accuracy is deterministic. Time is told as the ratio to one row of the same study:
+//! the least of [`REPEATS`] runs, because the work is the same in each and a busy machine only adds to it; median and
+//! greatest show by how much.
+
+mod choice;
+mod dynamics;
+mod figures;
+mod grids;
+mod page;
+mod reference;
+mod solver;
+
+pub use choice::{Offer, offers};
+pub use page::{describe, write_all};
+
+use crate::{
+    contact::Model,
+    haptize::{BackendChoice, BackendError, BakeError},
+    object::{Object, ObjectError},
+    proxy::Chain,
+    render::{field::FieldError, graphics::GraphicsError},
+    scene::{JointKind, Scene},
+};
+use reference::Reference;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Runs that are timed: of five, one is hardly ever without interruption, and the median tells how usual that is.
+pub const REPEATS: usize = 5;
+
+/// What is varied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Study {
+    /// Grid spacing and interpolation; cost is the bake.
+    Spacing,
+    /// Tolerance of the contact solver; cost is a configuration.
+    Tolerance,
+    /// How contact is solved; cost is a configuration.
+    Algorithm,
+    /// f64 on the CPU against f32 on the GPU; cost is a configuration.
+    Arithmetic,
+    /// Nodes of the object; cost is a configuration.
+    Nodes,
+    /// Interpolation; cost is a look-up.
+    Lookup,
+    /// Frame step of the graphics; error is in metres, cost is a simulated second.
+    Frame,
+}
+
+/// Ratio of times, with the spread of the runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Cost {
+    /// Of the runs [1].
+    pub median: f64,
+    /// [1]
+    pub least: f64,
+    /// [1]
+    pub greatest: f64,
+}
+
+/// One setting and what it gave.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// What is varied.
+    pub study: Study,
+    /// Curve that it belongs to.
+    pub series: String,
+    /// The setting, with its unit.
+    pub setting: String,
+    /// The setting as a number, where it is one.
+    pub value: f64,
+    /// Grid points (spacing), nodes or iterations on average; 0 where there are none.
+    pub points: usize,
+    /// Size of the dataset; 0 where there is none [bytes].
+    pub bytes: usize,
+    /// Time, relative to the least of the study's baseline.
+    pub cost: Cost,
+    /// Root mean square of the error [N m; m for frames].
+    pub rms: f64,
+    /// Greatest error [N m; m for frames].
+    pub worst: f64,
+}
+
+/// Work around loops of one size.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Loops {
+    /// Interpolation.
+    pub series: String,
+    /// Side of the square loop [rad or m].
+    pub side: f64,
+    /// Root mean square of the work around the loop [J].
+    pub work: f64,
+}
+
+/// All that was measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Accuracy {
+    /// Name of the scene.
+    pub scene: String,
+    /// Configurations of the reference.
+    pub configurations: usize,
+    /// Of which in contact.
+    pub in_contact: usize,
+    /// Left out, because the reference itself did not converge there.
+    pub left_out: usize,
+    /// Root mean square of the reference torque [N m].
+    pub torque: f64,
+    /// Error of the reference itself, rms [N m].
+    pub reference_error: f64,
+    /// Joints.
+    pub joints: usize,
+    /// Unit of spacings: `rad`, `m`, or `rad, m` where joints of both kinds mix.
+    pub unit: &'static str,
+    /// Greatest energy of the scene's own dataset [J].
+    pub greatest_energy: f64,
+    /// Study by study.
+    pub rows: Vec<Row>,
+    /// Work around loops in the scene's own dataset.
+    pub loops: Vec<Loops>,
+    /// What could not be measured here, and why.
+    pub notes: Vec<String>,
+}
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Extent {
+    /// Random configurations.
+    pub configurations: usize,
+    /// Grids with more points than this are left out.
+    pub points: usize,
+}
+
+/// The study failed.
+#[derive(Debug, thiserror::Error)]
+pub enum AccuracyError {
+    /// The object cannot be built.
+    #[error(transparent)]
+    Object(#[from] ObjectError),
+    /// No backend.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
+    /// A grid cannot be haptized.
+    #[error(transparent)]
+    Bake(#[from] BakeError),
+    /// A dataset cannot be interpolated.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// The object cannot be moved.
+    #[error(transparent)]
+    Graphics(#[from] GraphicsError),
+    /// Nothing to compare with.
+    #[error(
+        "the proxy touches nothing, or contact converges nowhere, at {0} random configurations: give the scene's \
+             grid a region where the proxy touches the object"
+    )]
+    NoContact(usize),
+}
+
+/// Measures `scene`. `progress` is told what comes next.
+///
+/// # Errors
+/// Any [`AccuracyError`].
+pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) -> Result<Accuracy, AccuracyError> {
+    let object = Object::build(&scene.object)?;
+    let chain = Chain::new(&scene.proxy);
+    let model = Model::new(&object, &chain, scene.contact);
+    progress("reference");
+    let reference = Reference::solve(scene, &model, extent.configurations)?;
+    let mut study = Accuracy {
+        scene: scene.name.clone(),
+        configurations: reference.exact.len(),
+        in_contact: reference.in_contact,
+        left_out: reference.left_out,
+        torque: reference.torque,
+        reference_error: reference.error,
+        joints: chain.joints.len(),
+        unit: unit(scene),
+        greatest_energy: 0.0,
+        rows: Vec::new(),
+        loops: Vec::new(),
+        notes: Vec::new(),
+    };
+    progress("grid spacing and interpolation");
+    let own = grids::spacing(scene, &reference, extent.points, &mut study)?;
+    study.greatest_energy = own.summary().max_energy.unwrap_or(0.0);
+    progress("look-up and loops");
+    grids::look_up(scene, &own, &mut study)?;
+    grids::loops(scene, &own, &reference, &mut study)?;
+    progress("contact solver");
+    solver::tolerance(scene, &model, &reference, &mut study)?;
+    solver::algorithm(scene, &model, &reference, &mut study)?;
+    solver::arithmetic(&model, &reference, &mut study)?;
+    solver::nodes(scene, &chain, &reference, &mut study)?;
+    progress("graphics");
+    dynamics::frames(scene, &object, &own, &mut study)?;
+    Ok(study)
+}
+
+/// Unit of the scene's joints.
+fn unit(scene: &Scene) -> &'static str {
+    let prismatic = scene.proxy.joints.iter().filter(|joint| joint.kind == JointKind::Prismatic).count();
+    match prismatic {
+        0 => "rad",
+        all if all == scene.proxy.joints.len() => "m",
+        _ => "rad, m",
+    }
+}
+
+/// Median time of [`REPEATS`] runs of `work`, with least and greatest [s], and the last result.
+fn timed<T, E>(mut work: impl FnMut() -> Result<T, E>) -> Result<(Cost, T), E> {
+    let mut seconds = [0.0; REPEATS];
+    let mut run = |slot: &mut f64| {
+        let start = Instant::now();
+        let result = work();
+        *slot = start.elapsed().as_secs_f64();
+        result
+    };
+    for slot in &mut seconds[1..] {
+        run(slot)?;
+    }
+    let result = run(&mut seconds[0])?;
+    seconds.sort_unstable_by(f64::total_cmp);
+    Ok((Cost { median: seconds[REPEATS / 2], least: seconds[0], greatest: seconds[REPEATS - 1] }, result))
+}
+
+impl Cost {
+    /// Relative to `baseline` [s].
+    fn over(self, baseline: f64) -> Self {
+        let baseline = baseline.max(f64::MIN_POSITIVE);
+        Self { median: self.median / baseline, least: self.least / baseline, greatest: self.greatest / baseline }
+    }
+}
+
+/// What solves: the CPU, so that the figures are the same on every machine.
+const BACKEND: BackendChoice = BackendChoice::Cpu;

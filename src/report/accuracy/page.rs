@@ -1,0 +1,240 @@
+//! The files of a study: figures, one table of all rows as CSV, and one page that holds them all.
+
+use super::{
+    Accuracy, Study,
+    choice::{TARGETS, offers},
+    figures,
+};
+use crate::{
+    report::{ReportError, canvas::Canvas, write, write_both},
+    scene::Interpolation,
+};
+use std::{
+    fmt::{self, Write as _},
+    path::{Path, PathBuf},
+};
+
+/// Writes `accuracy-*.{svg,png}`, `accuracy.csv` and `accuracy.html` into `folder`, and returns their paths.
+///
+/// # Errors
+/// [`ReportError::Write`] when a file cannot be written.
+pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, ReportError> {
+    let sheets: [(&str, Canvas, &str); 4] = [
+        (
+            "accuracy-spacing",
+            figures::spacing(accuracy),
+            "Solid curves are rms errors, dashed ones the worst. Where contact begins, where another node of the proxy \
+             touches and where a contact passes from one facet to the next, the torque has a kink or a jump: such places \
+             fill a layer of one cell, whose share falls with the spacing, so that the curves bend towards the order 0.5 \
+             (jumps) or 1.5 (kinks) however smooth the interpolation is in between. The knee is where smooth cells stop \
+             to count.",
+        ),
+        (
+            "accuracy-loops",
+            figures::loops(accuracy),
+            "Linear torque, component by component, is no gradient: it gives or takes energy around a loop. The \
+             potential's work is zero to rounding. Where linear and gap-field coincide, the latter covers the former.",
+        ),
+        (
+            "accuracy-solver",
+            figures::solver(accuracy),
+            "A tolerance below the knee buys nothing that interpolation does not throw away. Linearised contact keeps the \
+             geometry at rest; the paper's iteration has its own fixed point, or none: the table counts what did not converge. \
+             Objects of other nodes are other facets for a point to touch: where the right curve does not fall, the \
+             finest object is no better than the others.",
+        ),
+        (
+            "accuracy-loop",
+            figures::loop_costs(accuracy),
+            "Interpolations by the time of one look-up; the graphics by its frame step, second order where the step \
+             follows the object's vibration.",
+        ),
+    ];
+    let mut files = Vec::new();
+    for (name, canvas, _) in &sheets {
+        files.extend(write_both(folder, name, canvas)?);
+    }
+    files.push(write(folder.join("accuracy.csv"), csv(accuracy).as_bytes())?);
+    let html = page(accuracy, &sheets).unwrap_or_default();
+    files.push(write(folder.join("accuracy.html"), html.as_bytes())?);
+    Ok(files)
+}
+
+fn csv(accuracy: &Accuracy) -> String {
+    let mut text =
+        "study,series,setting,value,points,bytes,cost_median,cost_least,cost_greatest,rms,worst,rms_relative\n"
+            .to_owned();
+    for row in &accuracy.rows {
+        let relative = if row.study == Study::Frame { f64::NAN } else { row.rms / accuracy.torque };
+        // A String takes everything.
+        let _ = writeln!(
+            text,
+            "{},{},\"{}\",{},{},{},{},{},{},{},{},{}",
+            study_name(row.study),
+            row.series,
+            row.setting.replace('"', "'"),
+            row.value,
+            row.points,
+            row.bytes,
+            row.cost.median,
+            row.cost.least,
+            row.cost.greatest,
+            row.rms,
+            row.worst,
+            relative
+        );
+    }
+    text
+}
+
+fn study_name(study: Study) -> &'static str {
+    match study {
+        Study::Spacing => "spacing",
+        Study::Tolerance => "tolerance",
+        Study::Algorithm => "algorithm",
+        Study::Arithmetic => "arithmetic",
+        Study::Nodes => "nodes",
+        Study::Lookup => "look-up",
+        Study::Frame => "frame",
+    }
+}
+
+/// What to take for which error, and what was measured, for people.
+///
+/// # Errors
+/// None in a `String`.
+pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
+    writeln!(
+        text,
+        "{}: {} random configurations, {} in contact, {} left out; rms torque {:.4} N m, the reference errs by {:.1e}",
+        accuracy.scene,
+        accuracy.configurations,
+        accuracy.in_contact,
+        accuracy.left_out,
+        accuracy.torque,
+        accuracy.reference_error
+    )?;
+    for interpolation in Interpolation::ALL {
+        if let Some(order) = accuracy.order(interpolation.name()) {
+            writeln!(
+                text,
+                "  order        {:<9} error falls with spacing to the power {order:.2}",
+                interpolation.name()
+            )?;
+        }
+    }
+    for offer in offers(accuracy) {
+        writeln!(
+            text,
+            "  for {:4.0} %   take {} at {:.4} {}: {:.0} points, {:.2} of the scene's bake{}",
+            100.0 * offer.target,
+            offer.series,
+            offer.spacing,
+            accuracy.unit,
+            offer.points,
+            offer.cost,
+            if offer.measured { "" } else { " (not measured: by the order)" }
+        )?;
+    }
+    if let Some(least) = unreached(accuracy) {
+        writeln!(
+            text,
+            "  below {:2.0} %   out of reach: no grid up to four times as fine as the finest here",
+            100.0 * least
+        )?;
+    }
+    accuracy.notes.iter().try_for_each(|note| writeln!(text, "  note         {note}"))
+}
+
+/// The smallest error on offer, where smaller ones were asked for in vain; the greatest that was asked for, where there is
+/// no offer at all [1].
+fn unreached(accuracy: &Accuracy) -> Option<f64> {
+    let offers = offers(accuracy);
+    let least = offers.iter().map(|offer| offer.target).fold(TARGETS[0], f64::min);
+    (offers.len() < TARGETS.len()).then_some(least)
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+fn page(accuracy: &Accuracy, sheets: &[(&str, Canvas, &str)]) -> Result<String, fmt::Error> {
+    let mut html = String::new();
+    let name = escaped(&accuracy.scene);
+    write!(
+        html,
+        "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>What accuracy costs: {name}</title>\n<style>\
+         body{{font:16px/1.5 system-ui,sans-serif;max-width:980px;margin:2em auto;padding:0 1em;color:#222b36}}\
+         table{{border-collapse:collapse;font-size:14px}}td,th{{padding:.2em .8em;text-align:right;border-bottom:1px \
+         solid #e2e6ec}}td:first-child,th:first-child{{text-align:left}}svg{{max-width:100%;height:auto}}</style>\n\
+         <h1>What accuracy costs in time: {name}</h1>\n<p>Reference: {} random configurations solved directly to a \
+         residual of {:.0e}, {} in contact, {} left out because contact did not converge there. The rms torque is {:.4} \
+         N m; the reference itself errs by {:.1e} N m. Times are ratios, the least of {} runs; accuracy is the same in every \
+         run.</p>\n",
+        accuracy.configurations,
+        crate::tolerances::REFERENCE_TOLERANCE,
+        accuracy.in_contact,
+        accuracy.left_out,
+        accuracy.torque,
+        accuracy.reference_error,
+        super::REPEATS
+    )?;
+    html.push_str(
+        "<h2>For which error take what</h2>\n<table><tr><th>error<th>interpolation<th>spacing<th>points<th>bake time",
+    );
+    html.push_str("<th></tr>\n");
+    for offer in offers(accuracy) {
+        writeln!(
+            html,
+            "<tr><td>{:.0} %<td>{}<td>{:.4}<td>{:.0}<td>{:.2}<td>{}</tr>",
+            100.0 * offer.target,
+            offer.series,
+            offer.spacing,
+            offer.points,
+            offer.cost,
+            if offer.measured { "measured" } else { "predicted by the measured order" }
+        )?;
+    }
+    html.push_str("</table>\n");
+    if let Some(least) = unreached(accuracy) {
+        writeln!(
+            html,
+            "<p>Less than {:.0} % is out of reach of grids up to four times as fine as the finest here.</p>",
+            100.0 * least
+        )?;
+    }
+    for (_, canvas, caption) in sheets {
+        writeln!(html, "<figure>{}<figcaption>{caption}</figcaption></figure>", canvas.svg())?;
+    }
+    html.push_str(
+        "<h2>All rows</h2>\n<table><tr><th>study<th>series<th>setting<th>points or iterations<th>bytes<th>time",
+    );
+    html.push_str("<th>median<th>most<th>rms<th>worst<th>rms/torque</tr>\n");
+    for row in &accuracy.rows {
+        writeln!(
+            html,
+            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{:.3}<td>{:.3}<td>{:.3}<td>{:.3e}<td>{:.3e}<td>{}</tr>",
+            study_name(row.study),
+            escaped(&row.series),
+            escaped(&row.setting),
+            row.points,
+            row.bytes,
+            row.cost.least,
+            row.cost.median,
+            row.cost.greatest,
+            row.rms,
+            row.worst,
+            if row.study == Study::Frame {
+                "m".to_owned()
+            } else {
+                format!("{:.2} %", 100.0 * row.rms / accuracy.torque)
+            }
+        )?;
+    }
+    html.push_str("</table>\n");
+    for note in &accuracy.notes {
+        writeln!(html, "<p>Note: {}</p>", escaped(note))?;
+    }
+    html.push_str("</html>\n");
+    Ok(html)
+}

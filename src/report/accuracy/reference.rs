@@ -1,0 +1,119 @@
+//! Directly solved random configurations, and the distance of other answers from them.
+
+use super::AccuracyError;
+use crate::{
+    JointVector,
+    contact::{Equilibrium, Model, Status},
+    haptize::{Backend, CpuBackend},
+    scene::{Algorithm, ContactSpec, JointKind, Scene},
+    tolerances::{LEVER_ARM, REFERENCE_TOLERANCE},
+};
+
+/// Random configurations and their torques.
+pub(super) struct Reference {
+    /// Configurations [rad or m].
+    pub places: Vec<JointVector>,
+    /// Torques there, converged.
+    pub exact: Vec<JointVector>,
+    pub in_contact: usize,
+    pub left_out: usize,
+    /// rms of the torque [N m].
+    pub torque: f64,
+    /// rms of its own error [N m].
+    pub error: f64,
+    levers: JointVector,
+}
+
+impl Reference {
+    /// Solves `count` random configurations within the grid of `scene`, the same ones every time.
+    pub fn solve(scene: &Scene, model: &Model<'_>, count: usize) -> Result<Self, AccuracyError> {
+        let mut random = Random(0x9e37_79b9_7f4a_7c15);
+        let place = |_| {
+            let mut q = JointVector::zeros(scene.grid.axes.len());
+            for (q, axis) in q.iter_mut().zip(&scene.grid.axes) {
+                *q = axis.start + random.next() * axis.step * (axis.count - 1) as f64;
+            }
+            q
+        };
+        let drawn: Vec<JointVector> = (0..count).map(place).collect();
+        let tight = |tolerance: f64| ContactSpec {
+            algorithm: Algorithm::Energy,
+            tolerance,
+            max_iterations: scene.contact.max_iterations.saturating_mul(10),
+            ..scene.contact
+        };
+        let converged = equilibria(model, tight(REFERENCE_TOLERANCE), &drawn)?;
+        let rougher = equilibria(model, tight(100.0 * REFERENCE_TOLERANCE), &drawn)?;
+        let mut levers = JointVector::zeros(model.chain.joints.len());
+        levers.iter_mut().zip(&scene.proxy.joints).for_each(|(lever, joint)| {
+            *lever = if joint.kind == JointKind::Prismatic { LEVER_ARM } else { 1.0 };
+        });
+        let mut reference =
+            Self { places: Vec::new(), exact: Vec::new(), in_contact: 0, left_out: 0, torque: 0.0, error: 0.0, levers };
+        let mut rough = Vec::new();
+        for ((q, equilibrium), other) in drawn.into_iter().zip(converged).zip(rougher) {
+            match equilibrium.status {
+                Status::Free | Status::Contact => {
+                    reference.in_contact += usize::from(equilibrium.status == Status::Contact);
+                    reference.places.push(q);
+                    reference.exact.push(equilibrium.torque);
+                    rough.push(other.torque);
+                }
+                _ => reference.left_out += 1,
+            }
+        }
+        if reference.in_contact == 0 {
+            return Err(AccuracyError::NoContact(count));
+        }
+        let zero = JointVector::zeros(reference.levers.len());
+        reference.torque = reference.errors(|_| zero).0;
+        let mut rough = rough.into_iter();
+        reference.error = reference.errors(|_| rough.next().unwrap_or(zero)).0;
+        Ok(reference)
+    }
+
+    /// The first `count` configurations.
+    pub fn first(&self, count: usize) -> Self {
+        let (places, exact) = (self.places[..count].to_vec(), self.exact[..count].to_vec());
+        Self { places, exact, ..*self }
+    }
+
+    /// The same configurations with other torques.
+    pub fn with(&self, exact: Vec<JointVector>) -> Self {
+        Self { places: self.places.clone(), exact, ..*self }
+    }
+
+    /// Root mean square and greatest distance of the torque that `answer` gives at each place from the exact one [N m].
+    pub fn errors(&self, mut answer: impl FnMut(&JointVector) -> JointVector) -> (f64, f64) {
+        let (mut sum, mut worst) = (0.0, 0.0_f64);
+        for (q, exact) in self.places.iter().zip(&self.exact) {
+            let pairs = answer(q);
+            let parts = pairs.iter().zip(exact.iter()).zip(self.levers.iter());
+            let square: f64 = parts.map(|((a, b), lever)| (lever * (a - b)).powi(2)).sum();
+            sum += square;
+            worst = worst.max(square);
+        }
+        ((sum / self.exact.len().max(1) as f64).sqrt(), worst.sqrt())
+    }
+}
+
+/// `places` solved as `contact` says, on all cores.
+pub(super) fn equilibria(
+    model: &Model<'_>,
+    contact: ContactSpec,
+    places: &[JointVector],
+) -> Result<Vec<Equilibrium>, AccuracyError> {
+    let model = Model::new(model.object, model.chain, contact);
+    let mut backend = CpuBackend::new(&model, 0).map_err(crate::haptize::BackendError::from)?;
+    Ok(backend.solve(places).unwrap_or_else(|never| match never {}))
+}
+
+/// Numbers in 0..1, the same every time (a 64-bit linear congruence, upper bits; Knuth 1998, section 3.3.4).
+pub(super) struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}

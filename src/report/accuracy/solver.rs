@@ -1,0 +1,159 @@
+//! How contact is solved, away from any grid: tolerance, algorithm, arithmetic, nodes of the object.
+
+use super::{
+    Accuracy, AccuracyError, Cost, Row, Study,
+    reference::{Reference, equilibria},
+    timed,
+};
+use crate::{
+    JointVector,
+    contact::{Equilibrium, Model, Status},
+    haptize::{Backend, BackendChoice, ChosenBackend},
+    object::Object,
+    proxy::Chain,
+    scene::{Algorithm, ContactSpec, Scene, Shape},
+};
+
+/// Relative residuals that are asked for.
+const TOLERANCES: [f64; 6] = [0.3, 0.1, 1e-2, 1e-3, 1e-5, 1e-8];
+
+/// Configurations on the GPU: as many as a software adapter solves in some seconds.
+const GPU_CONFIGURATIONS: usize = 256;
+
+/// Rings and segments of a sphere, relative to the scene's own.
+const FINER: [f64; 4] = [0.7, 1.0, 1.5, 2.0];
+
+fn row(
+    study: Study,
+    series: &str,
+    setting: String,
+    value: f64,
+    cost: Cost,
+    reference: &Reference,
+    found: &[Equilibrium],
+) -> Row {
+    let mut torques = found.iter().map(|equilibrium| equilibrium.torque);
+    let zero = JointVector::zeros(reference.exact.first().map_or(0, |tau| tau.len()));
+    let (rms, worst) = reference.errors(|_| torques.next().unwrap_or(zero));
+    let contacts = found.iter().filter(|e| e.status != Status::Free).count().max(1);
+    let iterations = found.iter().map(|e| e.iterations as usize).sum::<usize>() as f64 / contacts as f64;
+    Row {
+        study,
+        series: series.to_owned(),
+        setting,
+        value,
+        points: iterations.round() as usize,
+        bytes: 0,
+        cost,
+        rms,
+        worst,
+    }
+}
+
+fn solved(
+    model: &Model<'_>,
+    contact: ContactSpec,
+    reference: &Reference,
+) -> Result<(Cost, Vec<Equilibrium>), AccuracyError> {
+    timed(|| equilibria(model, contact, &reference.places))
+}
+
+/// Error and time against the tolerance.
+pub(super) fn tolerance(
+    scene: &Scene,
+    model: &Model<'_>,
+    reference: &Reference,
+    study: &mut Accuracy,
+) -> Result<(), AccuracyError> {
+    let (baseline, _) = solved(model, scene.contact, reference)?;
+    for tolerance in TOLERANCES {
+        let (cost, found) = solved(model, ContactSpec { tolerance, ..scene.contact }, reference)?;
+        let cost = cost.over(baseline.least);
+        let setting = format!("{tolerance:.0e}");
+        study.rows.push(row(Study::Tolerance, "energy", setting, tolerance, cost, reference, &found));
+    }
+    Ok(())
+}
+
+/// Error and time against the algorithm.
+pub(super) fn algorithm(
+    scene: &Scene,
+    model: &Model<'_>,
+    reference: &Reference,
+    study: &mut Accuracy,
+) -> Result<(), AccuracyError> {
+    let (baseline, _) = solved(model, scene.contact, reference)?;
+    for (algorithm, name) in
+        [(Algorithm::Linearised, "linearised"), (Algorithm::Paper, "paper"), (Algorithm::Energy, "energy")]
+    {
+        let (cost, found) = solved(model, ContactSpec { algorithm, ..scene.contact }, reference)?;
+        let lost = found.iter().filter(|e| e.status == Status::Unconverged).count();
+        let setting = format!("{name}, {lost} of {} not converged", reference.in_contact);
+        let cost = cost.over(baseline.least);
+        study.rows.push(row(Study::Algorithm, name, setting, 0.0, cost, reference, &found));
+    }
+    Ok(())
+}
+
+/// f32 on a GPU, where there is one, against f64.
+pub(super) fn arithmetic(model: &Model<'_>, reference: &Reference, study: &mut Accuracy) -> Result<(), AccuracyError> {
+    let places = &reference.places[..reference.places.len().min(GPU_CONFIGURATIONS)];
+    let (baseline, found) = timed(|| equilibria(model, model.contact, places))?;
+    let part = reference.first(places.len());
+    let cost = baseline.over(baseline.least);
+    study.rows.push(row(Study::Arithmetic, "cpu", "cpu, f64".to_owned(), 64.0, cost, &part, &found));
+    let mut gpu = match ChosenBackend::open(BackendChoice::Gpu, model) {
+        Ok(gpu) => gpu,
+        Err(error) => {
+            study.notes.push(format!("f32 on a GPU is not measured: {error}"));
+            return Ok(());
+        }
+    };
+    match timed(|| gpu.solve(places)) {
+        Ok((cost, found)) => {
+            let setting = format!("{}, f32", gpu.adapter());
+            let cost = cost.over(baseline.least);
+            study.rows.push(row(Study::Arithmetic, "gpu", setting, 32.0, cost, &part, &found));
+        }
+        Err(error) => study.notes.push(format!("f32 on a GPU is not measured: {error}")),
+    }
+    Ok(())
+}
+
+/// The scene's sphere with other numbers of nodes; the finest is the reference of this study. Springs keep the stiffness of
+/// a continuous shell: between nodes as they are, to the ground in proportion to the area of a node.
+pub(super) fn nodes(
+    scene: &Scene,
+    chain: &Chain,
+    reference: &Reference,
+    study: &mut Accuracy,
+) -> Result<(), AccuracyError> {
+    let Shape::Sphere { centre, radius, rings, segments } = scene.object.shape else {
+        study.notes.push("the number of object nodes is varied for spheres alone: a mesh is what it is".to_owned());
+        return Ok(());
+    };
+    let of = |finer: f64| {
+        let mut object = scene.object.clone();
+        let more = |count: usize| (count as f64 * finer).round() as usize;
+        let (new_rings, new_segments) = (more(rings), more(segments));
+        object.shape = Shape::Sphere { centre, radius, rings: new_rings, segments: new_segments };
+        object.ground.stiffness *= (rings * segments + 2) as f64 / (new_rings * new_segments + 2) as f64;
+        object
+    };
+    let mut found = Vec::new();
+    for finer in FINER {
+        let object = Object::build(&of(finer))?;
+        let model = Model::new(&object, chain, scene.contact);
+        let (cost, equilibria) = timed(|| equilibria(&model, scene.contact, &reference.places))?;
+        found.push((finer, object.rest.len(), cost, equilibria));
+    }
+    let Some((_, _, _, finest)) = found.last() else { return Ok(()) };
+    let finest = reference.with(finest.iter().map(|e| e.torque).collect());
+    let baseline = found.iter().find(|(finer, ..)| *finer == 1.0).map_or(0.0, |(_, _, cost, _)| cost.least);
+    for (_, nodes, cost, equilibria) in &found[..found.len() - 1] {
+        let setting = format!("{nodes} nodes");
+        let cost = cost.over(baseline);
+        study.rows.push(row(Study::Nodes, "sphere", setting, *nodes as f64, cost, &finest, equilibria));
+    }
+    Ok(())
+}

@@ -1,0 +1,79 @@
+//! Arms in singular postures, at their limits, with axes that coincide: contact sees where the nodes are and nothing else.
+
+use super::super::{Bound, Failure, Outcome, Setting};
+use super::world::{PAPER, contact, joint, sphere};
+use crate::{
+    contact::{Model, Solver},
+    proxy::Chain,
+    scene::{JointKind, JointSpec, ProxyNodeSpec, ProxySpec},
+};
+use glam::DVec3;
+
+/// Where the base stands [m]: its links reach the sphere stretched out, a little off the plane in which its edges lie.
+const BASE: DVec3 = DVec3::new(-0.2, 0.003, 0.04);
+
+/// What is singular, the joints, and their coordinates when the links are turned by an angle.
+type Arm = (&'static str, Vec<JointSpec>, fn(f64) -> Vec<f64>);
+
+fn revolute(origin: DVec3, nodes: Vec<ProxyNodeSpec>) -> JointSpec {
+    joint(JointKind::Revolute, origin, DVec3::Y, nodes)
+}
+
+fn nodes(from: f64) -> Vec<ProxyNodeSpec> {
+    (0..10).map(|k| ProxyNodeSpec { position: DVec3::X * (from + 0.012 * f64::from(k)), radius: 0.0 }).collect()
+}
+
+/// Equilibria of one posture by arms of one, two and three joints that put the same nodes in the same place.
+pub fn run(_: &Setting) -> Result<Vec<Outcome>, Failure> {
+    let object = sphere(PAPER)?;
+    let plain = vec![revolute(BASE, nodes(0.1))];
+    // Two joints about one axis.
+    let coincident = vec![revolute(BASE, vec![]), revolute(DVec3::ZERO, nodes(0.1))];
+    // Stretched out: elbow and wrist at zero, J J^T singular.
+    let stretched =
+        vec![revolute(BASE, vec![]), revolute(DVec3::X * 0.05, vec![]), revolute(DVec3::X * 0.05, nodes(0.0))];
+    // Limits that forbid the posture.
+    let mut limited = plain.clone();
+    limited[0].limits = [-0.01, 0.01];
+    let angles = [0.0, 0.05, 0.1, 0.15, 0.2];
+    let arms: [Arm; 3] = [
+        ("two coincident axes", coincident, |q| vec![0.75 * q, 0.25 * q]),
+        ("stretched out, singular", stretched, |q| vec![q, 0.0, 0.0]),
+        ("beyond its limits", limited, |q| vec![q]),
+    ];
+    let reference = Chain::new(&ProxySpec { joints: plain });
+    let mut outcomes = Vec::new();
+    for (name, joints, posture) in arms {
+        let arm = Chain::new(&ProxySpec { joints });
+        let mut worst = 0.0f64;
+        let mut touching = 0;
+        for stiffness in [1e2, 1e4] {
+            let models = [&reference, &arm].map(|chain| Model::new(&object, chain, contact(stiffness)));
+            let mut solvers = [Solver::new(&models[0]), Solver::new(&models[1])];
+            for q in angles {
+                let expected = solvers[0].solve(&[q]);
+                let found = solvers[1].solve(&posture(q));
+                touching += usize::from(!expected.touches.is_empty());
+                if expected.status != found.status || expected.forces.len() != found.forces.len() {
+                    worst = f64::INFINITY;
+                    continue;
+                }
+                let size = expected.forces.iter().map(|force| force.force.length()).fold(1e-9, f64::max);
+                for (a, b) in expected.forces.iter().zip(&found.forces) {
+                    worst = worst.max(a.force.distance(b.force) / size);
+                }
+                // The first joint turns everything, whatever comes after it.
+                worst = worst.max((expected.torque[0] - found.torque[0]).abs() / (size * 0.2));
+            }
+        }
+        outcomes.push(Outcome {
+            case: "singular arms".into(),
+            varied: name.into(),
+            measure: "forces and torque against a plain arm's, relative [1]".into(),
+            worst,
+            bound: Bound::AtMost(1e-6),
+            note: format!("{touching} in contact"),
+        });
+    }
+    Ok(outcomes)
+}

@@ -1,0 +1,49 @@
+//! Hard cases of contact: stiffness, geometry, meshes, units, kinematics, and the torque as a field over C-space.
+
+mod field;
+mod geometry;
+mod kinematics;
+mod meshes;
+mod stiffness;
+mod units;
+mod world;
+
+use super::Case;
+
+/// All of them.
+#[must_use]
+pub fn cases() -> Vec<Case> {
+    let case = |name, run| Case { room: "contact", name, run };
+    vec![
+        case("stiffness", stiffness::run),
+        case("exact places", geometry::exact_places),
+        case("coincident nodes", geometry::coincident_nodes),
+        case("right through", geometry::right_through),
+        case("concave object", geometry::concave),
+        case("two regions", geometry::two_regions),
+        case("broken meshes", meshes::run),
+        case("units", units::units),
+        case("far from the origin", units::far_away),
+        case("continuous torque", field::continuity),
+        case("torque from energy", field::curl),
+        case("singular arms", kinematics::run),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Effort, Outcome, Setting, table};
+    use super::*;
+
+    /// On the CPU; the GPU's half is in `tests/gpu.rs`.
+    #[test]
+    fn a_sample_of_every_case_keeps_its_bounds() {
+        let setting = Setting { effort: Effort::Sample, gpu: None };
+        for case in cases() {
+            let outcomes = (case.run)(&setting).unwrap();
+            assert!(!outcomes.is_empty(), "{}", case.name);
+            let failed: Vec<Outcome> = outcomes.into_iter().filter(|outcome| !outcome.passed()).collect();
+            assert!(failed.is_empty(), "{}", table(&failed));
+        }
+    }
+}

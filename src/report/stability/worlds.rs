@@ -1,0 +1,133 @@
+//! Haptized worlds that are known in closed form, for hard cases and tests of the loop: no bake, no file.
+
+use crate::{
+    JointVector,
+    contact::Status,
+    dataset::{Axis, Contacts, Dataset, Grid, Provenance, Surface},
+};
+use std::fmt::Write;
+
+/// Normal stiffness of the block [N/m].
+pub const BLOCK_STIFFNESS: f64 = 500.0;
+
+/// Stiffness of the half space [N m/rad].
+pub const HALF_SPACE_STIFFNESS: f64 = 5.0;
+
+/// The scene of a flat block under a fingertip that slides (x) and presses (z, positive down); `haptics` is the text of the
+/// table `[haptics]`, empty for its defaults.
+#[must_use]
+pub fn block_scene(haptics: &str) -> String {
+    format!(
+        "[object]
+mesh = {{ file = \"block.obj\" }}
+springs = {{ kind = \"isotropic\", stiffness = 300.0 }}
+ground = {{ stiffness = 100.0 }}
+
+[[proxy.joint]]
+name = \"slide\"
+kind = \"prismatic\"
+axis = [1.0, 0.0, 0.0]
+limits = [-0.2, 0.2]
+
+[[proxy.joint]]
+name = \"press\"
+kind = \"prismatic\"
+axis = [0.0, 0.0, -1.0]
+limits = [-0.2, 0.2]
+nodes = [{{ at = [0.0, 0.0, 0.0] }}]
+
+{haptics}
+"
+    )
+}
+
+/// The block, haptized: `U = 1/2 k z^2` below its surface z = 0, the force on its only node in contact.
+#[must_use]
+pub fn block(haptics: &str) -> Dataset {
+    let grid = grid(&[("slide", "m", 5, 0.1), ("press", "m", 41, 1e-3)]);
+    let (mut offsets, mut nodes, mut forces) = (vec![0_u64], Vec::new(), Vec::new());
+    for point in 0..grid.points() {
+        let depth = grid.configuration(point)[1].max(0.0);
+        if depth > 0.0 {
+            // The finger is pushed up, the block down.
+            nodes.push(0_u32);
+            forces.extend([0.0_f32, 0.0, -(BLOCK_STIFFNESS * depth) as f32]);
+        }
+        offsets.push(nodes.len() as u64);
+    }
+    let contacts = Contacts { offsets: offsets.into(), nodes: nodes.into(), forces: forces.into() };
+    let surface = Surface {
+        nodes: vec![0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.1, 0.0].into(),
+        triangles: vec![0_u32, 1, 2].into(),
+    };
+    let direction = JointVector::from_slice(&[0.0, 1.0]);
+    let world = wall(grid, &direction, BLOCK_STIFFNESS, block_scene(haptics));
+    Dataset { contacts: Some(contacts), surface: Some(surface), ..world }
+}
+
+/// A half space in C-space for an arm of `joints` revolute joints: pressed by all joints alike.
+#[must_use]
+pub fn half_space(joints: usize, haptics: &str) -> Dataset {
+    let mut scene = String::new();
+    for joint in 0..joints {
+        // Writing to a string cannot fail.
+        let _ = write!(
+            scene,
+            "[[proxy.joint]]
+kind = \"revolute\"
+origin = [{}, 0.0, 0.0]
+axis = {}
+limits = [-3.0, 3.0]
+mass = 0.05
+centre_of_mass = [0.05, 0.0, 0.0]
+inertia = [1e-6, 4e-5, 4e-5]
+nodes = [{{ at = [0.1, 0.0, 0.0] }}]
+
+",
+            if joint == 0 { 0.0 } else { 0.1 },
+            if joint % 2 == 0 { "[0.0, 1.0, 0.0]" } else { "[0.0, 0.0, 1.0]" },
+        );
+    }
+    let count = if joints > 3 { 5 } else { 13 };
+    let step = 1.2 / (count - 1) as f64;
+    let axes: Vec<_> = (0..joints).map(|_| ("q", "rad", count, step)).collect();
+    let mut direction = JointVector::zeros(joints);
+    direction.fill(1.0 / (joints as f64).sqrt());
+    wall(grid(&axes), &direction, HALF_SPACE_STIFFNESS, scene + haptics)
+}
+
+/// Axes of (name, unit, count, step), centred on zero.
+fn grid(axes: &[(&str, &str, usize, f64)]) -> Grid {
+    let axis = |&(name, unit, count, step): &(&str, &str, usize, f64)| Axis {
+        name: name.into(),
+        unit: unit.into(),
+        start: -0.5 * step * (count - 1) as f64,
+        step,
+        count,
+    };
+    Grid { axes: axes.iter().map(axis).collect() }
+}
+
+/// `U = 1/2 k max(0, direction . q)^2` over `grid`.
+fn wall(grid: Grid, direction: &JointVector, stiffness: f64, scene: String) -> Dataset {
+    let (mut torque, mut energy, mut status) = (Vec::new(), Vec::new(), Vec::new());
+    for point in 0..grid.points() {
+        let depth = grid.configuration(point).dot(direction).max(0.0);
+        torque.extend(direction.iter().map(|part| -stiffness * depth * part));
+        energy.push(0.5 * stiffness * depth * depth);
+        status.push(if depth > 0.0 { Status::Contact } else { Status::Free } as u8);
+    }
+    Dataset {
+        grid,
+        torque: torque.into(),
+        energy: Some(energy.into()),
+        gap: None,
+        status: status.into(),
+        residual: None,
+        iterations: None,
+        contacts: None,
+        surface: None,
+        scene,
+        provenance: Provenance::default(),
+    }
+}

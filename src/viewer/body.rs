@@ -1,0 +1,114 @@
+//! The object in the window: its nodes advanced on the GPU by the interpolated contact forces, frame after frame.
+
+use super::{loaded::Loaded, stage::Surface};
+use crate::{
+    contact::Status,
+    gpu::{Context, FrameError, FrameMethod, FrameUpdate, GpuError},
+    object::Factor,
+    render::{
+        graphics::{ContactForces, Smoothing},
+        session::Latest,
+    },
+};
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+/// The object on the device.
+pub struct Body {
+    update: FrameUpdate,
+    /// What is drawn.
+    pub surface: Surface,
+    contact: Arc<ContactForces>,
+    forces: Vec<DVec3>,
+    smoothing: Option<Smoothing>,
+    /// n0 [m].
+    rest: Vec<Vec3>,
+    /// Time between two frames of the object [s].
+    period: f64,
+    /// Time that the object lags behind [s].
+    owed: f64,
+    /// Greatest displacement at rest under the dataset's largest contact forces [m], and the largest of these on a node [N].
+    pub extremes: [f64; 2],
+}
+
+/// Frames of the object that one frame of the window makes up for: a window at 10 frames a second still shows an object at
+/// 60. A slower one shows it slowed down.
+const MOST_FRAMES: usize = 6;
+
+impl Body {
+    /// The object of `loaded` at rest; none where it has no object.
+    ///
+    /// # Errors
+    /// When the device refuses it.
+    pub fn new(context: &Arc<Context>, loaded: &Loaded) -> Result<Option<Self>, FrameError> {
+        let (Some(object), Some(contact), Some(graphics)) =
+            (&loaded.setup.object, &loaded.forces, &loaded.setup.scene.graphics)
+        else {
+            return Ok(None);
+        };
+        let nodes = object.rest.len();
+        let period = 1.0 / graphics.rate;
+        let update =
+            FrameUpdate::new(Arc::clone(context), object, period, FrameMethod::suitable(nodes), &graphics.effects)?;
+        let surface = Surface::new(context, object, &update)?;
+        let forces = vec![DVec3::ZERO; nodes];
+        let smoothing = graphics.effects.smoothing.map(|time| Smoothing::new(time, period, nodes));
+        let rest = object.rest.iter().map(|point| point.as_vec3()).collect();
+        let (contact, extremes) = (Arc::clone(contact), extremes(loaded));
+        Ok(Some(Self { update, surface, contact, forces, smoothing, rest, period, owed: 0.0, extremes }))
+    }
+
+    /// Lets `elapsed` [s] go by under the contact forces of `latest`.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn advance(&mut self, latest: &Latest, elapsed: f64) -> Result<(), GpuError> {
+        self.contact.interpolate(&latest.proxy, latest.share, &mut self.forces);
+        self.owed += elapsed;
+        let due = (self.owed / self.period).floor();
+        self.owed -= due * self.period;
+        for _ in 0..(due as usize).min(MOST_FRAMES) {
+            let forces = match &mut self.smoothing {
+                Some(smoothing) => smoothing.toward(&self.forces),
+                None => &self.forces,
+            };
+            self.update.step(forces)?;
+        }
+        Ok(())
+    }
+
+    /// Place of `node` at rest [m].
+    #[must_use]
+    pub fn rest(&self, node: usize) -> Vec3 {
+        self.rest[node]
+    }
+
+    /// Nodes with a contact force, and that force [N].
+    pub fn contacts(&self) -> impl Iterator<Item = (usize, DVec3)> {
+        self.forces.iter().copied().enumerate().filter(|(_, force)| *force != DVec3::ZERO)
+    }
+}
+
+/// See [`Body::extremes`]: at the grid point with the most energy, or with the largest torque.
+fn extremes(loaded: &Loaded) -> [f64; 2] {
+    let dataset = &loaded.dataset;
+    let weight = |point: usize| match &dataset.energy {
+        Some(energy) => energy[point],
+        None => dataset.torque(point).iter().map(|tau| tau * tau).sum(),
+    };
+    let converged = (0..dataset.grid.points()).filter(|&point| dataset.status(point) == Status::Contact);
+    let deepest = converged.max_by(|&a, &b| weight(a).total_cmp(&weight(b)));
+    let (Some(object), Some(point)) = (&loaded.setup.object, deepest) else { return [0.0; 2] };
+    let mut displacement = vec![DVec3::ZERO; object.rest.len()];
+    for contact in dataset.forces(point) {
+        displacement[contact.node as usize] = contact.force;
+    }
+    let size = |vectors: &[DVec3]| vectors.iter().map(|vector| vector.length()).fold(0.0, f64::max);
+    let force = size(&displacement);
+    // K was proven positive definite when the object was built; where memory lacks, nothing is coloured.
+    match Factor::of(&object.stiffness, 1.0, &vec![0.0; object.rest.len()]) {
+        Ok(factor) => factor.solve(&mut displacement),
+        Err(_) => displacement.fill(DVec3::ZERO),
+    }
+    [size(&displacement), force]
+}

@@ -1,0 +1,165 @@
+//! The haptized data as a cloud of points in C-space (paper's Fig. 3): every configuration in contact, coloured by the size
+//! of its torque, over the first three joints. It turns with the pointer. With more than three joints the others stay at
+//! the grid line nearest to the configuration.
+
+use super::{
+    camera::Camera,
+    loaded::Loaded,
+    number,
+    slices::{gradient, untrusted},
+    theme,
+};
+use crate::{JointVector, contact::Status, dataset::Dataset, report::colour::ColourMap};
+use eframe::egui::{self, Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Ui, vec2};
+use glam::{Vec2, Vec3};
+
+/// The cloud's panel.
+pub struct Cloud {
+    camera: Camera,
+    /// Grid lines of the joints beyond the third, and the points on them.
+    points: Option<(Vec<usize>, Vec<Point>)>,
+    high: f64,
+}
+
+/// A configuration in contact.
+struct Point {
+    /// In the box from -1 to 1.
+    place: Vec3,
+    torque: f64,
+    trusted: bool,
+}
+
+impl Cloud {
+    /// The cloud of `dataset`.
+    #[must_use]
+    pub fn new(dataset: &Dataset) -> Self {
+        let contact = (0..dataset.grid.points()).filter(|&point| dataset.status(point) == Status::Contact);
+        let high = contact.map(|point| size(dataset, point)).fold(0.0, f64::max);
+        let mut camera = Camera::looking_at(Vec3::ZERO, 2.1);
+        (camera.azimuth, camera.elevation) = (-0.95, 0.45);
+        Self { camera, points: None, high }
+    }
+
+    /// Shows it in a picture `height` points high.
+    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, q: &JointVector, height: f32) {
+        let dataset = &loaded.dataset;
+        let grid = &dataset.grid;
+        let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click_and_drag());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "Cloud of contacts in C-space"));
+        let moved = response.drag_delta() / rect.height();
+        self.camera.orbit(Vec2::new(moved.x, moved.y));
+        if response.double_clicked() {
+            (self.camera.azimuth, self.camera.elevation) = (-0.95, 0.45);
+        }
+        let others: Vec<usize> =
+            grid.axes.iter().zip(q.iter()).skip(3).map(|(axis, q)| axis.nearest_line(*q)).collect();
+        if self.points.as_ref().is_none_or(|(known, _)| *known != others) {
+            self.points = Some((others.clone(), points(dataset, &others)));
+        }
+        let Some((_, points)) = &self.points else { return };
+        let palette = theme::palette(ui.visuals());
+        let painter = ui.painter_at(rect);
+        painter.rect_filled(rect, 4.0, palette.stage);
+        let clip = self.camera.clip(rect.width() / rect.height());
+        let show = |place: Vec3| -> (Pos2, f32) {
+            let shown = clip.project_point3(place);
+            let at = rect.center() + 0.5 * vec2(shown.x * rect.width(), -shown.y * rect.height());
+            (at, shown.z)
+        };
+        self.frame(&painter, &show, dataset, ui.visuals().weak_text_color(), palette.axis.gamma_multiply(0.45));
+        let map = ColourMap::Root { high: self.high };
+        let mut dots: Vec<(Pos2, f32, &Point)> = points
+            .iter()
+            .map(|point| {
+                let (at, depth) = show(point.place);
+                (at, depth, point)
+            })
+            .collect();
+        dots.sort_by(|a, b| b.1.total_cmp(&a.1));
+        // Distance of neighbours in the box, the geometric mean over its sides.
+        let shown = grid.axes.len().min(3) as f32;
+        let cell = grid.axes.iter().take(3).map(|axis| 2.0 / axis.count as f32).product::<f32>().powf(1.0 / shown);
+        let radius = (0.4 * cell / self.camera.height_at_target() * rect.height()).clamp(1.0, 6.0);
+        for (at, _, point) in dots {
+            let share = (point.torque / self.high.max(f64::MIN_POSITIVE)).cbrt().clamp(0.45, 1.0) as f32;
+            let colour = if point.trusted { theme::egui_colour(map.colour(point.torque)) } else { palette.flagged };
+            painter.circle_filled(at, radius * share, colour);
+        }
+        let (here, _) = show(place(dataset, q));
+        for (radius, colour) in [(7.0, palette.here), (5.0, palette.stage), (2.5, palette.here)] {
+            painter.circle_filled(here, radius, colour);
+        }
+        let unit = grid.axes.first().map_or("N m", |axis| axis.effort_unit());
+        let bar = Rect::from_min_size(rect.right_top() + vec2(-104.0, 22.0), vec2(86.0, 6.0));
+        gradient(&painter, bar, map, true);
+        let (text, small) = (ui.visuals().text_color(), FontId::proportional(10.5));
+        let title = format!("torque [{unit}]");
+        painter.text(bar.center_top() + vec2(0.0, -3.0), Align2::CENTER_BOTTOM, title, small.clone(), text);
+        painter.text(bar.left_bottom() + vec2(0.0, 2.0), Align2::CENTER_TOP, "0", small.clone(), text);
+        painter.text(bar.right_bottom() + vec2(-2.0, 2.0), Align2::CENTER_TOP, number(self.high), small, text);
+    }
+
+    /// The box's edges, and the names of its axes with their ends.
+    fn frame(
+        &self,
+        painter: &egui::Painter,
+        show: &dyn Fn(Vec3) -> (Pos2, f32),
+        dataset: &Dataset,
+        text: Color32,
+        line: Color32,
+    ) {
+        let small = FontId::proportional(10.5);
+        for axis in 0..3 {
+            for (u, v) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+                let mut ends = [Vec3::ZERO; 2];
+                for (end, along) in ends.iter_mut().zip([-1.0, 1.0]) {
+                    (end[axis], end[(axis + 1) % 3], end[(axis + 2) % 3]) = (along, u, v);
+                }
+                painter.line_segment(ends.map(|end| show(end).0), Stroke::new(1.0, line));
+            }
+        }
+        // Names along the edges of the floor nearest to the eye, and along the upright one farthest left.
+        let toward = self.camera.backward();
+        let near = |component: f32| if component < 0.0 { -1.0 } else { 1.0 };
+        let [x, y] = [near(toward.x), near(toward.y)];
+        let out = 1.18;
+        let places = [Vec3::new(0.0, out * y, -out), Vec3::new(out * x, 0.0, -out)];
+        let left = [Vec3::new(x, -y, 0.0), Vec3::new(-x, y, 0.0)];
+        let upright = left.into_iter().min_by(|a, b| show(*a).0.x.total_cmp(&show(*b).0.x)).unwrap_or(Vec3::ZERO);
+        for (joint, (axis, place)) in dataset.grid.axes.iter().zip(places.into_iter().chain([upright])).enumerate() {
+            let align = if joint == 2 { Align2::RIGHT_CENTER } else { Align2::CENTER_CENTER };
+            let offset = if joint == 2 { vec2(-6.0, 0.0) } else { vec2(0.0, 4.0) };
+            let name = format!("{} [{}]", axis.name, axis.unit);
+            painter.text(show(place).0 + offset, align, name, small.clone(), text);
+        }
+    }
+}
+
+/// Size of the torque of a grid point [N m].
+fn size(dataset: &Dataset, point: usize) -> f64 {
+    dataset.torque(point).iter().map(|tau| tau * tau).sum::<f64>().sqrt()
+}
+
+/// Where a configuration lies in the box from -1 to 1; missing joints in its middle, or on its floor.
+fn place(dataset: &Dataset, q: &JointVector) -> Vec3 {
+    let mut place = Vec3::new(0.0, 0.0, if dataset.grid.joints() < 3 { -1.0 } else { 0.0 });
+    for (joint, axis) in dataset.grid.axes.iter().enumerate().take(3) {
+        let half = 0.5 * axis.step * (axis.count - 1).max(1) as f64;
+        place[joint] = ((q[joint] - axis.start) / half - 1.0) as f32;
+    }
+    place
+}
+
+fn points(dataset: &Dataset, others: &[usize]) -> Vec<Point> {
+    let pitch: usize = dataset.grid.axes.iter().skip(3).map(|axis| axis.count).product();
+    let within = dataset.grid.axes.iter().skip(3).zip(others).fold(0, |point, (axis, line)| point * axis.count + line);
+    (0..dataset.grid.points() / pitch)
+        .map(|block| block * pitch + within)
+        .filter(|&point| !matches!(dataset.status(point), Status::Free | Status::Outside))
+        .map(|point| Point {
+            place: place(dataset, &dataset.grid.configuration(point)),
+            torque: size(dataset, point),
+            trusted: !untrusted(dataset.status(point)),
+        })
+        .collect()
+}

@@ -1,0 +1,250 @@
+//! The haptic loop beside the window, and what the window sees of it. The haptic thread waits for nobody: the hand's goal,
+//! ticks and costs cross through wait-free buffers; a second, ordinary thread moves the hand's goal at 500 Hz, so that a
+//! motion does not depend on the window's frame rate.
+//!
+//! A picture without a window has no time of its own: there the same loop runs by steps that are told
+//! ([`Pace::Steps`]), and gives the same numbers on every machine.
+
+use super::guide::Guide;
+use crate::{
+    JointVector,
+    device::{Device, Pointer, PointerInput, Reading},
+    render::{
+        clock,
+        haptic::Haptics,
+        realtime::{ClearFault, Ends, HapticLoop},
+        session::{Driver, Latest},
+        trace::Tick,
+    },
+    scene::HapticsSpec,
+};
+use std::{
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+        mpsc,
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+/// What drives the ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// The clock, in a thread with real-time priority where that is permitted.
+    Clock,
+    /// The caller.
+    Steps,
+}
+
+/// The loop as the window holds it. Dropping it ends its threads.
+pub struct Feel {
+    guide: Arc<Mutex<Guide>>,
+    ticks: rtrb::Consumer<Tick>,
+    costs: rtrb::Consumer<Duration>,
+    latest: triple_buffer::Output<Latest>,
+    clear: Option<ClearFault>,
+    stop: Arc<AtomicBool>,
+    steps: Option<mpsc::Sender<usize>>,
+    stepped: mpsc::Receiver<()>,
+    refused: mpsc::Receiver<Vec<String>>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+/// How often the hand's goal is moved.
+const GUIDE_PERIOD: Duration = Duration::from_millis(2);
+
+/// Ticks and costs that wait for the window: four seconds at 1 kHz.
+const RING: usize = 4096;
+
+/// What the haptic thread is given.
+struct Body {
+    haptics: Arc<Haptics>,
+    device: Timed,
+    stop: Arc<AtomicBool>,
+}
+
+/// What the haptic thread gives back before its first tick.
+type Seen = (rtrb::Consumer<Tick>, triple_buffer::Output<Latest>, Option<ClearFault>);
+
+impl Feel {
+    /// Starts the loop with the device where `guide` leads it.
+    ///
+    /// # Errors
+    /// In words, when device and loop do not fit or the system gives no threads.
+    pub fn start(haptics: Arc<Haptics>, gains: &HapticsSpec, guide: Guide, pace: Pace) -> Result<Self, String> {
+        let (pointer, input) = Pointer::new(gains, &guide.goal()).map_err(|error| error.to_string())?;
+        let guide = Arc::new(Mutex::new(guide));
+        let stop = Arc::new(AtomicBool::new(false));
+        let (cost, costs) = rtrb::RingBuffer::new(RING);
+        let device = Timed { pointer, read: Instant::now(), cost };
+        let body = Body { haptics, device, stop: Arc::clone(&stop) };
+        let (report, began) = mpsc::channel();
+        let (refuse, refused) = mpsc::channel();
+        let (acknowledge, stepped) = mpsc::channel();
+        let (steps, asked) = mpsc::channel();
+        let thread = |name: &str, work: Box<dyn FnOnce() + Send>| {
+            let started = std::thread::Builder::new().name(name.into()).spawn(work);
+            started.map_err(|error| format!("the system gives no thread: {error}; close other programs"))
+        };
+        let mut threads = Vec::new();
+        let steps = match pace {
+            Pace::Clock => {
+                let (leader, over) = (Arc::clone(&guide), Arc::clone(&stop));
+                threads.push(thread("guide", Box::new(move || lead(&leader, input, &over)))?);
+                threads.push(thread("haptic", Box::new(move || body.by_the_clock(&report, &refuse)))?);
+                None
+            }
+            Pace::Steps => {
+                let leader = Arc::clone(&guide);
+                let work = move || body.by_steps(&leader, input, &report, &asked, &acknowledge);
+                threads.push(thread("haptic", Box::new(work))?);
+                Some(steps)
+            }
+        };
+        let ended = "the haptic thread ended before its first tick; start haptize again".to_owned();
+        let (ticks, latest, clear) = began.recv().map_err(|_| ended)??;
+        Ok(Self { guide, ticks, costs, latest, clear, stop, steps, stepped, refused, threads })
+    }
+
+    /// The hand's leader. The haptic thread never locks it.
+    pub fn guide(&self) -> MutexGuard<'_, Guide> {
+        lock(&self.guide)
+    }
+
+    /// Does `count` ticks and waits for them, where the loop runs by steps.
+    pub fn step(&self, count: usize) {
+        if let Some(steps) = &self.steps
+            && steps.send(count).is_ok()
+        {
+            // The thread ended where there is no answer; there are no ticks then.
+            let _ = self.stepped.recv();
+        }
+    }
+
+    /// Lets the loop begin anew after a fault.
+    pub fn clear_fault(&self) {
+        if let Some(clear) = &self.clear {
+            clear.ask();
+        }
+    }
+
+    /// The next tick that has not been seen.
+    pub fn next_tick(&mut self) -> Option<Tick> {
+        self.ticks.pop().ok()
+    }
+
+    /// The next cost of a tick that has not been seen.
+    pub fn next_cost(&mut self) -> Option<Duration> {
+        self.costs.pop().ok()
+    }
+
+    /// The latest tick, as graphics needs it.
+    pub fn latest(&mut self) -> Latest {
+        *self.latest.read()
+    }
+
+    /// What the system did not grant the haptic thread; told once.
+    #[must_use]
+    pub fn refused(&self) -> Option<Vec<String>> {
+        self.refused.try_recv().ok()
+    }
+}
+
+impl Drop for Feel {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        self.steps = None;
+        for thread in self.threads.drain(..) {
+            // A thread that panicked has said so already.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn lock(guide: &Mutex<Guide>) -> MutexGuard<'_, Guide> {
+    // A guide is a plain value: a panic elsewhere leaves nothing half-written that would matter.
+    guide.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Moves the hand's goal until the loop is over.
+fn lead(guide: &Mutex<Guide>, mut input: PointerInput, over: &AtomicBool) {
+    let mut last = Instant::now();
+    while !over.load(Ordering::Acquire) {
+        let now = Instant::now();
+        let goal = lock(guide).advance((now - last).as_secs_f64());
+        last = now;
+        // A goal that is none is refused, and the hand stays.
+        let _ = input.move_to(&goal);
+        std::thread::sleep(GUIDE_PERIOD);
+    }
+}
+
+impl Body {
+    fn by_the_clock(mut self, report: &mpsc::Sender<Result<Seen, String>>, refuse: &mpsc::Sender<Vec<String>>) {
+        match HapticLoop::new(&self.haptics, &mut self.device) {
+            Err(error) => drop(report.send(Err(error.to_string()))),
+            Ok((mut body, Ends { ticks, latest, clear, .. })) => {
+                drop(report.send(Ok((ticks, latest, Some(clear)))));
+                drop(refuse.send(clock::ask_for_real_time()));
+                while !self.stop.load(Ordering::Acquire) {
+                    body.tick();
+                }
+            }
+        }
+    }
+
+    fn by_steps(
+        mut self,
+        guide: &Mutex<Guide>,
+        mut input: PointerInput,
+        report: &mpsc::Sender<Result<Seen, String>>,
+        asked: &mpsc::Receiver<usize>,
+        done: &mpsc::Sender<()>,
+    ) {
+        let mut driver = match Driver::new(&self.haptics, &mut self.device) {
+            Ok(driver) => driver,
+            Err(error) => return drop(report.send(Err(error.to_string()))),
+        };
+        let (mut record, ticks) = rtrb::RingBuffer::new(RING);
+        let start = JointVector::zeros(self.haptics.joints());
+        let (mut latest, read) =
+            triple_buffer::triple_buffer(&Latest { time: 0.0, proxy: start, device: start, share: 0.0 });
+        drop(report.send(Ok((ticks, read, None))));
+        let period = self.haptics.period();
+        for count in asked {
+            for _ in 0..count {
+                let goal = lock(guide).advance(period);
+                let _ = input.move_to(&goal);
+                let (tick, state) = driver.tick(period, period);
+                latest.write(state);
+                // Ticks beyond the ring are not recorded; steps are far shorter than it.
+                let _ = record.push(tick);
+            }
+            if done.send(()).is_err() {
+                break;
+            }
+        }
+    }
+}
+
+/// The device, with the time from its reading to the torque that answers it: what a tick costs.
+struct Timed {
+    pointer: Pointer,
+    read: Instant,
+    cost: rtrb::Producer<Duration>,
+}
+
+impl Device for Timed {
+    fn read(&mut self, elapsed: f64) -> Reading {
+        let reading = self.pointer.read(elapsed);
+        self.read = Instant::now();
+        reading
+    }
+
+    fn apply(&mut self, torque: &JointVector) {
+        // Unread costs of the last seconds are as good as newer ones.
+        let _ = self.cost.push(self.read.elapsed());
+        self.pointer.apply(torque);
+    }
+}

@@ -1,0 +1,84 @@
+//! The pointer's grip on the proxy: which node it holds, and where it takes it. The ray through the pointer meets the plane
+//! through the node that faces the eye; inverse kinematics turns that place into joint coordinates.
+
+use super::camera::Camera;
+use crate::{
+    JointVector,
+    haptize::scan::reach::approach,
+    proxy::{Chain, Pose},
+};
+use glam::{Vec2, Vec3};
+
+/// A node of the proxy in the pointer's hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grip {
+    /// Number of the proxy's node.
+    pub node: usize,
+    /// Where the node was when it was gripped [m]: a point of the plane in which it is moved.
+    anchor: Vec3,
+    /// From the pointer's place in that plane to the node [m].
+    offset: Vec3,
+}
+
+/// How near to a node the pointer must be, in heights of the picture.
+const REACH: f32 = 0.05;
+
+impl Grip {
+    /// Takes the node nearest to the picture point `at` (x right, y up, from -1 to 1), if one is near.
+    #[must_use]
+    pub fn take(camera: &Camera, aspect: f32, at: Vec2, pose: &Pose) -> Option<Self> {
+        let clip = camera.clip(aspect);
+        let distance = |node: &Vec3| {
+            let shown = clip.project_point3(*node).truncate() - at;
+            0.5 * Vec2::new(shown.x * aspect, shown.y).length()
+        };
+        let nodes = pose.nodes.iter().map(|node| node.as_vec3()).enumerate();
+        let (node, anchor) = nodes.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))?;
+        if distance(&anchor) > REACH {
+            return None;
+        }
+        let met = camera.ray(at, aspect).meet_plane(anchor, camera.backward())?;
+        Some(Self { node, anchor, offset: anchor - met })
+    }
+
+    /// Configuration that brings the node to the picture point `at`, as far as the joints let it; `from` is where they are.
+    #[must_use]
+    pub fn lead(
+        &self,
+        camera: &Camera,
+        aspect: f32,
+        at: Vec2,
+        chain: &Chain,
+        from: &JointVector,
+    ) -> Option<JointVector> {
+        let met = camera.ray(at, aspect).meet_plane(self.anchor, camera.backward())?;
+        Some(approach(chain, self.node, (met + self.offset).as_dvec3(), from).0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn a_gripped_node_follows_the_pointer() {
+        let scene = Scene::parse(include_str!("../../datasets/sphere.toml"), "sphere.toml").unwrap();
+        let chain = Chain::new(&scene.proxy);
+        let q = JointVector::from_slice(&[0.0, 1.4, -1.9]);
+        let mut pose = chain.new_pose();
+        chain.pose(&q, &mut pose);
+        let camera = Camera::looking_at(Vec3::new(0.0, 0.0, 0.08), 0.2);
+        let aspect = 1.3;
+        let node = pose.nodes.len() - 1;
+        let shown = camera.clip(aspect).project_point3(pose.nodes[node].as_vec3()).truncate();
+        let grip = Grip::take(&camera, aspect, shown, &pose).unwrap();
+        assert_eq!(grip.node, node);
+        let target = shown + Vec2::new(0.02, -0.05);
+        let led = grip.lead(&camera, aspect, target, &chain, &q).unwrap();
+        chain.pose(&led, &mut pose);
+        let now = camera.clip(aspect).project_point3(pose.nodes[node].as_vec3()).truncate();
+        assert!(now.distance(target) < 1e-4, "{now} is not {target}");
+        assert!(Grip::take(&camera, aspect, Vec2::new(0.9, -0.9), &pose).is_none());
+    }
+}

@@ -1,0 +1,114 @@
+//! The last seconds of the haptic loop, for plots and export.
+
+use super::{feel::Feel, loaded::Loaded};
+use crate::render::{
+    setup::labels,
+    timing::{Durations, Timing},
+    trace::{Tick, Trace},
+};
+use std::{collections::VecDeque, time::Duration};
+
+/// Ticks that are kept: twenty seconds at 1 kHz.
+const KEPT: usize = 20_000;
+
+/// What was felt lately, and how punctually.
+#[derive(Clone)]
+pub struct History {
+    ticks: VecDeque<Tick>,
+    /// Number of the first tick kept, since the loop began.
+    first: usize,
+    /// Nominal time between ticks [s].
+    period: f64,
+    cost: Durations,
+    jitter: Durations,
+    refused: Vec<String>,
+}
+
+impl History {
+    /// Nothing yet, of a loop with `period` [s] between ticks; none without memory.
+    #[must_use]
+    pub fn new(period: f64) -> Option<Self> {
+        let (cost, jitter) = (Durations::new()?, Durations::new()?);
+        Some(Self { ticks: VecDeque::with_capacity(KEPT), first: 0, period, cost, jitter, refused: Vec::new() })
+    }
+
+    /// Takes what `feel` has to say.
+    pub fn collect(&mut self, feel: &mut Feel) {
+        while let Some(tick) = feel.next_tick() {
+            if let Some(last) = self.ticks.back() {
+                let late = (tick.time - last.time - self.period).abs();
+                self.jitter.record(Duration::from_secs_f64(late));
+            }
+            if self.ticks.len() == KEPT {
+                self.ticks.pop_front();
+                self.first += 1;
+            }
+            self.ticks.push_back(tick);
+        }
+        while let Some(cost) = feel.next_cost() {
+            self.cost.record(cost);
+        }
+        if let Some(refused) = feel.refused() {
+            self.refused = refused;
+        }
+    }
+
+    /// The latest tick.
+    #[must_use]
+    pub fn last(&self) -> Option<&Tick> {
+        self.ticks.back()
+    }
+
+    /// About `count` ticks of the last `seconds`, evenly, always the same ones while time goes on.
+    pub fn recent(&self, seconds: f64, count: usize) -> impl Iterator<Item = &Tick> {
+        let from = self.last().map_or(0.0, |tick| tick.time - seconds);
+        let begin = self.ticks.partition_point(|tick| tick.time < from);
+        let stride = ((self.ticks.len() - begin) / count.max(1)).max(1).next_power_of_two();
+        let offset = (stride - (self.first + begin) % stride) % stride;
+        self.ticks.iter().skip(begin + offset).step_by(stride)
+    }
+
+    /// Everything that is kept, as a recording of `loaded`.
+    #[must_use]
+    pub fn trace(&self, loaded: &Loaded) -> Trace {
+        let joints = labels(&loaded.dataset.grid);
+        Trace { joints, ticks: self.ticks.iter().copied().collect(), ..Trace::default() }
+    }
+
+    /// From a tick's reading to its torque.
+    #[must_use]
+    pub fn cost(&self) -> &Durations {
+        &self.cost
+    }
+
+    /// Difference of the time between two ticks from the nominal one.
+    #[must_use]
+    pub fn jitter(&self) -> &Durations {
+        &self.jitter
+    }
+
+    /// What the system did not grant, in words.
+    #[must_use]
+    pub fn refused(&self) -> &[String] {
+        &self.refused
+    }
+
+    /// Forgets how punctual the loop was so far.
+    pub fn reset_timing(&mut self) {
+        if let (Some(cost), Some(jitter)) = (Durations::new(), Durations::new()) {
+            (self.cost, self.jitter) = (cost, jitter);
+        }
+    }
+
+    /// Punctuality for the figure of `report::jitter`.
+    #[must_use]
+    pub fn timing(&self) -> Timing {
+        Timing {
+            refused: self.refused.clone(),
+            lateness: self.jitter.percentiles(),
+            lateness_bins: self.jitter.bins(),
+            tick_cost: self.cost.percentiles(),
+            ..Timing::default()
+        }
+    }
+}

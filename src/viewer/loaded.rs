@@ -1,0 +1,94 @@
+//! What is open in the window: a dataset with everything its rendering needs, and how it came to be.
+
+use crate::{
+    JointVector,
+    dataset::Dataset,
+    device::Motion,
+    haptize::SweepReport,
+    render::{
+        graphics::ContactForces,
+        haptic::Haptics,
+        passivity::Bound,
+        setup::{Setup, SetupError},
+    },
+    scene::{HapticsSpec, Scene},
+};
+use std::{path::PathBuf, sync::Arc};
+
+/// A dataset that can be felt and seen. Cheap to clone: the data are shared.
+#[derive(Clone)]
+pub struct Loaded {
+    /// For the window's title.
+    pub name: String,
+    /// The file it was read from; none for one that was just baked.
+    pub file: Option<PathBuf>,
+    /// The scene that it can be baked from again; none for a scanned dataset.
+    pub scene: Option<Arc<Scene>>,
+    /// The data.
+    pub dataset: Arc<Dataset>,
+    /// Proxy, haptic loop, object.
+    pub setup: Arc<Setup>,
+    /// Contact forces on the object; absent where there is no object to draw.
+    pub forces: Option<Arc<ContactForces>>,
+    /// What the bake said, if this window baked it.
+    pub report: Option<Arc<SweepReport>>,
+}
+
+impl Loaded {
+    /// Builds what rendering needs.
+    ///
+    /// # Errors
+    /// When the dataset cannot be rendered.
+    pub fn new(dataset: Dataset, scene: Option<Scene>, file: Option<PathBuf>) -> Result<Self, SetupError> {
+        let setup = Setup::new(&dataset)?;
+        let scene = scene.or_else(|| {
+            let path = file.clone().unwrap_or_else(|| setup.scene.path.clone());
+            Scene::parse(&dataset.scene, path).ok()
+        });
+        let forces = setup.object.as_ref().map(|object| ContactForces::new(&dataset, object.rest.len()));
+        let forces = forces.transpose()?;
+        Ok(Self {
+            name: setup.scene.name.clone(),
+            file,
+            scene: scene.map(Arc::new),
+            dataset: Arc::new(dataset),
+            setup: Arc::new(setup),
+            forces: forces.map(Arc::new),
+            report: None,
+        })
+    }
+
+    /// The haptic loop with `gains`, and which of them are beyond their passivity bound.
+    ///
+    /// # Errors
+    /// When they do not make a loop.
+    pub fn tuned(&self, gains: &HapticsSpec) -> Result<(Arc<Haptics>, Vec<Bound>), SetupError> {
+        let (haptics, exceeded) = self.setup.retuned(&self.dataset, gains)?;
+        Ok((Arc::new(haptics), exceeded))
+    }
+
+    /// The scene's motions by name.
+    #[must_use]
+    pub fn motions(&self) -> Vec<(&'static str, Motion)> {
+        let motion = &self.setup.scene.motion;
+        let joints = self.setup.chain.joints.len();
+        [("press", &motion.press), ("scrape", &motion.scrape)]
+            .into_iter()
+            .filter_map(|(name, waypoints)| Some((name, Motion::through(waypoints, joints).ok()?)))
+            .collect()
+    }
+
+    /// Where the device is at first: at the beginning of the first motion, else in the middle of the grid.
+    #[must_use]
+    pub fn start(&self) -> JointVector {
+        self.motions().first().map_or_else(|| self.middle(), |(_, motion)| motion.at(0.0).0)
+    }
+
+    /// The middle of the grid.
+    #[must_use]
+    pub fn middle(&self) -> JointVector {
+        let middles =
+            self.dataset.grid.axes.iter().map(|axis| axis.coordinate(0) + 0.5 * axis.step * (axis.count - 1) as f64);
+        JointVector::from_slice(&middles.collect::<Vec<_>>())
+    }
+}

@@ -1,0 +1,119 @@
+//! The window of `haptize view`, and the same picture without one: a dataset seen, pressed and understood.
+//!
+//! | file | subject |
+//! |---|---|
+//! | `app` | the window's state, what happens in a frame, and where panels lie |
+//! | `window`, `offscreen` | the two places where it is drawn: a window, a picture |
+//! | `theme` | colours, type, spacing |
+//! | `loaded`, `job` | what is open, and how it is baked or read in the background |
+//! | `feel`, `guide`, `history` | the haptic loop beside the window, who leads the hand, what was felt lately |
+//! | `scene`, `body`, `grip` | the 3-D panel, the object on the GPU, the pointer's grip on the proxy |
+//! | `stage`, `pipelines`, `shapes`, `camera`, `pixels` | the renderer of that panel |
+//! | `slices`, `cloud`, `plots`, `controls`, `files` | the other panels |
+//! | `effects` | what the loop does beyond the least, and its price |
+//!
+//! One device computes and draws: the object's nodes go from the frame update to the screen without a read-back. The
+//! haptic thread waits for nothing here; see `feel`.
+
+mod app;
+mod body;
+mod camera;
+mod cloud;
+mod controls;
+mod effects;
+mod feel;
+mod files;
+mod grip;
+mod guide;
+mod history;
+mod job;
+mod loaded;
+mod offscreen;
+mod pipelines;
+mod pixels;
+mod plots;
+mod scene;
+mod shapes;
+mod slices;
+mod stage;
+mod theme;
+mod window;
+
+pub use app::{Start, Viewer};
+pub use eframe::egui_wgpu::RenderState;
+pub use feel::Pace;
+pub use offscreen::{Picture, render_state, screenshot};
+pub use theme::apply as dress;
+pub use window::open;
+
+use crate::gpu::{FrameError, GpuError};
+
+/// The viewer cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewError {
+    /// The device that draws.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The object's frame update.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// There is no window to be had.
+    #[error("no window can be opened: {0}. Without a display, haptize view --screenshot FILE.png draws one picture")]
+    Window(String),
+    /// What was to be shown in a picture cannot be opened.
+    #[error("{0}")]
+    Open(String),
+    /// The picture cannot be written.
+    #[error("cannot write {}: {reason}; choose another folder or free some space", path.display())]
+    Write {
+        /// The file.
+        path: std::path::PathBuf,
+        /// Why.
+        reason: String,
+    },
+}
+
+/// A number with three digits, as labels show it.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 {
+        "0".into()
+    } else if !value.is_finite() {
+        "–".into()
+    } else if size >= 100.0 {
+        format!("{value:.0}")
+    } else if size >= 10.0 {
+        format!("{value:.1}")
+    } else if size >= 1.0 {
+        trimmed(format!("{value:.2}"))
+    } else if size >= 0.01 {
+        trimmed(format!("{value:.3}"))
+    } else {
+        format!("{value:.1e}")
+    }
+}
+
+fn trimmed(text: String) -> String {
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn labels_have_three_digits_and_no_idle_ones() {
+        for (value, text) in [
+            (0.0, "0"),
+            (20.0, "20.0"),
+            (1.5, "1.5"),
+            (-0.25, "-0.25"),
+            (0.0123, "0.012"),
+            (123.4, "123"),
+            (2e-5, "2.0e-5"),
+            (f64::NAN, "–"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+}

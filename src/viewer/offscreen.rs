@@ -1,0 +1,155 @@
+//! The window's picture without a window: the same panels, laid out and painted by egui into a texture that is read back.
+
+use super::{Pace, Start, ViewError, Viewer, dress, guide::LEAD_IN, pixels};
+use crate::gpu::{AdapterChoice, Context, GpuError};
+use eframe::{
+    egui::{self, Pos2, Rect, Theme, vec2},
+    egui_wgpu::{RenderState, Renderer, RendererOptions, ScreenDescriptor},
+};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+/// A picture of the window.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// Points across and down.
+    pub size: [f32; 2],
+    /// Pixels a point.
+    pub scale: f32,
+    /// Dark colours.
+    pub dark: bool,
+    /// Name of the motion that is played.
+    pub motion: String,
+    /// When the picture is taken, since the motion began [s].
+    pub time: f64,
+}
+
+impl Default for Picture {
+    fn default() -> Self {
+        Self { size: [1280.0, 800.0], scale: 1.5, dark: false, motion: "press".into(), time: 2.2 }
+    }
+}
+
+/// Time between two frames of the picture's past [s].
+const FRAME: f64 = 0.05;
+
+/// Frames of the last instant: egui lays out what it has measured in the frame before.
+const SETTLING: usize = 3;
+
+/// A renderer of egui on the device of `context`, without a window.
+///
+/// # Errors
+/// When the device refuses it.
+pub fn render_state(context: &Context) -> Result<RenderState, ViewError> {
+    let (instance, adapter, device, queue) = context.shared();
+    let target_format = super::pipelines::FORMAT;
+    let renderer = context.scoped(|device| Renderer::new(device, target_format, RendererOptions::PREDICTABLE))?;
+    Ok(RenderState {
+        available_adapters: vec![adapter.clone()],
+        instance,
+        adapter,
+        device,
+        queue,
+        target_format,
+        renderer: Arc::new(egui::mutex::RwLock::new(renderer)),
+    })
+}
+
+/// Opens `start`, plays until the picture's instant, and writes the window as it is then to the PNG file `path`.
+///
+/// # Errors
+/// When there is no device, `start` cannot be opened, or the file not be written.
+pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), ViewError> {
+    let context = Arc::new(Context::open(AdapterChoice::Any)?);
+    let render = render_state(&context)?;
+    let egui = egui::Context::default();
+    egui.set_theme(if picture.dark { Theme::Dark } else { Theme::Light });
+    dress(&egui);
+    let mut viewer = Viewer::new(Arc::clone(&context), render.clone(), Pace::Steps, PathBuf::from("."))?;
+    viewer.start(start, &egui);
+    viewer.wait(&egui);
+    if let Some(error) = viewer.error() {
+        return Err(ViewError::Open(error.to_owned()));
+    }
+    viewer.play(&picture.motion);
+    viewer.advance(FRAME, &egui);
+    // The hand may have to be led to where the motion begins first.
+    for _ in 0..((picture.time + LEAD_IN) / FRAME).ceil() as usize {
+        if viewer.time_in_motion().is_some_and(|(time, duration)| time < picture.time.min(duration) - 0.5 * FRAME) {
+            viewer.advance(FRAME, &egui);
+        }
+    }
+    // Only the last instant is seen: its past needs no layout.
+    let mut output = egui::FullOutput::default();
+    for frame in 0..SETTLING {
+        let size = vec2(picture.size[0], picture.size[1]);
+        let mut input = egui::RawInput {
+            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, size)),
+            time: Some(frame as f64 * FRAME),
+            ..Default::default()
+        };
+        input.viewports.entry(egui::ViewportId::ROOT).or_default().native_pixels_per_point = Some(picture.scale);
+        output.append(egui.run_ui(input, |ui| viewer.ui(ui)));
+    }
+    let (size, bytes) = paint(&context, &render, &egui, output, picture)?;
+    let written = image::save_buffer(path, &bytes, size[0], size[1], image::ColorType::Rgba8);
+    written.map_err(|error| ViewError::Write { path: path.to_owned(), reason: error.to_string() })
+}
+
+/// Paints a frame of egui and reads it back: size and bytes of red, green, blue, opacity.
+fn paint(
+    context: &Context,
+    render: &RenderState,
+    egui: &egui::Context,
+    mut output: egui::FullOutput,
+    picture: &Picture,
+) -> Result<([u32; 2], Vec<u8>), GpuError> {
+    let size = picture.size.map(|side| (side * picture.scale).round() as u32);
+    let screen = ScreenDescriptor { size_in_pixels: size, pixels_per_point: output.pixels_per_point };
+    let triangles = egui.tessellate(std::mem::take(&mut output.shapes), output.pixels_per_point);
+    let mut renderer = render.renderer.write();
+    let (texture, commands) = context.scoped(|device| {
+        for (id, images) in output.textures_delta.set.drain() {
+            for image in images {
+                renderer.update_texture(device, &render.queue, id, &image);
+            }
+        }
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("window"),
+            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: render.target_format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&Default::default());
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let mut commands = renderer.update_buffers(device, &render.queue, &mut encoder, &triangles, &screen);
+        let mut pass = encoder
+            .begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("window"),
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &view,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                        store: wgpu::StoreOp::Store,
+                    },
+                    depth_slice: None,
+                })],
+                ..Default::default()
+            })
+            .forget_lifetime();
+        renderer.render(&mut pass, &triangles, &screen);
+        drop(pass);
+        commands.push(encoder.finish());
+        (texture, commands)
+    })?;
+    output.textures_delta.free.clear();
+    context.queue.submit(commands);
+    Ok((size, pixels::read(context, &texture)?))
+}

@@ -1,0 +1,319 @@
+//! Live plots of the haptic loop: torque, configuration, contacts, energy accounts, and what time it takes. They pause,
+//! zoom, and can be written as CSV and as the figures that `haptize play` draws.
+
+use super::{history::History, loaded::Loaded, number, theme};
+use crate::{
+    dataset::replace_file,
+    render::{timing::Percentiles, trace::Tick},
+    report::{self, ReportError},
+};
+use eframe::egui::{self, RichText, Ui, vec2};
+use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};
+use std::path::{Path, PathBuf};
+
+/// What is plotted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tab {
+    /// Contact torque and torque on the device.
+    #[default]
+    Torque,
+    /// Positions of device and proxy.
+    Configuration,
+    /// Object nodes in contact.
+    Contacts,
+    /// Energy accounts.
+    Energy,
+    /// Cost and punctuality of ticks.
+    Timing,
+}
+
+/// The panel's state.
+pub struct Plots {
+    /// What is plotted.
+    pub tab: Tab,
+    /// What is shown while paused.
+    frozen: Option<History>,
+    /// Length of the time axis [s].
+    seconds: f64,
+    /// Where files were written, or why not.
+    note: Option<Result<String, String>>,
+}
+
+/// Points of a line: about one a pixel.
+const POINTS: usize = 700;
+
+impl Default for Plots {
+    fn default() -> Self {
+        Self { tab: Tab::Torque, frozen: None, seconds: 6.0, note: None }
+    }
+}
+
+impl Plots {
+    /// Forgets what is paused.
+    pub fn reset(&mut self) {
+        self.frozen = None;
+    }
+
+    /// The panel in all of `ui`; `folder` is where files go.
+    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, history: &mut History, folder: &Path) {
+        ui.horizontal_wrapped(|ui| {
+            for (tab, name) in [
+                (Tab::Torque, "Torque"),
+                (Tab::Configuration, "Configuration"),
+                (Tab::Contacts, "Contacts"),
+                (Tab::Energy, "Energy"),
+                (Tab::Timing, "Timing"),
+            ] {
+                ui.selectable_value(&mut self.tab, tab, name);
+            }
+            ui.separator();
+            let mut paused = self.frozen.is_some();
+            if ui.toggle_value(&mut paused, "Freeze").on_hover_text("Stop the plots; the loop goes on").clicked() {
+                self.frozen = paused.then(|| history.clone());
+            }
+            let label = ui.label("Last");
+            let span = egui::ComboBox::from_id_salt("span").width(56.0).selected_text(format!("{} s", self.seconds));
+            let choices = span.show_ui(ui, |ui| {
+                for seconds in [2.0, 6.0, 18.0] {
+                    ui.selectable_value(&mut self.seconds, seconds, format!("{seconds} s"));
+                }
+            });
+            choices.response.labelled_by(label.id);
+            if ui.button("CSV").on_hover_text("Export all ticks kept, the last twenty seconds").clicked() {
+                self.note = Some(self.write_csv(loaded, history, folder));
+            }
+            if ui.button("PNG").on_hover_text("Export the figures that haptize play draws").clicked() {
+                self.note = Some(self.write_png(loaded, history, folder).map_err(|error| error.to_string()));
+            }
+            if self.tab == Tab::Timing && ui.button("Reset").clicked() {
+                history.reset_timing();
+            }
+            match &self.note {
+                Some(Ok(note)) => drop(ui.label(RichText::new(note).weak())),
+                Some(Err(note)) => drop(ui.colored_label(ui.visuals().error_fg_color, note)),
+                None => {}
+            }
+        });
+        let shown = self.frozen.as_ref().unwrap_or(history);
+        match self.tab {
+            Tab::Torque => self.torque(ui, loaded, shown),
+            Tab::Configuration => self.configuration(ui, loaded, shown),
+            Tab::Contacts => self.contacts(ui, shown),
+            Tab::Energy => self.energy(ui, shown),
+            Tab::Timing => timing(ui, shown),
+        }
+    }
+
+    fn torque(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
+        let axes = &loaded.dataset.grid.axes;
+        let unit = units(axes.iter().map(|axis| axis.effort_unit()));
+        let joints = axes.iter().enumerate().flat_map(|(joint, axis)| {
+            let felt = (
+                format!("{} contact", axis.name),
+                joint,
+                false,
+                Box::new(move |tick: &Tick| tick.contact_torque[joint]) as Get,
+            );
+            let told = (
+                format!("{} device", axis.name),
+                joint,
+                true,
+                Box::new(move |tick: &Tick| tick.device_torque[joint]) as Get,
+            );
+            [felt, told]
+        });
+        self.lines(ui, history, &format!("torque [{unit}]"), joints.collect());
+    }
+
+    fn configuration(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
+        let axes = &loaded.dataset.grid.axes;
+        let unit = units(axes.iter().map(|axis| axis.unit.as_str()));
+        let joints = axes.iter().enumerate().flat_map(|(joint, axis)| {
+            let proxy =
+                (format!("{} proxy", axis.name), joint, false, Box::new(move |tick: &Tick| tick.proxy[joint]) as Get);
+            let device =
+                (format!("{} device", axis.name), joint, true, Box::new(move |tick: &Tick| tick.device[joint]) as Get);
+            [proxy, device]
+        });
+        self.lines(ui, history, &format!("q [{unit}]"), joints.collect());
+    }
+
+    fn contacts(&self, ui: &mut Ui, history: &History) {
+        let nodes = (
+            "object nodes in contact".to_owned(),
+            0,
+            false,
+            Box::new(|tick: &Tick| f64::from(tick.contact_nodes)) as Get,
+        );
+        let index = ("contact index × 10".to_owned(), 1, true, Box::new(|tick: &Tick| 10.0 * tick.index) as Get);
+        self.lines(ui, history, "contacts [1]", vec![nodes, index]);
+    }
+
+    fn energy(&self, ui: &mut Ui, history: &History) {
+        let account = |name: &str, number, get: fn(&Tick) -> f64| {
+            (name.to_owned(), number, false, Box::new(move |tick: &Tick| 1e3 * get(tick)) as Get)
+        };
+        let accounts = vec![
+            account("stored in the object", 0, |tick| tick.accounts.stored),
+            account("absorbed by proxy and coupling", 1, |tick| tick.accounts.absorbed()),
+            account("proxy's damping", 2, |tick| tick.accounts.proxy_dissipation),
+            account("made by holding torque", 3, |tick| tick.accounts.hold_gain()),
+            account("leak of interpolation", 5, |tick| tick.accounts.leak),
+        ];
+        self.lines(ui, history, "energy [mJ]", accounts);
+    }
+
+    fn lines(&self, ui: &mut Ui, history: &History, label: &str, lines: Vec<(String, usize, bool, Get<'_>)>) {
+        let dark = ui.visuals().dark_mode;
+        legend(ui, &lines);
+        let end = history.last().map_or(0.0, |tick| tick.time);
+        let ticks: Vec<&Tick> = history.recent(self.seconds, POINTS).collect();
+        let paused = self.frozen.is_some();
+        let mut plot = plot(ui, ("lines", label, paused), "time [s]", label);
+        if !paused {
+            plot = plot.default_x_bounds(end - self.seconds, end).auto_bounds([false, true]).allow_drag(false);
+        }
+        let bounds = (end - self.seconds).max(0.0)..=end.max(self.seconds);
+        plot.show(ui, |plot| {
+            if !paused {
+                plot.set_plot_bounds_x(bounds);
+            }
+            for (name, number, thin, get) in lines {
+                let points: PlotPoints<'_> = ticks.iter().map(|tick| [tick.time, get(tick)]).collect();
+                let colour = theme::series(number, dark);
+                let line = Line::new(name, points);
+                plot.line(if thin {
+                    line.color(colour.gamma_multiply(0.6)).width(1.0).style(egui_plot::LineStyle::dashed_dense())
+                } else {
+                    line.color(colour).width(1.8)
+                });
+            }
+        });
+    }
+
+    fn write_csv(&self, loaded: &Loaded, history: &History, folder: &Path) -> Result<String, String> {
+        let file = folder.join("viewer-trace.csv");
+        let trace = self.frozen.as_ref().unwrap_or(history).trace(loaded);
+        replace_file(&file, |out| trace.write_ticks(out)).map_err(|error| {
+            format!("cannot write {}: {error}; free some space or start haptize elsewhere", file.display())
+        })?;
+        Ok(format!("wrote {}", file.display()))
+    }
+
+    fn write_png(&self, loaded: &Loaded, history: &History, folder: &Path) -> Result<String, ReportError> {
+        let history = self.frozen.as_ref().unwrap_or(history);
+        let trace = history.trace(loaded);
+        let mut files: Vec<PathBuf> = vec![
+            report::write_png(folder, "viewer-press", &report::press::press(&trace))?,
+            report::write_png(folder, "viewer-energy", &report::press::energy(&trace))?,
+        ];
+        if history.jitter().percentiles().count > 0 {
+            files.push(report::write_png(folder, "viewer-jitter", &report::jitter::jitter(&history.timing()))?);
+        }
+        let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        Ok(format!("wrote {}", names.join(", ")))
+    }
+}
+
+/// A number of a tick.
+type Get<'a> = Box<dyn Fn(&Tick) -> f64 + 'a>;
+
+/// `N m`, or both units where joints differ.
+fn units<'a>(all: impl Iterator<Item = &'a str>) -> String {
+    let mut units: Vec<&str> = Vec::new();
+    for unit in all {
+        if !units.contains(&unit) {
+            units.push(unit);
+        }
+    }
+    units.join(" or ")
+}
+
+/// Names of the lines above their plot; dashed ones are told by their name.
+fn legend(ui: &mut Ui, lines: &[(String, usize, bool, Get<'_>)]) {
+    let dark = ui.visuals().dark_mode;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 5.0;
+        for (name, number, thin, _) in lines {
+            let (rect, _) = ui.allocate_exact_size(vec2(16.0, 10.0), egui::Sense::hover());
+            let colour = theme::series(*number, dark);
+            let ends = [rect.left_center(), rect.right_center()];
+            if *thin {
+                let stroke = egui::Stroke::new(1.2, colour.gamma_multiply(0.75));
+                ui.painter().extend(egui::Shape::dashed_line(&ends, stroke, 3.0, 2.5));
+            } else {
+                ui.painter().line_segment(ends, egui::Stroke::new(2.2, colour));
+            }
+            ui.label(RichText::new(name).small());
+            ui.add_space(6.0);
+        }
+    });
+}
+
+fn plot<'a>(ui: &Ui, id: impl std::fmt::Debug, x: &str, y: &str) -> Plot<'a> {
+    Plot::new(format!("{id:?}"))
+        .custom_x_axes(vec![theme::across(x)])
+        .custom_y_axes(vec![theme::upward(y)])
+        .allow_scroll(false)
+        .set_margin_fraction(vec2(0.0, 0.08))
+        .show_background(false)
+        .grid_color(theme::grid(ui.visuals()))
+}
+
+/// Histograms of jitter and cost, side by side, with their shares in words.
+fn timing(ui: &mut Ui, history: &History) {
+    let dark = ui.visuals().dark_mode;
+    let size = vec2(0.5 * (ui.available_width() - 12.0), ui.available_height());
+    ui.horizontal_top(|ui| {
+        for (number, title, durations) in [(0, "jitter", history.jitter()), (1, "cost of a tick", history.cost())] {
+            ui.allocate_ui(size, |ui| {
+                ui.vertical(|ui| {
+                    let Percentiles { count, p50, p99, p999, max, .. } = durations.percentiles();
+                    let words = if count == 0 {
+                        format!("{title}: nothing measured, the loop runs by steps")
+                    } else {
+                        let [p50, p99, p999, max] = [p50, p99, p999, max].map(super::number);
+                        format!("{title} [µs]: median {p50}, 99 % {p99}, 99.9 % {p999}, most {max}")
+                    };
+                    ui.label(RichText::new(words).small());
+                    let bars: Vec<Bar> = durations
+                        .bins()
+                        .iter()
+                        .filter(|bin| bin.count > 0)
+                        .map(|bin| {
+                            let (from, to) = (bin.from.log10(), bin.to.log10());
+                            Bar::new(0.5 * (from + to), (bin.count as f64).log10() + 1.0).width(0.94 * (to - from))
+                        })
+                        .collect();
+                    let chart = BarChart::new(title, bars).color(theme::series(number, dark)).allow_hover(false);
+                    let decade = |mark: egui_plot::GridMark, _: &std::ops::RangeInclusive<f64>| {
+                        if (mark.value - mark.value.round()).abs() < 1e-9 {
+                            number_of(10.0_f64.powf(mark.value))
+                        } else {
+                            String::new()
+                        }
+                    };
+                    let ticks = |mark: egui_plot::GridMark, _: &std::ops::RangeInclusive<f64>| {
+                        let power = mark.value - 1.0;
+                        let whole = power >= 0.0 && (power - power.round()).abs() < 1e-9;
+                        if whole { number_of(10.0_f64.powf(power)) } else { String::new() }
+                    };
+                    plot(ui, ("timing", number), &format!("{title} [µs]"), "ticks")
+                        .default_x_bounds(-1.0, 4.0)
+                        .include_y(0.0)
+                        .include_x(-1.0)
+                        .include_x(4.0)
+                        .custom_x_axes(vec![theme::across(&format!("{title} [µs]")).formatter(decade)])
+                        .custom_y_axes(vec![theme::upward("ticks").formatter(ticks)])
+                        .show(ui, |plot| {
+                            plot.bar_chart(chart);
+                        });
+                });
+            });
+        }
+    });
+}
+
+fn number_of(value: f64) -> String {
+    if value >= 1.0 { format!("{value:.0}") } else { number(value) }
+}

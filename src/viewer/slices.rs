@@ -1,0 +1,387 @@
+//! A plane of C-space as a heat map: any two joints across and up, the others at a grid line each, which follows the
+//! configuration or is set by a slider. A cell is a grid point with the number that is stored there, not interpolated.
+
+use super::{
+    history::History,
+    loaded::Loaded,
+    number,
+    theme::{self, Palette},
+};
+use crate::{
+    JointVector,
+    contact::Status,
+    dataset::{Dataset, Grid},
+    report::colour::ColourMap,
+};
+use eframe::egui::{
+    self, Color32, ColorImage, ComboBox, Painter, Rect, RichText, Slider, TextureHandle, TextureOptions, Ui, pos2, vec2,
+};
+use egui_plot::{HoverPosition, Line, MarkerShape, Plot, PlotImage, PlotPoint, Points};
+
+/// What a cell's colour says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Column {
+    /// Torque of a joint, by its number.
+    Torque(usize),
+    /// Stored energy U.
+    Energy,
+    /// Smallest signed distance at rest.
+    Gap,
+    /// What became of the point.
+    Status,
+    /// Relative residual.
+    Residual,
+}
+
+/// The panel's state.
+pub struct Slices {
+    column: Column,
+    axes: [usize; 2],
+    /// Whether the other joints follow the configuration.
+    follow: bool,
+    /// Grid line of every joint.
+    lines: Vec<usize>,
+    drawn: Option<(Key, TextureHandle, ColourMap)>,
+}
+
+/// What a picture depends on.
+#[derive(Clone, PartialEq)]
+struct Key {
+    column: Column,
+    axes: [usize; 2],
+    lines: Vec<usize>,
+    dark: bool,
+    dataset: *const Dataset,
+}
+
+impl Column {
+    /// Those that `dataset` has.
+    #[must_use]
+    pub fn all(dataset: &Dataset) -> Vec<Self> {
+        let torques = (0..dataset.grid.joints()).map(Self::Torque);
+        let rest = [
+            dataset.energy.is_some().then_some(Self::Energy),
+            dataset.gap.is_some().then_some(Self::Gap),
+            Some(Self::Status),
+            dataset.residual.is_some().then_some(Self::Residual),
+        ];
+        torques.chain(rest.into_iter().flatten()).collect()
+    }
+
+    /// With its unit.
+    #[must_use]
+    pub fn name(self, grid: &Grid) -> String {
+        match self {
+            Self::Torque(joint) => {
+                let axis = &grid.axes[joint];
+                let effort = if axis.unit == "m" { "force" } else { "torque" };
+                format!("{} {effort} [{}]", axis.name, axis.effort_unit())
+            }
+            Self::Energy => "energy U [mJ]".into(),
+            Self::Gap => "gap [mm]".into(),
+            Self::Status => "status".into(),
+            Self::Residual => "log10 of residual".into(),
+        }
+    }
+
+    /// Its number at grid point `point`, in the unit of its name.
+    fn value(self, dataset: &Dataset, point: usize) -> f64 {
+        match self {
+            Self::Torque(joint) => dataset.torque(point)[joint],
+            Self::Energy => dataset.energy.as_ref().map_or(f64::NAN, |energy| 1e3 * energy[point]),
+            Self::Gap => dataset.gap.as_ref().map_or(f64::NAN, |gap| 1e3 * f64::from(gap[point])),
+            Self::Status => f64::from(dataset.status[point]),
+            // Free points have no residual.
+            Self::Residual => {
+                let residual = dataset.residual.as_ref().map_or(f64::NAN, |residual| residual[point].into());
+                if residual > 0.0 { residual.log10() } else { f64::NAN }
+            }
+        }
+    }
+
+    /// Colours over the whole dataset, so that planes can be compared.
+    fn map(self, dataset: &Dataset) -> ColourMap {
+        let trusted = (0..dataset.grid.points())
+            .filter(|&point| matches!(dataset.status(point), Status::Contact | Status::Free))
+            .map(|point| self.value(dataset, point))
+            .filter(|value| value.is_finite());
+        let [low, high] = trusted.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+        match self {
+            Self::Torque(_) | Self::Gap => ColourMap::Diverging { bound: low.abs().max(high.abs()) },
+            Self::Energy => ColourMap::Root { high },
+            Self::Status | Self::Residual => ColourMap::Sequential { low, high },
+        }
+    }
+}
+
+impl Slices {
+    /// The plane of the last two joints, or of a single one along itself, in the middle of the grid.
+    #[must_use]
+    pub fn new(dataset: &Dataset) -> Self {
+        let joints = dataset.grid.joints();
+        let axes = [joints.saturating_sub(2), joints - 1];
+        let lines = dataset.grid.axes.iter().map(|axis| axis.count / 2).collect();
+        Self { column: Column::Torque(axes[0]), axes, follow: true, lines, drawn: None }
+    }
+
+    /// The panel, `height` points of it for the heat map.
+    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, q: &JointVector, history: &History, height: f32) {
+        let grid = &loaded.dataset.grid;
+        self.choices(ui, &loaded.dataset);
+        if self.follow {
+            for ((line, axis), q) in self.lines.iter_mut().zip(&grid.axes).zip(q.iter()) {
+                *line = axis.nearest_line(*q);
+            }
+        }
+        self.others(ui, grid);
+        let map = self.refresh(ui, &loaded.dataset);
+        self.plot(ui, loaded, q, history, height);
+        self.key(ui, &loaded.dataset, map);
+    }
+
+    fn choices(&mut self, ui: &mut Ui, dataset: &Dataset) {
+        let grid = &dataset.grid;
+        ui.horizontal(|ui| {
+            let label = ui.label("Show");
+            ComboBox::from_id_salt("column")
+                .width(150.0)
+                .selected_text(self.column.name(grid))
+                .show_ui(ui, |ui| {
+                    for column in Column::all(dataset) {
+                        ui.selectable_value(&mut self.column, column, column.name(grid));
+                    }
+                })
+                .response
+                .labelled_by(label.id);
+        });
+        if grid.joints() < 2 {
+            return;
+        }
+        ui.horizontal(|ui| {
+            for (side, name) in ["Across", "Up"].into_iter().enumerate() {
+                let label = ui.label(name);
+                let chosen = &grid.axes[self.axes[side]].name;
+                let mut axis = self.axes[side];
+                ComboBox::from_id_salt(name)
+                    .width(78.0)
+                    .selected_text(chosen)
+                    .show_ui(ui, |ui| {
+                        for (joint, of) in grid.axes.iter().enumerate() {
+                            ui.selectable_value(&mut axis, joint, &of.name);
+                        }
+                    })
+                    .response
+                    .labelled_by(label.id);
+                if axis != self.axes[side] {
+                    // Choosing the other side's joint swaps the two.
+                    if axis == self.axes[1 - side] {
+                        self.axes[1 - side] = self.axes[side];
+                    }
+                    self.axes[side] = axis;
+                }
+            }
+            if grid.joints() > 2 {
+                ui.checkbox(&mut self.follow, "follow q").on_hover_text("The plane goes through the configuration");
+            }
+        });
+    }
+
+    /// Sliders for the joints that are not shown.
+    fn others(&mut self, ui: &mut Ui, grid: &Grid) {
+        for (joint, axis) in grid.axes.iter().enumerate() {
+            if self.axes.contains(&joint) {
+                continue;
+            }
+            ui.horizontal(|ui| {
+                let value = axis.coordinate(self.lines[joint]);
+                ui.spacing_mut().slider_width = (ui.available_width() - 150.0).max(60.0);
+                let slider = Slider::new(&mut self.lines[joint], 0..=axis.count - 1).show_value(false).text(&axis.name);
+                let response = ui.add_enabled(!self.follow, slider);
+                ui.label(RichText::new(format!("{} {}", number(value), axis.unit)).weak());
+                response.on_hover_text("Grid line of the joint that is not shown");
+            });
+        }
+    }
+
+    /// Makes the picture anew where something has changed.
+    fn refresh(&mut self, ui: &Ui, dataset: &std::sync::Arc<Dataset>) -> ColourMap {
+        let mut lines = self.lines.clone();
+        self.axes.iter().for_each(|&axis| lines[axis] = 0);
+        let dark = ui.visuals().dark_mode;
+        let key = Key { column: self.column, axes: self.axes, lines, dark, dataset: std::sync::Arc::as_ptr(dataset) };
+        match &self.drawn {
+            Some((known, _, map)) if *known == key => *map,
+            drawn => {
+                let map = match drawn {
+                    Some((known, _, map)) if known.column == key.column && known.dataset == key.dataset => *map,
+                    _ => self.column.map(dataset),
+                };
+                let image = picture(dataset, &key, map, &theme::palette(ui.visuals()));
+                let texture = ui.ctx().load_texture("C-space plane", image, TextureOptions::NEAREST);
+                self.drawn = Some((key, texture, map));
+                map
+            }
+        }
+    }
+
+    fn plot(&mut self, ui: &mut Ui, loaded: &Loaded, q: &JointVector, history: &History, height: f32) {
+        let grid = &loaded.dataset.grid;
+        let palette = theme::palette(ui.visuals());
+        let Some((key, texture, _)) = &self.drawn else { return };
+        let [across, up] = self.axes.map(|axis| &grid.axes[axis]);
+        let single = grid.joints() == 1;
+        let extent = |axis: &crate::dataset::Axis| {
+            [axis.start - 0.5 * axis.step, axis.coordinate(axis.count - 1) + 0.5 * axis.step]
+        };
+        let ([left, right], [low, high]) = (extent(across), if single { [0.0, 1.0] } else { extent(up) });
+        let image = PlotImage::new(
+            "grid points",
+            texture.id(),
+            PlotPoint::new(0.5 * (left + right), 0.5 * (low + high)),
+            vec2((right - left) as f32, (high - low) as f32),
+        )
+        .allow_hover(false);
+        let place = |q: &JointVector| if single { [q[0], 0.5] } else { [q[self.axes[0]], q[self.axes[1]]] };
+        let trail: Vec<[f64; 2]> = history.recent(2.0, 200).map(|tick| place(&tick.proxy)).collect();
+        let flagged: Vec<[f64; 2]> = plane(grid, key)
+            .filter(|&(_, point)| untrusted(loaded.dataset.status(point)))
+            .map(|(_, point)| place(&grid.configuration(point)))
+            .collect();
+        let here = place(q);
+        let dataset = &loaded.dataset;
+        let column = self.column;
+        let (axes, lines) = (self.axes, self.lines.clone());
+        let plot = Plot::new(("slice", self.axes))
+            .height(height)
+            .show_grid(false)
+            .show_background(false)
+            .default_x_bounds(left, right)
+            .default_y_bounds(low, high)
+            .set_margin_fraction(vec2(0.0, 0.0))
+            .custom_x_axes(vec![theme::across(&format!("{} [{}]", across.name, across.unit))])
+            .custom_y_axes(vec![theme::upward(&format!("{} [{}]", up.name, up.unit))])
+            .show_axes([true, !single])
+            .show_crosshair(false)
+            .label_formatter(move |position| {
+                let (HoverPosition::NearDataPoint { position: at, .. } | HoverPosition::Elsewhere { position: at }) =
+                    position;
+                let mut q = JointVector::zeros(dataset.grid.joints());
+                for ((q, axis), line) in q.iter_mut().zip(&dataset.grid.axes).zip(&lines) {
+                    *q = axis.coordinate(*line);
+                }
+                (q[axes[0]], q[axes[1]]) = if single { (at.x, at.x) } else { (at.x, at.y) };
+                let point = dataset.grid.nearest(&q)?;
+                let status = format!("{:?}", dataset.status(point)).to_lowercase();
+                Some(format!("{}: {}\n{status}", column.name(&dataset.grid), number(column.value(dataset, point))))
+            });
+        plot.show(ui, |plot| {
+            plot.image(image);
+            plot.line(Line::new("trail", trail).color(palette.force).width(1.2).allow_hover(false));
+            if !flagged.is_empty() {
+                let marks = Points::new("not converged", flagged).shape(MarkerShape::Cross).radius(3.5);
+                plot.points(marks.color(palette.flagged).allow_hover(false));
+            }
+            // A ring with a rim on both sides shows on any colour.
+            for (radius, colour) in [(7.0, palette.here), (5.0, palette.stage), (2.5, palette.here)] {
+                plot.points(Points::new("q", vec![here]).radius(radius).color(colour).allow_hover(false));
+            }
+        });
+    }
+
+    /// Colour bar, or what the colours of the statuses mean.
+    fn key(&self, ui: &mut Ui, dataset: &Dataset, map: ColourMap) {
+        let palette = theme::palette(ui.visuals());
+        if self.column == Column::Status {
+            ui.horizontal_wrapped(|ui| {
+                for status in [Status::Free, Status::Contact, Status::Unconverged, Status::Overflow, Status::Outside] {
+                    let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), egui::Sense::hover());
+                    ui.painter().rect_filled(rect, 2.0, status_colour(status, &palette));
+                    ui.label(RichText::new(format!("{status:?}").to_lowercase()).small());
+                }
+            });
+            return;
+        }
+        let [low, high] = map.range();
+        ui.horizontal(|ui| {
+            ui.label(RichText::new(number(low)).small());
+            let width = ui.available_width() - 60.0;
+            let (rect, _) = ui.allocate_exact_size(vec2(width.max(20.0), 8.0), egui::Sense::hover());
+            gradient(ui.painter(), rect, map, matches!(map, ColourMap::Root { .. }));
+            ui.label(RichText::new(number(high)).small());
+        });
+        let lost = dataset.status_counts();
+        if lost.unconverged + lost.overflow > 0 {
+            let note =
+                format!("× {} of {} points not converged", lost.unconverged + lost.overflow, dataset.grid.points());
+            ui.colored_label(palette.flagged, RichText::new(note).small());
+        }
+    }
+}
+
+/// Cells of a plane, row by row from the top, with their grid points.
+fn plane<'a>(grid: &'a Grid, key: &'a Key) -> impl Iterator<Item = ([usize; 2], usize)> + 'a {
+    let [across, up] = key.axes;
+    let single = across == up;
+    let rows = if single { 1 } else { grid.axes[up].count };
+    (0..rows).rev().flat_map(move |row| {
+        (0..grid.axes[across].count).map(move |column| {
+            let point = grid.axes.iter().enumerate().fold(0, |point, (joint, axis)| {
+                let line = if joint == across {
+                    column
+                } else if joint == up {
+                    row
+                } else {
+                    key.lines[joint]
+                };
+                point * axis.count + line
+            });
+            ([column, row], point)
+        })
+    })
+}
+
+fn picture(dataset: &Dataset, key: &Key, map: ColourMap, palette: &Palette) -> ColorImage {
+    let grid = &dataset.grid;
+    let [across, up] = key.axes;
+    let size = [grid.axes[across].count, if across == up { 1 } else { grid.axes[up].count }];
+    let colour = |point: usize| {
+        let status = dataset.status(point);
+        match (key.column, status) {
+            (Column::Status, _) => status_colour(status, palette),
+            (_, Status::Outside) => palette.absent,
+            // Nothing is felt there, which is not the same as little.
+            (Column::Torque(_) | Column::Energy | Column::Residual, Status::Free) => palette.free,
+            _ => theme::egui_colour(map.colour(key.column.value(dataset, point))),
+        }
+    };
+    ColorImage::new(size, plane(grid, key).map(|(_, point)| colour(point)).collect())
+}
+
+/// Whether a point's numbers are not to be trusted.
+#[must_use]
+pub fn untrusted(status: Status) -> bool {
+    matches!(status, Status::Unconverged | Status::Overflow)
+}
+
+fn status_colour(status: Status, palette: &Palette) -> Color32 {
+    match status {
+        Status::Free => palette.free,
+        Status::Contact => palette.ghost,
+        Status::Unconverged => palette.flagged,
+        Status::Overflow => palette.force,
+        Status::Outside => palette.absent,
+    }
+}
+
+/// A colour bar from left to right; `by_root`: the map's own scale is that of a square root.
+pub fn gradient(painter: &Painter, rect: Rect, map: ColourMap, by_root: bool) {
+    const STEPS: usize = 48;
+    let [low, high] = map.range();
+    for step in 0..STEPS {
+        let share = (step as f64 + 0.5) / STEPS as f64;
+        let value = low + (high - low) * if by_root { share * share } else { share };
+        let left = rect.left() + rect.width() * step as f32 / STEPS as f32;
+        let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(rect.width() / STEPS as f32 + 0.6, rect.height()));
+        painter.rect_filled(cell.intersect(rect), 0.0, theme::egui_colour(map.colour(value)));
+    }
+}

@@ -1,0 +1,262 @@
+//! The 3-D picture: the surface straight from the frame update's buffers, and [`Shape`]s, drawn into a texture of its own
+//! with depth and four samples a pixel. The window shows the texture; a screenshot reads it.
+
+use super::{
+    camera::Camera,
+    pipelines::{self, DEPTH, FORMAT, SAMPLES, View, bind},
+    shapes::{Shape, unit_shape},
+};
+use crate::{
+    gpu::{Context, FrameUpdate, GpuError},
+    object::Object,
+    report::colour::ColourMap,
+};
+use std::sync::Arc;
+use wgpu::util::DeviceExt;
+
+/// The surface to draw: buffers on the device.
+pub struct Surface {
+    /// Rest positions, state, forces, mesh.
+    bindings: [wgpu::Buffer; 4],
+    nodes: u32,
+    triangles: u32,
+}
+
+/// What the surface's colour says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quantity {
+    /// Size of the displacement [m].
+    #[default]
+    Displacement,
+    /// Size of the contact force on a node [N].
+    Force,
+}
+
+/// How the picture looks.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// Gamma-encoded background, 0 to 1.
+    pub background: [f32; 3],
+    /// What the surface's colour says.
+    pub quantity: Quantity,
+    /// Displacement [m] or force [N] at the top of the colour map.
+    pub colour_top: f32,
+    /// Width of the triangles' edges [pixels]; 0 for none.
+    pub edge_width: f32,
+}
+
+/// Pipelines and targets.
+pub struct Stage {
+    context: Arc<Context>,
+    surface: wgpu::RenderPipeline,
+    shapes: wgpu::RenderPipeline,
+    view: wgpu::Buffer,
+    unit: wgpu::Buffer,
+    unit_vertices: u32,
+    /// Stands for the state where there is no object.
+    no_state: wgpu::Buffer,
+    targets: Option<Targets>,
+}
+
+struct Targets {
+    size: [u32; 2],
+    samples: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    picture: wgpu::Texture,
+}
+
+/// Largest side of the picture [pixels]: what every device has.
+const LARGEST_SIDE: u32 = 8192;
+
+impl Surface {
+    /// `object` as `update` moves it.
+    ///
+    /// # Errors
+    /// When the device refuses the buffers.
+    pub fn new(context: &Context, object: &Object, update: &FrameUpdate) -> Result<Self, GpuError> {
+        let rest: Vec<[f32; 4]> = object.rest.iter().map(|point| point.as_vec3().extend(0.0).to_array()).collect();
+        let topology = &object.topology;
+        let mut mesh: Vec<u32> = object.triangles.as_flattened().to_vec();
+        mesh.extend(&topology.around_offsets);
+        mesh.extend(&topology.around);
+        let storage = |label, contents: &[u8]| {
+            context.scoped(|device| {
+                device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                    label: Some(label),
+                    contents,
+                    usage: wgpu::BufferUsages::STORAGE,
+                })
+            })
+        };
+        let rest = storage("drawn rest positions", bytemuck::cast_slice(&rest))?;
+        let mesh = storage("drawn mesh", bytemuck::cast_slice(&mesh))?;
+        let nodes = topology.around_offsets.len().saturating_sub(1) as u32;
+        let bindings = [rest, update.state_buffer().clone(), update.force_buffer().clone(), mesh];
+        Ok(Self { bindings, nodes, triangles: object.triangles.len() as u32 })
+    }
+}
+
+impl Stage {
+    /// Compiles the drawing shaders.
+    ///
+    /// # Errors
+    /// When the device refuses them.
+    pub fn new(context: Arc<Context>) -> Result<Self, GpuError> {
+        let unit_shape = unit_shape();
+        let (surface, shapes, view, unit, no_state) = context.scoped(|device| {
+            let view = wgpu::BufferDescriptor {
+                label: Some("view"),
+                size: size_of::<View>() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            };
+            let unit = wgpu::util::BufferInitDescriptor {
+                label: Some("unit shape"),
+                contents: bytemuck::cast_slice(&unit_shape),
+                usage: wgpu::BufferUsages::VERTEX,
+            };
+            let no_state = wgpu::util::BufferInitDescriptor {
+                label: Some("no state"),
+                contents: &[0; 16],
+                usage: wgpu::BufferUsages::STORAGE,
+            };
+            (
+                pipelines::surface(device),
+                pipelines::shapes(device),
+                device.create_buffer(&view),
+                device.create_buffer_init(&unit),
+                device.create_buffer_init(&no_state),
+            )
+        })?;
+        let unit_vertices = unit_shape.len() as u32;
+        Ok(Self { context, surface, shapes, view, unit, unit_vertices, no_state, targets: None })
+    }
+
+    /// Draws one picture of `size` pixels and returns its texture; the texture is the same one until the size changes.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn draw(
+        &mut self,
+        size: [u32; 2],
+        camera: &Camera,
+        look: &Look,
+        surface: Option<&Surface>,
+        shapes: &[Shape],
+    ) -> Result<&wgpu::Texture, GpuError> {
+        let size = size.map(|pixels| pixels.clamp(1, LARGEST_SIDE));
+        let targets = match self.targets.take().filter(|targets| targets.size == size) {
+            Some(targets) => targets,
+            None => Targets::new(&self.context, size)?,
+        };
+        let targets = self.targets.insert(targets);
+        let view = view(size, camera, look, surface);
+        self.context.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
+        let commands = self.context.scoped(|device| {
+            let mut encoder = device.create_command_encoder(&Default::default());
+            let mut pass = targets.begin(&mut encoder, look.background);
+            if let Some(surface) = surface {
+                let [rest, state, forces, mesh] = &surface.bindings;
+                let bound = bind(device, &self.surface, &[&self.view, rest, state, forces, mesh]);
+                pass.set_pipeline(&self.surface);
+                pass.set_bind_group(0, &bound, &[]);
+                pass.draw(0..3 * surface.triangles, 0..1);
+            }
+            if !shapes.is_empty() {
+                let instances = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                    label: Some("shapes"),
+                    contents: bytemuck::cast_slice(shapes),
+                    usage: wgpu::BufferUsages::VERTEX,
+                });
+                let state = surface.map_or(&self.no_state, |surface| &surface.bindings[1]);
+                let bound = bind(device, &self.shapes, &[&self.view, state]);
+                pass.set_pipeline(&self.shapes);
+                pass.set_bind_group(0, &bound, &[]);
+                pass.set_vertex_buffer(0, instances.slice(..));
+                pass.set_vertex_buffer(1, self.unit.slice(..));
+                pass.draw(0..self.unit_vertices, 0..shapes.len() as u32);
+            }
+            drop(pass);
+            encoder.finish()
+        })?;
+        self.context.queue.submit([commands]);
+        Ok(&targets.picture)
+    }
+}
+
+/// The light comes from above the eye's right shoulder, and goes with it.
+fn view(size: [u32; 2], camera: &Camera, look: &Look, surface: Option<&Surface>) -> View {
+    let [right, up] = camera.right_and_up();
+    let light = (0.45 * right + 0.75 * up + 0.65 * camera.backward()).normalize_or_zero();
+    let map = ColourMap::Pale { low: 0.0, high: 1.0 };
+    let stop = |number: usize| {
+        let [red, green, blue] = map.colour(number as f64 / 4.0).rgb.map(|channel| f32::from(channel) / 255.0);
+        [red, green, blue, 1.0]
+    };
+    View {
+        clip: camera.clip(size[0] as f32 / size[1] as f32).to_cols_array_2d(),
+        eye: camera.eye().extend(1.0).to_array(),
+        light: light.extend(0.0).to_array(),
+        stops: std::array::from_fn(stop),
+        colour_top: look.colour_top,
+        edge_width: look.edge_width,
+        nodes: surface.map_or(0, |surface| surface.nodes),
+        triangles: surface.map_or(0, |surface| surface.triangles),
+        quantity: u32::from(look.quantity == Quantity::Force),
+        padding: [0; 3],
+    }
+}
+
+impl Targets {
+    fn new(context: &Context, size: [u32; 2]) -> Result<Self, GpuError> {
+        context.scoped(|device| {
+            let texture = |label, format, sample_count, usage| {
+                device.create_texture(&wgpu::TextureDescriptor {
+                    label: Some(label),
+                    size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+                    mip_level_count: 1,
+                    sample_count,
+                    dimension: wgpu::TextureDimension::D2,
+                    format,
+                    usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
+                    view_formats: &[],
+                })
+            };
+            let none = wgpu::TextureUsages::empty();
+            let shown = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+            Self {
+                size,
+                samples: texture("scene samples", FORMAT, SAMPLES, none).create_view(&Default::default()),
+                depth: texture("scene depth", DEPTH, SAMPLES, none).create_view(&Default::default()),
+                picture: texture("scene picture", FORMAT, 1, shown),
+            }
+        })
+    }
+
+    fn begin<'encoder>(
+        &self,
+        encoder: &'encoder mut wgpu::CommandEncoder,
+        background: [f32; 3],
+    ) -> wgpu::RenderPass<'encoder> {
+        let picture = self.picture.create_view(&Default::default());
+        let [r, g, b] = background.map(f64::from);
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("scene"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.samples,
+                resolve_target: Some(&picture),
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
+                    store: wgpu::StoreOp::Discard,
+                },
+                depth_slice: None,
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth,
+                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(1.0), store: wgpu::StoreOp::Discard }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        })
+    }
+}
