@@ -72,7 +72,7 @@ fn rate(scene: &Scene) -> Result<Sweep, Box<dyn Error>> {
     let configurations: Vec<JointVector> = (0..grid.points()).map(|point| grid.configuration(point)).collect();
     let mut backend = CpuBackend::new(&model, 0)?;
     let start = Instant::now();
-    let free_space = FreeSpace::find(&model, &grid)?;
+    let free_space = FreeSpace::new(&model, &grid).find(0..grid.points())?;
     let left: Vec<JointVector> =
         (0..grid.points()).filter(|&p| free_space.gap(p).is_none()).map(|p| configurations[p]).collect();
     let equilibria = backend.solve(&left)?;
@@ -218,7 +218,7 @@ fn curves(root: &Path, scene: &Scene) -> Result<(), Box<dyn Error>> {
     for finer in [1, 2, 3, 5] {
         let grid = grid_of(finer);
         let start = Instant::now();
-        let free_space = FreeSpace::find(&model, &grid)?;
+        let free_space = FreeSpace::new(&model, &grid).find(0..grid.points())?;
         let found = start.elapsed().as_secs_f64();
         let mut proximity = Proximity::new(&model);
         let left = (0..grid.points()).filter(|&p| free_space.gap(p).is_none()).map(|p| grid.configuration(p));

@@ -1,15 +1,13 @@
 //! `haptize bake`: a scene haptized into a dataset.
 
-use super::{Failure, Report};
+use super::{Failure, Report, bar::bar};
 use haptize::{
-    dataset::Dataset,
-    haptize::{BackendChoice, Bake, BakeError, Iterations, Progress, SweepReport},
+    haptize::{BackendChoice, Bake, BakeError, Bounds, Footprint, Iterations, Progress, SweepReport},
     scene::{Algorithm, Scene},
 };
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use std::{
     fmt::{self, Write},
-    io::{IsTerminal, stderr},
     path::{Path, PathBuf},
     sync::{Arc, atomic::AtomicBool, atomic::Ordering},
     time::SystemTime,
@@ -49,7 +47,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             .with_extension("haptize"),
     };
     let bake = |bake: Bake<'_>| bake.to_file(&output, arguments.resume);
-    let (_, report) = watched(&scene, arguments.backend, bake)?;
+    let report = watched(&scene, arguments.backend, bake)?;
+    warn(&report);
     let mut json = serde_json::to_value(&report)?;
     json["file"] = output.display().to_string().into();
     let mut text = String::new();
@@ -59,12 +58,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
 }
 
 /// Runs `bake`, dated now, with a progress bar. Ctrl-C stops it after the configurations at hand; afterwards, or again,
-/// Ctrl-C ends the program at once. Warnings go to standard error.
-pub fn watched(
+/// Ctrl-C ends the program at once.
+pub fn watched<T>(
     scene: &Scene,
     backend: BackendChoice,
-    bake: impl FnOnce(Bake<'_>) -> Result<(Dataset, SweepReport), BakeError>,
-) -> Result<(Dataset, SweepReport), Failure> {
+    bake: impl FnOnce(Bake<'_>) -> Result<T, BakeError>,
+) -> Result<T, Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = stop.clone();
     ctrlc::set_handler(move || {
@@ -72,7 +71,7 @@ pub fn watched(
             std::process::exit(INTERRUPTED);
         }
     })?;
-    let bar = progress_bar();
+    let bar = bar(0, "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     let mut announced = false;
     let mut progress = |progress: Progress| {
         if !std::mem::replace(&mut announced, true) {
@@ -84,9 +83,12 @@ pub fn watched(
     let result = bake(Bake { scene, backend, date: &date, stop: &stop, progress: &mut progress });
     bar.finish_and_clear();
     stop.store(true, Ordering::Relaxed);
-    let (dataset, report) = result?;
+    Ok(result?)
+}
+
+/// Tells on standard error what was noticed on the way.
+pub fn warn(report: &SweepReport) {
     report.warnings.iter().for_each(|warning| eprintln!("haptize: {warning}"));
-    Ok((dataset, report))
 }
 
 /// What was baked into `file`, for people.
@@ -108,25 +110,20 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport) -> fmt::Re
     )
 }
 
-/// A bar on standard error, hidden where that is no terminal.
-fn progress_bar() -> ProgressBar {
-    if !stderr().is_terminal() {
-        return ProgressBar::hidden();
-    }
-    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} points, {msg}, {eta} left");
-    ProgressBar::new(0).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-}
-
 /// What the sweep is going to take, before it begins.
 fn announce(progress: &Progress) {
-    let megabytes = |bytes: usize| (bytes as f64 / 1e6).ceil();
-    let Progress { points, done, memory, .. } = progress;
-    eprintln!(
-        "haptize: {points} points, {done} of them done; their results take {} MB of memory, and {} MB if every node of the \
-         proxy touched everywhere",
-        megabytes(memory.least),
-        megabytes(memory.most)
-    );
+    let range = |Bounds { least, most }| format!("{} to {}", megabytes(least), megabytes(most));
+    let Progress { points, done, footprint: Footprint { memory, disk }, .. } = progress;
+    let disk = match disk.most {
+        0 => String::new(),
+        _ => format!(", {} of disk (for a moment at the end twice that)", range(*disk)),
+    };
+    eprintln!("haptize: {points} points, {done} of them done; {} of memory beside the object's{disk}", range(*memory));
+}
+
+/// Rounded up, with unit.
+fn megabytes(bytes: usize) -> String {
+    format!("{} MB", (bytes as f64 / 1e6).ceil())
 }
 
 fn show(bar: &ProgressBar, progress: Progress) {

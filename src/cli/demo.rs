@@ -27,6 +27,7 @@ pub fn run() -> Result<Report, Failure> {
 
     eprintln!("haptizing the sphere, contact at {} configurations ...", points(&scene));
     let (baked, sweep) = bake::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
+    bake::warn(&sweep);
     baked.save(&file)?;
     let dataset = Dataset::open(&file)?;
 

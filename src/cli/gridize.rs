@@ -1,6 +1,6 @@
 //! `haptize gridize`: scattered measurements made a dataset over a uniform grid.
 
-use super::{Failure, Report};
+use super::{Failure, Report, bar::bar};
 use haptize::{
     dataset::Dataset,
     haptize::{
@@ -16,10 +16,8 @@ use haptize::{
     },
     scene::{Rendering, ScanScene},
 };
-use indicatif::{ProgressBar, ProgressStyle};
 use std::{
     fmt::{self, Write},
-    io::{IsTerminal, stderr},
     path::PathBuf,
     time::{Instant, SystemTime},
 };
@@ -183,10 +181,7 @@ fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
 
 fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
     let total = total_size(logs);
-    let bar = if stderr().is_terminal() { ProgressBar::new(total) } else { ProgressBar::hidden() };
-    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {bytes}/{total_bytes}, {msg}, {eta} left") {
-        bar.set_style(style);
-    }
+    let bar = bar(total, "{wide_bar} {bytes}/{total_bytes}, {msg}, {eta} left");
     let mut progress = |progress: ImportProgress| {
         bar.set_position(progress.bytes);
         bar.set_message(format!("{} rows", progress.rows));

@@ -12,6 +12,7 @@
 
 mod accuracy;
 mod bake;
+mod bar;
 mod demo;
 mod doctor;
 mod export;

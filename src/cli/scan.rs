@@ -1,6 +1,6 @@
 //! `haptize scan`: a real object haptized by touching it. The rig that ships is simulated, and says so.
 
-use super::{Failure, Report};
+use super::{Failure, Report, bar::bar};
 use haptize::{
     JointVector,
     haptize::scan::{
@@ -10,9 +10,7 @@ use haptize::{
     proxy::Chain,
     scene::ScanScene,
 };
-use indicatif::{ProgressBar, ProgressStyle};
 use std::{
-    io::{IsTerminal, stderr},
     path::PathBuf,
     sync::{Arc, atomic::AtomicBool, atomic::Ordering},
 };
@@ -74,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let flag = stop.clone();
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))?;
     eprintln!("haptize: {}", rig.description());
-    let bar = progress_bar();
+    let bar = bar(0, "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     let mut progress = |progress: ScanProgress| {
         bar.set_length(progress.points as u64);
         bar.set_position(progress.done as u64);
@@ -126,13 +124,4 @@ fn describe(output: &std::path::Path, report: &ScanReport) -> String {
         }
     }
     text
-}
-
-/// A bar on standard error, hidden where that is no terminal.
-fn progress_bar() -> ProgressBar {
-    if !stderr().is_terminal() {
-        return ProgressBar::hidden();
-    }
-    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} points, {msg}, {eta} left");
-    ProgressBar::new(0).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

@@ -1,16 +1,11 @@
 //! `haptize stability`: the hard cases of contact, gridization, loops and graphics, on this machine and its adapter.
 
-use super::{Failure, Report};
+use super::{Failure, Report, bar::bar};
 use haptize::{
     gpu::{AdapterChoice, Context},
     report::stability::{Bound, Case, Effort, Outcome, Setting, cases, table},
 };
-use indicatif::{ProgressBar, ProgressStyle};
-use std::{
-    io::{IsTerminal, stderr},
-    sync::Arc,
-    time::Instant,
-};
+use std::{sync::Arc, time::Instant};
 
 /// Which cases, on what.
 #[derive(clap::Args)]
@@ -31,7 +26,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let (gpu, adapter) = adapter(arguments.no_gpu);
     let effort = if arguments.sample { Effort::Sample } else { Effort::Full };
     let setting = Setting { effort, gpu };
-    let bar = progress_bar(cases.len() as u64);
+    let bar = bar(cases.len() as u64, "{wide_bar} {pos}/{len} cases, {msg}, {elapsed}");
     let started = Instant::now();
     let mut outcomes = Vec::new();
     for case in &cases {
@@ -102,13 +97,4 @@ fn not_run(case: &Case, error: &Failure) -> Outcome {
         bound: Bound::AtMost(0.0),
         note: error.to_string(),
     }
-}
-
-/// A bar on standard error, hidden where that is no terminal.
-fn progress_bar(cases: u64) -> ProgressBar {
-    if !stderr().is_terminal() {
-        return ProgressBar::hidden();
-    }
-    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} cases, {msg}, {elapsed}");
-    ProgressBar::new(cases).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

@@ -10,7 +10,7 @@ use std::{
 };
 
 /// Buffer between the writer and the file [bytes].
-const BUFFER: usize = 1 << 20;
+pub(crate) const BUFFER: usize = 1 << 20;
 
 /// Replaces the file at `path` by what `write` writes.
 ///

@@ -5,8 +5,10 @@ use memmap2::Mmap;
 use std::{ops::Deref, ops::Range, sync::Arc};
 
 /// A read-only slice of `T` that owns its memory or shares a mapped file.
+#[derive(Clone)]
 pub struct Column<T: Pod>(Storage<T>);
 
+#[derive(Clone)]
 enum Storage<T> {
     Owned(Vec<T>),
     Mapped { map: Arc<Mmap>, bytes: Range<usize> },

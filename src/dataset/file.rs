@@ -27,11 +27,15 @@
 //! A mapped file must not be cut short by anyone while it is open: the system then kills the reader (SIGBUS). Programs
 //! of this crate never do that, they rename; the haptic loop reads through [`Dataset::load`], which copies.
 
-use super::{Column, Contacts, Dataset, Error, Surface, check, replace_file};
+use super::{Column, Contacts, Dataset, Error, Grid, Provenance, Surface, check, replace_file};
 use bytemuck::Pod;
 use safetensors::{Dtype, tensor::TensorInfo};
 use serde::Serialize;
-use std::{collections::BTreeMap, io::Write, path::Path};
+use std::{
+    collections::BTreeMap,
+    io::{self, Seek, SeekFrom, Write},
+    path::Path,
+};
 
 #[cfg(target_endian = "big")]
 compile_error!("dataset columns are read where they lie, which needs a little-endian machine");
@@ -73,7 +77,7 @@ struct Metadata {
 }
 
 /// A number type that a tensor may hold.
-pub(super) trait Element: Pod {
+pub(crate) trait Element: Pod {
     const DTYPE: Dtype;
 }
 
@@ -84,49 +88,65 @@ macro_rules! element {
 }
 element!(f64 => F64, u64 => U64, f32 => F32, u32 => U32, u8 => U8);
 
-/// A tensor about to be written; `bytes` is aligned to its type.
-pub(super) struct Tensor<'a> {
+/// A tensor about to be written.
+pub(crate) struct Tensor<C> {
     pub(super) name: &'static str,
     pub(super) dtype: Dtype,
     pub(super) shape: Vec<usize>,
-    pub(super) bytes: &'a [u8],
+    pub(super) contents: C,
 }
 
-impl<'a> Tensor<'a> {
-    fn new<T: Element>(name: &'static str, shape: Vec<usize>, column: &'a Column<T>) -> Self {
-        Self { name, dtype: T::DTYPE, shape, bytes: bytemuck::cast_slice(column) }
+/// Where a tensor's numbers come from.
+pub(crate) trait Contents {
+    /// Writes them, little-endian.
+    fn write(&self, writer: &mut impl Write) -> io::Result<()>;
+}
+
+/// Numbers in memory, aligned to their type.
+impl Contents for &[u8] {
+    fn write(&self, writer: &mut impl Write) -> io::Result<()> {
+        writer.write_all(self)
     }
 }
 
-/// All tensors of a dataset, widest type first.
-pub(super) fn tensors(dataset: &Dataset) -> Vec<Tensor<'_>> {
+impl<C> Tensor<C> {
+    /// A tensor of `T`.
+    pub(crate) fn new<T: Element>(name: &'static str, shape: Vec<usize>, contents: C) -> Self {
+        Self { name, dtype: T::DTYPE, shape, contents }
+    }
+
+    fn bytes(&self) -> usize {
+        self.shape.iter().product::<usize>() * self.dtype.bitsize() / 8
+    }
+}
+
+/// All tensors of a dataset.
+pub(super) fn tensors(dataset: &Dataset) -> Vec<Tensor<&[u8]>> {
+    fn tensor<'a, T: Element>(name: &'static str, shape: &[usize], column: &'a Column<T>) -> Tensor<&'a [u8]> {
+        Tensor::new::<T>(name, shape.to_vec(), bytemuck::cast_slice(column))
+    }
     let grid = dataset.grid.counts();
-    let mut torque_shape = grid.clone();
-    torque_shape.push(dataset.grid.joints());
-    let mut tensors = vec![
-        Tensor::new("torque", torque_shape, &dataset.torque),
-        Tensor::new("status", grid.clone(), &dataset.status),
-    ];
-    tensors.extend(dataset.energy.as_ref().map(|column| Tensor::new("energy", grid.clone(), column)));
-    tensors.extend(dataset.gap.as_ref().map(|column| Tensor::new("gap", grid.clone(), column)));
-    tensors.extend(dataset.residual.as_ref().map(|column| Tensor::new("residual", grid.clone(), column)));
-    tensors.extend(dataset.iterations.as_ref().map(|column| Tensor::new("iterations", grid.clone(), column)));
+    let torque_shape = [&grid[..], &[dataset.grid.joints()]].concat();
+    let mut tensors = vec![tensor("torque", &torque_shape, &dataset.torque), tensor("status", &grid, &dataset.status)];
+    tensors.extend(dataset.energy.as_ref().map(|column| tensor("energy", &grid, column)));
+    tensors.extend(dataset.gap.as_ref().map(|column| tensor("gap", &grid, column)));
+    tensors.extend(dataset.residual.as_ref().map(|column| tensor("residual", &grid, column)));
+    tensors.extend(dataset.iterations.as_ref().map(|column| tensor("iterations", &grid, column)));
     if let Some(Contacts { offsets, nodes, forces }) = &dataset.contacts {
-        tensors.push(Tensor::new("contact_offsets", vec![offsets.len()], offsets));
-        tensors.push(Tensor::new("contact_nodes", vec![nodes.len()], nodes));
-        tensors.push(Tensor::new("contact_forces", vec![nodes.len(), 3], forces));
+        tensors.push(tensor("contact_offsets", &[offsets.len()], offsets));
+        tensors.push(tensor("contact_nodes", &[nodes.len()], nodes));
+        tensors.push(tensor("contact_forces", &[nodes.len(), 3], forces));
     }
     if let Some(Surface { nodes, triangles }) = &dataset.surface {
-        tensors.push(Tensor::new("surface_nodes", vec![nodes.len() / 3, 3], nodes));
-        tensors.push(Tensor::new("surface_triangles", vec![triangles.len() / 3, 3], triangles));
+        tensors.push(tensor("surface_nodes", &[nodes.len() / 3, 3], nodes));
+        tensors.push(tensor("surface_triangles", &[triangles.len() / 3, 3], triangles));
     }
-    tensors.sort_by_key(|tensor| std::cmp::Reverse(tensor.dtype.bitsize()));
     tensors
 }
 
 /// Memory of all columns [bytes].
 pub(super) fn bytes(dataset: &Dataset) -> usize {
-    tensors(dataset).iter().map(|tensor| tensor.bytes.len()).sum()
+    tensors(dataset).iter().map(Tensor::bytes).sum()
 }
 
 impl Dataset {
@@ -135,41 +155,85 @@ impl Dataset {
     /// # Errors
     /// [`Error::Inconsistent`] when it would be refused on reading, [`Error::Write`] from the system.
     pub fn save(&self, path: &Path) -> Result<(), Error> {
-        let inconsistent = |reason| Error::Inconsistent { path: path.into(), reason };
-        check::check(self).map_err(inconsistent)?;
-        let tensors = tensors(self);
-        let mut text = header(self, &tensors).map_err(|error| inconsistent(error.to_string()))?;
-        text.resize((LENGTH + text.len()).next_multiple_of(PAGE) - LENGTH, b' ');
-        if text.len() > MAX_HEADER {
-            return Err(inconsistent(format!("its header, scene included, is longer than {MAX_HEADER} bytes")));
-        }
-        let mut opening = [(text.len() as u64).to_le_bytes().as_slice(), &text].concat();
-        let mut hasher = crc32fast::Hasher::new();
-        hasher.update(&opening);
-        tensors.iter().for_each(|tensor| hasher.update(tensor.bytes));
-        opening[CHECKSUM..CHECKSUM + NO_CHECKSUM.len()].copy_from_slice(digits(hasher).as_bytes());
-        replace_file(path, |writer| {
-            writer.write_all(&opening)?;
-            tensors.iter().try_for_each(|tensor| writer.write_all(tensor.bytes))
-        })
-        .map_err(|source| Error::Write { path: path.into(), source })
+        check::check(self).map_err(|reason| Error::Inconsistent { path: path.into(), reason })?;
+        let heading = Heading { grid: &self.grid, provenance: &self.provenance, scene: &self.scene };
+        write_file(path, heading, tensors(self))
     }
 }
 
-fn header(dataset: &Dataset, tensors: &[Tensor<'_>]) -> serde_json::Result<Vec<u8>> {
+/// What the header tells beside the tensors.
+#[derive(Clone, Copy)]
+pub(crate) struct Heading<'a> {
+    pub(crate) grid: &'a Grid,
+    pub(crate) provenance: &'a Provenance,
+    pub(crate) scene: &'a str,
+}
+
+/// Writes a dataset's file, replacing the one at `path` whole or not at all. The tensors are as in the table above, in any order.
+pub(crate) fn write_file<C: Contents>(
+    path: &Path,
+    heading: Heading<'_>,
+    mut tensors: Vec<Tensor<C>>,
+) -> Result<(), Error> {
+    let inconsistent = |reason| Error::Inconsistent { path: path.into(), reason };
+    tensors.sort_by_key(|tensor| std::cmp::Reverse(tensor.dtype.bitsize()));
+    let mut text = header(heading, &tensors).map_err(|error| inconsistent(error.to_string()))?;
+    text.resize((LENGTH + text.len()).next_multiple_of(PAGE) - LENGTH, b' ');
+    if text.len() > MAX_HEADER {
+        return Err(inconsistent(format!("its header, scene included, is longer than {MAX_HEADER} bytes")));
+    }
+    replace_file(path, |writer| {
+        let mut hashed = Hashed { writer: &mut *writer, hasher: crc32fast::Hasher::new(), bytes: 0 };
+        hashed.write_all(&(text.len() as u64).to_le_bytes())?;
+        hashed.write_all(&text)?;
+        for tensor in &tensors {
+            let end = hashed.bytes + tensor.bytes();
+            tensor.contents.write(&mut hashed)?;
+            if hashed.bytes != end {
+                return Err(io::Error::other(format!("tensor {} changed its length meanwhile", tensor.name)));
+            }
+        }
+        let checksum = digits(hashed.hasher);
+        writer.seek(SeekFrom::Start(CHECKSUM as u64))?;
+        writer.write_all(checksum.as_bytes())
+    })
+    .map_err(|source| Error::Write { path: path.into(), source })
+}
+
+/// Counts what goes through, and takes its checksum.
+struct Hashed<W> {
+    writer: W,
+    hasher: crc32fast::Hasher,
+    bytes: usize,
+}
+
+impl<W: Write> Write for Hashed<W> {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let count = self.writer.write(buffer)?;
+        self.hasher.update(&buffer[..count]);
+        self.bytes += count;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+fn header<C>(heading: Heading<'_>, tensors: &[Tensor<C>]) -> serde_json::Result<Vec<u8>> {
     let mut end = 0;
     let infos = tensors.iter().map(|tensor| {
         let start = end;
-        end += tensor.bytes.len();
+        end += tensor.bytes();
         (tensor.name, TensorInfo { dtype: tensor.dtype, shape: tensor.shape.clone(), data_offsets: (start, end) })
     });
     serde_json::to_vec(&Header {
         metadata: Metadata {
             checksum: NO_CHECKSUM.into(),
             format: FORMAT.into(),
-            grid: serde_json::to_string(&dataset.grid)?,
-            provenance: serde_json::to_string(&dataset.provenance)?,
-            scene: dataset.scene.clone(),
+            grid: serde_json::to_string(heading.grid)?,
+            provenance: serde_json::to_string(heading.provenance)?,
+            scene: heading.scene.into(),
         },
         tensors: infos.collect(),
     })

@@ -15,10 +15,12 @@ mod grid;
 mod read;
 mod summary;
 
+pub(crate) use atomic::BUFFER;
 pub use atomic::replace_file;
 pub use column::Column;
 pub use error::Error;
 pub use export::Format;
+pub(crate) use file::{Contents as TensorContents, Heading, Tensor, write_file};
 pub use grid::{Axis, Grid};
 pub use summary::{StatusCounts, Summary};
 
@@ -63,6 +65,7 @@ pub struct Contacts {
 }
 
 /// The object's surface at rest.
+#[derive(Clone)]
 pub struct Surface {
     /// Three numbers a node [m].
     pub nodes: Column<f64>,

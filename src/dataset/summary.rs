@@ -51,20 +51,31 @@ pub struct StatusCounts {
     pub outside: usize,
 }
 
+impl StatusCounts {
+    /// Counts a point of `status`.
+    pub fn add(&mut self, status: Status) {
+        *match status {
+            Status::Free => &mut self.free,
+            Status::Contact => &mut self.contact,
+            Status::Unconverged => &mut self.unconverged,
+            Status::Overflow => &mut self.overflow,
+            Status::Outside => &mut self.outside,
+        } += 1;
+    }
+
+    /// Points at which something touches, converged or not.
+    #[must_use]
+    pub fn in_contact(&self) -> usize {
+        self.contact + self.unconverged + self.overflow
+    }
+}
+
 impl Dataset {
     /// Number of points of each status.
     #[must_use]
     pub fn status_counts(&self) -> StatusCounts {
         let mut counts = StatusCounts::default();
-        for point in 0..self.status.len() {
-            *match self.status(point) {
-                Status::Free => &mut counts.free,
-                Status::Contact => &mut counts.contact,
-                Status::Unconverged => &mut counts.unconverged,
-                Status::Overflow => &mut counts.overflow,
-                Status::Outside => &mut counts.outside,
-            } += 1;
-        }
+        (0..self.status.len()).for_each(|point| counts.add(self.status(point)));
         counts
     }
 

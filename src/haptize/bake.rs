@@ -39,20 +39,13 @@ pub struct Bake<'a> {
     pub progress: &'a mut dyn FnMut(Progress),
 }
 
-/// Where the dataset goes.
-#[derive(Clone, Copy)]
-enum Destination<'a> {
-    Memory,
-    File { output: &'a Path, resume: bool },
-}
-
 impl Bake<'_> {
-    /// Haptizes into the file `output`; see [`Sweep::bake`].
+    /// Haptizes into the file `output`, in memory that does not grow with the grid; see [`Sweep::bake`].
     ///
     /// # Errors
     /// Any [`BakeError`].
-    pub fn to_file(self, output: &Path, resume: bool) -> Result<(Dataset, SweepReport), BakeError> {
-        self.run(Destination::File { output, resume })
+    pub fn to_file(self, output: &Path, resume: bool) -> Result<SweepReport, BakeError> {
+        self.with(|sweep, backend, run| sweep.bake(backend, output, resume, run))
     }
 
     /// Haptizes in memory.
@@ -60,10 +53,13 @@ impl Bake<'_> {
     /// # Errors
     /// Any [`BakeError`].
     pub fn in_memory(self) -> Result<(Dataset, SweepReport), BakeError> {
-        self.run(Destination::Memory)
+        self.with(|sweep, backend, run| sweep.run(backend, run))
     }
 
-    fn run(self, destination: Destination<'_>) -> Result<(Dataset, SweepReport), BakeError> {
+    fn with<T>(
+        self,
+        sweep_with: impl FnOnce(&Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, SweepError>,
+    ) -> Result<T, BakeError> {
         let Self { scene, backend, date, stop, progress } = self;
         let object = Object::build(&scene.object)?;
         let chain = Chain::new(&scene.proxy);
@@ -72,10 +68,7 @@ impl Bake<'_> {
         let mut sweep = Sweep::new(scene, &object, backend.name(), &backend.adapter(), date)?;
         sweep.skip_free_space(&model)?;
         let run = Run { chunk: backend.chunk(), stop, progress };
-        Ok(match destination {
-            Destination::Memory => sweep.run(&mut backend, run),
-            Destination::File { output, resume } => sweep.bake(&mut backend, output, resume, run),
-        }?)
+        Ok(sweep_with(&sweep, &mut backend, run)?)
     }
 }
 

@@ -1,6 +1,4 @@
-//! Columns that grow as a sweep goes on, and their form as one block of bytes.
-//!
-//! A block is a chunk of consecutive grid points:
+//! Results of consecutive grid points as columns, and their form as one block of bytes.
 //!
 //! ```text
 //! u64 first point, u64 points p, u64 contacts c
@@ -10,11 +8,16 @@
 
 use crate::contact::{Equilibrium, Status};
 use bytemuck::Pod;
+use std::collections::TryReserveError;
 
-/// Bytes of a point without torque and contacts: energy, contacts, gap, residual, iterations, status.
-const POINT: usize = 8 + 8 + 4 + 4 + 4 + 1;
-/// Bytes of a contact: node and force.
-const CONTACT: usize = 4 + 12;
+/// What every point of a sweep has.
+#[derive(Clone, Copy)]
+pub(super) struct Shape {
+    pub joints: usize,
+    pub surface_nodes: usize,
+    /// Whether contact forces are stored.
+    pub with_forces: bool,
+}
 
 /// Results of consecutive grid points. Field by field as in [`crate::dataset::Dataset`].
 #[derive(Default)]
@@ -31,9 +34,66 @@ pub(super) struct Columns {
     pub forces: Vec<f32>,
 }
 
+/// The columns of a block, in their order there.
+#[derive(Clone, Copy)]
+pub(super) enum Section {
+    Torque,
+    Energy,
+    Contacts,
+    Gap,
+    Residual,
+    Iterations,
+    Nodes,
+    Forces,
+    Status,
+}
+
+/// How a block begins.
+#[derive(Clone, Copy)]
+pub(super) struct Opening {
+    /// Number of the first point.
+    pub first: usize,
+    pub points: usize,
+    pub contacts: usize,
+}
+
+impl Opening {
+    /// Length [bytes].
+    pub const BYTES: usize = 3 * 8;
+
+    /// Reads it; `None` where its numbers cannot be counted to.
+    pub fn of(bytes: [u8; Self::BYTES]) -> Option<Self> {
+        let mut rest = &bytes[..];
+        let mut number = || usize::try_from(take::<u64>(&mut rest, 1)?[0]).ok();
+        Some(Self { first: number()?, points: number()?, contacts: number()? })
+    }
+
+    fn bytes(self) -> [[u8; 8]; 3] {
+        [self.first, self.points, self.contacts].map(|count| (count as u64).to_le_bytes())
+    }
+
+    /// Lengths of the columns behind it, by [`Section`] [bytes].
+    fn lengths(self, joints: usize) -> [usize; 9] {
+        let Self { points: p, contacts: c, .. } = self;
+        [(p, joints * 8), (p, 8), (p, 8), (p, 4), (p, 4), (p, 4), (c, 4), (c, 12), (p, 1)]
+            .map(|(count, size)| count.saturating_mul(size))
+    }
+
+    /// Where a column begins behind it, and its length [bytes].
+    pub fn place(self, section: Section, joints: usize) -> (usize, usize) {
+        let lengths = self.lengths(joints);
+        (lengths[..section as usize].iter().sum(), lengths[section as usize])
+    }
+
+    /// Length of all columns behind it [bytes].
+    pub fn columns(self, joints: usize) -> usize {
+        self.lengths(joints).into_iter().fold(0, usize::saturating_add)
+    }
+}
+
 impl Columns {
     /// Room for `points` points of `joints` joints, contacts aside; an error where there is no such memory.
-    pub fn with_room(points: usize, joints: usize) -> Result<Self, std::collections::TryReserveError> {
+    pub fn with_room(points: usize, joints: usize) -> Result<Self, TryReserveError> {
         let mut columns = Self::default();
         columns.torque.try_reserve_exact(points.saturating_mul(joints))?;
         columns.energy.try_reserve_exact(points)?;
@@ -52,22 +112,37 @@ impl Columns {
 
     /// Bytes of `points` points of `joints` joints with `contacts` contacts in all.
     pub fn bytes(points: usize, joints: usize, contacts: usize) -> usize {
-        let point = joints.saturating_mul(8).saturating_add(POINT);
-        points.saturating_mul(point).saturating_add(contacts.saturating_mul(CONTACT))
+        Opening { first: 0, points, contacts }.columns(joints)
     }
 
-    /// Adds the equilibrium of the next point, its forces too if `with_forces`.
+    /// No points, in the room there is.
+    pub fn clear(&mut self) {
+        self.torque.clear();
+        self.energy.clear();
+        self.gap.clear();
+        self.residual.clear();
+        self.iterations.clear();
+        self.status.clear();
+        self.contacts.clear();
+        self.nodes.clear();
+        self.forces.clear();
+    }
+
+    /// Adds the equilibrium of the next point.
     ///
-    /// A result that no file may hold (a number that is not finite, torques of another chain) becomes an unconverged
-    /// point without torque and forces, of residual 1: the empty answer, which balances nothing.
-    pub fn push(&mut self, equilibrium: &Equilibrium, joints: usize, with_forces: bool) {
+    /// A result that no file may hold (a number that is not finite, torques of another chain, nodes that the surface does not
+    /// have or out of order) becomes an unconverged point without torque and forces, of residual 1: the empty answer, which
+    /// balances nothing.
+    pub fn push(&mut self, equilibrium: &Equilibrium, shape: Shape) {
         let Equilibrium { status, iterations, residual, energy, gap, torque, forces, touches: _ } = equilibrium;
-        let sound = torque.len() == joints
+        let sound = torque.len() == shape.joints
             && torque.is_finite()
             && energy.is_finite()
             && (*gap as f32).is_finite()
             && (*residual as f32).is_finite()
-            && forces.iter().all(|contact| contact.force.as_vec3().is_finite());
+            && forces.iter().all(|contact| contact.force.as_vec3().is_finite())
+            && forces.is_sorted_by(|a, b| a.node < b.node)
+            && forces.last().is_none_or(|last| (last.node as usize) < shape.surface_nodes);
         self.iterations.push(*iterations);
         if sound {
             self.torque.extend_from_slice(torque);
@@ -76,13 +151,13 @@ impl Columns {
             self.residual.push(*residual as f32);
             self.status.push(*status as u8);
         } else {
-            self.torque.resize(self.torque.len() + joints, 0.0);
+            self.torque.resize(self.torque.len() + shape.joints, 0.0);
             self.energy.push(0.0);
             self.gap.push(if (*gap as f32).is_finite() { *gap as f32 } else { 0.0 });
             self.residual.push(1.0);
             self.status.push(Status::Unconverged as u8);
         }
-        let stored = if sound && with_forces { forces.as_slice() } else { &[] };
+        let stored = if sound && shape.with_forces { forces.as_slice() } else { &[] };
         self.contacts.push(stored.len() as u64);
         for contact in stored {
             self.nodes.push(contact.node);
@@ -91,8 +166,8 @@ impl Columns {
     }
 
     /// Adds a point at which nothing touches and nothing was solved, with a lower bound of its gap [m].
-    pub fn push_free(&mut self, gap: f32, joints: usize) {
-        self.torque.resize(self.torque.len() + joints, 0.0);
+    pub fn push_free(&mut self, gap: f32, shape: Shape) {
+        self.torque.resize(self.torque.len() + shape.joints, 0.0);
         self.energy.push(0.0);
         self.gap.push(gap);
         self.residual.push(0.0);
@@ -102,7 +177,7 @@ impl Columns {
     }
 
     /// Adds the points of `chunk` behind these; an error where there is no memory for their contacts.
-    pub fn append(&mut self, chunk: &Self) -> Result<(), std::collections::TryReserveError> {
+    pub fn append(&mut self, chunk: &Self) -> Result<(), TryReserveError> {
         self.nodes.try_reserve(chunk.nodes.len())?;
         self.forces.try_reserve(chunk.forces.len())?;
         self.torque.extend_from_slice(&chunk.torque);
@@ -117,10 +192,10 @@ impl Columns {
         Ok(())
     }
 
-    /// The block of these points, of which the first has number `first`.
-    pub fn encode(&self, first: usize) -> Vec<u8> {
-        let opening = [first, self.points(), self.nodes.len()].map(|count| (count as u64).to_le_bytes());
-        let columns: [&[u8]; 9] = [
+    /// The opening of the block of these points, of which the first has number `first`, and its columns.
+    pub fn block(&self, first: usize) -> ([[u8; 8]; 3], [&[u8]; 9]) {
+        let opening = Opening { first, points: self.points(), contacts: self.nodes.len() };
+        let columns = [
             bytemuck::cast_slice(&self.torque),
             bytemuck::cast_slice(&self.energy),
             bytemuck::cast_slice(&self.contacts),
@@ -131,17 +206,17 @@ impl Columns {
             bytemuck::cast_slice(&self.forces),
             &self.status,
         ];
-        [opening.as_flattened(), &columns.concat()].concat()
+        (opening.bytes(), columns)
     }
 
     /// Reads the block of the points from number `first` on; `None` when it is none.
     pub fn decode(block: &[u8], first: usize, joints: usize) -> Option<Self> {
-        let mut rest = block;
-        let mut number = || usize::try_from(take::<u64>(&mut rest, 1)?[0]).ok();
-        let (found, points, contacts) = (number()?, number()?, number()?);
-        if found != first || rest.len() != Self::bytes(points, joints, contacts) {
+        let (opening, mut rest) = block.split_first_chunk()?;
+        let opening = Opening::of(*opening)?;
+        if opening.first != first || rest.len() != opening.columns(joints) {
             return None;
         }
+        let Opening { points, contacts, .. } = opening;
         let columns = Self {
             torque: take(&mut rest, points * joints)?,
             energy: take(&mut rest, points)?,

@@ -14,8 +14,8 @@ pub enum SweepError {
     #[error("the scene's grid: {0}; correct [[grid.axes]] in the scene")]
     Grid(String),
     /// The columns do not fit in memory.
-    #[error("the grid's {points} points need {} MB of memory ({source}); take a coarser grid, or continue on a \
-             machine with more memory with --resume", bytes / 1_000_000)]
+    #[error("the grid's {points} points need {} MB of memory ({source}); take a coarser grid, or haptize into a file \
+             (`haptize bake`), which takes little memory whatever the grid", bytes / 1_000_000)]
     Memory {
         /// Grid points.
         points: usize,
@@ -52,8 +52,24 @@ pub enum SweepError {
         /// Where they are kept.
         part: Option<PathBuf>,
     },
+    /// The part cannot be begun.
+    #[error(
+        "{path}: cannot be written: {source}; make the folder, or choose another output (-o) in one where you may write"
+    )]
+    Folder {
+        /// The part.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// There is a folder of the output's name.
+    #[error("{path}: is a folder; name a file in it (-o)")]
+    IsFolder {
+        /// The output.
+        path: PathBuf,
+    },
     /// The part cannot be read or written.
-    #[error("{path}: {source}; free some space or choose another folder, then continue with --resume")]
+    #[error("{path}: {source}; free some space, then continue with the same command and --resume")]
     Part {
         /// The part.
         path: PathBuf,
@@ -83,7 +99,7 @@ pub enum SweepError {
         difference: &'static str,
     },
     /// The finished dataset could not be written; its points are in the part.
-    #[error("{source}; all points are kept in {part}: continue with the same command and --resume")]
+    #[error("{source}; all points are kept in {part}: afterwards give the same command with --resume")]
     Dataset {
         /// Where the points are.
         part: PathBuf,

@@ -26,7 +26,11 @@ use crate::{
     tolerances::FREE_SPACE_ROUNDING,
 };
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::{
+    collections::TryReserveError,
+    ops::Range,
+    sync::atomic::{AtomicU32, Ordering},
+};
 
 /// Blocks that threads take one after the other have at most as many points: many more blocks than threads, and far fewer than
 /// points.
@@ -35,10 +39,23 @@ const SHARE: usize = 4096;
 /// Blocks of as many points are not cut any further: proving one of them free costs as much as the gaps of all of them do.
 const SMALLEST: usize = 4;
 
-/// What is known of every grid point's gap before anything is solved.
-pub struct FreeSpace {
+/// Most points for which bounds are kept at a time: four megabytes.
+const SLAB: usize = 1 << 20;
+
+/// Finds grid points that need no solve.
+pub struct FreeSpace<'a> {
+    model: &'a Model<'a>,
+    grid: &'a Grid,
+    reach: Reach,
+    /// Most points of a slab.
+    most: usize,
+}
+
+/// What is known of some grid points' gaps before anything is solved.
+pub struct FreeGaps {
+    first: usize,
     /// Bits of a positive lower bound of the gap [m]; of NaN where the point is to be solved.
-    gaps: Vec<AtomicU32>,
+    bounds: Vec<AtomicU32>,
 }
 
 /// Grid points `low..high` along each axis.
@@ -48,51 +65,96 @@ struct Block {
     high: [usize; MAX_JOINTS],
 }
 
-impl FreeSpace {
+impl<'a> FreeSpace<'a> {
     /// Grid steps around contact within which gaps are exact: the cells that touch contact, and their neighbours.
     pub const MARGIN: usize = 2;
 
-    /// Searches the grid for points at which nothing touches.
+    /// For `grid`, which has an axis for each joint of the chain of `model`.
+    #[must_use]
+    pub fn new(model: &'a Model<'a>, grid: &'a Grid) -> Self {
+        Self { model, grid, reach: Reach::new(model.chain, grid), most: SLAB }
+    }
+
+    /// The slab with `point`: whole lines of the grid that follow each other, cut from the grid alone, so that bounds can be
+    /// found slab by slab in bounded memory.
+    #[must_use]
+    pub fn slab(&self, point: usize) -> Range<usize> {
+        // Trailing axes whose lines all fit, and the axis before them, of whose lines some fit.
+        let (mut line, mut count) = (1, 1);
+        for axis in self.grid.axes.iter().rev() {
+            if line * axis.count > self.most {
+                count = axis.count;
+                break;
+            }
+            line *= axis.count;
+        }
+        let sheet = line * count;
+        // Slabs of equally many lines, as nearly as can be.
+        let lines = line * count.div_ceil(sheet.div_ceil(self.most).min(count));
+        let start = point / sheet * sheet;
+        let first = start + (point - start) / lines * lines;
+        first..(first + lines).min(start + sheet)
+    }
+
+    /// Most points of a slab.
+    pub(super) fn largest_slab(&self) -> usize {
+        self.slab(0).len()
+    }
+
+    /// Searches `points`, whole lines of the grid as in a slab, for those at which nothing touches.
     ///
     /// # Errors
     /// When there is no memory for four bytes a point.
-    pub fn find(model: &Model<'_>, grid: &Grid) -> Result<Self, std::collections::TryReserveError> {
-        let points = grid.points();
-        let mut gaps = Vec::new();
-        gaps.try_reserve_exact(points)?;
-        gaps.resize_with(points, || AtomicU32::new(f32::NAN.to_bits()));
-        let mut whole = Block { low: [0; MAX_JOINTS], high: [1; MAX_JOINTS] };
-        grid.axes.iter().zip(&mut whole.high).for_each(|(axis, high)| *high = axis.count);
-        let reach = Reach::new(model.chain, grid);
+    pub fn find(&self, points: Range<usize>) -> Result<FreeGaps, TryReserveError> {
+        let mut bounds = Vec::new();
+        bounds.try_reserve_exact(points.len())?;
+        bounds.resize_with(points.len(), || AtomicU32::new(f32::NAN.to_bits()));
+        let gaps = FreeGaps { first: points.start, bounds };
+        let Some(whole) = Block::of(self.grid, &points) else { return Ok(gaps) };
         let mut blocks = vec![whole];
         let mut shares = Vec::new();
         while let Some(block) = blocks.pop() {
             if block.points() <= SHARE {
                 shares.push(block);
             } else {
-                blocks.extend(block.halves(grid, &reach));
+                blocks.extend(block.halves(self.grid, &self.reach));
             }
         }
-        let scene = Scene { model, grid, reach: &reach, gaps: &gaps };
-        shares.par_iter().for_each_init(|| Proximity::new(model), |proximity, block| scene.search(proximity, *block));
-        Ok(Self { gaps })
+        shares
+            .par_iter()
+            .for_each_init(|| Proximity::new(self.model), |proximity, block| self.search(proximity, *block, &gaps));
+        Ok(gaps)
     }
+}
 
+impl FreeGaps {
     /// A positive lower bound of the gap at `point`, within `f32` rounding; `None` where the point is to be solved [m].
     #[must_use]
     pub fn gap(&self, point: usize) -> Option<f32> {
-        let gap = f32::from_bits(self.gaps.get(point)?.load(Ordering::Relaxed));
-        (!gap.is_nan()).then_some(gap)
+        let bits = self.bounds.get(point.checked_sub(self.first)?)?.load(Ordering::Relaxed);
+        Some(f32::from_bits(bits)).filter(|gap| !gap.is_nan())
     }
 
     /// Number of points that are skipped.
     #[must_use]
     pub fn skipped(&self) -> usize {
-        (0..self.gaps.len()).filter(|&point| self.gap(point).is_some()).count()
+        (self.first..self.first + self.bounds.len()).filter(|&point| self.gap(point).is_some()).count()
     }
 }
 
 impl Block {
+    /// The block of the points `points`, if they make one.
+    fn of(grid: &Grid, points: &Range<usize>) -> Option<Self> {
+        let (mut low, mut high) = ([0; MAX_JOINTS], [1; MAX_JOINTS]);
+        let (mut first, mut last) = (points.start, points.end.checked_sub(1)?);
+        for (j, axis) in grid.axes.iter().enumerate().rev() {
+            (low[j], high[j]) = (first % axis.count, last % axis.count + 1);
+            (first, last) = (first / axis.count, last / axis.count);
+        }
+        let ascends = low.iter().zip(&high).all(|(low, high)| low < high);
+        Some(Self { low, high }).filter(|block| ascends && first == 0 && last == 0 && block.points() == points.len())
+    }
+
     fn points(&self) -> usize {
         self.low.iter().zip(&self.high).map(|(low, high)| high - low).product()
     }
@@ -161,16 +223,8 @@ impl Reach {
     }
 }
 
-/// What the search knows.
-struct Scene<'a> {
-    model: &'a Model<'a>,
-    grid: &'a Grid,
-    reach: &'a Reach,
-    gaps: &'a [AtomicU32],
-}
-
-impl Scene<'_> {
-    fn search(&self, proximity: &mut Proximity<'_>, block: Block) {
+impl FreeSpace<'_> {
+    fn search(&self, proximity: &mut Proximity<'_>, block: Block, gaps: &FreeGaps) {
         if block.points() <= SMALLEST {
             return;
         }
@@ -200,9 +254,9 @@ impl Scene<'_> {
         }
         let rounding = FREE_SPACE_ROUNDING * (self.reach.length + self.model.extent);
         if least > rounding {
-            self.skip(block, &centre, gap - rounding, &slopes);
+            self.skip(block, &centre, gap - rounding, &slopes, gaps);
         } else if gap + farthest >= 0.0 {
-            block.halves(self.grid, self.reach).into_iter().for_each(|half| self.search(proximity, half));
+            block.halves(self.grid, &self.reach).into_iter().for_each(|half| self.search(proximity, half, gaps));
         }
     }
 
@@ -215,7 +269,7 @@ impl Scene<'_> {
     }
 
     /// Notes lower bounds of the gaps of a free block, whose centre has the gap `gap`.
-    fn skip(&self, block: Block, centre: &JointVector, gap: f64, slopes: &JointVector) {
+    fn skip(&self, block: Block, centre: &JointVector, gap: f64, slopes: &JointVector, gaps: &FreeGaps) {
         let joints = self.grid.joints();
         let mut index = block.low;
         loop {
@@ -227,7 +281,7 @@ impl Scene<'_> {
             }
             // Rounded towards zero, but not to it: the point is free.
             let bound = ((gap - motion) as f32).next_down().max(f32::MIN_POSITIVE);
-            self.gaps[point].store(bound.to_bits(), Ordering::Relaxed);
+            gaps.bounds[point - gaps.first].store(bound.to_bits(), Ordering::Relaxed);
             let Some(axis) = (0..joints).rev().find(|&j| index[j] + 1 < block.high[j]) else { return };
             index[axis] += 1;
             index[axis + 1..].copy_from_slice(&block.low[axis + 1..]);
@@ -291,6 +345,31 @@ mod tests {
         look(&Model::new(&object, &chain, scene.contact), sweep.grid())
     }
 
+    #[test]
+    fn slabs_follow_each_other_and_are_blocks() {
+        let mut cut = 0;
+        for seed in 0..8 {
+            with_model(&random_scene(seed), |model, grid| {
+                for most in [1, 7, 16, 100, 600, 5000] {
+                    let free_space = FreeSpace { most, ..FreeSpace::new(model, grid) };
+                    let mut next = 0;
+                    while next < grid.points() {
+                        let slab = free_space.slab(next);
+                        assert!(slab.start == next && !slab.is_empty() && slab.len() <= most);
+                        assert_eq!(Block::of(grid, &slab).unwrap().points(), slab.len());
+                        assert_eq!(free_space.slab(slab.end - 1), slab);
+                        next = slab.end;
+                        cut += usize::from(slab.len() < grid.points());
+                    }
+                    assert_eq!(next, grid.points());
+                }
+                let lines = grid.axes[grid.joints() - 1].count;
+                assert!(grid.joints() == 1 || Block::of(grid, &(0..lines + 1)).is_none());
+            });
+        }
+        assert!(cut > 1000);
+    }
+
     /// Against the gap of every point: what is skipped is free, and stays so [`FreeSpace::MARGIN`] steps all round; what is
     /// stored is a lower bound.
     #[test]
@@ -298,14 +377,23 @@ mod tests {
         let (mut skipped, mut points, mut touching) = (0, 0, 0);
         for seed in 0..40 {
             with_model(&random_scene(seed), |model, grid| {
-                let free_space = FreeSpace::find(model, grid).unwrap();
+                // Every other scene slab by slab.
+                let most = if seed % 2 == 0 { grid.points() } else { 600 };
+                let free_space = FreeSpace { most, ..FreeSpace::new(model, grid) };
+                let mut slabs: Vec<FreeGaps> = Vec::new();
+                for point in 0..grid.points() {
+                    if slabs.last().is_none_or(|slab| slab.first + slab.bounds.len() <= point) {
+                        slabs.push(free_space.find(free_space.slab(point)).unwrap());
+                    }
+                }
+                let gap_at = |point: usize| slabs.iter().find_map(|slab| slab.gap(point));
                 let mut proximity = Proximity::new(model);
                 let counts = grid.counts();
                 let margin = FreeSpace::MARGIN as isize;
                 for point in 0..grid.points() {
                     let gap = proximity.gap(&grid.configuration(point));
                     points += 1;
-                    match free_space.gap(point) {
+                    match gap_at(point) {
                         Some(bound) => {
                             assert!(
                                 0.0 < bound && f64::from(bound) <= gap,
@@ -329,7 +417,7 @@ mod tests {
                                     inside &= (0..count as isize).contains(&line);
                                     neighbour = neighbour * count as isize + line;
                                 }
-                                assert!(!inside || free_space.gap(neighbour as usize).is_none(), "seed {seed}");
+                                assert!(!inside || gap_at(neighbour as usize).is_none(), "seed {seed}");
                             }
                         }
                         None => {}
@@ -346,8 +434,7 @@ mod tests {
         let mut sharpest = 0.0_f64;
         for seed in 0..40 {
             with_model(&random_scene(seed), |model, grid| {
-                let reach = Reach::new(model.chain, grid);
-                let scene = Scene { model, grid, reach: &reach, gaps: &[] };
+                let free_space = FreeSpace::new(model, grid);
                 let mut next = sequence(seed + 100);
                 let mut proximity = Proximity::new(model);
                 let joints = grid.joints();
@@ -366,7 +453,7 @@ mod tests {
                     for (node, there) in there.iter().enumerate() {
                         let moved = there.distance(proximity.pose().nodes[node]);
                         let bound: f64 = (0..=model.chain.nodes[node].link)
-                            .map(|j| scene.slope(&proximity, node, j, &wide) * (q[j] - centre[j]).abs())
+                            .map(|j| free_space.slope(&proximity, node, j, &wide) * (q[j] - centre[j]).abs())
                             .sum();
                         assert!(moved <= bound * (1.0 + 1e-12) + 1e-15, "seed {seed}: {moved} {bound}");
                         sharpest = sharpest.max(moved / bound.max(1e-9));

@@ -1,11 +1,14 @@
 //! Sweeps: a virtual object haptized over a grid in C-space.
 
+mod assembly;
 mod bake;
 mod choice;
+mod chunks;
 mod columns;
 mod cpu;
 mod error;
 mod fallback;
+mod footprint;
 mod free_space;
 pub mod gridize;
 pub mod import;
@@ -14,16 +17,18 @@ mod part;
 mod report;
 pub mod scan;
 mod sweep;
+mod tally;
 
 pub use bake::{Bake, BakeError, sample};
 pub use choice::{BackendChoice, BackendError, ChosenBackend};
 pub use cpu::CpuBackend;
 pub use error::SweepError;
 pub use fallback::WithFallback;
-pub use free_space::FreeSpace;
+pub use footprint::{Bounds, Footprint};
+pub use free_space::{FreeGaps, FreeSpace};
 pub use inspection::{Contact, Inspection, ObjectNode, ProxyNode};
 pub use report::{Iterations, SweepReport};
-pub use sweep::{Memory, Progress, Run, Sweep};
+pub use sweep::{Progress, Run, Sweep};
 
 use crate::{JointVector, contact::Equilibrium};
 

@@ -4,11 +4,15 @@
 //! "haptize part 1\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
 //! ```
 //!
-//! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`], or [`NOTICE`] and a text. Frames are only ever appended. What
-//! a crash leaves at the end (half a frame, or a wrong checksum) is cut off and computed again: a part never adds a wrong
+//! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`], or [`NOTICE`] and a text. Frames are only
+//! ever appended. What a crash leaves at the end (half a frame, or a wrong checksum) is cut off and computed again: a part never adds a wrong
 //! number to a dataset, and the finished file is the same, bit for bit, as without the interruption.
 
-use super::{SweepError, columns::Columns};
+use super::{
+    SweepError,
+    columns::{Columns, Opening, Section},
+    tally::Tally,
+};
 use crate::dataset::{Grid, Provenance};
 use serde::{Deserialize, Serialize};
 use std::{
@@ -20,6 +24,9 @@ use std::{
 const MAGIC: &[u8] = b"haptize part 1\n";
 /// Length and checksum before each body [bytes].
 const FRAME: usize = 8 + 4;
+
+/// Buffer for reading columns back [bytes].
+pub(super) const BUFFER: usize = 1 << 16;
 
 /// How the body of a notice begins: as no block of columns does, whose first point has no such number.
 const NOTICE: [u8; 8] = [u8::MAX; 8];
@@ -56,43 +63,63 @@ impl Binding {
 pub(super) struct Part {
     path: PathBuf,
     file: File,
+    /// Where the frame behind the binding begins [bytes].
+    results: u64,
+    /// Contact forces in all.
+    contacts: usize,
 }
 
 impl Part {
-    /// Begins a part at `path`, or with `resume` continues the one that is there; then its points are added to `columns`
-    /// and `binding` takes its date.
-    pub fn open(path: &Path, resume: bool, binding: &mut Binding, columns: &mut Columns) -> Result<Self, SweepError> {
+    /// Begins a part at `path`, or with `resume` continues the one that is there, and counts its points; `binding` then takes its
+    /// date and notices.
+    pub fn open(path: &Path, resume: bool, binding: &mut Binding) -> Result<(Self, Tally), SweepError> {
         let failed = |source| SweepError::Part { path: path.into(), source };
-        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(path)
+            .map_err(|source| SweepError::Folder { path: path.into(), source })?;
         match file.try_lock() {
             Ok(()) => (),
             Err(TryLockError::WouldBlock) => return Err(SweepError::Busy { path: path.into() }),
             // Some network file systems have no locks; only the second of two bakes at once would notice.
             Err(TryLockError::Error(_)) => (),
         }
-        let mut part = Self { path: path.into(), file };
-        if !(resume && part.read(binding, columns)?) {
-            part.begin(binding).map_err(failed)?;
+        let mut part = Self { path: path.into(), file, results: 0, contacts: 0 };
+        let found = if resume { part.read(binding)? } else { None };
+        match found {
+            Some(tally) => Ok((part, tally)),
+            None => part.begin(binding).map(|()| (part, Tally::default())).map_err(failed),
         }
-        Ok(part)
     }
 
     /// Adds a chunk whose first point has number `first`.
     pub fn append(&mut self, first: usize, chunk: &Columns) -> Result<(), SweepError> {
-        self.write(&chunk.encode(first)).map_err(|source| SweepError::Part { path: self.path.clone(), source })
+        let (opening, columns) = chunk.block(first);
+        let mut body = vec![opening.as_flattened()];
+        body.extend(columns);
+        self.write(&body).map_err(|source| SweepError::Part { path: self.path.clone(), source })?;
+        self.contacts += chunk.nodes.len();
+        Ok(())
     }
 
     /// Adds something that provenance will tell.
     pub fn note(&mut self, notice: &str) -> Result<(), SweepError> {
-        let body = [&NOTICE, notice.as_bytes()].concat();
-        self.write(&body).map_err(|source| SweepError::Part { path: self.path.clone(), source })
+        self.write(&[&NOTICE, notice.as_bytes()]).map_err(|source| SweepError::Part { path: self.path.clone(), source })
     }
 
     /// Removes the part, whose points are all in a finished file now.
     pub fn remove(self) -> Result<(), SweepError> {
-        let Self { path, file } = self;
+        let Self { path, file, .. } = self;
         drop(file);
         std::fs::remove_file(&path).map_err(|source| SweepError::Part { path, source })
+    }
+
+    /// Number of contact forces in it.
+    pub fn contacts(&self) -> usize {
+        self.contacts
     }
 
     /// Where it is.
@@ -104,17 +131,54 @@ impl Part {
         self.file.set_len(0)?;
         self.file.rewind()?;
         self.file.write_all(MAGIC)?;
-        self.write(&serde_json::to_vec(binding)?)
+        self.write(&[&serde_json::to_vec(binding)?])?;
+        self.results = self.file.stream_position()?;
+        Ok(())
     }
 
-    fn write(&mut self, body: &[u8]) -> io::Result<()> {
-        let length = (body.len() as u64).to_le_bytes();
-        let checksum = crc32fast::hash(body).to_le_bytes();
-        self.file.write_all(&[&length[..], &checksum, body].concat())
+    /// Appends a frame whose body comes in pieces.
+    fn write(&mut self, body: &[&[u8]]) -> io::Result<()> {
+        let length: usize = body.iter().map(|piece| piece.len()).sum();
+        let mut hasher = crc32fast::Hasher::new();
+        body.iter().for_each(|piece| hasher.update(piece));
+        self.file.write_all(&[&(length as u64).to_le_bytes()[..], &hasher.finalize().to_le_bytes()].concat())?;
+        body.iter().try_for_each(|piece| self.file.write_all(piece))
     }
 
-    /// Reads the part from its start, cuts off what is not whole, and leaves the file there; false when nothing is.
-    fn read(&mut self, binding: &mut Binding, columns: &mut Columns) -> Result<bool, SweepError> {
+    /// Hands the bytes of one column of all points, block by block, to `take`, which reads all of them.
+    pub fn column(
+        &self,
+        section: Section,
+        joints: usize,
+        take: &mut dyn FnMut(&mut dyn Read) -> io::Result<()>,
+    ) -> io::Result<()> {
+        let mut left = self.file.metadata()?.len().saturating_sub(self.results);
+        let mut reader = BufReader::with_capacity(BUFFER, &self.file);
+        reader.seek(SeekFrom::Start(self.results))?;
+        while left > 0 {
+            let (mut length, mut opening) = ([0; 8], [0; Opening::BYTES]);
+            reader.read_exact(&mut length)?;
+            reader.seek_relative((FRAME - length.len()) as i64)?;
+            let length = u64::from_le_bytes(length);
+            let (first, others) = opening.split_at_mut(NOTICE.len());
+            reader.read_exact(first)?;
+            let mut done = NOTICE.len();
+            if first != NOTICE {
+                reader.read_exact(others)?;
+                let opening = Opening::of(opening).ok_or(io::ErrorKind::InvalidData)?;
+                let (start, bytes) = opening.place(section, joints);
+                reader.seek_relative(start as i64)?;
+                take(&mut reader.by_ref().take(bytes as u64))?;
+                done = Opening::BYTES + start + bytes;
+            }
+            reader.seek_relative(length as i64 - done as i64)?;
+            left = left.checked_sub(FRAME as u64 + length).ok_or(io::ErrorKind::UnexpectedEof)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the part from its start, cuts off what is not whole, and leaves the file there; `None` when nothing is.
+    fn read(&mut self, binding: &mut Binding) -> Result<Option<Tally>, SweepError> {
         let failed = |source| SweepError::Part { path: self.path.clone(), source };
         let mut left = self.file.metadata().map_err(failed)?.len();
         let mut reader = BufReader::new(&self.file);
@@ -122,7 +186,7 @@ impl Part {
         (&mut reader).take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(failed)?;
         if magic != MAGIC {
             // Killed while it wrote its first line; anything else is not ours to overwrite.
-            return if MAGIC.starts_with(&magic) { Ok(false) } else { Err(self.foreign("a haptize part")) };
+            return if MAGIC.starts_with(&magic) { Ok(None) } else { Err(self.foreign("it is no part of a bake")) };
         }
         left -= MAGIC.len() as u64;
         let mut whole = MAGIC.len() as u64;
@@ -131,12 +195,13 @@ impl Part {
             *whole += body.as_ref().map_or(0, |body| (FRAME + body.len()) as u64);
             Ok(body)
         };
-        let Some(body) = next(&mut whole)? else { return Ok(false) };
+        let Some(body) = next(&mut whole)? else { return Ok(None) };
         let found: Binding = serde_json::from_slice(&body).map_err(|error| self.foreign(&error.to_string()))?;
         if let Some(difference) = found.difference(binding) {
             return Err(SweepError::OtherPart { path: self.path.clone(), difference });
         }
         let (points, joints) = (binding.grid.points(), binding.grid.joints());
+        let (results, mut tally, mut contacts) = (whole, Tally::default(), 0);
         loop {
             let before = whole;
             let Some(body) = next(&mut whole)? else { break };
@@ -144,10 +209,10 @@ impl Part {
                 binding.provenance.notices.push(String::from_utf8_lossy(notice).into_owned());
                 continue;
             }
-            match Columns::decode(&body, columns.points(), joints) {
-                Some(chunk) if chunk.points() <= points - columns.points() => {
-                    let bytes = Columns::bytes(points, joints, columns.nodes.len() + chunk.nodes.len());
-                    columns.append(&chunk).map_err(|source| SweepError::Memory { points, bytes, source })?;
+            match Columns::decode(&body, tally.points, joints) {
+                Some(chunk) if chunk.points() <= points - tally.points => {
+                    tally.add(&chunk);
+                    contacts += chunk.nodes.len();
                 }
                 _ => {
                     whole = before;
@@ -158,8 +223,9 @@ impl Part {
         drop(reader);
         self.file.set_len(whole).map_err(failed)?;
         self.file.seek(SeekFrom::Start(whole)).map_err(failed)?;
+        (self.results, self.contacts) = (results, contacts);
         binding.provenance.date = found.provenance.date;
-        Ok(true)
+        Ok(Some(tally))
     }
 
     fn foreign(&self, reason: &str) -> SweepError {

@@ -1,7 +1,7 @@
 //! What a sweep did, in numbers.
 
-use super::Memory;
-use crate::{contact::Status, dataset::Dataset};
+use super::{Footprint, tally::Tally};
+use crate::dataset::Provenance;
 use serde::Serialize;
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ pub struct SweepReport {
     pub max_residual: f64,
     /// Iterations of the points in contact.
     pub iterations: Iterations,
-    /// Points that were proven free of contact without being solved.
+    /// Points that this run proved free of contact without solving them.
     pub skipped_points: usize,
     /// Points that were taken over from an interrupted sweep.
     pub resumed_points: usize,
@@ -34,8 +34,8 @@ pub struct SweepReport {
     pub adapter: String,
     /// `energy`, `paper` or `linearised`.
     pub algorithm: String,
-    /// Memory of the results, as it was stated before the sweep.
-    pub memory: Memory,
+    /// Memory and disk, as they were stated before the sweep.
+    pub footprint: Footprint,
     /// What was noticed about the object while it was built, and what happened on the way.
     pub warnings: Vec<String>,
 }
@@ -50,41 +50,39 @@ pub struct Iterations {
 }
 
 impl SweepReport {
-    pub(super) fn of(
-        dataset: &Dataset,
-        memory: Memory,
-        skipped_points: usize,
-        resumed_points: usize,
-        time: Duration,
-        warnings: Vec<String>,
-    ) -> Self {
-        let points = dataset.grid.points();
-        let counts = dataset.status_counts();
-        let contact_points = counts.contact + counts.unconverged + counts.overflow;
-        let iterations = dataset.iterations.as_deref().unwrap_or_default();
-        let in_contact = iterations.iter().zip(0..).filter(|&(_, point)| {
-            matches!(dataset.status(point), Status::Contact | Status::Unconverged | Status::Overflow)
-        });
-        let (sum, max) = in_contact.fold((0, 0), |(sum, max), (&count, _)| (sum + u64::from(count), count.max(max)));
+    pub(super) fn of(tally: &Tally, run: RunFacts, provenance: &Provenance, object_warnings: &[String]) -> Self {
+        let RunFacts { footprint, skipped_points, resumed_points, time } = run;
+        let contact_points = tally.statuses.in_contact();
         let seconds = time.as_secs_f64();
         Self {
-            points,
+            points: tally.points,
             contact_points,
-            unconverged: counts.unconverged,
-            overflowed: counts.overflow,
-            max_residual: dataset.max_residual().unwrap_or(0.0),
-            iterations: Iterations { mean: sum as f64 / contact_points.max(1) as f64, max },
+            unconverged: tally.statuses.unconverged,
+            overflowed: tally.statuses.overflow,
+            max_residual: tally.max_residual.into(),
+            iterations: Iterations {
+                mean: tally.iterations as f64 / contact_points.max(1) as f64,
+                max: tally.max_iterations,
+            },
             skipped_points,
             resumed_points,
             seconds,
             // A clock that did not move is taken for its own resolution.
-            configurations_per_second: (points - resumed_points) as f64
+            configurations_per_second: (tally.points - resumed_points) as f64
                 / time.max(Duration::from_nanos(1)).as_secs_f64(),
-            backend: dataset.provenance.backend.clone(),
-            adapter: dataset.provenance.adapter.clone(),
-            algorithm: dataset.provenance.algorithm.clone(),
-            memory,
-            warnings,
+            backend: provenance.backend.clone(),
+            adapter: provenance.adapter.clone(),
+            algorithm: provenance.algorithm.clone(),
+            footprint,
+            warnings: object_warnings.iter().chain(&provenance.notices).cloned().collect(),
         }
     }
+}
+
+/// What is known of a run beside its results.
+pub(super) struct RunFacts {
+    pub footprint: Footprint,
+    pub skipped_points: usize,
+    pub resumed_points: usize,
+    pub time: Duration,
 }

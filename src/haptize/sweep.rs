@@ -4,14 +4,17 @@
 //! is cut into chunks, and an interrupted sweep continues where it stopped (see [`Sweep::bake`]).
 
 use super::{
-    Backend, FreeSpace, SweepError, SweepReport,
-    columns::Columns,
+    Backend, Footprint, FreeSpace, SweepError, SweepReport,
+    assembly::{self, assemble},
+    chunks::{Begun, together},
+    columns::{Columns, Shape},
+    footprint::{self, Bounds},
     part::{Binding, Part},
+    tally::Tally,
 };
 use crate::{
-    JointVector,
-    contact::{Model, Status},
-    dataset::{Axis, Contacts, Dataset, Grid, Provenance, Surface},
+    contact::Model,
+    dataset::{Axis, Contacts, Dataset, Grid, Heading, Provenance, Surface},
     object::Object,
     scene::{JointKind, Scene},
 };
@@ -19,8 +22,7 @@ use clap::ValueEnum;
 use std::{
     ffi::OsString,
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering},
-    time::{Duration, Instant},
+    sync::atomic::AtomicBool,
 };
 
 /// How far a sweep has come.
@@ -34,17 +36,8 @@ pub struct Progress {
     pub contact_points: usize,
     /// Points a second, of this run; 0 before the first chunk [1/s].
     pub rate: f64,
-    /// Memory that the sweep takes.
-    pub memory: Memory,
-}
-
-/// Memory of a sweep's results, known before it begins; chunks in flight and the object's compliance come on top.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Memory {
-    /// Where nothing touches anywhere [bytes].
-    pub least: usize,
-    /// Where every node of the proxy touches three nodes of the object everywhere [bytes].
-    pub most: usize,
+    /// What the sweep takes up.
+    pub footprint: Footprint,
 }
 
 /// How a sweep is run; nothing of it changes the result.
@@ -58,25 +51,21 @@ pub struct Run<'a> {
 }
 
 /// A sweep, ready to run.
-pub struct Sweep {
-    grid: Grid,
-    surface_nodes: Vec<f64>,
-    surface_triangles: Vec<u32>,
+pub struct Sweep<'a> {
+    pub(super) grid: Grid,
+    surface: Surface,
     scene: String,
     provenance: Provenance,
-    with_forces: bool,
-    warnings: Vec<String>,
-    free_space: Option<FreeSpace>,
-    /// Most object nodes that one configuration touches.
-    most_contacts: usize,
-    /// Time that finding it took.
-    preparation: Duration,
+    pub(super) shape: Shape,
+    /// What was noticed about the object.
+    pub(super) warnings: Vec<String>,
+    /// By which free space is found; `None` where all points are solved.
+    model: Option<&'a Model<'a>>,
+    /// Number of nodes of the proxy.
+    proxy_nodes: usize,
 }
 
-/// Most points of a chunk, skipped ones included: they cost little time, but the part should not wait for millions of them.
-const LARGEST_CHUNK: usize = 1 << 16;
-
-impl Sweep {
+impl<'a> Sweep<'a> {
     /// The sweep that `scene` asks for, over `object`, which was built from it.
     ///
     /// Provenance is given `backend` (`cpu` or `gpu`), `adapter` and `date` (ISO 8601, UTC): they are not measured here,
@@ -102,9 +91,16 @@ impl Sweep {
         grid.check().map_err(SweepError::Grid)?;
         let surface = &object.rest[..object.surface_nodes];
         Ok(Self {
+            shape: Shape {
+                joints: grid.joints(),
+                surface_nodes: object.surface_nodes,
+                with_forces: scene.graphics.is_some() || scene.haptics.effects.at_contacts().is_some(),
+            },
             grid,
-            surface_nodes: surface.iter().flat_map(|node| node.to_array()).collect(),
-            surface_triangles: object.triangles.as_flattened().to_vec(),
+            surface: Surface {
+                nodes: surface.iter().flat_map(|node| node.to_array()).collect::<Vec<f64>>().into(),
+                triangles: object.triangles.as_flattened().to_vec().into(),
+            },
             scene: scene.text.clone(),
             provenance: Provenance {
                 version: env!("CARGO_PKG_VERSION").into(),
@@ -119,17 +115,9 @@ impl Sweep {
                 date: date.into(),
                 notices: Vec::new(),
             },
-            with_forces: scene.graphics.is_some() || scene.haptics.effects.at_contacts().is_some(),
             warnings: object.warnings.clone(),
-            free_space: None,
-            most_contacts: scene
-                .proxy
-                .joints
-                .iter()
-                .map(|joint| 3 * joint.nodes.len())
-                .sum::<usize>()
-                .min(object.surface_nodes),
-            preparation: Duration::ZERO,
+            model: None,
+            proxy_nodes: scene.proxy.joints.iter().map(|joint| joint.nodes.len()).sum(),
         })
     }
 
@@ -137,12 +125,13 @@ impl Sweep {
     /// [`FreeSpace::MARGIN`] grid steps from any contact, which become lower bounds.
     ///
     /// # Errors
-    /// [`SweepError::Memory`].
-    pub fn skip_free_space(&mut self, model: &Model<'_>) -> Result<(), SweepError> {
-        let start = Instant::now();
-        let free_space = FreeSpace::find(model, &self.grid).map_err(|source| self.out_of_memory(source))?;
-        self.free_space = Some(free_space);
-        self.preparation = start.elapsed();
+    /// [`SweepError::Grid`] when the model's proxy has other joints.
+    pub fn skip_free_space(&mut self, model: &'a Model<'a>) -> Result<(), SweepError> {
+        let joints = model.chain.joints.len();
+        if joints != self.grid.joints() {
+            return Err(SweepError::Grid(format!("{} axes for {joints} joints", self.grid.joints())));
+        }
+        self.model = Some(model);
         Ok(())
     }
 
@@ -152,21 +141,21 @@ impl Sweep {
         &self.grid
     }
 
-    /// Memory of the finished columns with `contacts` contact forces at each point [bytes]; chunks in flight come on top.
+    /// What a sweep in memory, or else into a file, takes up with chunks of `chunk` configurations.
     #[must_use]
-    pub fn memory_needed(&self, contacts: usize) -> usize {
+    pub fn footprint(&self, chunk: usize, in_memory: bool) -> Footprint {
         let points = self.grid.points();
-        let contacts = if self.with_forces { points.saturating_mul(contacts) } else { 0 };
-        Columns::bytes(points, self.grid.joints(), contacts)
-    }
-
-    /// Memory of this sweep.
-    #[must_use]
-    pub fn memory(&self) -> Memory {
-        let points = self.grid.points();
-        let skipping = if self.free_space.is_some() { 4 * points } else { 0 };
-        let needed = |contacts| self.memory_needed(contacts).saturating_add(skipping);
-        Memory { least: needed(0), most: needed(self.most_contacts) }
+        let solved = chunk.clamp(1, points);
+        let free_space = self.free_space();
+        let together = points.min(if free_space.is_some() { together(solved) } else { solved });
+        let slab = free_space.map_or(0, |free_space| 4 * free_space.largest_slab());
+        let results = |touching| footprint::results(points, touching, self.shape);
+        let memory = |touching| {
+            let chunk = footprint::chunk(solved, together, touching, self.shape).saturating_add(slab);
+            chunk.saturating_add(if in_memory { results(touching) } else { assembly::BUFFERS })
+        };
+        let disk = |touching| if in_memory { 0 } else { results(touching) };
+        Footprint { memory: Bounds::of(self.proxy_nodes, memory), disk: Bounds::of(self.proxy_nodes, disk) }
     }
 
     /// Where [`Sweep::bake`] keeps what it has of `output`.
@@ -182,11 +171,20 @@ impl Sweep {
     /// # Errors
     /// [`SweepError::Memory`], [`SweepError::Backend`], [`SweepError::Stopped`].
     pub fn run<B: Backend>(&self, backend: &mut B, run: Run<'_>) -> Result<(Dataset, SweepReport), SweepError> {
-        let columns = self.empty_columns()?;
-        self.finish(backend, run, columns, self.provenance.clone(), None)
+        let footprint = self.footprint(run.chunk, true);
+        let (points, bytes) = (self.grid.points(), footprint.memory.least);
+        let mut columns = Columns::with_room(points, self.shape.joints).map_err(|source| SweepError::Memory {
+            points,
+            bytes,
+            source,
+        })?;
+        let begun = Begun { tally: Tally::default(), provenance: self.provenance.clone() };
+        let (report, provenance) = self.solve(backend, run, begun, footprint, &mut columns)?;
+        Ok((self.dataset(columns, provenance), report))
     }
 
-    /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole.
+    /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. Memory does not grow
+    /// with the grid.
     ///
     /// With `resume` it continues from such a part; the file is then the same, bit for bit, as without the interruption,
     /// the date of the beginning included. Without a part it begins.
@@ -199,111 +197,40 @@ impl Sweep {
         output: &Path,
         resume: bool,
         run: Run<'_>,
-    ) -> Result<(Dataset, SweepReport), SweepError> {
+    ) -> Result<SweepReport, SweepError> {
+        if output.is_dir() {
+            return Err(SweepError::IsFolder { path: output.into() });
+        }
         let mut surface = crc32fast::Hasher::new();
-        surface.update(bytemuck::cast_slice(&self.surface_nodes));
-        surface.update(bytemuck::cast_slice(&self.surface_triangles));
+        surface.update(bytemuck::cast_slice(&self.surface.nodes));
+        surface.update(bytemuck::cast_slice(&self.surface.triangles));
         let mut binding = Binding {
             grid: self.grid.clone(),
             scene: self.scene.clone(),
             surface: surface.finalize(),
             provenance: self.provenance.clone(),
         };
-        let mut columns = self.empty_columns()?;
-        let mut part = Part::open(&Self::part_of(output), resume, &mut binding, &mut columns)?;
-        if !binding.provenance.notices.is_empty() {
+        let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
+        let mut provenance = binding.provenance;
+        if !provenance.notices.is_empty() {
             let Provenance { backend, adapter, .. } = &self.provenance;
-            let notice = format!("from grid point {} on: resumed on {backend} ({adapter})", columns.points());
+            let notice = format!("from grid point {} on: resumed on {backend} ({adapter})", tally.points);
             part.note(&notice)?;
-            binding.provenance.notices.push(notice);
+            provenance.notices.push(notice);
         }
-        let finished = self.finish(backend, run, columns, binding.provenance, Some(&mut part))?;
-        finished.0.save(output).map_err(|source| SweepError::Dataset { part: part.path().into(), source })?;
+        let footprint = self.footprint(run.chunk, false);
+        let begun = Begun { tally, provenance };
+        let (report, provenance) = self.solve(backend, run, begun, footprint, &mut part)?;
+        let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
+        assemble(&part, output, heading, &self.surface, self.shape)
+            .map_err(|source| SweepError::Dataset { part: part.path().into(), source })?;
         part.remove()?;
-        Ok(finished)
+        Ok(report)
     }
 
-    fn empty_columns(&self) -> Result<Columns, SweepError> {
-        Columns::with_room(self.grid.points(), self.grid.joints()).map_err(|source| self.out_of_memory(source))
-    }
-
-    fn out_of_memory(&self, source: std::collections::TryReserveError) -> SweepError {
-        SweepError::Memory { points: self.grid.points(), bytes: self.memory().least, source }
-    }
-
-    fn free_gap(&self, point: usize) -> Option<f32> {
-        self.free_space.as_ref()?.gap(point)
-    }
-
-    /// Solves the points that `columns` lacks.
-    fn finish<B: Backend>(
-        &self,
-        backend: &mut B,
-        run: Run<'_>,
-        mut columns: Columns,
-        mut provenance: Provenance,
-        mut part: Option<&mut Part>,
-    ) -> Result<(Dataset, SweepReport), SweepError> {
-        let (points, joints, resumed) = (self.grid.points(), self.grid.joints(), columns.points());
-        let (start, memory) = (Instant::now(), self.memory());
-        let mut contact_points = in_contact(&columns);
-        (run.progress)(Progress { done: resumed, points, contact_points, rate: 0.0, memory });
-        let mut configurations: Vec<JointVector> = Vec::new();
-        while columns.points() < points {
-            let first = columns.points();
-            if run.stop.load(Ordering::Relaxed) {
-                let part = part.map(|part| part.path().to_path_buf());
-                return Err(SweepError::Stopped { done: first, points, part });
-            }
-            configurations.clear();
-            let most = run.chunk.max(1);
-            let mut last = first;
-            for point in first..points.min(first.saturating_add(most.max(LARGEST_CHUNK))) {
-                if self.free_gap(point).is_none() {
-                    if configurations.len() == most {
-                        break;
-                    }
-                    configurations.push(self.grid.configuration(point));
-                }
-                last = point;
-            }
-            let equilibria = backend.solve(&configurations).map_err(|source| SweepError::Backend {
-                first,
-                last,
-                source: Box::new(source),
-            })?;
-            if equilibria.len() != configurations.len() {
-                return Err(SweepError::Miscount { asked: configurations.len(), found: equilibria.len() });
-            }
-            for notice in backend.notices() {
-                let notice = format!("from grid point {first} on: {notice}");
-                if let Some(part) = &mut part {
-                    part.note(&notice)?;
-                }
-                provenance.notices.push(notice);
-            }
-            let mut chunk = Columns::default();
-            let mut solved = equilibria.iter();
-            for point in first..=last {
-                match self.free_gap(point) {
-                    Some(gap) => chunk.push_free(gap, joints),
-                    None => solved.next().into_iter().for_each(|solved| chunk.push(solved, joints, self.with_forces)),
-                }
-            }
-            if let Some(part) = &mut part {
-                part.append(first, &chunk)?;
-            }
-            columns.append(&chunk).map_err(|source| self.out_of_memory(source))?;
-            contact_points += in_contact(&chunk);
-            let rate = (columns.points() - resumed) as f64 / start.elapsed().as_secs_f64().max(f64::MIN_POSITIVE);
-            (run.progress)(Progress { done: columns.points(), points, contact_points, rate, memory });
-        }
-        let dataset = self.dataset(columns, provenance);
-        let skipped = self.free_space.as_ref().map_or(0, FreeSpace::skipped);
-        let time = start.elapsed() + self.preparation;
-        let warnings = self.warnings.iter().chain(&dataset.provenance.notices).cloned().collect();
-        let report = SweepReport::of(&dataset, memory, skipped, resumed, time, warnings);
-        Ok((dataset, report))
+    /// How free space is found, where it is.
+    pub(super) fn free_space(&self) -> Option<FreeSpace<'_>> {
+        self.model.map(|model| FreeSpace::new(model, &self.grid))
     }
 
     fn dataset(&self, columns: Columns, provenance: Provenance) -> Dataset {
@@ -311,7 +238,7 @@ impl Sweep {
             *sum += count;
             Some(*sum)
         }));
-        let contacts = self.with_forces.then(|| Contacts {
+        let contacts = self.shape.with_forces.then(|| Contacts {
             offsets: offsets.collect::<Vec<u64>>().into(),
             nodes: columns.nodes.into(),
             forces: columns.forces.into(),
@@ -325,18 +252,9 @@ impl Sweep {
             residual: Some(columns.residual.into()),
             iterations: Some(columns.iterations.into()),
             contacts,
-            surface: Some(Surface {
-                nodes: self.surface_nodes.clone().into(),
-                triangles: self.surface_triangles.clone().into(),
-            }),
+            surface: Some(self.surface.clone()),
             scene: self.scene.clone(),
             provenance,
         }
     }
-}
-
-/// Number of points at which something touches.
-fn in_contact(columns: &Columns) -> usize {
-    let untouched = [Status::Free as u8, Status::Outside as u8];
-    columns.status.iter().filter(|status| !untouched.contains(status)).count()
 }

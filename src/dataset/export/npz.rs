@@ -26,11 +26,11 @@ fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Resul
     for tensor in file::tensors(dataset) {
         let (name, shape) = (tensor.name, &tensor.shape);
         match tensor.dtype {
-            Dtype::F64 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, f64>(tensor.bytes)),
-            Dtype::U64 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, u64>(tensor.bytes)),
-            Dtype::F32 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, f32>(tensor.bytes)),
-            Dtype::U32 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, u32>(tensor.bytes)),
-            _ => array(&mut zip, name, shape, tensor.bytes),
+            Dtype::F64 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, f64>(tensor.contents)),
+            Dtype::U64 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, u64>(tensor.contents)),
+            Dtype::F32 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, f32>(tensor.contents)),
+            Dtype::U32 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, u32>(tensor.contents)),
+            _ => array(&mut zip, name, shape, tensor.contents),
         }?;
     }
     let mut shape = grid.counts();

@@ -12,7 +12,7 @@ use toml::Spanned;
 
 /// Most grid points: `point * joints + joint` then fits 32 bits, as GPU kernels count.
 const MAX_POINTS: usize = 1 << 28;
-/// Memory of one point beside its torques: energy, gap, status, residual, iterations, contact offset [B].
+/// Disk of one point beside its torques: energy, gap, status, residual, iterations, contact offset [B].
 const BYTES_PER_POINT: usize = 8 + 4 + 1 + 4 + 4 + 8;
 
 pub(super) fn convert(
@@ -103,7 +103,7 @@ fn check_size(checker: &Checker<'_>, axes: &[AxisSpec], span: std::ops::Range<us
     }
     let bytes = points * (BYTES_PER_POINT + size_of::<f64>() * axes.len()) as f64;
     let message = format!(
-        "the grid has {points:.3e} points and would need at least {:.0} GB of memory; at most {MAX_POINTS} points are \
+        "the grid has {points:.3e} points and would need at least {:.0} GB on the disk; at most {MAX_POINTS} points are \
          possible: widen the spacing or shorten the axes",
         bytes / 1e9
     );

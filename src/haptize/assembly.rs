@@ -1,0 +1,93 @@
+//! The dataset's file, put together from a part: column after column is copied through a buffer, so that memory does not grow
+//! with the grid.
+
+use super::{
+    columns::{Section, Shape},
+    part::{self, Part},
+};
+use crate::dataset::{self, Heading, Surface, Tensor, TensorContents, write_file};
+use std::{
+    io::{self, Write},
+    path::Path,
+};
+
+/// Memory that it takes: the buffers between part and file [bytes].
+pub(super) const BUFFERS: usize = part::BUFFER + dataset::BUFFER;
+
+/// Writes all points of `part` as the dataset `output`.
+pub(super) fn assemble(
+    part: &Part,
+    output: &Path,
+    heading: Heading<'_>,
+    surface: &Surface,
+    shape: Shape,
+) -> Result<(), dataset::Error> {
+    let of = |section| Contents::Section { part, section, joints: shape.joints };
+    let grid = heading.grid.counts();
+    let mut tensors = vec![
+        Tensor::new::<f64>("torque", [&grid[..], &[shape.joints]].concat(), of(Section::Torque)),
+        Tensor::new::<u8>("status", grid.clone(), of(Section::Status)),
+        Tensor::new::<f64>("energy", grid.clone(), of(Section::Energy)),
+        Tensor::new::<f32>("gap", grid.clone(), of(Section::Gap)),
+        Tensor::new::<f32>("residual", grid.clone(), of(Section::Residual)),
+        Tensor::new::<u32>("iterations", grid, of(Section::Iterations)),
+    ];
+    if shape.with_forces {
+        let forces = part.contacts();
+        let offsets = Contents::Offsets { part, joints: shape.joints };
+        tensors.push(Tensor::new::<u64>("contact_offsets", vec![heading.grid.points() + 1], offsets));
+        tensors.push(Tensor::new::<u32>("contact_nodes", vec![forces], of(Section::Nodes)));
+        tensors.push(Tensor::new::<f32>("contact_forces", vec![forces, 3], of(Section::Forces)));
+    }
+    let (nodes, triangles) = (&surface.nodes, &surface.triangles);
+    tensors.push(Tensor::new::<f64>(
+        "surface_nodes",
+        vec![nodes.len() / 3, 3],
+        Contents::Held(bytemuck::cast_slice(nodes)),
+    ));
+    tensors.push(Tensor::new::<u32>(
+        "surface_triangles",
+        vec![triangles.len() / 3, 3],
+        Contents::Held(bytemuck::cast_slice(triangles)),
+    ));
+    write_file(output, heading, tensors)
+}
+
+enum Contents<'a> {
+    Held(&'a [u8]),
+    /// A column of all points.
+    Section {
+        part: &'a Part,
+        section: Section,
+        joints: usize,
+    },
+    /// Sums of the points' numbers of contacts, from 0 on.
+    Offsets {
+        part: &'a Part,
+        joints: usize,
+    },
+}
+
+impl TensorContents for Contents<'_> {
+    fn write(&self, writer: &mut impl Write) -> io::Result<()> {
+        match *self {
+            Self::Held(bytes) => writer.write_all(bytes),
+            Self::Section { part, section, joints } => {
+                part.column(section, joints, &mut |column| io::copy(column, writer).map(drop))
+            }
+            Self::Offsets { part, joints } => {
+                let mut sum = 0_u64;
+                writer.write_all(&sum.to_le_bytes())?;
+                part.column(Section::Contacts, joints, &mut |column| {
+                    let mut counts = Vec::new();
+                    column.read_to_end(&mut counts)?;
+                    for count in counts.as_chunks().0 {
+                        sum = sum.wrapping_add(u64::from_le_bytes(*count));
+                        writer.write_all(&sum.to_le_bytes())?;
+                    }
+                    Ok(())
+                })
+            }
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! The grid's points, chunk by chunk: free ones skipped, the others solved by the backend, all handed on to where they are kept.
+
+use super::{
+    Backend, Footprint, FreeSpace, Progress, Run, Sweep, SweepError, SweepReport, columns::Columns,
+    free_space::FreeGaps, part::Part, report::RunFacts, tally::Tally,
+};
+use crate::{JointVector, contact::Equilibrium, dataset::Provenance};
+use std::{ops::Range, path::Path, sync::atomic::Ordering, time::Instant};
+
+/// Where a sweep's results go as they come.
+pub(super) trait Store {
+    /// Adds a chunk whose first point has number `first`.
+    fn append(&mut self, first: usize, chunk: &Columns) -> Result<(), SweepError>;
+    /// Adds something that provenance will tell.
+    fn note(&mut self, notice: &str) -> Result<(), SweepError>;
+    /// Where an interrupted sweep continues from.
+    fn path(&self) -> Option<&Path>;
+}
+
+impl Store for Part {
+    fn append(&mut self, first: usize, chunk: &Columns) -> Result<(), SweepError> {
+        Part::append(self, first, chunk)
+    }
+    fn note(&mut self, notice: &str) -> Result<(), SweepError> {
+        Part::note(self, notice)
+    }
+    fn path(&self) -> Option<&Path> {
+        Some(Part::path(self))
+    }
+}
+
+/// In memory, with room for all points.
+impl Store for Columns {
+    fn append(&mut self, _first: usize, chunk: &Columns) -> Result<(), SweepError> {
+        let points = self.status.capacity();
+        let joints = chunk.torque.len() / chunk.points().max(1);
+        let bytes = Columns::bytes(points, joints, self.nodes.len() + chunk.nodes.len());
+        self.append(chunk).map_err(|source| SweepError::Memory { points, bytes, source })
+    }
+    fn note(&mut self, _notice: &str) -> Result<(), SweepError> {
+        Ok(())
+    }
+    fn path(&self) -> Option<&Path> {
+        None
+    }
+}
+
+/// What there is of a sweep before a run.
+pub(super) struct Begun {
+    pub tally: Tally,
+    pub provenance: Provenance,
+}
+
+/// Most points of a chunk of which `solved` are to be solved: skipped ones cost little time, but the store should not wait for
+/// millions of them.
+pub(super) fn together(solved: usize) -> usize {
+    solved.max(1 << 16)
+}
+
+/// A stretch of points under way.
+struct Chunk {
+    points: Range<usize>,
+    /// Of those that are to be solved.
+    configurations: Vec<JointVector>,
+}
+
+impl Sweep<'_> {
+    /// Solves the points that `begun` lacks; says what all of them are like, and where they come from.
+    pub(super) fn solve<B: Backend>(
+        &self,
+        backend: &mut B,
+        run: Run<'_>,
+        begun: Begun,
+        footprint: Footprint,
+        store: &mut dyn Store,
+    ) -> Result<(SweepReport, Provenance), SweepError> {
+        let Begun { mut tally, mut provenance } = begun;
+        let (points, resumed, start) = (self.grid.points(), tally.points, Instant::now());
+        let mut tell = |tally: &Tally, rate| {
+            let (done, contact_points) = (tally.points, tally.statuses.in_contact());
+            (run.progress)(Progress { done, points, contact_points, rate, footprint });
+        };
+        tell(&tally, 0.0);
+        let (free_space, mut skipped) = (self.free_space(), 0);
+        let most = run.chunk.clamp(1, points);
+        let mut columns = Columns::default();
+        while tally.points < points {
+            let slab = free_space.as_ref().map_or(0..points, |free_space| free_space.slab(tally.points));
+            let gaps = free_space.as_ref().map(|free_space| self.gaps(free_space, slab.clone())).transpose()?;
+            let free_gap = |point| gaps.as_ref()?.gap(point);
+            while tally.points < slab.end {
+                let first = tally.points;
+                if run.stop.load(Ordering::Relaxed) {
+                    return Err(SweepError::Stopped { done: first, points, part: store.path().map(Into::into) });
+                }
+                let chunk = self.cut(first..slab.end, most, free_gap);
+                let equilibria = solved(backend, &chunk)?;
+                for notice in backend.notices() {
+                    let notice = format!("from grid point {first} on: {notice}");
+                    store.note(&notice)?;
+                    provenance.notices.push(notice);
+                }
+                columns.clear();
+                let mut equilibria = equilibria.iter();
+                for point in chunk.points {
+                    match free_gap(point) {
+                        Some(gap) => columns.push_free(gap, self.shape),
+                        None => equilibria.next().into_iter().for_each(|solved| columns.push(solved, self.shape)),
+                    }
+                }
+                skipped += columns.points() - chunk.configurations.len();
+                store.append(first, &columns)?;
+                tally.add(&columns);
+                tell(&tally, (tally.points - resumed) as f64 / start.elapsed().as_secs_f64().max(f64::MIN_POSITIVE));
+            }
+        }
+        let facts = RunFacts { footprint, skipped_points: skipped, resumed_points: resumed, time: start.elapsed() };
+        Ok((SweepReport::of(&tally, facts, &provenance, &self.warnings), provenance))
+    }
+
+    fn gaps(&self, free_space: &FreeSpace<'_>, slab: Range<usize>) -> Result<FreeGaps, SweepError> {
+        let (points, bytes) = (slab.len(), 4 * slab.len());
+        free_space.find(slab).map_err(|source| SweepError::Memory { points, bytes, source })
+    }
+
+    /// The first points of `points`, so many that at most `most` of them are to be solved.
+    fn cut(&self, points: Range<usize>, most: usize, free_gap: impl Fn(usize) -> Option<f32>) -> Chunk {
+        let mut configurations = Vec::new();
+        let end = points.end.min(points.start.saturating_add(together(most)));
+        for point in points.start..end {
+            if free_gap(point).is_none() {
+                if configurations.len() == most {
+                    return Chunk { points: points.start..point, configurations };
+                }
+                configurations.push(self.grid.configuration(point));
+            }
+        }
+        Chunk { points: points.start..end, configurations }
+    }
+}
+
+fn solved<B: Backend>(backend: &mut B, chunk: &Chunk) -> Result<Vec<Equilibrium>, SweepError> {
+    let equilibria = backend.solve(&chunk.configurations).map_err(|source| SweepError::Backend {
+        first: chunk.points.start,
+        last: chunk.points.end - 1,
+        source: Box::new(source),
+    })?;
+    if equilibria.len() != chunk.configurations.len() {
+        return Err(SweepError::Miscount { asked: chunk.configurations.len(), found: equilibria.len() });
+    }
+    Ok(equilibria)
+}

@@ -1,0 +1,54 @@
+//! What a sweep takes up, stated before it begins.
+
+use super::columns::{Columns, Shape};
+use crate::{
+    JointVector,
+    contact::{Equilibrium, NodeForce, Touch},
+};
+
+/// Memory and disk of a sweep. The object, its compliance and the backend's own buffers come on top: they do not grow with the
+/// grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Footprint {
+    /// Memory [bytes].
+    pub memory: Bounds,
+    /// The dataset on disk, its header aside; twice as much for a moment, while it is put together from its part. Zero for a sweep
+    /// in memory [bytes].
+    pub disk: Bounds,
+}
+
+/// From where nothing touches anywhere, to where every node of the proxy touches three nodes of the object everywhere.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Bounds {
+    /// Nothing touches.
+    pub least: usize,
+    /// Everything touches.
+    pub most: usize,
+}
+
+impl Bounds {
+    /// Of what `bytes` takes, which says it for a number of nodes of the proxy in contact at each point.
+    pub(super) fn of(proxy_nodes: usize, bytes: impl Fn(usize) -> usize) -> Self {
+        Self { least: bytes(0), most: bytes(proxy_nodes) }
+    }
+}
+
+/// Results of `points` points at each of which `touching` nodes of the proxy touch [bytes].
+pub(super) fn results(points: usize, touching: usize, shape: Shape) -> usize {
+    let contacts = if shape.with_forces { node_forces(touching, shape) } else { 0 };
+    Columns::bytes(points, shape.joints, points.saturating_mul(contacts))
+}
+
+/// A chunk on its way: `solved` configurations and their equilibria, and the columns of `points` points [bytes].
+pub(super) fn chunk(solved: usize, points: usize, touching: usize, shape: Shape) -> usize {
+    // Lists grow by doubling.
+    let lists = 2 * (node_forces(touching, shape) * size_of::<NodeForce>() + touching * size_of::<Touch>());
+    let each = size_of::<JointVector>() + size_of::<Equilibrium>() + lists;
+    let contacts = if shape.with_forces { 2 * solved.saturating_mul(node_forces(touching, shape)) } else { 0 };
+    solved.saturating_mul(each).saturating_add(Columns::bytes(points, shape.joints, contacts))
+}
+
+/// Nodes of the object that `touching` nodes of the proxy touch.
+fn node_forces(touching: usize, shape: Shape) -> usize {
+    (3 * touching).min(shape.surface_nodes)
+}

@@ -1,0 +1,34 @@
+//! What a sweep counts on the way, so that it need not keep its results to sum them up.
+
+use super::columns::Columns;
+use crate::{contact::Status, dataset::StatusCounts};
+
+/// Sums over the points done.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Tally {
+    pub points: usize,
+    pub statuses: StatusCounts,
+    /// Greatest residual of a converged point [1].
+    pub max_residual: f32,
+    /// Of the points in contact.
+    pub iterations: u64,
+    pub max_iterations: u32,
+}
+
+impl Tally {
+    /// Counts the points of `chunk`.
+    pub fn add(&mut self, chunk: &Columns) {
+        self.points += chunk.points();
+        for ((&number, &iterations), &residual) in chunk.status.iter().zip(&chunk.iterations).zip(&chunk.residual) {
+            let status = Status::from_number(number).unwrap_or(Status::Outside);
+            self.statuses.add(status);
+            if !matches!(status, Status::Free | Status::Outside) {
+                self.iterations += u64::from(iterations);
+                self.max_iterations = self.max_iterations.max(iterations);
+            }
+            if status == Status::Contact {
+                self.max_residual = self.max_residual.max(residual);
+            }
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Devices that fail, folders that cannot be written, disks that are full.
+
+use crate::fixture::{Folder, MadeUp, POINTS, answer, bake, scene, sweep, uninterrupted};
+use haptize::{
+    contact::{Model, Solver},
+    dataset::Dataset,
+    haptize::{Run, SweepError, WithFallback},
+    object::Object,
+    proxy::Chain,
+};
+use std::sync::atomic::AtomicBool;
+
+#[test]
+fn a_failing_backend_leaves_a_part_and_the_earlier_file() {
+    let whole = uninterrupted();
+    let folder = Folder::new();
+    std::fs::write(folder.output(), "earlier").unwrap();
+    let mut broken = MadeUp { breaks_after: 25, ..MadeUp::default() };
+    let error = bake(&sweep(), &mut broken, &folder.output(), false, 10, usize::MAX).unwrap_err();
+    assert_eq!(error.to_string(), "the backend failed at grid points 20 to 29: device lost");
+    assert_eq!(std::fs::read(folder.output()).unwrap(), b"earlier");
+    let report = bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX).unwrap();
+    assert_eq!(report.resumed_points, 20);
+    assert!(std::fs::read(folder.output()).unwrap() == whole);
+}
+
+/// The device breaks down for good in the third batch of ten; the sweep goes on, and says so in report and file, also when it
+/// is killed later on and resumed.
+#[test]
+fn a_sweep_whose_device_is_lost_goes_on_with_the_cpu() {
+    let scene = scene();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, scene.contact);
+    let lossy = || WithFallback::new(MadeUp { breaks_after: 25, ..MadeUp::default() }, "a made-up device", &model);
+    let folder = Folder::new();
+    let report = bake(&sweep(), &mut lossy(), &folder.output(), false, 10, usize::MAX).unwrap();
+    let dataset = Dataset::open(&folder.output()).unwrap();
+    let [notice] = &dataset.provenance.notices[..] else { panic!("{:?}", dataset.provenance) };
+    assert!(notice.starts_with("from grid point 20 on: solved by "), "{notice}");
+    assert!(notice.ends_with("since a made-up device failed: device lost"), "{notice}");
+    assert_eq!(&report.warnings, &dataset.provenance.notices);
+    let mut solver = Solver::new(&model);
+    for point in 0..POINTS {
+        let q = dataset.grid.configuration(point);
+        let expected = if point < 20 { answer(&q) } else { solver.solve(&q) };
+        assert_eq!(dataset.torque(point), &expected.torque[..], "point {point}");
+        assert_eq!(dataset.status(point), expected.status, "point {point}");
+    }
+
+    let stopped = bake(&sweep(), &mut lossy(), &folder.output(), false, 10, 40).unwrap_err();
+    assert!(matches!(stopped, SweepError::Stopped { done: 40, .. }), "{stopped}");
+    bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX).unwrap();
+    let resumed = Dataset::open(&folder.output()).unwrap().provenance.notices;
+    assert_eq!(&resumed[..], [notice.as_str(), "from grid point 40 on: resumed on cpu (none)"]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_named_at_once() {
+    let folder = Folder::new();
+    let mut backend = MadeUp::default();
+    let missing = folder.0.path().join("none").join("a.haptize");
+    let error = bake(&sweep(), &mut backend, &missing, false, 10, usize::MAX).unwrap_err();
+    assert!(matches!(error, SweepError::Folder { .. }), "{error}");
+    assert!(error.to_string().contains("make the folder"), "{error}");
+    let error = bake(&sweep(), &mut backend, folder.0.path(), false, 10, usize::MAX).unwrap_err();
+    assert!(matches!(error, SweepError::IsFolder { .. }), "{error}");
+    assert_eq!((backend.solved, folder.names()), (0, Vec::new()));
+}
+
+/// A folder takes the output's name while the last points are solved: the finished file cannot take it.
+#[test]
+fn a_dataset_that_cannot_be_put_in_place_stays_in_its_part() {
+    let whole = uninterrupted();
+    let folder = Folder::new();
+    let mut progress = |progress: haptize::haptize::Progress| {
+        if progress.done == POINTS {
+            std::fs::create_dir(folder.output()).unwrap();
+        }
+    };
+    let run = Run { chunk: 10, stop: &AtomicBool::new(false), progress: &mut progress };
+    let error = sweep().bake(&mut MadeUp::default(), &folder.output(), false, run).unwrap_err();
+    assert!(matches!(error, SweepError::Dataset { .. }), "{error}");
+    assert!(error.to_string().contains("--resume"), "{error}");
+    assert_eq!(folder.names(), ["a.haptize", "a.haptize.part"], "no other file is left");
+    std::fs::remove_dir(folder.output()).unwrap();
+    let mut idle = MadeUp::default();
+    let report = bake(&sweep(), &mut idle, &folder.output(), true, 10, usize::MAX).unwrap();
+    assert_eq!((report.resumed_points, idle.solved), (POINTS, 0));
+    assert!(std::fs::read(folder.output()).unwrap() == whole);
+}

@@ -1,0 +1,47 @@
+//! One configuration in full.
+
+use crate::{
+    equilibria::relative_error,
+    fixture::{Folder, SCENE, scene},
+};
+use glam::DVec3;
+use haptize::{contact::Model, haptize::Inspection, object::Object, proxy::Chain};
+
+#[test]
+fn an_inspection_tells_the_same_from_scene_and_dataset() {
+    let folder = Folder::new();
+    std::fs::write(folder.0.path().join("small.toml"), SCENE).unwrap();
+    let haptize = |arguments: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
+        let output = command.current_dir(folder.0.path()).args(arguments).arg("--json").output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
+    };
+    haptize(&["bake", "small.toml", "--backend", "cpu"]);
+    std::fs::remove_file(folder.0.path().join("small.toml")).unwrap();
+    let from_dataset = haptize(&["inspect", "small.haptize", "--q", "-0.2,0.042"]);
+    std::fs::write(folder.0.path().join("small.toml"), SCENE).unwrap();
+    let mut from_scene = haptize(&["inspect", "small.toml", "--q=-0.2,0.042"]);
+    assert_eq!(from_scene["status"], "contact");
+    // The grid point 1 x 8, as it was stored and as it is solved anew.
+    assert_eq!(from_dataset["stored"]["point"], 9 + 8);
+    let torque = |value: &serde_json::Value| serde_json::from_value::<Vec<f64>>(value["torque"].clone()).unwrap();
+    assert!(relative_error(&torque(&from_dataset["stored"]), &torque(&from_dataset)) < 1e-6);
+    from_scene["stored"] = from_dataset["stored"].clone();
+    assert_eq!(from_scene, from_dataset);
+}
+
+#[test]
+fn an_inspection_is_complete_enough_to_recompute_the_torque() {
+    let scene = scene();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, scene.contact);
+    let inspection = Inspection::new(&model, &[0.05, 0.045]);
+    assert_eq!((inspection.status.as_str(), inspection.proxy_nodes.len()), ("contact", 3));
+    assert_eq!(inspection.object_nodes.len(), object.surface_nodes);
+    assert!(relative_error(&inspection.torque_of_contacts(), &inspection.torque) < 1e-12);
+    let pushed: DVec3 = inspection.object_nodes.iter().map(|node| node.force).sum();
+    let pushing: DVec3 =
+        inspection.proxy_nodes.iter().filter_map(|node| node.contact).map(|contact| contact.force).sum();
+    assert!((pushed + pushing).length() < 1e-12 * pushed.length());
+}

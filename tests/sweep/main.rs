@@ -1,0 +1,13 @@
+//! Sweeps: the dataset depends on nothing but scene and backend, and an interruption leaves no trace in it.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod equilibria;
+mod failure;
+mod fixture;
+mod inspection;
+mod memory;
+#[cfg(unix)]
+mod program;
+mod results;
+mod resume;

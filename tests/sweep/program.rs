@@ -1,0 +1,98 @@
+//! The program killed, interrupted, and without room on the disk.
+
+use crate::fixture::{Folder, SCENE};
+use haptize::dataset::Dataset;
+use std::path::Path;
+
+/// Everything but the date, bit for bit.
+fn columns(path: &Path) -> Vec<Vec<u8>> {
+    let dataset = Dataset::open(path).unwrap();
+    let contacts = dataset.contacts.as_ref().unwrap();
+    vec![
+        bytemuck::cast_slice(&dataset.torque).to_vec(),
+        dataset.status.to_vec(),
+        bytemuck::cast_slice(dataset.energy.as_ref().unwrap()).to_vec(),
+        bytemuck::cast_slice(dataset.gap.as_ref().unwrap()).to_vec(),
+        bytemuck::cast_slice(&contacts.nodes).to_vec(),
+        bytemuck::cast_slice(&contacts.forces).to_vec(),
+        dataset.scene.into_bytes(),
+    ]
+}
+
+/// The program, started in `folder` on a scene of `turns` times 90 configurations, once its part holds some of them.
+fn program_at_work(folder: &Folder, turns: usize) -> std::process::Child {
+    let fine = SCENE
+        .replace("step = 0.1, count = 7", &format!("stop = 0.3, count = {turns}"))
+        .replace("step = 0.004, count = 9", "step = 0.0004, count = 90");
+    std::fs::write(folder.0.path().join("fine.toml"), fine).unwrap();
+    let mut program = program(folder, &[]).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let part = folder.0.path().join("fine.haptize.part");
+    while std::fs::metadata(&part).map_or(0, |part| part.len()) < 50_000 {
+        assert!(program.try_wait().unwrap().is_none(), "ended before its part was seen");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    program
+}
+
+fn program(folder: &Folder, more: &[&str]) -> std::process::Command {
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
+    command.current_dir(folder.0.path()).args(["bake", "fine.toml", "--backend", "cpu", "--json"]).args(more);
+    command
+}
+
+#[test]
+fn a_killed_program_is_resumed_to_the_same_numbers() {
+    let folder = Folder::new();
+    let mut killed = program_at_work(&folder, 350);
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    assert_eq!(folder.names(), ["fine.haptize.part", "fine.toml"]);
+    let output = program(&folder, &["--resume"]).output().unwrap();
+    assert!(output.status.success());
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(report["resumed_points"].as_u64().unwrap() > 0);
+    assert_eq!(report["points"], 31_500);
+    assert_eq!(folder.names(), ["fine.haptize", "fine.toml"]);
+    let path = folder.0.path().join("fine.haptize");
+    let resumed = columns(&path);
+    assert!(program(&folder, &[]).output().unwrap().status.success());
+    assert!(columns(&path) == resumed);
+}
+
+#[test]
+fn an_interrupted_program_says_how_to_resume() {
+    let folder = Folder::new();
+    let interrupted = program_at_work(&folder, 10_000);
+    // SAFETY: kill(2) has no conditions; the process is our child and not yet waited for.
+    assert_eq!(unsafe { libc::kill(interrupted.id() as i32, libc::SIGINT) }, 0);
+    let output = interrupted.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("fine.haptize.part") && message.contains("--resume"), "{message}");
+    assert_eq!(folder.names(), ["fine.haptize.part", "fine.toml"]);
+}
+
+/// A file size limit stands in for a full disk: writing beyond it fails.
+#[test]
+fn a_full_disk_leaves_the_earlier_file_and_no_rubbish() {
+    let folder = Folder::new();
+    std::fs::write(folder.0.path().join("small.toml"), SCENE).unwrap();
+    let haptize = |prelude: &str, arguments: &str| {
+        let line = format!("{prelude} exec '{}' {arguments}", env!("CARGO_BIN_EXE_haptize"));
+        std::process::Command::new("sh").current_dir(folder.0.path()).args(["-c", &line]).output().unwrap()
+    };
+    assert!(haptize("", "bake small.toml --backend cpu").status.success());
+    let before = std::fs::read(folder.0.path().join("small.haptize")).unwrap();
+    for arguments in
+        ["export small.haptize --format npz", "export small.haptize --format csv", "bake small.toml --backend cpu"]
+    {
+        let output = haptize("trap '' XFSZ; ulimit -f 1;", arguments);
+        assert_eq!(output.status.code(), Some(1), "{arguments}");
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(message.contains("free some space") && message.contains("small."), "{message}");
+    }
+    assert_eq!(folder.names(), ["small.haptize", "small.haptize.part", "small.toml"]);
+    assert!(std::fs::read(folder.0.path().join("small.haptize")).unwrap() == before);
+    assert!(haptize("", "bake small.toml --backend cpu --resume").status.success());
+    assert_eq!(folder.names(), ["small.haptize", "small.toml"]);
+}

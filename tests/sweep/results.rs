@@ -1,0 +1,198 @@
+//! What a sweep's dataset holds.
+
+use crate::fixture::{Folder, MadeUp, POINTS, SCENE, answer, bake, scene, sweep, sweep_of, uninterrupted};
+use glam::DVec3;
+use haptize::{
+    JointVector,
+    contact::{Equilibrium, Model, NodeForce, Status},
+    dataset::Dataset,
+    haptize::{CpuBackend, FreeSpace, Run, Sweep},
+    object::Object,
+    proxy::Chain,
+    scene::Scene,
+};
+use std::sync::atomic::AtomicBool;
+
+#[test]
+fn the_dataset_is_what_the_backend_answered_at_every_grid_point() {
+    let folder = Folder::new();
+    let report = bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 10, usize::MAX).unwrap();
+    let dataset = Dataset::open(&folder.output()).unwrap();
+    assert_eq!(dataset.grid.points(), POINTS);
+    assert_eq!([&*dataset.grid.axes[0].unit, &*dataset.grid.axes[1].unit], ["rad", "m"]);
+    for point in 0..POINTS {
+        let (turn, slide) = (point / 9, point % 9);
+        let q = [-0.3 + turn as f64 * 0.1, 0.01 + slide as f64 * 0.004];
+        assert_eq!(dataset.grid.configuration(point)[..], q);
+        let expected = answer(&q);
+        assert_eq!(dataset.torque(point), &expected.torque[..]);
+        assert_eq!(dataset.status(point), expected.status);
+        assert_eq!(dataset.energy.as_ref().unwrap()[point], expected.energy);
+        assert_eq!(dataset.gap.as_ref().unwrap()[point], expected.gap as f32);
+        assert_eq!(dataset.residual.as_ref().unwrap()[point], expected.residual as f32);
+        assert_eq!(dataset.iterations.as_ref().unwrap()[point], expected.iterations);
+        let forces: Vec<_> = dataset.forces(point).map(|contact| (contact.node, contact.force.as_vec3())).collect();
+        let expected: Vec<_> = expected.forces.iter().map(|contact| (contact.node, contact.force.as_vec3())).collect();
+        assert_eq!(forces, expected);
+    }
+    assert_eq!(dataset.scene, SCENE);
+    assert_eq!(dataset.provenance.algorithm, "energy");
+
+    let answers: Vec<_> = (0..POINTS).map(|point| answer(&dataset.grid.configuration(point))).collect();
+    let count = |status| answers.iter().filter(|answer| answer.status == status).count();
+    let in_contact: Vec<_> = answers.iter().filter(|answer| answer.status != Status::Free).collect();
+    assert_eq!(report.points, POINTS);
+    assert_eq!(report.contact_points, in_contact.len());
+    assert_eq!(report.unconverged, count(Status::Unconverged));
+    assert_eq!(report.overflowed, count(Status::Overflow));
+    assert!(report.unconverged > 0 && report.overflowed > 0);
+    assert_eq!(report.iterations.max, in_contact.iter().map(|answer| answer.iterations).max().unwrap());
+    let sum: u32 = in_contact.iter().map(|answer| answer.iterations).sum();
+    assert_eq!(report.iterations.mean, f64::from(sum) / in_contact.len() as f64);
+    assert_eq!(report.max_residual, f64::from(3e-9_f32));
+    let json = serde_json::to_value(&report).unwrap();
+    for key in [
+        "points",
+        "contact_points",
+        "unconverged",
+        "overflowed",
+        "max_residual",
+        "iterations",
+        "seconds",
+        "configurations_per_second",
+        "backend",
+        "adapter",
+        "algorithm",
+    ] {
+        assert!(!json[key].is_null(), "{key}");
+    }
+    assert!(json["iterations"]["mean"].is_number() && json["iterations"]["max"].is_number());
+}
+
+#[test]
+fn a_sweep_in_memory_saves_the_same_file() {
+    let folder = Folder::new();
+    let blind = Scene::parse(&SCENE.replace("graphics = {}", ""), "small.toml").unwrap();
+    for scene in [scene(), blind] {
+        let sweep = sweep_of(&scene, "none", "2012-03-04T00:00:00Z");
+        let run = Run { chunk: 10, stop: &AtomicBool::new(false), progress: &mut |_| () };
+        let (dataset, in_memory) = sweep.run(&mut MadeUp::default(), run).unwrap();
+        dataset.save(&folder.output()).unwrap();
+        let saved = std::fs::read(folder.output()).unwrap();
+        let report = bake(&sweep, &mut MadeUp::default(), &folder.output(), false, 7, usize::MAX).unwrap();
+        assert!(std::fs::read(folder.output()).unwrap() == saved);
+        assert_eq!((report.iterations, report.max_residual), (in_memory.iterations, in_memory.max_residual));
+    }
+}
+
+#[test]
+fn chunk_size_leaves_no_trace() {
+    let whole = uninterrupted();
+    for chunk in [0, 1, 7, POINTS, 1000] {
+        let folder = Folder::new();
+        bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, chunk, usize::MAX).unwrap();
+        assert!(std::fs::read(folder.output()).unwrap() == whole, "chunk {chunk}");
+    }
+    let mut other =
+        MadeUp { answer: |q| Equilibrium { energy: answer(q).energy + 1e-16, ..answer(q) }, ..MadeUp::default() };
+    let folder = Folder::new();
+    bake(&sweep(), &mut other, &folder.output(), false, 10, usize::MAX).unwrap();
+    assert!(std::fs::read(folder.output()).unwrap() != whole, "the comparison sees the last bit");
+}
+
+#[test]
+fn the_number_of_threads_leaves_no_trace() {
+    let scene = scene();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, scene.contact);
+    let baked = |threads, chunk| {
+        let folder = Folder::new();
+        let mut backend = CpuBackend::new(&model, threads).unwrap();
+        let report = bake(&sweep(), &mut backend, &folder.output(), false, chunk, usize::MAX).unwrap();
+        assert!(report.contact_points > 5 && report.contact_points < POINTS, "{report:?}");
+        std::fs::read(folder.output()).unwrap()
+    };
+    let one = baked(1, POINTS);
+    for (threads, chunk) in [(2, POINTS), (3, 17), (5, 1)] {
+        assert!(baked(threads, chunk) == one, "{threads} threads, chunks of {chunk}");
+    }
+}
+
+/// Skipping changes nothing but gaps far from contact, and those are then lower bounds.
+#[test]
+fn skipping_free_space_changes_no_more_than_far_gaps() {
+    let fine = SCENE.replace("step = 0.1, count = 7", "step = 0.01, count = 70");
+    let fine = fine.replace("start = 0.01, step = 0.004, count = 9", "start = 0.0, step = 0.0005, count = 100");
+    let scene = Scene::parse(&fine, "fine.toml").unwrap();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, scene.contact);
+    let run = |skip: bool| {
+        let mut sweep = Sweep::new(&scene, &object, "cpu", "none", "").unwrap();
+        if skip {
+            sweep.skip_free_space(&model).unwrap();
+        }
+        let run = Run { chunk: 300, stop: &AtomicBool::new(false), progress: &mut |_| () };
+        sweep.run(&mut CpuBackend::new(&model, 2).unwrap(), run).unwrap()
+    };
+    let ((whole, all), (skipping, some)) = (run(false), run(true));
+    assert_eq!((all.skipped_points, all.contact_points), (0, some.contact_points));
+    assert!(some.skipped_points > 2000 && some.contact_points > 500, "{some:?}");
+    assert!(*whole.torque == *skipping.torque && *whole.status == *skipping.status);
+    assert!(*whole.iterations.unwrap() == *skipping.iterations.unwrap());
+    assert!(*whole.contacts.unwrap().forces == *skipping.contacts.unwrap().forces);
+    let (whole_gap, gap) = (whole.gap.unwrap(), skipping.gap.unwrap());
+    let place = |point: usize| [point / 100, point % 100];
+    let touching: Vec<[usize; 2]> = (0..7000).filter(|&p| whole.status[p] != 0).map(place).collect();
+    let mut bounds = 0;
+    for point in 0..7000 {
+        if gap[point] != whole_gap[point] {
+            bounds += 1;
+            assert!(0.0 < gap[point] && gap[point] < whole_gap[point]);
+            let far = |[a, b]: &[usize; 2]| a.abs_diff(point / 100).max(b.abs_diff(point % 100)) > FreeSpace::MARGIN;
+            assert!(touching.iter().all(far), "point {point} is near contact");
+        }
+    }
+    assert!(bounds > 1000);
+}
+
+#[test]
+fn results_that_no_file_may_hold_become_unconverged_points() {
+    let sick: [fn(&[f64]) -> Equilibrium; 7] = [
+        |q| Equilibrium { torque: JointVector::from_slice(&[f64::NAN, 0.0]), status: Status::Contact, ..answer(q) },
+        |q| Equilibrium { torque: JointVector::zeros(1), status: Status::Contact, ..answer(q) },
+        |q| Equilibrium { energy: f64::INFINITY, status: Status::Contact, ..answer(q) },
+        |q| Equilibrium { gap: f64::NAN, status: Status::Free, ..answer(q) },
+        |q| Equilibrium {
+            forces: vec![NodeForce { node: 0, force: DVec3::splat(1e39) }],
+            status: Status::Contact,
+            ..answer(q)
+        },
+        |q| Equilibrium { forces: vec![NodeForce { node: 22, force: DVec3::X }], status: Status::Contact, ..answer(q) },
+        |q| Equilibrium {
+            forces: [3, 1].map(|node| NodeForce { node, force: DVec3::X }).to_vec(),
+            status: Status::Contact,
+            ..answer(q)
+        },
+    ];
+    for answer in sick {
+        let folder = Folder::new();
+        let mut backend = MadeUp { answer, ..MadeUp::default() };
+        let report = bake(&sweep(), &mut backend, &folder.output(), false, 10, usize::MAX).unwrap();
+        assert_eq!(report.unconverged, POINTS);
+        let dataset = Dataset::open(&folder.output()).unwrap();
+        assert!(dataset.torque.iter().all(|&tau| tau == 0.0));
+        assert!(dataset.contacts.as_ref().unwrap().nodes.is_empty());
+    }
+}
+
+#[test]
+fn forces_are_stored_only_for_a_scene_with_graphics() {
+    let run = |scene: &Scene| {
+        let stop = AtomicBool::new(false);
+        let run = Run { chunk: 10, stop: &stop, progress: &mut |_| () };
+        sweep_of(scene, "none", "").run(&mut MadeUp::default(), run).unwrap().0
+    };
+    let blind = Scene::parse(&SCENE.replace("graphics = {}", ""), "small.toml").unwrap();
+    assert!(run(&scene()).contacts.is_some());
+    assert!(run(&blind).contacts.is_none());
+}
