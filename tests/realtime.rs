@@ -1,4 +1,5 @@
-//! The real-time loop: it allocates nothing, and does every tick that it does not report as missed.
+//! The real-time loop: it allocates nothing, and does every tick that it does not report as missed. The device whose hand
+//! another thread leads.
 
 #![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 
@@ -11,7 +12,7 @@ use haptize as engine;
 use haptize::{
     JointVector, MAX_JOINTS,
     dataset::Dataset,
-    device::{Motion, SimulatedHand},
+    device::{Device, HandError, Motion, Pointer, SimulatedHand},
     render::{
         field::TorqueField,
         haptic::{Haptics, Inputs},
@@ -109,4 +110,39 @@ fn a_session_against_the_clock_does_every_tick_that_it_does_not_report_and_repla
     let again = recording.replay(&haptics, None, labels(&data.grid)).unwrap();
     assert_eq!(again, trace);
     assert_eq!(recording.first_difference(&again), None);
+}
+
+#[test]
+fn the_device_goes_where_another_thread_points_and_yields_to_torque() {
+    let start = JointVector::from_slice(&[0.1, -0.2]);
+    let (mut device, mut pointer) = Pointer::new(&haptics(2), &start).unwrap();
+    assert_eq!(device.read(0.0).position, start);
+    let goal = JointVector::from_slice(&[0.4, 0.0]);
+    std::thread::spawn(move || pointer.move_to(&goal).unwrap()).join().unwrap();
+    device.apply(&JointVector::from_slice(&[0.0, -1.0]));
+    let mut before = start;
+    for _ in 0..2000 {
+        let reading = device.read(1e-3);
+        // Never faster than sqrt(Kh/m) times the way: no leap, whatever the pointer does.
+        assert!((reading.position[0] - before[0]).abs() < 0.3 * (20.0_f64 / 3e-3).sqrt() * 1e-3);
+        before = reading.position;
+        assert_eq!(reading.hand, goal);
+    }
+    // At rest where the hand's spring holds the torque: Kh (goal - y) + tau = 0.
+    assert!((before[0] - 0.4).abs() < 1e-9 && (before[1] + 1.0 / 20.0).abs() < 1e-9, "{before:?}");
+}
+
+#[test]
+fn a_place_that_is_none_is_refused_and_the_hand_keeps_its_goal() {
+    let start = JointVector::zeros(2);
+    let (mut device, mut pointer) = Pointer::new(&haptics(2), &start).unwrap();
+    for place in [&[f64::NAN, 0.0][..], &[0.0, f64::INFINITY], &[0.0, -1e300]] {
+        let place = JointVector::from_slice(place);
+        assert!(matches!(pointer.move_to(&place), Err(HandError::Place(_))));
+        assert!(matches!(Pointer::new(&haptics(2), &place), Err(HandError::Place(_))));
+    }
+    let other = JointVector::zeros(3);
+    assert_eq!(pointer.move_to(&other), Err(HandError::Joints { told: 3, device: 2 }));
+    assert!(Pointer::new(&haptics(2), &other).is_err());
+    assert_eq!(device.read(1e-3).hand, start);
 }
