@@ -30,6 +30,14 @@ pub enum GpuError {
         /// Adapters that were there, or `none`.
         found: String,
     },
+    /// The one adapter that was asked for is not among those of this machine.
+    #[error("the adapter {wanted} does not answer; found: {found}. Choose one of these, or the CPU")]
+    NotThere {
+        /// The adapter that was asked for.
+        wanted: String,
+        /// Adapters that were there, or `none`.
+        found: String,
+    },
     /// The adapter refuses a device with WebGPU's default limits.
     #[error("adapter {adapter} gives no device: {reason}. Update its driver, or use --backend cpu")]
     NoDevice {
@@ -81,12 +89,34 @@ pub enum GpuError {
 }
 
 /// Which adapters qualify.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AdapterChoice {
     /// A GPU made of silicon: what automatic choice takes; a software rasteriser is slower than the CPU backend.
     Hardware,
     /// Any adapter, software Vulkan included.
     Any,
+    /// This one, of [`adapters`], and no other.
+    This(AdapterSummary),
+}
+
+impl AdapterChoice {
+    fn takes(&self, adapter: &AdapterSummary) -> bool {
+        match self {
+            Self::Hardware => adapter.hardware,
+            Self::Any => true,
+            Self::This(wanted) => adapter == wanted,
+        }
+    }
+
+    /// Why none of the adapters that were `found` qualifies.
+    fn refusal(&self, found: &[String]) -> GpuError {
+        let found = if found.is_empty() { "none".to_owned() } else { found.join("; ") };
+        match self {
+            Self::Hardware => GpuError::NoAdapter { wanted: "hardware", found },
+            Self::Any => GpuError::NoAdapter { wanted: "usable", found },
+            Self::This(wanted) => GpuError::NotThere { wanted: wanted.to_string(), found },
+        }
+    }
 }
 
 /// One adapter, in words for `doctor` and for a dataset's provenance.
@@ -190,7 +220,8 @@ impl Context {
     /// Opens the best adapter that qualifies.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] with what was found; [`GpuError::NoDevice`] when none of them gives a device.
+    /// [`GpuError::NoAdapter`] or [`GpuError::NotThere`] with what was found; [`GpuError::NoDevice`] when none of them gives
+    /// a device.
     pub fn open(choice: AdapterChoice) -> Result<Self, GpuError> {
         let instance = instance();
         let found = candidates(&instance);
@@ -198,18 +229,15 @@ impl Context {
         let mut refusal = None;
         for adapter in &found {
             let summary = AdapterSummary::of(adapter);
-            if choice == AdapterChoice::Hardware && !summary.hardware {
+            if !choice.takes(&summary) {
                 continue;
             }
-            match Self::open_on(&instance, adapter, summary, choice) {
+            match Self::open_on(&instance, adapter, summary, choice.clone()) {
                 Ok(context) => return Ok(context),
                 Err(error) => refusal = refusal.or(Some(error)),
             }
         }
-        Err(refusal.unwrap_or_else(|| GpuError::NoAdapter {
-            wanted: if choice == AdapterChoice::Hardware { "hardware" } else { "usable" },
-            found: if names.is_empty() { "none".to_owned() } else { names.join("; ") },
-        }))
+        Err(refusal.unwrap_or_else(|| choice.refusal(&names)))
     }
 
     fn open_on(
@@ -254,7 +282,7 @@ impl Context {
     /// # Errors
     /// As [`Context::open`].
     pub fn reopen(&self) -> Result<Self, GpuError> {
-        Self::open(self.choice)
+        Self::open(self.choice.clone())
     }
 
     /// The adapter in use.

@@ -57,6 +57,13 @@ pub fn greatest_stiffness(spec: &HapticsSpec, joint: usize) -> f64 {
     (wall_bound(spec, joint).min(encoder) - handed_stiffness(spec, joint)).max(0.0)
 }
 
+/// Greatest passive damping Bvc of the coupling at `joint`, the device in nobody's hand, bd - K T/2 [N m s/rad].
+#[must_use]
+pub fn greatest_damping(spec: &HapticsSpec, joint: usize) -> f64 {
+    let stiffness = spec.coupling_stiffness[joint] + handed_stiffness(spec, joint);
+    (spec.device_damping[joint] - 0.5 * stiffness / spec.rate).max(0.0)
+}
+
 /// Colgate's wall, 2 (bd - Bvc) / T [N m/rad].
 fn wall_bound(spec: &HapticsSpec, joint: usize) -> f64 {
     (2.0 * (spec.device_damping[joint] - spec.coupling_damping[joint]) * spec.rate).max(0.0)

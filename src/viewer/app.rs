@@ -9,23 +9,32 @@ use super::{
     files::Files,
     guide::Guide,
     history::History,
-    job::{Job, Outcome, Task},
+    job::{Job, Outcome, Solver, Task, short},
     loaded::Loaded,
     number,
     plots::Plots,
     scene::SceneView,
     slices::Slices,
-    theme::{GAP, GROUP_GAP},
+    theme::{
+        BAR_MARGIN, CONTROLS_RANGE, CONTROLS_WIDTH, FINE_GAP, GAP, GROUP_GAP, LONE_BUTTON, MESSAGE_WIDTH, MOTION_WIDTH,
+        NARROW, PANEL_MARGIN, PAUSE_WIDTH, PLANE_WIDGETS, PLOTS_RANGE, PROGRESS, PROGRESS_HEIGHT, ROOM_FOR_BOTH,
+        SIDE_SHARE, SPACE_RANGE, WIDE_PROGRESS,
+    },
 };
-use crate::{JointVector, gpu::Context, haptize::BackendChoice, render::passivity::Bound, scene::Scene};
+use crate::{
+    JointVector,
+    gpu::Context,
+    render::{passivity::Bound, timing::Timing, trace::Tick},
+    scene::Scene,
+};
 use eframe::{
     egui::{
-        self, Align, Button, CentralPanel, Frame, Layout, Margin, Panel, ProgressBar, RichText, ScrollArea, Slider, Ui,
-        vec2,
+        self, Align, Button, CentralPanel, Frame, Layout, Panel, ProgressBar, RichText, ScrollArea, Slider, Ui, vec2,
     },
     egui_wgpu::RenderState,
 };
 use std::{
+    fs::File,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -37,6 +46,24 @@ pub enum Start {
     Sphere,
     /// A scene or a dataset.
     File(PathBuf),
+}
+
+impl Start {
+    /// Whether the file, where there is one, can be read at all.
+    ///
+    /// # Errors
+    /// When it cannot.
+    pub fn check(&self) -> Result<(), ViewError> {
+        let Self::File(path) = self else { return Ok(()) };
+        let readable = File::open(path).and_then(|file| match file.metadata()? {
+            found if found.is_dir() => Err(std::io::ErrorKind::IsADirectory.into()),
+            _ => Ok(()),
+        });
+        readable.map_err(|error| {
+            let remedy = "give a scene (.toml) or a dataset (.haptize)";
+            ViewError::Open(format!("{}: cannot be read: {error}; {remedy}", path.display()))
+        })
+    }
 }
 
 /// The paper's sphere, part of the program.
@@ -51,7 +78,9 @@ pub struct Viewer {
     plots: Plots,
     files: Files,
     job: Option<Job>,
-    backend: BackendChoice,
+    /// What this machine bakes with, and what is chosen of it.
+    solvers: Vec<Solver>,
+    solver: Solver,
     /// What went wrong, until it is dismissed.
     error: Option<String>,
 }
@@ -69,18 +98,18 @@ struct Session {
     cloud_first: bool,
 }
 
-/// Height from which on plane and cloud of C-space find room [points].
-const ROOM_FOR_BOTH: f32 = 470.0;
-
-/// Height of everything about a plane but its heat map [points].
-const SLICE_WIDGETS: f32 = 150.0;
-
 impl Session {
-    fn new(loaded: Loaded, pace: Pace, wake: impl Fn() + Send + 'static) -> Result<Self, String> {
-        let controls = Controls::new(&loaded, wake);
-        let (haptics, exceeded) = loaded.tuned(&controls.gains).map_err(|error| error.to_string())?;
+    fn new(
+        loaded: Loaded,
+        context: &Arc<Context>,
+        pace: Pace,
+        wake: impl Fn() + Send + 'static,
+    ) -> Result<Self, String> {
+        let controls = Controls::new(&loaded, context, wake);
+        let gains = &controls.tuning.haptics;
+        let (haptics, exceeded) = loaded.tuned(gains).map_err(|error| error.to_string())?;
         let history = History::new(haptics.period()).ok_or("no memory for histograms; close other programs")?;
-        let feel = Feel::start(haptics, &controls.gains, Guide::new(&loaded), pace)?;
+        let feel = Feel::start(haptics, gains, Guide::new(&loaded), pace)?;
         let (slices, cloud) = (Slices::new(&loaded.dataset), Cloud::new(&loaded.dataset));
         Ok(Self { loaded, feel, history, slices, cloud, controls, exceeded, cloud_first: false })
     }
@@ -96,23 +125,24 @@ impl Session {
             }
         });
         if both || !self.cloud_first {
-            let below = if both { 0.5 * (ui.available_height() - 150.0) } else { 0.0 };
-            let height = ui.available_height() - SLICE_WIDGETS - below;
+            let room = ui.available_height() - PLANE_WIDGETS;
+            let height = if both { 0.5 * room } else { room };
             self.slices.show(ui, &self.loaded, q, &self.history, height);
             ui.add_space(GAP);
         }
         if both || self.cloud_first {
-            let height = ui.available_height() - 2.0;
+            let height = ui.available_height() - FINE_GAP;
             self.cloud.show(ui, &self.loaded, q, height);
         }
     }
 
-    /// Goes on with the gains of the controls, the hand where it is.
+    /// Goes on with gains and effects of the controls, the hand where it is.
     fn retune(&mut self, pace: Pace) -> Result<(), String> {
-        let (haptics, exceeded) = self.loaded.tuned(&self.controls.gains).map_err(|error| error.to_string())?;
+        let gains = &self.controls.tuning.haptics;
+        let (haptics, exceeded) = self.loaded.tuned(gains).map_err(|error| error.to_string())?;
         let guide = self.feel.guide().clone();
         let history = History::new(haptics.period()).ok_or("no memory for histograms; close other programs")?;
-        self.feel = Feel::start(haptics, &self.controls.gains, guide, pace)?;
+        self.feel = Feel::start(haptics, gains, guide, pace)?;
         (self.history, self.exceeded) = (history, exceeded);
         Ok(())
     }
@@ -133,7 +163,8 @@ impl Viewer {
             plots: Plots::default(),
             files: Files::new(folder),
             job: None,
-            backend: BackendChoice::Auto,
+            solvers: Solver::all(),
+            solver: Solver::Auto,
             error: None,
         })
     }
@@ -158,16 +189,22 @@ impl Viewer {
     fn begin(&mut self, task: Task, egui: &egui::Context) {
         self.error = None;
         let egui = egui.clone();
-        match Job::begin(task, self.backend, Arc::clone(&self.context), move || egui.request_repaint()) {
+        match Job::begin(task, self.solver.clone(), Arc::clone(&self.context), move || egui.request_repaint()) {
             Ok(job) => self.job = Some(job),
             Err(error) => self.error = Some(error),
         }
     }
 
-    /// Waits until what is being opened is open; for pictures and tests.
+    /// Waits until what is being opened is open, drawn as it is to be, and priced; for pictures and tests.
     pub fn wait(&mut self, egui: &egui::Context) {
         if let Some(job) = self.job.take() {
             self.take(job.wait(), egui);
+        }
+        if let Err(error) = self.scene.wait() {
+            self.error = Some(error.to_string());
+        }
+        if let Some(session) = &mut self.session {
+            session.controls.wait();
         }
     }
 
@@ -176,10 +213,11 @@ impl Viewer {
             Outcome::Cancelled => {}
             Outcome::Failed(reason) => self.error = Some(reason),
             Outcome::Loaded(loaded) => {
-                let opened = self.scene.open(&loaded).map_err(|error| error.to_string());
+                let (loaded, body) = *loaded;
                 let egui = egui.clone();
-                match opened.and_then(|()| Session::new(*loaded, self.pace, move || egui.request_repaint())) {
+                match Session::new(loaded, &self.context, self.pace, move || egui.request_repaint()) {
                     Ok(mut session) => {
+                        self.scene.open(&session.loaded, body);
                         if let Some(before) = &self.session {
                             session.controls.keep(&before.controls);
                         }
@@ -210,6 +248,19 @@ impl Viewer {
     #[must_use]
     pub fn time_in_motion(&self) -> Option<(f64, f64)> {
         self.session.as_ref()?.feel.guide().time()
+    }
+
+    /// How punctual the haptic thread has been, and how costly its ticks; none where nothing is open.
+    #[must_use]
+    pub fn timing(&self) -> Option<Timing> {
+        Some(self.session.as_ref()?.history.timing())
+    }
+
+    /// Forgets how punctual it was so far.
+    pub fn forget_timing(&mut self) {
+        if let Some(session) = &mut self.session {
+            session.history.reset_timing();
+        }
     }
 
     /// Size of the contact torque now [N m]; none before the first tick.
@@ -300,8 +351,7 @@ impl Viewer {
             let Some(session) = &self.session else { return };
             if let Some(tick) = session.history.last() {
                 ui.separator();
-                let contact =
-                    if tick.contact { format!("{} nodes in contact", tick.contact_nodes) } else { "free".into() };
+                let contact = contact(tick, session.loaded.knows_nodes());
                 ui.label(RichText::new(contact).small());
                 ui.separator();
                 ui.label(RichText::new(format!("torque {} N m", number(tick.contact_torque.norm()))).small());
@@ -315,7 +365,7 @@ impl Viewer {
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if let Some(job) = &self.job {
-                    progress(ui, job, 190.0);
+                    progress(ui, job, PROGRESS);
                     ui.label(RichText::new(&job.title).small());
                     return;
                 }
@@ -336,25 +386,27 @@ impl Viewer {
     fn panels(&mut self, ui: &mut Ui) {
         let Some(session) = &mut self.session else { return };
         let size = ui.available_size();
-        let side = Frame::new().fill(ui.visuals().panel_fill).inner_margin(Margin::symmetric(12, 8));
+        let side = Frame::new().fill(ui.visuals().panel_fill).inner_margin(PANEL_MARGIN);
         let mut asked = Default::default();
-        let below = (0.27 * size.y).clamp(130.0, 320.0);
+        let share = |length: f32, [least, greatest]: [f32; 2]| (SIDE_SHARE * length).clamp(least, greatest);
+        let below = share(size.y, PLOTS_RANGE);
         // In a narrow window the plots get its whole width, in a wide one C-space gets its whole height.
         let narrow = size.x < NARROW;
         if narrow {
             plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
         }
-        Panel::left("controls").frame(side).resizable(true).default_size(232.0).size_range(200.0..=360.0).show(
-            ui,
-            |ui| {
+        Panel::left("controls")
+            .frame(side)
+            .resizable(true)
+            .default_size(CONTROLS_WIDTH)
+            .size_range(CONTROLS_RANGE)
+            .show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
                     let (controls, loaded) = (&mut session.controls, &session.loaded);
-                    let object = self.scene.has_object();
-                    asked = controls.show(ui, loaded, &session.exceeded, &mut self.scene.shown, object);
+                    asked = controls.show(ui, loaded, &session.exceeded, &mut self.scene.shown, &self.solvers);
                 });
-            },
-        );
-        let right = (0.27 * size.x).clamp(240.0, 420.0);
+            });
+        let right = share(size.x, SPACE_RANGE);
         Panel::right("C-space").frame(side).resizable(true).default_size(right).show(ui, |ui| {
             let q = session.history.last().map_or_else(|| session.loaded.start(), |tick| tick.proxy);
             session.configuration_space(ui, &q);
@@ -368,11 +420,18 @@ impl Viewer {
                 self.error = Some(error.to_string());
             }
         });
-        self.backend = session.controls.backend;
+        self.solver = session.controls.solver.clone();
         if asked.retune
             && let Err(error) = session.retune(self.pace)
         {
             self.error = Some(error);
+        }
+        if asked.redraw {
+            let egui = ui.ctx().clone();
+            let effects = session.controls.tuning.graphics;
+            if let Err(error) = self.scene.redraw(&session.loaded, effects, move || egui.request_repaint()) {
+                self.error = Some(error);
+            }
         }
         if let (true, Some(scene)) = (asked.bake, session.controls.scene.clone()) {
             self.begin(Task::Bake(scene), &ui.ctx().clone());
@@ -382,13 +441,15 @@ impl Viewer {
     /// What is shown before there is anything to feel.
     fn welcome(&mut self, ui: &mut Ui) {
         ui.vertical_centered(|ui| {
-            ui.add_space(0.32 * ui.available_height());
+            // Somewhat above the middle, where one looks first.
+            ui.add_space(ui.available_height() / 3.0);
             match &self.job {
                 Some(job) => {
                     ui.heading(&job.title);
                     ui.label(RichText::new("Contact is solved at every point of the grid over the joints, once; then it is felt at 1 kHz.").weak());
                     ui.add_space(GROUP_GAP);
-                    ui.allocate_ui(vec2(420.0, 30.0), |ui| ui.horizontal(|ui| progress(ui, job, 330.0)));
+                    let size = vec2(WIDE_PROGRESS + LONE_BUTTON.x, LONE_BUTTON.y);
+                    ui.allocate_ui(size, |ui| ui.horizontal(|ui| progress(ui, job, WIDE_PROGRESS)));
                 }
                 None => {
                     ui.heading("Nothing is open");
@@ -410,12 +471,12 @@ impl Viewer {
             .resizable(false)
             .anchor(egui::Align2::CENTER_CENTER, vec2(0.0, 0.0))
             .show(ui.ctx(), |ui| {
-                ui.set_max_width(560.0);
+                ui.set_max_width(MESSAGE_WIDTH);
                 // Messages point at a line with a caret: that needs letters of one width.
                 let text = RichText::new(error).color(ui.visuals().error_fg_color);
                 ui.label(if error.contains('\n') { text.monospace() } else { text });
                 ui.add_space(GROUP_GAP);
-                dismissed = ui.add(Button::new("Dismiss").min_size(vec2(90.0, 24.0))).clicked();
+                dismissed = ui.add(Button::new("Dismiss").min_size(LONE_BUTTON)).clicked();
             });
         if dismissed {
             self.error = None;
@@ -432,12 +493,11 @@ impl Viewer {
     }
 }
 
-/// Width of the window below which plots lie under all other panels [points].
-const NARROW: f32 = 1150.0;
-
 fn plots_panel(ui: &mut Ui, frame: Frame, height: f32, plots: &mut Plots, session: &mut Session, folder: &Path) {
     Panel::bottom("plots").frame(frame).resizable(true).default_size(height).show(ui, |ui| {
-        plots.show(ui, &session.loaded, &mut session.history, folder);
+        if plots.show(ui, &session.loaded, &mut session.history, folder) {
+            session.history.hold_still(&mut session.feel);
+        }
     });
 }
 
@@ -462,10 +522,10 @@ fn motions(ui: &mut Ui, guide: &mut Guide) {
     }
     if let (Some((mut time, duration)), true) = (guide.time(), chosen.is_some()) {
         let text = if guide.is_running() { "Pause" } else { "Play" };
-        if ui.add(Button::new(text).min_size(vec2(52.0, 0.0))).clicked() {
+        if ui.add(Button::new(text).min_size(vec2(PAUSE_WIDTH, 0.0))).clicked() {
             guide.toggle();
         }
-        ui.spacing_mut().slider_width = 120.0;
+        ui.spacing_mut().slider_width = MOTION_WIDTH;
         let slider = Slider::new(&mut time, 0.0..=duration).show_value(false);
         let response = ui.add(slider);
         response.widget_info(|| egui::WidgetInfo::slider(true, time, "Time in the motion"));
@@ -491,16 +551,21 @@ fn progress(ui: &mut Ui, job: &Job, width: f32) {
             job.cancel();
         }
     };
-    let bar = ProgressBar::new(share).desired_width(width).desired_height(18.0).text(RichText::new(text).small());
+    let bar =
+        ProgressBar::new(share).desired_width(width).desired_height(PROGRESS_HEIGHT).text(RichText::new(text).small());
     ui.add(bar);
     cancel(ui);
 }
 
 fn bar(ui: &Ui) -> Frame {
-    Frame::new().fill(ui.visuals().panel_fill).inner_margin(Margin::symmetric(12, 5))
+    Frame::new().fill(ui.visuals().panel_fill).inner_margin(BAR_MARGIN)
 }
 
-/// The beginning of an adapter's name.
-fn short(name: &str) -> &str {
-    name.split(" (").next().unwrap_or(name)
+/// What is touched, in words; `known`: whether the dataset tells which nodes of the object are.
+fn contact(tick: &Tick, known: bool) -> String {
+    match tick.contact {
+        false => "free".into(),
+        true if known => format!("{} nodes in contact", tick.contact_nodes),
+        true => "in contact, nodes not stored".into(),
+    }
 }

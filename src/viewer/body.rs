@@ -9,38 +9,45 @@ use crate::{
         graphics::{ContactForces, Smoothing},
         session::Latest,
     },
+    scene::GraphicsEffects,
 };
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// The object on the device.
+/// The object as it is drawn.
 pub struct Body {
-    update: FrameUpdate,
+    nodes: Nodes,
     /// What is drawn.
     pub surface: Surface,
+    /// n0 [m].
+    rest: Vec<Vec3>,
+    /// Greatest displacement at rest under the dataset's largest contact forces [m], and the largest of these on a node [N].
+    pub extremes: [f64; 2],
+}
+
+/// The object's nodes on the device, and what moves them.
+pub struct Nodes {
+    /// Their state.
+    pub update: FrameUpdate,
     contact: Arc<ContactForces>,
     forces: Vec<DVec3>,
     smoothing: Option<Smoothing>,
-    /// n0 [m].
-    rest: Vec<Vec3>,
     /// Time between two frames of the object [s].
     period: f64,
     /// Time that the object lags behind [s].
     owed: f64,
-    /// Greatest displacement at rest under the dataset's largest contact forces [m], and the largest of these on a node [N].
-    pub extremes: [f64; 2],
 }
 
 /// Frames of the object that one frame of the window makes up for: a window at 10 frames a second still shows an object at
 /// 60. A slower one shows it slowed down.
 const MOST_FRAMES: usize = 6;
 
-impl Body {
-    /// The object of `loaded` at rest; none where it has no object.
+impl Nodes {
+    /// Those of `loaded` at rest, to be moved with `effects`; none where it has no object.
     ///
     /// # Errors
-    /// When the device refuses it.
-    pub fn new(context: &Arc<Context>, loaded: &Loaded) -> Result<Option<Self>, FrameError> {
+    /// When the device refuses them.
+    pub fn new(context: &Arc<Context>, loaded: &Loaded, effects: &GraphicsEffects) -> Result<Option<Self>, FrameError> {
         let (Some(object), Some(contact), Some(graphics)) =
             (&loaded.setup.object, &loaded.forces, &loaded.setup.scene.graphics)
         else {
@@ -48,14 +55,16 @@ impl Body {
         };
         let nodes = object.rest.len();
         let period = 1.0 / graphics.rate;
-        let update =
-            FrameUpdate::new(Arc::clone(context), object, period, FrameMethod::suitable(nodes), &graphics.effects)?;
-        let surface = Surface::new(context, object, &update)?;
+        let update = FrameUpdate::new(Arc::clone(context), object, period, FrameMethod::suitable(nodes), effects)?;
         let forces = vec![DVec3::ZERO; nodes];
-        let smoothing = graphics.effects.smoothing.map(|time| Smoothing::new(time, period, nodes));
-        let rest = object.rest.iter().map(|point| point.as_vec3()).collect();
-        let (contact, extremes) = (Arc::clone(contact), extremes(loaded));
-        Ok(Some(Self { update, surface, contact, forces, smoothing, rest, period, owed: 0.0, extremes }))
+        let smoothing = effects.smoothing.map(|time| Smoothing::new(time, period, nodes));
+        Ok(Some(Self { update, contact: Arc::clone(contact), forces, smoothing, period, owed: 0.0 }))
+    }
+
+    /// Time between two frames [s].
+    #[must_use]
+    pub fn period(&self) -> f64 {
+        self.period
     }
 
     /// Lets `elapsed` [s] go by under the contact forces of `latest`.
@@ -76,6 +85,29 @@ impl Body {
         }
         Ok(())
     }
+}
+
+impl Body {
+    /// The object of `loaded` at rest, to be moved with `effects`; none where it has no object.
+    ///
+    /// # Errors
+    /// When the device refuses it.
+    pub fn new(context: &Arc<Context>, loaded: &Loaded, effects: &GraphicsEffects) -> Result<Option<Self>, FrameError> {
+        let (Some(object), Some(nodes)) = (&loaded.setup.object, Nodes::new(context, loaded, effects)?) else {
+            return Ok(None);
+        };
+        let surface = Surface::new(context, object, &nodes.update)?;
+        let rest = object.rest.iter().map(|point| point.as_vec3()).collect();
+        Ok(Some(Self { nodes, surface, rest, extremes: extremes(loaded) }))
+    }
+
+    /// Lets `elapsed` [s] go by under the contact forces of `latest`.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn advance(&mut self, latest: &Latest, elapsed: f64) -> Result<(), GpuError> {
+        self.nodes.advance(latest, elapsed)
+    }
 
     /// Place of `node` at rest [m].
     #[must_use]
@@ -85,7 +117,7 @@ impl Body {
 
     /// Nodes with a contact force, and that force [N].
     pub fn contacts(&self) -> impl Iterator<Item = (usize, DVec3)> {
-        self.forces.iter().copied().enumerate().filter(|(_, force)| *force != DVec3::ZERO)
+        self.nodes.forces.iter().copied().enumerate().filter(|(_, force)| *force != DVec3::ZERO)
     }
 }
 

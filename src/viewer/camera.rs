@@ -29,6 +29,23 @@ pub struct Ray {
 
 /// Vertical angle of view [rad].
 const FIELD_OF_VIEW: f32 = 0.60;
+/// From where one looks at first: from the front, a little from the left and from above [rad].
+const AZIMUTH: f32 = -0.9;
+const ELEVATION: f32 = 0.42;
+/// Turn for a pointer's way of the picture's height [rad]: about half round.
+const TURN: f32 = 3.0;
+/// Nearest and farthest that is drawn, over the distance to the target [1]: there, depth in f32 (6e-8) over the nearest
+/// tells 6e-6 of the distance apart.
+const NEAR: f32 = 0.01;
+const FAR: f32 = 100.0;
+/// Nearest and farthest that one can zoom [m].
+const DISTANCES: [f32; 2] = [1e-4, 1e4];
+/// Least width over height of a picture [1]: one of no width has no projection.
+const LEAST_ASPECT: f32 = 1e-3;
+/// Least cosine of a ray to a plane's normal at which they meet [1]: f32 rounds it by 1e-7.
+const LEAST_SLOPE: f32 = 1e-6;
+/// Least extent of what is looked at [m].
+const LEAST_RADIUS: f32 = 1e-6;
 /// The eye stays this far from straight above or below, where "up" has no meaning [rad].
 const POLE_MARGIN: f32 = 0.02;
 
@@ -36,8 +53,8 @@ impl Camera {
     /// Sees a ball of `radius` about `target` whole.
     #[must_use]
     pub fn looking_at(target: Vec3, radius: f32) -> Self {
-        let distance = radius.max(1e-6) / (0.5 * FIELD_OF_VIEW).sin();
-        Self { target, distance, azimuth: -0.9, elevation: 0.42 }
+        let distance = radius.max(LEAST_RADIUS) / (0.5 * FIELD_OF_VIEW).sin();
+        Self { target, distance, azimuth: AZIMUTH, elevation: ELEVATION }
     }
 
     /// Unit vector from the target to the eye.
@@ -64,9 +81,8 @@ impl Camera {
     /// World to clip space (depth 0 to 1) for a picture of the given width over height.
     #[must_use]
     pub fn clip(&self, aspect: f32) -> Mat4 {
-        let near = 0.01 * self.distance;
-        let far = 100.0 * self.distance;
-        perspective(FIELD_OF_VIEW, aspect.max(1e-3), near, far) * look_at_mat4(self.eye(), self.target, Vec3::Z)
+        let [near, far] = [NEAR, FAR].map(|share| share * self.distance);
+        perspective(FIELD_OF_VIEW, aspect.max(LEAST_ASPECT), near, far) * look_at_mat4(self.eye(), self.target, Vec3::Z)
     }
 
     /// Height of the picture at the target's distance [m].
@@ -78,8 +94,8 @@ impl Camera {
     /// Turns by a pointer movement, in fractions of the picture's height.
     pub fn orbit(&mut self, movement: Vec2) {
         let limit = std::f32::consts::FRAC_PI_2 - POLE_MARGIN;
-        self.azimuth = (self.azimuth - 3.0 * movement.x).rem_euclid(std::f32::consts::TAU);
-        self.elevation = (self.elevation + 3.0 * movement.y).clamp(-limit, limit);
+        self.azimuth = (self.azimuth - TURN * movement.x).rem_euclid(std::f32::consts::TAU);
+        self.elevation = (self.elevation + TURN * movement.y).clamp(-limit, limit);
     }
 
     /// Shifts the target by a pointer movement, in fractions of the picture's height: what is under the pointer follows.
@@ -90,7 +106,7 @@ impl Camera {
 
     /// Brings the eye nearer for `factor` below one.
     pub fn zoom(&mut self, factor: f32) {
-        self.distance = (self.distance * factor).clamp(1e-4, 1e4);
+        self.distance = (self.distance * factor).clamp(DISTANCES[0], DISTANCES[1]);
     }
 
     /// The ray through a point of the picture: x right and y up, both from -1 to 1.
@@ -109,7 +125,7 @@ impl Ray {
     pub fn meet_plane(&self, point: Vec3, normal: Vec3) -> Option<Vec3> {
         let slope = self.direction.dot(normal);
         let along = (point - self.origin).dot(normal) / slope;
-        (slope.abs() > 1e-6 && along > 0.0).then(|| self.origin + along * self.direction)
+        (slope.abs() > LEAST_SLOPE && along > 0.0).then(|| self.origin + along * self.direction)
     }
 }
 

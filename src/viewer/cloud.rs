@@ -5,13 +5,33 @@
 use super::{
     camera::Camera,
     loaded::Loaded,
-    number,
+    number, palette,
     slices::{gradient, untrusted},
-    theme,
+    theme::{self, COLOUR_BAR, FINE_GAP, GAP, HAIRLINE, ROUNDING},
 };
 use crate::{JointVector, contact::Status, dataset::Dataset, report::colour::ColourMap};
-use eframe::egui::{self, Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Ui, vec2};
+use eframe::egui::{self, Align2, Color32, Pos2, Rect, Sense, Stroke, Ui, vec2};
 use glam::{Vec2, Vec3};
+
+/// From where it is seen at first [rad]: a little more from the side than the 3-D scene, so that all three names show.
+const AZIMUTH: f32 = -0.95;
+const ELEVATION: f32 = 0.45;
+
+/// Radius of what is seen whole about the box from -1 to 1: its corners, at sqrt 3, and the names beside them.
+const SEEN: f32 = 2.1;
+
+/// Distance of names from the box's middle, over that of its faces [1].
+const NAMES: f32 = 1.18;
+
+/// Radius of a dot at the greatest torque over the distance of neighbours: nearly touching [1]; within these limits
+/// [points]; and of the least torque over that of the greatest [1].
+const DOT: f32 = 0.4;
+const DOTS: [f32; 2] = [1.0, 6.0];
+const LEAST_SHARE: f64 = 0.45;
+
+/// The colour bar, from the panel's upper right corner [points].
+const BAR_AT: egui::Vec2 = vec2(-104.0, 22.0);
+const BAR_WIDTH: f32 = 86.0;
 
 /// The cloud's panel.
 pub struct Cloud {
@@ -35,9 +55,7 @@ impl Cloud {
     pub fn new(dataset: &Dataset) -> Self {
         let contact = (0..dataset.grid.points()).filter(|&point| dataset.status(point) == Status::Contact);
         let high = contact.map(|point| size(dataset, point)).fold(0.0, f64::max);
-        let mut camera = Camera::looking_at(Vec3::ZERO, 2.1);
-        (camera.azimuth, camera.elevation) = (-0.95, 0.45);
-        Self { camera, points: None, high }
+        Self { camera: home(), points: None, high }
     }
 
     /// Shows it in a picture `height` points high.
@@ -49,7 +67,7 @@ impl Cloud {
         let moved = response.drag_delta() / rect.height();
         self.camera.orbit(Vec2::new(moved.x, moved.y));
         if response.double_clicked() {
-            (self.camera.azimuth, self.camera.elevation) = (-0.95, 0.45);
+            self.camera = home();
         }
         let others: Vec<usize> =
             grid.axes.iter().zip(q.iter()).skip(3).map(|(axis, q)| axis.nearest_line(*q)).collect();
@@ -57,16 +75,22 @@ impl Cloud {
             self.points = Some((others.clone(), points(dataset, &others)));
         }
         let Some((_, points)) = &self.points else { return };
-        let palette = theme::palette(ui.visuals());
+        let palette = palette::of(ui.visuals());
         let painter = ui.painter_at(rect);
-        painter.rect_filled(rect, 4.0, palette.stage);
+        painter.rect_filled(rect, f32::from(ROUNDING), palette.stage);
         let clip = self.camera.clip(rect.width() / rect.height());
         let show = |place: Vec3| -> (Pos2, f32) {
             let shown = clip.project_point3(place);
             let at = rect.center() + 0.5 * vec2(shown.x * rect.width(), -shown.y * rect.height());
             (at, shown.z)
         };
-        self.frame(&painter, &show, dataset, ui.visuals().weak_text_color(), palette.axis.gamma_multiply(0.45));
+        self.frame(
+            &painter,
+            &show,
+            dataset,
+            ui.visuals().weak_text_color(),
+            palette.axis.gamma_multiply(palette::FAINT),
+        );
         let map = ColourMap::Root { high: self.high };
         let mut dots: Vec<(Pos2, f32, &Point)> = points
             .iter()
@@ -79,24 +103,30 @@ impl Cloud {
         // Distance of neighbours in the box, the geometric mean over its sides.
         let shown = grid.axes.len().min(3) as f32;
         let cell = grid.axes.iter().take(3).map(|axis| 2.0 / axis.count as f32).product::<f32>().powf(1.0 / shown);
-        let radius = (0.4 * cell / self.camera.height_at_target() * rect.height()).clamp(1.0, 6.0);
+        let radius = (DOT * cell / self.camera.height_at_target() * rect.height()).clamp(DOTS[0], DOTS[1]);
         for (at, _, point) in dots {
-            let share = (point.torque / self.high.max(f64::MIN_POSITIVE)).cbrt().clamp(0.45, 1.0) as f32;
-            let colour = if point.trusted { theme::egui_colour(map.colour(point.torque)) } else { palette.flagged };
+            let share = (point.torque / self.high.max(f64::MIN_POSITIVE)).cbrt().clamp(LEAST_SHARE, 1.0) as f32;
+            let colour = if point.trusted { palette::egui_colour(map.colour(point.torque)) } else { palette.flagged };
             painter.circle_filled(at, radius * share, colour);
         }
         let (here, _) = show(place(dataset, q));
-        for (radius, colour) in [(7.0, palette.here), (5.0, palette.stage), (2.5, palette.here)] {
+        for (radius, colour) in palette::ring(&palette) {
             painter.circle_filled(here, radius, colour);
         }
         let unit = grid.axes.first().map_or("N m", |axis| axis.effort_unit());
-        let bar = Rect::from_min_size(rect.right_top() + vec2(-104.0, 22.0), vec2(86.0, 6.0));
+        let bar = Rect::from_min_size(rect.right_top() + BAR_AT, vec2(BAR_WIDTH, COLOUR_BAR));
         gradient(&painter, bar, map, true);
-        let (text, small) = (ui.visuals().text_color(), FontId::proportional(10.5));
+        let (text, small) = (ui.visuals().text_color(), theme::small());
         let title = format!("torque [{unit}]");
-        painter.text(bar.center_top() + vec2(0.0, -3.0), Align2::CENTER_BOTTOM, title, small.clone(), text);
-        painter.text(bar.left_bottom() + vec2(0.0, 2.0), Align2::CENTER_TOP, "0", small.clone(), text);
-        painter.text(bar.right_bottom() + vec2(-2.0, 2.0), Align2::CENTER_TOP, number(self.high), small, text);
+        painter.text(bar.center_top() + vec2(0.0, -FINE_GAP), Align2::CENTER_BOTTOM, title, small.clone(), text);
+        painter.text(bar.left_bottom() + vec2(0.0, FINE_GAP), Align2::CENTER_TOP, "0", small.clone(), text);
+        painter.text(
+            bar.right_bottom() + vec2(-FINE_GAP, FINE_GAP),
+            Align2::CENTER_TOP,
+            number(self.high),
+            small,
+            text,
+        );
     }
 
     /// The box's edges, and the names of its axes with their ends.
@@ -108,31 +138,34 @@ impl Cloud {
         text: Color32,
         line: Color32,
     ) {
-        let small = FontId::proportional(10.5);
+        let small = theme::small();
         for axis in 0..3 {
             for (u, v) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
                 let mut ends = [Vec3::ZERO; 2];
                 for (end, along) in ends.iter_mut().zip([-1.0, 1.0]) {
                     (end[axis], end[(axis + 1) % 3], end[(axis + 2) % 3]) = (along, u, v);
                 }
-                painter.line_segment(ends.map(|end| show(end).0), Stroke::new(1.0, line));
+                painter.line_segment(ends.map(|end| show(end).0), Stroke::new(HAIRLINE, line));
             }
         }
         // Names along the edges of the floor nearest to the eye, and along the upright one farthest left.
         let toward = self.camera.backward();
         let near = |component: f32| if component < 0.0 { -1.0 } else { 1.0 };
         let [x, y] = [near(toward.x), near(toward.y)];
-        let out = 1.18;
-        let places = [Vec3::new(0.0, out * y, -out), Vec3::new(out * x, 0.0, -out)];
+        let places = [Vec3::new(0.0, NAMES * y, -NAMES), Vec3::new(NAMES * x, 0.0, -NAMES)];
         let left = [Vec3::new(x, -y, 0.0), Vec3::new(-x, y, 0.0)];
         let upright = left.into_iter().min_by(|a, b| show(*a).0.x.total_cmp(&show(*b).0.x)).unwrap_or(Vec3::ZERO);
         for (joint, (axis, place)) in dataset.grid.axes.iter().zip(places.into_iter().chain([upright])).enumerate() {
             let align = if joint == 2 { Align2::RIGHT_CENTER } else { Align2::CENTER_CENTER };
-            let offset = if joint == 2 { vec2(-6.0, 0.0) } else { vec2(0.0, 4.0) };
+            let offset = if joint == 2 { vec2(-GAP, 0.0) } else { vec2(0.0, GAP) };
             let name = format!("{} [{}]", axis.name, axis.unit);
             painter.text(show(place).0 + offset, align, name, small.clone(), text);
         }
     }
+}
+
+fn home() -> Camera {
+    Camera { azimuth: AZIMUTH, elevation: ELEVATION, ..Camera::looking_at(Vec3::ZERO, SEEN) }
 }
 
 /// Size of the torque of a grid point [N m].

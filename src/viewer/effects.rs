@@ -1,102 +1,178 @@
-//! The effects of the scene's loop, each of which can be left out while one feels, and what each of them costs.
-//!
-//! The price of an effect is the difference in the cost of a tick with it and without it: the scene's first motion is
-//! played by a simulated hand as fast as it goes, a few times, in the background; the fastest run counts, because
-//! everything else that a machine does only adds to it.
+//! The effects that a scene names, of the loop and of the object that is drawn; each can be left out while one feels and
+//! sees, and taken back as the scene has it.
 
 use super::loaded::Loaded;
-use crate::{
-    device::SimulatedHand,
-    render::session,
-    scene::{HapticsSpec, ProxyInertia},
-};
-use std::{sync::mpsc, time::Instant};
+use crate::scene::{GraphicsEffects, HapticsSpec, ProxyInertia};
 
-/// Something that the loop does because the scene asks for it.
+/// What can be turned without baking again.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tuning {
+    /// Gains and effects of a tick.
+    pub haptics: HapticsSpec,
+    /// Effects of a frame; none where nothing is drawn.
+    pub graphics: GraphicsEffects,
+}
+
+/// What an effect is part of, and so what it costs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Of each tick of the haptic loop.
+    Tick,
+    /// Of each frame of the object.
+    Frame,
+}
+
+/// Something that is done because the scene asks for it.
 pub struct Effect {
     /// For its box.
     pub name: &'static str,
     /// What it does.
     pub what: &'static str,
-    /// Whether gains ask for it.
-    pub is_on: fn(&HapticsSpec) -> bool,
+    /// What it is part of.
+    pub part: Part,
+    /// Whether it is asked for.
+    pub is_on: fn(&Tuning) -> bool,
     /// Leaves it out.
-    pub leave_out: fn(&mut HapticsSpec),
+    pub leave_out: fn(&mut Tuning),
     /// Takes it back as the scene has it.
-    pub take_back: fn(&mut HapticsSpec, &HapticsSpec),
+    pub take_back: fn(&mut Tuning, &Tuning),
 }
 
-/// All effects of the loop; a scene shows those that it names.
-pub const EFFECTS: [Effect; 1] = [Effect {
-    name: "Inertia of each configuration",
-    what: "The proxy moves with the chain's inertia where it is, instead of that in the middle of the grid",
-    is_on: |gains| gains.proxy_inertia == ProxyInertia::Configuration,
-    leave_out: |gains| gains.proxy_inertia = ProxyInertia::Constant,
-    take_back: |gains, scene| gains.proxy_inertia = scene.proxy_inertia,
-}];
+/// All effects; a scene shows those that it names.
+pub const EFFECTS: [Effect; 9] = [
+    Effect {
+        name: "Inertia of each configuration",
+        what: "The proxy moves with the chain's inertia where it is, instead of that in the middle of the grid",
+        part: Part::Tick,
+        is_on: |tuning| tuning.haptics.proxy_inertia == ProxyInertia::Configuration,
+        leave_out: |tuning| tuning.haptics.proxy_inertia = ProxyInertia::Constant,
+        take_back: |tuning, scene| tuning.haptics.proxy_inertia = scene.haptics.proxy_inertia,
+    },
+    Effect {
+        name: "Contact friction",
+        what: "Coulomb friction of elastic-plastic bristles at the proxy's nodes in contact: sticks, slips",
+        part: Part::Tick,
+        is_on: |tuning| tuning.haptics.effects.friction.is_some(),
+        leave_out: |tuning| tuning.haptics.effects.friction = None,
+        take_back: |tuning, scene| tuning.haptics.effects.friction.clone_from(&scene.haptics.effects.friction),
+    },
+    Effect {
+        name: "Contact damping",
+        what: "Dampers along the normals of the contacts",
+        part: Part::Tick,
+        is_on: |tuning| tuning.haptics.effects.contact_damping.is_some(),
+        leave_out: |tuning| tuning.haptics.effects.contact_damping = None,
+        take_back: |tuning, scene| {
+            tuning.haptics.effects.contact_damping.clone_from(&scene.haptics.effects.contact_damping);
+        },
+    },
+    Effect {
+        name: "Four-channel coupling",
+        what: "Forces and accelerations of hand and proxy are exchanged beside the coupling's spring and damper",
+        part: Part::Tick,
+        is_on: |tuning| tuning.haptics.effects.four_channel.is_some(),
+        leave_out: |tuning| tuning.haptics.effects.four_channel = None,
+        take_back: |tuning, scene| tuning.haptics.effects.four_channel = scene.haptics.effects.four_channel,
+    },
+    Effect {
+        name: "Passivity control",
+        what: "Damping wherever the passivity observer says that energy came from nowhere",
+        part: Part::Tick,
+        is_on: |tuning| tuning.haptics.effects.passivity_control,
+        leave_out: |tuning| tuning.haptics.effects.passivity_control = false,
+        take_back: |tuning, scene| {
+            tuning.haptics.effects.passivity_control = scene.haptics.effects.passivity_control;
+        },
+    },
+    Effect {
+        name: "Gravity",
+        what: "The object's nodes have weight",
+        part: Part::Frame,
+        is_on: |tuning| tuning.graphics.gravity.is_some(),
+        leave_out: |tuning| tuning.graphics.gravity = None,
+        take_back: |tuning, scene| tuning.graphics.gravity = scene.graphics.gravity,
+    },
+    Effect {
+        name: "Strain stiffening",
+        what: "The object's springs stiffen the more they are stretched",
+        part: Part::Frame,
+        is_on: |tuning| tuning.graphics.stiffening.is_some(),
+        leave_out: |tuning| tuning.graphics.stiffening = None,
+        take_back: |tuning, scene| tuning.graphics.stiffening = scene.graphics.stiffening,
+    },
+    Effect {
+        name: "Smoothing",
+        what: "Contact forces pass a low-pass filter before they move the object",
+        part: Part::Frame,
+        is_on: |tuning| tuning.graphics.smoothing.is_some(),
+        leave_out: |tuning| tuning.graphics.smoothing = None,
+        take_back: |tuning, scene| tuning.graphics.smoothing = scene.graphics.smoothing,
+    },
+    Effect {
+        name: "Quasi-static object",
+        what: "The object has no dynamics: it is drawn in equilibrium with the contact forces",
+        part: Part::Frame,
+        is_on: |tuning| tuning.graphics.quasi_static,
+        leave_out: |tuning| tuning.graphics.quasi_static = false,
+        take_back: |tuning, scene| tuning.graphics.quasi_static = scene.graphics.quasi_static,
+    },
+];
 
-/// What effects cost, as far as it is known.
-pub struct Prices {
-    known: Vec<Option<f64>>,
-    news: Option<mpsc::Receiver<(usize, f64)>>,
-}
-
-/// Runs of which the fastest counts.
-const RUNS: usize = 5;
-
-/// Length of a run [s].
-const LENGTH: f64 = 2.0;
-
-impl Prices {
-    /// Begins to measure the effects that the scene of `loaded` names. `wake` is called whenever there is news.
+impl Tuning {
+    /// As the scene of `loaded` has it.
     #[must_use]
-    pub fn measure(loaded: &Loaded, wake: impl Fn() + Send + 'static) -> Self {
-        let scene = loaded.setup.scene.haptics.clone();
-        let named: Vec<usize> = (0..EFFECTS.len()).filter(|&number| (EFFECTS[number].is_on)(&scene)).collect();
-        let known = vec![None; EFFECTS.len()];
-        if named.is_empty() {
-            return Self { known, news: None };
-        }
-        let (sender, news) = mpsc::channel();
-        let loaded = loaded.clone();
-        let work = move || {
-            let Some(whole) = cost(&loaded, &scene) else { return };
-            for number in named {
-                let mut without = scene.clone();
-                (EFFECTS[number].leave_out)(&mut without);
-                // A window that is gone needs no news.
-                let told = cost(&loaded, &without).map(|cost| sender.send((number, whole - cost)));
-                if !matches!(told, Some(Ok(()))) {
-                    return;
-                }
-                wake();
-            }
-        };
-        // Without a thread prices stay unknown, which is what the window says.
-        let news = std::thread::Builder::new().name("prices".into()).spawn(work).ok().map(|_| news);
-        Self { known, news }
+    pub fn of(loaded: &Loaded) -> Self {
+        let scene = &loaded.setup.scene;
+        let drawn = loaded.setup.object.as_ref().and(scene.graphics.as_ref());
+        Self { haptics: scene.haptics.clone(), graphics: drawn.map(|graphics| graphics.effects).unwrap_or_default() }
     }
 
-    /// Price of effect `number` [us a tick]; none while it is not known.
-    pub fn of(&mut self, number: usize) -> Option<f64> {
-        while let Some(Ok((effect, price))) = self.news.as_ref().map(mpsc::Receiver::try_recv) {
-            self.known[effect] = Some(price);
-        }
-        self.known[number]
+    /// Numbers of the effects that it asks for.
+    pub fn named(&self) -> impl Iterator<Item = usize> {
+        (0..EFFECTS.len()).filter(|&number| (EFFECTS[number].is_on)(self))
     }
 }
 
-/// Cost of a tick with `gains` [us]; none where the loop cannot run.
-fn cost(loaded: &Loaded, gains: &HapticsSpec) -> Option<f64> {
-    let (haptics, _) = loaded.tuned(gains).ok()?;
-    let motion = loaded.motions().into_iter().next()?.1;
-    let plan = loaded.setup.plan(&loaded.dataset, LENGTH, 0);
-    let mut fastest = f64::INFINITY;
-    for _ in 0..RUNS {
-        let mut hand = SimulatedHand::new(gains, motion.clone()).ok()?;
-        let begin = Instant::now();
-        session::run(&haptics, &mut hand, None, &plan).ok()?;
-        fastest = fastest.min(begin.elapsed().as_secs_f64() * 1e6 / plan.ticks as f64);
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Rendering;
+
+    /// The sphere with every effect that goes with the others named.
+    fn scene(graphics: &str) -> Tuning {
+        let text = include_str!("../../datasets/sphere.toml");
+        let (head, tail) = text.split_once("[graphics]").unwrap();
+        let text = format!(
+            "{head}\n[graphics]\n{graphics}{tail}\n[haptics.friction]\ncoefficient = 0.3\n\
+             [haptics.four_channel]\nchannels = [0.5, 0.5, 0.5, 0.5]\n"
+        );
+        let text = text.replacen(
+            "[haptics]",
+            "[haptics]\nproxy_inertia = \"configuration\"\ncontact_damping = 0.5\npassivity_control = true",
+            1,
+        );
+        let scene = Rendering::parse(&text, "all.toml").unwrap();
+        Tuning { haptics: scene.haptics, graphics: scene.graphics.unwrap().effects }
     }
-    Some(fastest)
+
+    #[test]
+    fn each_effect_is_left_out_alone_and_taken_back_as_it_was() {
+        let mut seen = [false; EFFECTS.len()];
+        for graphics in [
+            "gravity = [0.0, 0.0, -9.81]\nstiffening = { factor = 3.0, strain = 0.2 }\nsmoothing = 0.05\n",
+            "quasi_static = true\n",
+        ] {
+            let scene = scene(graphics);
+            for number in scene.named() {
+                seen[number] = true;
+                let mut tuning = scene.clone();
+                (EFFECTS[number].leave_out)(&mut tuning);
+                let left: Vec<usize> = tuning.named().collect();
+                assert!(scene.named().filter(|&other| other != number).eq(left), "{}", EFFECTS[number].name);
+                (EFFECTS[number].take_back)(&mut tuning, &scene);
+                assert_eq!(tuning, scene, "{}", EFFECTS[number].name);
+            }
+        }
+        assert_eq!(seen, [true; EFFECTS.len()], "an effect is not tested");
+    }
 }

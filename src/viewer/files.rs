@@ -1,8 +1,8 @@
 //! The chooser of scenes and datasets: what was opened before, and the folders of this machine. Files can be dropped on the
 //! window as well.
 
-use super::theme::GROUP_GAP;
-use eframe::egui::{self, Key, RichText, ScrollArea, TextEdit, Ui, vec2};
+use super::theme::{CHOOSER, FIELD_WIDTH, GROUP_GAP, LIST_HEIGHT};
+use eframe::egui::{self, Key, RichText, ScrollArea, TextEdit, Ui};
 use std::path::{Path, PathBuf};
 
 /// The chooser; shown while it is open.
@@ -62,8 +62,8 @@ impl Files {
             .open(&mut open)
             .collapsible(false)
             .resizable(false)
-            .default_size(vec2(420.0, 380.0))
-            .anchor(egui::Align2::CENTER_CENTER, vec2(0.0, 0.0))
+            .default_size(CHOOSER)
+            .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO)
             .show(ui.ctx(), |ui| {
                 ui.label(
                     RichText::new("A scene (.toml) or a dataset (.haptize); a file dropped on the window does as well")
@@ -72,7 +72,7 @@ impl Files {
                 ui.horizontal(|ui| {
                     let label = ui.label("Path");
                     let field = TextEdit::singleline(&mut self.typed).hint_text("type or paste a path");
-                    let response = ui.add(field.desired_width(290.0)).labelled_by(label.id);
+                    let response = ui.add(field.desired_width(FIELD_WIDTH)).labelled_by(label.id);
                     let entered_key = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
                     if (ui.button("Open").clicked() || entered_key) && !self.typed.trim().is_empty() {
                         chosen = Some(PathBuf::from(self.typed.trim()));
@@ -103,7 +103,7 @@ impl Files {
                         ui.label(RichText::new("no scene or dataset here").weak());
                     }
                     Ok(entries) => {
-                        let list = ScrollArea::vertical().max_height(220.0).auto_shrink([false, true]);
+                        let list = ScrollArea::vertical().max_height(LIST_HEIGHT).auto_shrink([false, true]);
                         list.show(ui, |ui| {
                             for entry in entries {
                                 let text = if entry.folder { format!("{}/", entry.name) } else { entry.name.clone() };

@@ -6,10 +6,14 @@ use crate::render::{
     timing::{Durations, Timing},
     trace::{Tick, Trace},
 };
-use std::{collections::VecDeque, time::Duration};
+use std::{collections::VecDeque, thread, time::Duration};
 
 /// Ticks that are kept: twenty seconds at 1 kHz.
 const KEPT: usize = 20_000;
+
+/// How long the window holds still, and what it gives its last frame before; the ring of ticks holds four seconds.
+const STILL: Duration = Duration::from_secs(2);
+const SETTLING: Duration = Duration::from_millis(200);
 
 /// What was felt lately, and how punctually.
 #[derive(Clone)]
@@ -21,6 +25,8 @@ pub struct History {
     period: f64,
     cost: Durations,
     jitter: Durations,
+    /// The same while the window held still.
+    still: Durations,
     refused: Vec<String>,
 }
 
@@ -28,16 +34,33 @@ impl History {
     /// Nothing yet, of a loop with `period` [s] between ticks; none without memory.
     #[must_use]
     pub fn new(period: f64) -> Option<Self> {
-        let (cost, jitter) = (Durations::new()?, Durations::new()?);
-        Some(Self { ticks: VecDeque::with_capacity(KEPT), first: 0, period, cost, jitter, refused: Vec::new() })
+        let [cost, jitter, still] = [Durations::new()?, Durations::new()?, Durations::new()?];
+        Some(Self { ticks: VecDeque::with_capacity(KEPT), first: 0, period, cost, jitter, still, refused: Vec::new() })
     }
 
     /// Takes what `feel` has to say.
     pub fn collect(&mut self, feel: &mut Feel) {
+        self.take(feel, |history| &mut history.jitter);
+    }
+
+    /// Lets the window hold still for some seconds, the loop going on, so that what is left of its jitter is the machine's
+    /// own.
+    pub fn hold_still(&mut self, feel: &mut Feel) {
+        // What has been drawn is let through.
+        thread::sleep(SETTLING);
+        self.collect(feel);
+        thread::sleep(STILL);
+        if let Some(still) = Durations::new() {
+            self.still = still;
+        }
+        self.take(feel, |history| &mut history.still);
+    }
+
+    fn take(&mut self, feel: &mut Feel, jitter: fn(&mut Self) -> &mut Durations) {
         while let Some(tick) = feel.next_tick() {
             if let Some(last) = self.ticks.back() {
                 let late = (tick.time - last.time - self.period).abs();
-                self.jitter.record(Duration::from_secs_f64(late));
+                jitter(self).record(Duration::from_secs_f64(late));
             }
             if self.ticks.len() == KEPT {
                 self.ticks.pop_front();
@@ -87,6 +110,12 @@ impl History {
         &self.jitter
     }
 
+    /// The same while the window held still; nothing where it has not.
+    #[must_use]
+    pub fn still(&self) -> &Durations {
+        &self.still
+    }
+
     /// What the system did not grant, in words.
     #[must_use]
     pub fn refused(&self) -> &[String] {
@@ -95,8 +124,8 @@ impl History {
 
     /// Forgets how punctual the loop was so far.
     pub fn reset_timing(&mut self) {
-        if let (Some(cost), Some(jitter)) = (Durations::new(), Durations::new()) {
-            (self.cost, self.jitter) = (cost, jitter);
+        if let (Some(cost), Some(jitter), Some(still)) = (Durations::new(), Durations::new(), Durations::new()) {
+            (self.cost, self.jitter, self.still) = (cost, jitter, still);
         }
     }
 

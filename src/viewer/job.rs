@@ -1,11 +1,11 @@
 //! Work in the background, so that the window never freezes: opening a file, baking a scene. It reports progress, can be
 //! cancelled, and ends with something [`Loaded`] or with the reason in words.
 
-use super::loaded::Loaded;
+use super::{body::Body, effects::Tuning, loaded::Loaded};
 use crate::{
     contact::Model,
     dataset::Dataset,
-    gpu::{Context, GpuSolver},
+    gpu::{AdapterChoice, AdapterSummary, Context, GpuError, GpuSolver},
     haptize::{BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, sample},
     object::Object,
     proxy::Chain,
@@ -13,6 +13,7 @@ use crate::{
 };
 use std::{
     error::Error,
+    fmt,
     path::{Path, PathBuf},
     sync::{
         Arc,
@@ -32,10 +33,66 @@ pub enum Task {
     Bake(Arc<Scene>),
 }
 
+/// What bakes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Solver {
+    /// The window's adapter if it is a hardware GPU, else the CPU.
+    #[default]
+    Auto,
+    /// All cores, f64.
+    Cpu,
+    /// This adapter.
+    Adapter(AdapterSummary),
+}
+
+impl Solver {
+    /// All that this machine has.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        [Self::Auto, Self::Cpu].into_iter().chain(crate::gpu::adapters().into_iter().map(Self::Adapter)).collect()
+    }
+
+    /// What it stands for.
+    #[must_use]
+    pub fn what(&self) -> String {
+        match self {
+            Self::Auto => "The window's adapter if it is a hardware GPU, else the CPU".into(),
+            Self::Cpu => "All cores, in f64".into(),
+            Self::Adapter(adapter) => adapter.to_string(),
+        }
+    }
+
+    /// The device to bake on; none for the CPU. `context` is the window's.
+    fn device(&self, context: &Arc<Context>) -> Result<Option<Arc<Context>>, GpuError> {
+        Ok(match self {
+            Self::Cpu => None,
+            Self::Auto => context.adapter().hardware.then(|| Arc::clone(context)),
+            Self::Adapter(adapter) if adapter == context.adapter() => Some(Arc::clone(context)),
+            Self::Adapter(adapter) => Some(Arc::new(Context::open(AdapterChoice::This(adapter.clone()))?)),
+        })
+    }
+}
+
+impl fmt::Display for Solver {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Cpu => f.write_str("CPU"),
+            Self::Adapter(adapter) => write!(f, "{}, {}", short(&adapter.name), adapter.interface),
+        }
+    }
+}
+
+/// The beginning of an adapter's name.
+#[must_use]
+pub fn short(name: &str) -> &str {
+    name.split(" (").next().unwrap_or(name)
+}
+
 /// How a job ended.
 pub enum Outcome {
-    /// Ready.
-    Loaded(Box<Loaded>),
+    /// Ready, with the object where there is one to draw.
+    Loaded(Box<(Loaded, Option<Body>)>),
     /// Somebody cancelled it.
     Cancelled,
     /// Why it failed and what to do.
@@ -57,13 +114,13 @@ enum Report {
 }
 
 impl Job {
-    /// Begins `task`. A bake on the GPU takes the window's device. `wake` is called whenever there is news.
+    /// Begins `task`; a bake is done by `solver`. `context` is the window's device. `wake` is called whenever there is news.
     ///
     /// # Errors
     /// In words, when the system gives no thread.
     pub fn begin(
         task: Task,
-        backend: BackendChoice,
+        solver: Solver,
         context: Arc<Context>,
         wake: impl Fn() + Send + 'static,
     ) -> Result<Self, String> {
@@ -80,7 +137,7 @@ impl Job {
                 let _ = sender.send(Report::Progress(progress));
                 wake();
             };
-            let outcome = match run(task, backend, &context, &flag, &mut progress) {
+            let outcome = match run(task, &solver, &context, &flag, &mut progress) {
                 Ok(loaded) => Outcome::Loaded(Box::new(loaded)),
                 Err(error) if is_cancelled(error.as_ref()) => Outcome::Cancelled,
                 Err(error) => Outcome::Failed(error.to_string()),
@@ -141,20 +198,21 @@ type Failure = Box<dyn Error + Send + Sync>;
 
 fn run(
     task: Task,
-    backend: BackendChoice,
+    solver: &Solver,
     context: &Arc<Context>,
     stop: &AtomicBool,
     progress: &mut dyn FnMut(Progress),
-) -> Result<Loaded, Failure> {
-    match task {
-        Task::Open(path) if is_scene(&path) => bake(Scene::load(&path)?, backend, context, stop, progress),
+) -> Result<(Loaded, Option<Body>), Failure> {
+    let loaded = match task {
+        Task::Open(path) if is_scene(&path) => bake(Scene::load(&path)?, solver, context, stop, progress)?,
         Task::Open(path) => {
             let dataset = Dataset::open(&path)?;
-            Loaded::new(dataset, None, Some(path.clone()))
-                .map_err(|error| format!("{}: {error}", path.display()).into())
+            Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
         }
-        Task::Bake(scene) => bake((*scene).clone(), backend, context, stop, progress),
-    }
+        Task::Bake(scene) => bake((*scene).clone(), solver, context, stop, progress)?,
+    };
+    let body = Body::new(context, &loaded, &Tuning::of(&loaded).graphics)?;
+    Ok((loaded, body))
 }
 
 /// Scenes end in .toml; everything else is taken for a dataset, whose reader says what it is not.
@@ -164,7 +222,7 @@ fn is_scene(path: &Path) -> bool {
 
 fn bake(
     scene: Scene,
-    choice: BackendChoice,
+    solver: &Solver,
     context: &Arc<Context>,
     stop: &AtomicBool,
     progress: &mut dyn FnMut(Progress),
@@ -172,20 +230,17 @@ fn bake(
     let object = Object::build(&scene.object)?;
     let chain = Chain::new(&scene.proxy);
     let model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
-    let on_device = match choice {
-        BackendChoice::Gpu => true,
-        BackendChoice::Auto => context.adapter().hardware,
-        BackendChoice::Cpu => false,
-    };
-    let mut backend = if on_device {
-        match GpuSolver::new(Arc::clone(context), &model) {
-            Ok(solver) => ChosenBackend::on(solver, &model),
-            // Where the GPU cannot take the scene the CPU can.
-            Err(_) if choice == BackendChoice::Auto => ChosenBackend::open(BackendChoice::Cpu, &model)?,
-            Err(error) => return Err(error.into()),
+    let on_device =
+        solver.device(context).and_then(|device| device.map(|device| GpuSolver::new(device, &model)).transpose());
+    let mut backend = match on_device {
+        Ok(Some(device)) => ChosenBackend::on(device, &model),
+        // Where the GPU cannot take the scene the CPU can.
+        Err(error) if *solver != Solver::Auto => {
+            return Err(
+                format!("{solver} cannot bake: {error}. Choose the CPU or another adapter in the window").into()
+            );
         }
-    } else {
-        ChosenBackend::open(BackendChoice::Cpu, &model)?
+        Ok(None) | Err(_) => ChosenBackend::open(BackendChoice::Cpu, &model)?,
     };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
     let mut sweep = Sweep::new(&scene, &object, backend.name(), &backend.adapter(), &date)?;
@@ -199,4 +254,23 @@ fn bake(
 
 fn is_cancelled(error: &(dyn Error + 'static)) -> bool {
     matches!(error.downcast_ref::<SweepError>(), Some(SweepError::Stopped { .. }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_adapter_that_does_not_answer_is_told_with_what_to_do() {
+        let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
+        let scene = Scene::parse(include_str!("../../datasets/sphere.toml"), "sphere.toml").unwrap();
+        let gone = AdapterSummary { name: "Unplugged (1)".into(), ..context.adapter().clone() };
+        let task = Task::Bake(Arc::new(scene));
+        let Outcome::Failed(why) = Job::begin(task, Solver::Adapter(gone), Arc::clone(&context), || ()).unwrap().wait()
+        else {
+            panic!("an adapter that is not there baked")
+        };
+        assert!(why.contains("Unplugged") && why.contains(&context.adapter().name), "{why}");
+        assert!(why.contains("Choose the CPU or another adapter"), "{why}");
+    }
 }

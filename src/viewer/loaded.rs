@@ -67,6 +67,12 @@ impl Loaded {
         Ok((Arc::new(haptics), exceeded))
     }
 
+    /// Whether the dataset tells which nodes of the object are in contact. What was measured on a real object does not.
+    #[must_use]
+    pub fn knows_nodes(&self) -> bool {
+        self.dataset.contacts.is_some()
+    }
+
     /// The scene's motions by name.
     #[must_use]
     pub fn motions(&self) -> Vec<(&'static str, Motion)> {

@@ -4,13 +4,13 @@
 //! |---|---|
 //! | `app` | the window's state, what happens in a frame, and where panels lie |
 //! | `window`, `offscreen` | the two places where it is drawn: a window, a picture |
-//! | `theme` | colours, type, spacing |
+//! | `theme`, `palette` | sizes and type, colours |
 //! | `loaded`, `job` | what is open, and how it is baked or read in the background |
 //! | `feel`, `guide`, `history` | the haptic loop beside the window, who leads the hand, what was felt lately |
 //! | `scene`, `body`, `grip` | the 3-D panel, the object on the GPU, the pointer's grip on the proxy |
 //! | `stage`, `pipelines`, `shapes`, `camera`, `pixels` | the renderer of that panel |
-//! | `slices`, `cloud`, `plots`, `controls`, `files` | the other panels |
-//! | `effects` | what the loop does beyond the least, and its price |
+//! | `slices`, `cloud`, `plots`, `controls`, `gains`, `files` | the other panels |
+//! | `effects`, `prices` | what is done beyond the least, and what it costs |
 //!
 //! One device computes and draws: the object's nodes go from the frame update to the screen without a read-back. The
 //! haptic thread waits for nothing here; see `feel`.
@@ -23,15 +23,18 @@ mod controls;
 mod effects;
 mod feel;
 mod files;
+mod gains;
 mod grip;
 mod guide;
 mod history;
 mod job;
 mod loaded;
 mod offscreen;
+mod palette;
 mod pipelines;
 mod pixels;
 mod plots;
+mod prices;
 mod scene;
 mod shapes;
 mod slices;
@@ -57,10 +60,16 @@ pub enum ViewError {
     /// The object's frame update.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// There is no window to be had.
-    #[error("no window can be opened: {0}. Without a display, haptize view --screenshot FILE.png draws one picture")]
+    /// Nothing answers where a desktop would.
+    #[error(
+        "there is no display to open a window on: start haptize in a desktop session, or draw one picture without a \
+         display by haptize view --screenshot FILE.png"
+    )]
+    NoDisplay,
+    /// There is a display, but no window to be had.
+    #[error("no window can be opened: {0}. haptize view --screenshot FILE.png draws one picture without a window")]
     Window(String),
-    /// What was to be shown in a picture cannot be opened.
+    /// What was to be shown cannot be opened.
     #[error("{0}")]
     Open(String),
     /// The picture cannot be written.

@@ -1,6 +1,6 @@
 //! The window's picture without a window: the same panels, laid out and painted by egui into a texture that is read back.
 
-use super::{Pace, Start, ViewError, Viewer, dress, guide::LEAD_IN, pixels};
+use super::{Pace, Start, ViewError, Viewer, dress, guide::LEAD_IN, pixels, theme};
 use crate::gpu::{AdapterChoice, Context, GpuError};
 use eframe::{
     egui::{self, Pos2, Rect, Theme, vec2},
@@ -28,7 +28,7 @@ pub struct Picture {
 
 impl Default for Picture {
     fn default() -> Self {
-        Self { size: [1280.0, 800.0], scale: 1.5, dark: false, motion: "press".into(), time: 2.2 }
+        Self { size: theme::WINDOW, scale: 1.5, dark: false, motion: "press".into(), time: 2.2 }
     }
 }
 

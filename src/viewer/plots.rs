@@ -1,13 +1,21 @@
 //! Live plots of the haptic loop: torque, configuration, contacts, energy accounts, and what time it takes. They pause,
 //! zoom, and can be written as CSV and as the figures that `haptize play` draws.
 
-use super::{history::History, loaded::Loaded, number, theme};
+use super::{
+    history::History,
+    loaded::Loaded,
+    number, palette,
+    theme::{self, CURVE, DASHES, FINE_CURVE, FINE_GAP, GAP, GROUP_GAP, HAIRLINE, SAMPLE, SPAN_WIDTH},
+};
 use crate::{
     dataset::replace_file,
-    render::{timing::Percentiles, trace::Tick},
+    render::{
+        timing::{Durations, Percentiles},
+        trace::Tick,
+    },
     report::{self, ReportError},
 };
-use eframe::egui::{self, RichText, Ui, vec2};
+use eframe::egui::{self, Button, RichText, Ui, vec2};
 use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};
 use std::path::{Path, PathBuf};
 
@@ -39,12 +47,27 @@ pub struct Plots {
     note: Option<Result<String, String>>,
 }
 
+/// Lengths of the time axis that can be chosen [s]: a touch, a motion of the scene, all that is kept.
+const SPANS: [f64; 3] = [2.0, 6.0, 18.0];
+
+/// Opacity of the lines that others are compared with [1].
+const BEHIND: f32 = 0.6;
+
+/// Jitter and cost are shown from this decade to that one [log10 us]: from what clocks resolve to ten periods.
+const DECADES: [f64; 2] = [-1.0, 4.0];
+
+/// Width of a histogram's bar over that of its bin [1].
+const BAR: f64 = 0.94;
+
+/// Space above and below a line over the height of its plot [1].
+const AROUND: f32 = 0.08;
+
 /// Points of a line: about one a pixel.
 const POINTS: usize = 700;
 
 impl Default for Plots {
     fn default() -> Self {
-        Self { tab: Tab::Torque, frozen: None, seconds: 6.0, note: None }
+        Self { tab: Tab::Torque, frozen: None, seconds: SPANS[1], note: None }
     }
 }
 
@@ -54,8 +77,9 @@ impl Plots {
         self.frozen = None;
     }
 
-    /// The panel in all of `ui`; `folder` is where files go.
-    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, history: &mut History, folder: &Path) {
+    /// The panel in all of `ui`; `folder` is where files go. Answers whether the window is to hold still.
+    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, history: &mut History, folder: &Path) -> bool {
+        let mut hold_still = false;
         ui.horizontal_wrapped(|ui| {
             for (tab, name) in [
                 (Tab::Torque, "Torque"),
@@ -72,9 +96,10 @@ impl Plots {
                 self.frozen = paused.then(|| history.clone());
             }
             let label = ui.label("Last");
-            let span = egui::ComboBox::from_id_salt("span").width(56.0).selected_text(format!("{} s", self.seconds));
+            let span =
+                egui::ComboBox::from_id_salt("span").width(SPAN_WIDTH).selected_text(format!("{} s", self.seconds));
             let choices = span.show_ui(ui, |ui| {
-                for seconds in [2.0, 6.0, 18.0] {
+                for seconds in SPANS {
                     ui.selectable_value(&mut self.seconds, seconds, format!("{seconds} s"));
                 }
             });
@@ -85,8 +110,14 @@ impl Plots {
             if ui.button("PNG").on_hover_text("Export the figures that haptize play draws").clicked() {
                 self.note = Some(self.write_png(loaded, history, folder).map_err(|error| error.to_string()));
             }
-            if self.tab == Tab::Timing && ui.button("Reset").clicked() {
-                history.reset_timing();
+            if self.tab == Tab::Timing {
+                if ui.button("Reset").clicked() {
+                    history.reset_timing();
+                }
+                let why = "The window holds still for two seconds while the loop goes on: the jitter that is left is the \
+                           machine's own, what is more is the window's";
+                let clocked = history.cost().percentiles().count > 0;
+                hold_still = ui.add_enabled(clocked, Button::new("Hold still")).on_hover_text(why).clicked();
             }
             match &self.note {
                 Some(Ok(note)) => drop(ui.label(RichText::new(note).weak())),
@@ -98,15 +129,16 @@ impl Plots {
         match self.tab {
             Tab::Torque => self.torque(ui, loaded, shown),
             Tab::Configuration => self.configuration(ui, loaded, shown),
-            Tab::Contacts => self.contacts(ui, shown),
-            Tab::Energy => self.energy(ui, shown),
+            Tab::Contacts => self.contacts(ui, loaded, shown),
+            Tab::Energy => self.energy(ui, loaded, shown),
             Tab::Timing => timing(ui, shown),
         }
+        hold_still
     }
 
     fn torque(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
         let axes = &loaded.dataset.grid.axes;
-        let unit = units(axes.iter().map(|axis| axis.effort_unit()));
+        let unit = theme::units(axes.iter().map(|axis| axis.effort_unit().to_owned()));
         let joints = axes.iter().enumerate().flat_map(|(joint, axis)| {
             let felt = (
                 format!("{} contact", axis.name),
@@ -127,7 +159,7 @@ impl Plots {
 
     fn configuration(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
         let axes = &loaded.dataset.grid.axes;
-        let unit = units(axes.iter().map(|axis| axis.unit.as_str()));
+        let unit = theme::units(axes.iter().map(|axis| axis.unit.clone()));
         let joints = axes.iter().enumerate().flat_map(|(joint, axis)| {
             let proxy =
                 (format!("{} proxy", axis.name), joint, false, Box::new(move |tick: &Tick| tick.proxy[joint]) as Get);
@@ -138,7 +170,7 @@ impl Plots {
         self.lines(ui, history, &format!("q [{unit}]"), joints.collect());
     }
 
-    fn contacts(&self, ui: &mut Ui, history: &History) {
+    fn contacts(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
         let nodes = (
             "object nodes in contact".to_owned(),
             0,
@@ -146,30 +178,40 @@ impl Plots {
             Box::new(|tick: &Tick| f64::from(tick.contact_nodes)) as Get,
         );
         let index = ("contact index × 10".to_owned(), 1, true, Box::new(|tick: &Tick| 10.0 * tick.index) as Get);
-        self.lines(ui, history, "contacts [1]", vec![nodes, index]);
+        let mut lines = vec![index];
+        if loaded.knows_nodes() {
+            lines.insert(0, nodes);
+        } else {
+            absent(ui, "Nodes in contact are not stored: this dataset holds torques, no contact forces.");
+        }
+        self.lines(ui, history, "contacts [1]", lines);
     }
 
-    fn energy(&self, ui: &mut Ui, history: &History) {
+    fn energy(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
         let account = |name: &str, number, get: fn(&Tick) -> f64| {
             (name.to_owned(), number, false, Box::new(move |tick: &Tick| 1e3 * get(tick)) as Get)
         };
-        let accounts = vec![
-            account("stored in the object", 0, |tick| tick.accounts.stored),
+        let mut accounts = vec![
             account("absorbed by proxy and coupling", 1, |tick| tick.accounts.absorbed()),
             account("proxy's damping", 2, |tick| tick.accounts.proxy_dissipation),
             account("made by holding torque", 3, |tick| tick.accounts.hold_gain()),
-            account("leak of interpolation", 5, |tick| tick.accounts.leak),
         ];
+        if loaded.dataset.energy.is_some() {
+            accounts.insert(0, account("stored in the object", 0, |tick| tick.accounts.stored));
+            accounts.push(account("leak of interpolation", 5, |tick| tick.accounts.leak));
+        } else {
+            absent(ui, "The object's energy is not stored: what it holds and what interpolation leaks are not known.");
+        }
         self.lines(ui, history, "energy [mJ]", accounts);
     }
 
     fn lines(&self, ui: &mut Ui, history: &History, label: &str, lines: Vec<(String, usize, bool, Get<'_>)>) {
         let dark = ui.visuals().dark_mode;
-        legend(ui, &lines);
+        legend(ui, label, &lines);
         let end = history.last().map_or(0.0, |tick| tick.time);
         let ticks: Vec<&Tick> = history.recent(self.seconds, POINTS).collect();
         let paused = self.frozen.is_some();
-        let mut plot = plot(ui, ("lines", label, paused), "time [s]", label);
+        let mut plot = plot(ui, ("lines", label, paused), "time [s]", "");
         if !paused {
             plot = plot.default_x_bounds(end - self.seconds, end).auto_bounds([false, true]).allow_drag(false);
         }
@@ -180,12 +222,14 @@ impl Plots {
             }
             for (name, number, thin, get) in lines {
                 let points: PlotPoints<'_> = ticks.iter().map(|tick| [tick.time, get(tick)]).collect();
-                let colour = theme::series(number, dark);
+                let colour = palette::series(number, dark);
                 let line = Line::new(name, points);
                 plot.line(if thin {
-                    line.color(colour.gamma_multiply(0.6)).width(1.0).style(egui_plot::LineStyle::dashed_dense())
+                    line.color(colour.gamma_multiply(BEHIND))
+                        .width(HAIRLINE)
+                        .style(egui_plot::LineStyle::dashed_dense())
                 } else {
-                    line.color(colour).width(1.8)
+                    line.color(colour).width(CURVE)
                 });
             }
         });
@@ -215,37 +259,33 @@ impl Plots {
     }
 }
 
+/// Says what the dataset does not hold.
+fn absent(ui: &mut Ui, what: &str) {
+    ui.label(RichText::new(what).weak().small());
+}
+
 /// A number of a tick.
 type Get<'a> = Box<dyn Fn(&Tick) -> f64 + 'a>;
 
-/// `N m`, or both units where joints differ.
-fn units<'a>(all: impl Iterator<Item = &'a str>) -> String {
-    let mut units: Vec<&str> = Vec::new();
-    for unit in all {
-        if !units.contains(&unit) {
-            units.push(unit);
-        }
-    }
-    units.join(" or ")
-}
-
-/// Names of the lines above their plot; dashed ones are told by their name.
-fn legend(ui: &mut Ui, lines: &[(String, usize, bool, Get<'_>)]) {
+/// What is plotted and the names of the lines, above their plot: beside it, a short plot leaves no room for its axis' name.
+fn legend(ui: &mut Ui, label: &str, lines: &[(String, usize, bool, Get<'_>)]) {
     let dark = ui.visuals().dark_mode;
     ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing.x = 5.0;
+        ui.spacing_mut().item_spacing.x = GAP;
+        ui.label(RichText::new(label).small().weak());
+        ui.add_space(GAP);
         for (name, number, thin, _) in lines {
-            let (rect, _) = ui.allocate_exact_size(vec2(16.0, 10.0), egui::Sense::hover());
-            let colour = theme::series(*number, dark);
+            let (rect, _) = ui.allocate_exact_size(SAMPLE, egui::Sense::hover());
+            let colour = palette::series(*number, dark);
             let ends = [rect.left_center(), rect.right_center()];
             if *thin {
-                let stroke = egui::Stroke::new(1.2, colour.gamma_multiply(0.75));
-                ui.painter().extend(egui::Shape::dashed_line(&ends, stroke, 3.0, 2.5));
+                let stroke = egui::Stroke::new(FINE_CURVE, colour.gamma_multiply(BEHIND));
+                ui.painter().extend(egui::Shape::dashed_line(&ends, stroke, DASHES[0], DASHES[1]));
             } else {
-                ui.painter().line_segment(ends, egui::Stroke::new(2.2, colour));
+                ui.painter().line_segment(ends, egui::Stroke::new(CURVE, colour));
             }
             ui.label(RichText::new(name).small());
-            ui.add_space(6.0);
+            ui.add_space(FINE_GAP);
         }
     });
 }
@@ -255,37 +295,35 @@ fn plot<'a>(ui: &Ui, id: impl std::fmt::Debug, x: &str, y: &str) -> Plot<'a> {
         .custom_x_axes(vec![theme::across(x)])
         .custom_y_axes(vec![theme::upward(y)])
         .allow_scroll(false)
-        .set_margin_fraction(vec2(0.0, 0.08))
+        .set_margin_fraction(vec2(0.0, AROUND))
         .show_background(false)
-        .grid_color(theme::grid(ui.visuals()))
+        .grid_color(palette::grid(ui.visuals()))
 }
 
 /// Histograms of jitter and cost, side by side, with their shares in words.
 fn timing(ui: &mut Ui, history: &History) {
     let dark = ui.visuals().dark_mode;
-    let size = vec2(0.5 * (ui.available_width() - 12.0), ui.available_height());
+    let size = vec2(0.5 * (ui.available_width() - GROUP_GAP), ui.available_height());
     ui.horizontal_top(|ui| {
         for (number, title, durations) in [(0, "jitter", history.jitter()), (1, "cost of a tick", history.cost())] {
             ui.allocate_ui(size, |ui| {
                 ui.vertical(|ui| {
-                    let Percentiles { count, p50, p99, p999, max, .. } = durations.percentiles();
-                    let words = if count == 0 {
-                        format!("{title}: nothing measured, the loop runs by steps")
-                    } else {
-                        let [p50, p99, p999, max] = [p50, p99, p999, max].map(super::number);
-                        format!("{title} [µs]: median {p50}, 99 % {p99}, 99.9 % {p999}, most {max}")
-                    };
-                    ui.label(RichText::new(words).small());
+                    let words = shares(durations).unwrap_or_else(|| "nothing measured, the loop runs by steps".into());
+                    ui.label(RichText::new(format!("{title} [µs]: {words}")).small());
+                    if number == 0 {
+                        let words = shares(history.still()).unwrap_or_else(|| "not measured yet".into());
+                        ui.label(RichText::new(format!("the window holding still: {words}")).weak().small());
+                    }
                     let bars: Vec<Bar> = durations
                         .bins()
                         .iter()
                         .filter(|bin| bin.count > 0)
                         .map(|bin| {
                             let (from, to) = (bin.from.log10(), bin.to.log10());
-                            Bar::new(0.5 * (from + to), (bin.count as f64).log10() + 1.0).width(0.94 * (to - from))
+                            Bar::new(0.5 * (from + to), (bin.count as f64).log10() + 1.0).width(BAR * (to - from))
                         })
                         .collect();
-                    let chart = BarChart::new(title, bars).color(theme::series(number, dark)).allow_hover(false);
+                    let chart = BarChart::new(title, bars).color(palette::series(number, dark)).allow_hover(false);
                     let decade = |mark: egui_plot::GridMark, _: &std::ops::RangeInclusive<f64>| {
                         if (mark.value - mark.value.round()).abs() < 1e-9 {
                             number_of(10.0_f64.powf(mark.value))
@@ -299,10 +337,10 @@ fn timing(ui: &mut Ui, history: &History) {
                         if whole { number_of(10.0_f64.powf(power)) } else { String::new() }
                     };
                     plot(ui, ("timing", number), &format!("{title} [µs]"), "ticks")
-                        .default_x_bounds(-1.0, 4.0)
+                        .default_x_bounds(DECADES[0], DECADES[1])
                         .include_y(0.0)
-                        .include_x(-1.0)
-                        .include_x(4.0)
+                        .include_x(DECADES[0])
+                        .include_x(DECADES[1])
                         .custom_x_axes(vec![theme::across(&format!("{title} [µs]")).formatter(decade)])
                         .custom_y_axes(vec![theme::upward("ticks").formatter(ticks)])
                         .show(ui, |plot| {
@@ -312,6 +350,13 @@ fn timing(ui: &mut Ui, history: &History) {
             });
         }
     });
+}
+
+/// Shares of `durations` in words [us]; none where there are none.
+fn shares(durations: &Durations) -> Option<String> {
+    let Percentiles { count, p50, p99, p999, max, .. } = durations.percentiles();
+    let [p50, p99, p999, max] = [p50, p99, p999, max].map(number);
+    (count > 0).then(|| format!("median {p50}, 99 % {p99}, 99.9 % {p999}, most {max}"))
 }
 
 fn number_of(value: f64) -> String {

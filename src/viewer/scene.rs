@@ -8,17 +8,28 @@ use super::{
     grip::Grip,
     guide::Guide,
     loaded::Loaded,
+    palette::{self, Palette},
     shapes::Shape,
     stage::{Look, Quantity, Stage},
-    theme::{self, Palette},
+    theme::{self, AXIS_LINE, COLOUR_BAR, FINE_GAP, GAP, GROUP_GAP, TICK},
 };
-use crate::{JointVector, gpu::Context, proxy::Pose, render::session::Latest, report::colour::ColourMap};
+use crate::{
+    JointVector,
+    gpu::{Context, FrameError},
+    proxy::Pose,
+    render::session::Latest,
+    report::colour::ColourMap,
+    scene::GraphicsEffects,
+};
 use eframe::{
-    egui::{self, Align2, Color32, FontId, PointerButton, Rect, Sense, Stroke, Ui, pos2, vec2},
+    egui::{self, Align2, Color32, PointerButton, Rect, Sense, Stroke, Ui, pos2, vec2},
     egui_wgpu::RenderState,
 };
 use glam::{Vec2, Vec3};
-use std::sync::Arc;
+use std::{
+    sync::{Arc, mpsc},
+    thread,
+};
 
 /// What is shown of the scene, as the user wants it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +53,8 @@ pub struct SceneView {
     camera: Camera,
     home: Camera,
     body: Option<Body>,
+    /// The object with other effects, once it is set up.
+    coming: Option<mpsc::Receiver<Result<Option<Body>, FrameError>>>,
     pose: Pose,
     ghost: Pose,
     grip: Option<Grip>,
@@ -51,11 +64,44 @@ pub struct SceneView {
     extent: f32,
 }
 
-/// Turn of the view per pixel-high drag of the wheel.
+/// Zoom for each point that the wheel turns, as a logarithm [1/point]: a notch, some 50 points, brings the eye nearer by a
+/// tenth.
 const ZOOM_PER_POINT: f32 = 0.002;
 
-/// How far a key moves a joint in a second, as a share of its range.
+/// How far a key moves a joint in a second, as a share of its range [1/s]: all of it in four seconds, slowly enough to
+/// press with care.
 const KEY_SPEED: f64 = 0.25;
+
+/// Longest time that a key held through one frame moves a joint for [s]: a window that stood still must not throw the arm.
+const LONGEST_KEY: f32 = 0.1;
+
+// Sizes of the proxy: a link's radius over the extent of the scene; all others over that radius [1].
+const LINK: f32 = 0.012;
+const JOINT_BALL: f32 = 1.7;
+const NODE_BALL: f32 = 1.35;
+const CONTACT_BALL: f32 = 1.3;
+const HELD_BALL: f32 = 2.0;
+const GHOST: f32 = 0.45;
+const ARROW: f32 = 0.55;
+
+/// Length of the arrow of the dataset's greatest force over the extent of the scene [1].
+const LONGEST_ARROW: f32 = 0.5;
+
+/// Radius of what is seen at first over the extent of the scene [1]: a little less than all, whose corners are empty.
+const SEEN: f32 = 0.98;
+
+/// Extent of a scene with nothing in it [m].
+const NO_EXTENT: f32 = 0.1;
+
+// On the picture, from its lower left corner [points]: axes, how long they are and where their names are over that [1], the
+// scale and how long it is at most. From its lower right: the bar of colours.
+const AXES_AT: egui::Vec2 = vec2(34.0, -34.0);
+const AXES_LENGTH: f32 = 22.0;
+const AXES_NAMES: f32 = 1.38;
+const SCALE_AT: egui::Vec2 = vec2(78.0, -22.0);
+const LONGEST_SCALE: f32 = 90.0;
+const BAR_AT: egui::Vec2 = vec2(-156.0, -26.0);
+const BAR_WIDTH: f32 = 136.0;
 
 impl SceneView {
     /// An empty scene.
@@ -63,7 +109,7 @@ impl SceneView {
     /// # Errors
     /// When the device refuses the drawing shaders.
     pub fn new(context: Arc<Context>, render: RenderState) -> Result<Self, ViewError> {
-        let camera = Camera::looking_at(Vec3::ZERO, 0.1);
+        let camera = Camera::looking_at(Vec3::ZERO, NO_EXTENT);
         Ok(Self {
             stage: Stage::new(Arc::clone(&context))?,
             context,
@@ -72,20 +118,18 @@ impl SceneView {
             camera,
             home: camera,
             body: None,
+            coming: None,
             pose: Pose::default(),
             ghost: Pose::default(),
             grip: None,
             shown: Shown { edges: true, forces: true, ghost: true, quantity: Quantity::Displacement },
-            extent: 0.1,
+            extent: NO_EXTENT,
         })
     }
 
-    /// Takes the object and the proxy of `loaded`, and looks at them.
-    ///
-    /// # Errors
-    /// When the device refuses the object.
-    pub fn open(&mut self, loaded: &Loaded) -> Result<(), ViewError> {
-        self.body = Body::new(&self.context, loaded)?;
+    /// Takes the proxy of `loaded` and its object, `body`, and looks at them.
+    pub fn open(&mut self, loaded: &Loaded, body: Option<Body>) {
+        (self.body, self.coming) = (body, None);
         let chain = &loaded.setup.chain;
         (self.pose, self.ghost, self.grip) = (chain.new_pose(), chain.new_pose(), None);
         chain.pose(&loaded.start(), &mut self.pose);
@@ -95,8 +139,42 @@ impl SceneView {
         let least = points.iter().copied().reduce(Vec3::min).unwrap_or(Vec3::ZERO);
         let greatest = points.iter().copied().reduce(Vec3::max).unwrap_or(Vec3::ZERO);
         self.extent = 0.5 * least.distance(greatest);
-        self.home = Camera::looking_at(0.5 * (least + greatest), 0.98 * self.extent);
+        self.home = Camera::looking_at(0.5 * (least + greatest), SEEN * self.extent);
         self.camera = self.home;
+    }
+
+    /// Begins to set up the object of `loaded` with other `effects`; what is drawn stays until that is done. `wake` is
+    /// called then.
+    ///
+    /// # Errors
+    /// In words, when the system gives no thread.
+    pub fn redraw(
+        &mut self,
+        loaded: &Loaded,
+        effects: GraphicsEffects,
+        wake: impl Fn() + Send + 'static,
+    ) -> Result<(), String> {
+        let (sender, coming) = mpsc::channel();
+        let (context, loaded) = (Arc::clone(&self.context), loaded.clone());
+        let work = move || {
+            // A window that is gone needs no object.
+            let _ = sender.send(Body::new(&context, &loaded, &effects));
+            wake();
+        };
+        let spawned = thread::Builder::new().name("object".into()).spawn(work);
+        spawned.map_err(|error| format!("the system gives no thread: {error}; close other programs"))?;
+        self.coming = Some(coming);
+        Ok(())
+    }
+
+    /// Waits until the object that is being set up is drawn; for tests.
+    ///
+    /// # Errors
+    /// When the device refuses it.
+    pub fn wait(&mut self) -> Result<(), ViewError> {
+        if let Some(Ok(body)) = self.coming.take().map(|coming| coming.recv()) {
+            self.body = body?;
+        }
         Ok(())
     }
 
@@ -107,6 +185,10 @@ impl SceneView {
     pub fn advance(&mut self, loaded: &Loaded, latest: &Latest, elapsed: f64) -> Result<(), ViewError> {
         loaded.setup.chain.pose(&latest.proxy, &mut self.pose);
         loaded.setup.chain.pose(&latest.device, &mut self.ghost);
+        if let Some(Ok(body)) = self.coming.as_ref().map(mpsc::Receiver::try_recv) {
+            self.coming = None;
+            self.body = body?;
+        }
         if let Some(body) = &mut self.body {
             body.advance(latest, elapsed)?;
         }
@@ -121,12 +203,6 @@ impl SceneView {
         Some(rect.center() + 0.5 * vec2(shown.x * rect.width(), -shown.y * rect.height()))
     }
 
-    /// Whether there is an object to see.
-    #[must_use]
-    pub fn has_object(&self) -> bool {
-        self.body.is_some()
-    }
-
     /// Shows the scene in all of `ui`, and lets the pointer lead `guide`.
     ///
     /// # Errors
@@ -136,7 +212,7 @@ impl SceneView {
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "3-D scene"));
         let aspect = rect.width() / rect.height().max(1.0);
         self.steer(ui, &response, rect, aspect, loaded, guide);
-        let palette = theme::palette(ui.visuals());
+        let palette = palette::of(ui.visuals());
         let texture = self.draw(rect, ui.ctx().pixels_per_point(), &palette)?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(texture, rect, whole, Color32::WHITE);
@@ -244,15 +320,15 @@ impl SceneView {
 
     /// Everything that is drawn besides the surface.
     fn shapes(&self, palette: &Palette) -> Vec<Shape> {
-        let unit = 0.012 * self.extent;
+        let unit = LINK * self.extent;
         let mut shapes = arm(&self.pose, unit, channels(palette.link), channels(palette.node));
         if self.shown.ghost && self.ghost.nodes != self.pose.nodes {
             let ghost = channels(palette.ghost);
-            shapes.extend(arm(&self.ghost, 0.45 * unit, ghost, ghost).into_iter().map(Shape::unlit));
+            shapes.extend(arm(&self.ghost, GHOST * unit, ghost, ghost).into_iter().map(Shape::unlit));
         }
         if let Some(grip) = &self.grip {
             let held = self.pose.nodes[grip.node].as_vec3();
-            shapes.push(Shape::ball(held, 2.0 * unit, channels(palette.ghost)));
+            shapes.push(Shape::ball(held, HELD_BALL * unit, channels(palette.ghost)));
         }
         if let Some(body) = &self.body {
             let longest = body.extremes[1].max(f64::MIN_POSITIVE);
@@ -260,11 +336,11 @@ impl SceneView {
                 // The shapes' own places are those of the node at rest: the GPU moves them with it.
                 let rest = body.rest(node);
                 let colour = channels(palette.force);
-                shapes.push(Shape::ball(rest, 1.3 * unit, colour).anchored(node));
+                shapes.push(Shape::ball(rest, CONTACT_BALL * unit, colour).anchored(node));
                 if self.shown.forces {
                     // On the proxy, against the force on the object: the arrow stands out of the surface.
-                    let span = (-force * (f64::from(0.5 * self.extent) / longest)).as_vec3();
-                    let arrow = Shape::arrow(rest, span, 0.55 * unit, colour);
+                    let span = (-force * (f64::from(LONGEST_ARROW * self.extent) / longest)).as_vec3();
+                    let arrow = Shape::arrow(rest, span, ARROW * unit, colour);
                     shapes.extend(arrow.into_iter().map(|shape| shape.anchored(node)));
                 }
             }
@@ -275,29 +351,29 @@ impl SceneView {
     /// Axes, scale and colour bar, on top of the picture.
     fn overlay(&self, ui: &Ui, rect: Rect, palette: &Palette) {
         let painter = ui.painter_at(rect);
-        let small = FontId::proportional(10.5);
+        let small = theme::small();
         let text = ui.visuals().text_color();
         // Axes, turned as the scene is.
         let [right, up] = self.camera.right_and_up();
-        let origin = rect.left_bottom() + vec2(34.0, -34.0);
+        let origin = rect.left_bottom() + AXES_AT;
         for (axis, name) in [(Vec3::X, "x"), (Vec3::Y, "y"), (Vec3::Z, "z")] {
-            let end = vec2(axis.dot(right), -axis.dot(up)) * 22.0;
-            painter.line_segment([origin, origin + end], Stroke::new(1.5, palette.axis));
-            painter.text(origin + end * 1.38, Align2::CENTER_CENTER, name, small.clone(), text);
+            let end = vec2(axis.dot(right), -axis.dot(up)) * AXES_LENGTH;
+            painter.line_segment([origin, origin + end], Stroke::new(AXIS_LINE, palette.axis));
+            painter.text(origin + end * AXES_NAMES, Align2::CENTER_CENTER, name, small.clone(), text);
         }
         // A round length at the distance of what is looked at.
         let height = self.camera.height_at_target();
         let points_per_metre = rect.height() / height;
-        let length = round_length(f64::from(90.0 / points_per_metre));
+        let length = round_length(f64::from(LONGEST_SCALE / points_per_metre));
         let width = length as f32 * points_per_metre;
-        let left = rect.left_bottom() + vec2(78.0, -22.0);
-        let stroke = Stroke::new(1.5, palette.axis);
+        let left = rect.left_bottom() + SCALE_AT;
+        let stroke = Stroke::new(AXIS_LINE, palette.axis);
         painter.line_segment([left, left + vec2(width, 0.0)], stroke);
         for end in [left, left + vec2(width, 0.0)] {
-            painter.line_segment([end + vec2(0.0, -3.0), end + vec2(0.0, 3.0)], stroke);
+            painter.line_segment([end - vec2(0.0, TICK), end + vec2(0.0, TICK)], stroke);
         }
         let label = format!("{} mm", super::number(1e3 * length));
-        painter.text(left + vec2(0.5 * width, -6.0), Align2::CENTER_BOTTOM, label, small.clone(), text);
+        painter.text(left + vec2(0.5 * width, -GAP), Align2::CENTER_BOTTOM, label, small.clone(), text);
         if let Some(body) = &self.body {
             let (title, top) = match self.shown.quantity {
                 Quantity::Displacement => ("displacement [mm]", 1e3 * body.extremes[0]),
@@ -306,13 +382,13 @@ impl SceneView {
             let most = body.contacts().map(|(_, force)| force.length()).fold(0.0, f64::max);
             if most > 0.0 && self.shown.forces {
                 let note = format!("arrows: forces on the proxy, longest {} N", super::number(most));
-                painter.text(rect.left_top() + vec2(14.0, 12.0), Align2::LEFT_TOP, note, small.clone(), text);
+                painter.text(rect.left_top() + vec2(GROUP_GAP, GROUP_GAP), Align2::LEFT_TOP, note, small.clone(), text);
             }
-            let bar = Rect::from_min_size(rect.right_bottom() + vec2(-156.0, -26.0), vec2(136.0, 7.0));
+            let bar = Rect::from_min_size(rect.right_bottom() + BAR_AT, vec2(BAR_WIDTH, COLOUR_BAR));
             super::slices::gradient(&painter, bar, ColourMap::Pale { low: 0.0, high: 1.0 }, false);
-            painter.text(bar.center_top() + vec2(0.0, -4.0), Align2::CENTER_BOTTOM, title, small.clone(), text);
-            painter.text(bar.left_bottom() + vec2(0.0, 2.0), Align2::CENTER_TOP, "0", small.clone(), text);
-            painter.text(bar.right_bottom() + vec2(0.0, 2.0), Align2::CENTER_TOP, super::number(top), small, text);
+            painter.text(bar.center_top() - vec2(0.0, FINE_GAP), Align2::CENTER_BOTTOM, title, small.clone(), text);
+            painter.text(bar.left_bottom() + vec2(0.0, FINE_GAP), Align2::CENTER_TOP, "0", small.clone(), text);
+            painter.text(bar.right_bottom() + vec2(0.0, FINE_GAP), Align2::CENTER_TOP, super::number(top), small, text);
         }
     }
 }
@@ -327,10 +403,10 @@ fn arm(pose: &Pose, unit: f32, link: [f32; 3], node: [f32; 3]) -> Vec<Shape> {
         shapes.push(Shape::capsule(ends[0], ends[1], unit, link));
     }
     for origin in &pose.origins {
-        shapes.push(Shape::ball(origin.as_vec3(), 1.7 * unit, link));
+        shapes.push(Shape::ball(origin.as_vec3(), JOINT_BALL * unit, link));
     }
     for place in &pose.nodes {
-        shapes.push(Shape::ball(place.as_vec3(), 1.35 * unit, node));
+        shapes.push(Shape::ball(place.as_vec3(), NODE_BALL * unit, node));
     }
     shapes
 }
@@ -350,7 +426,7 @@ fn nudge(ui: &Ui, loaded: &Loaded, guide: &mut Guide) {
     use egui::Key::{A, D, E, Q, S, W};
     let (pressed, elapsed) = ui.input(|input| {
         let way = |less, more| f64::from(i8::from(input.key_down(more)) - i8::from(input.key_down(less)));
-        ([way(A, D), way(S, W), way(Q, E)], f64::from(input.stable_dt.min(0.1)))
+        ([way(A, D), way(S, W), way(Q, E)], f64::from(input.stable_dt.min(LONGEST_KEY)))
     });
     if pressed == [0.0; 3] {
         return;

@@ -16,6 +16,13 @@ pub struct Shape {
     anchor: u32,
 }
 
+/// An arrow over the radius of its shaft [1]: length below which it is not seen for the ball at its tail; length and radius
+/// of its head. And the head's greatest share of the whole [1].
+const LEAST_ARROW: f32 = 2.0;
+const HEAD_LENGTH: f32 = 5.0;
+const HEAD_RADIUS: f32 = 2.2;
+const HEAD_SHARE: f32 = 0.6;
+
 /// Red, green, blue, gamma-encoded, from 0 to 1.
 pub type Colour = [f32; 3];
 
@@ -62,12 +69,15 @@ impl Shape {
     #[must_use]
     pub fn arrow(tail: Vec3, span: Vec3, radius: f32, colour: Colour) -> Vec<Self> {
         let length = span.length();
-        if length < 2.0 * radius {
+        if length < LEAST_ARROW * radius {
             return Vec::new();
         }
-        let head_length = (5.0 * radius).min(0.6 * length);
+        let head_length = (HEAD_LENGTH * radius).min(HEAD_SHARE * length);
         let neck = tail + span * (1.0 - head_length / length);
-        vec![Self::capsule(tail, neck, radius, colour), Self::cone(neck, tail + span, [2.2 * radius, 0.0], colour)]
+        vec![
+            Self::capsule(tail, neck, radius, colour),
+            Self::cone(neck, tail + span, [HEAD_RADIUS * radius, 0.0], colour),
+        ]
     }
 }
 

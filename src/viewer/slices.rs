@@ -5,7 +5,8 @@ use super::{
     history::History,
     loaded::Loaded,
     number,
-    theme::{self, Palette},
+    palette::{self, Palette},
+    theme::{self, COLOUR_BAR, COLUMN_WIDTH, CROSS, FINE_CURVE, FINE_GAP, JOINT_WIDTH, SWATCH},
 };
 use crate::{
     JointVector,
@@ -17,6 +18,16 @@ use eframe::egui::{
     self, Color32, ColorImage, ComboBox, Painter, Rect, RichText, Slider, TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
 use egui_plot::{HoverPosition, Line, MarkerShape, Plot, PlotImage, PlotPoint, Points};
+
+/// Length of the trail behind the configuration [s], and its points.
+const TRAIL: f64 = 2.0;
+const TRAIL_POINTS: usize = 200;
+
+/// Width left for name and value beside a slider, and for the ends of the range beside a colour bar; least width of slider
+/// and bar [points].
+const NAMES_WIDTH: f32 = 150.0;
+const RANGE_WIDTH: f32 = 60.0;
+const LEAST_WIDTH: f32 = 40.0;
 
 /// What a cell's colour says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,7 +155,7 @@ impl Slices {
         ui.horizontal(|ui| {
             let label = ui.label("Show");
             ComboBox::from_id_salt("column")
-                .width(150.0)
+                .width(COLUMN_WIDTH)
                 .selected_text(self.column.name(grid))
                 .show_ui(ui, |ui| {
                     for column in Column::all(dataset) {
@@ -163,7 +174,7 @@ impl Slices {
                 let chosen = &grid.axes[self.axes[side]].name;
                 let mut axis = self.axes[side];
                 ComboBox::from_id_salt(name)
-                    .width(78.0)
+                    .width(JOINT_WIDTH)
                     .selected_text(chosen)
                     .show_ui(ui, |ui| {
                         for (joint, of) in grid.axes.iter().enumerate() {
@@ -194,7 +205,7 @@ impl Slices {
             }
             ui.horizontal(|ui| {
                 let value = axis.coordinate(self.lines[joint]);
-                ui.spacing_mut().slider_width = (ui.available_width() - 150.0).max(60.0);
+                ui.spacing_mut().slider_width = (ui.available_width() - NAMES_WIDTH).max(LEAST_WIDTH);
                 let slider = Slider::new(&mut self.lines[joint], 0..=axis.count - 1).show_value(false).text(&axis.name);
                 let response = ui.add_enabled(!self.follow, slider);
                 ui.label(RichText::new(format!("{} {}", number(value), axis.unit)).weak());
@@ -216,7 +227,7 @@ impl Slices {
                     Some((known, _, map)) if known.column == key.column && known.dataset == key.dataset => *map,
                     _ => self.column.map(dataset),
                 };
-                let image = picture(dataset, &key, map, &theme::palette(ui.visuals()));
+                let image = picture(dataset, &key, map, &palette::of(ui.visuals()));
                 let texture = ui.ctx().load_texture("C-space plane", image, TextureOptions::NEAREST);
                 self.drawn = Some((key, texture, map));
                 map
@@ -226,7 +237,7 @@ impl Slices {
 
     fn plot(&mut self, ui: &mut Ui, loaded: &Loaded, q: &JointVector, history: &History, height: f32) {
         let grid = &loaded.dataset.grid;
-        let palette = theme::palette(ui.visuals());
+        let palette = palette::of(ui.visuals());
         let Some((key, texture, _)) = &self.drawn else { return };
         let [across, up] = self.axes.map(|axis| &grid.axes[axis]);
         let single = grid.joints() == 1;
@@ -242,7 +253,7 @@ impl Slices {
         )
         .allow_hover(false);
         let place = |q: &JointVector| if single { [q[0], 0.5] } else { [q[self.axes[0]], q[self.axes[1]]] };
-        let trail: Vec<[f64; 2]> = history.recent(2.0, 200).map(|tick| place(&tick.proxy)).collect();
+        let trail: Vec<[f64; 2]> = history.recent(TRAIL, TRAIL_POINTS).map(|tick| place(&tick.proxy)).collect();
         let flagged: Vec<[f64; 2]> = plane(grid, key)
             .filter(|&(_, point)| untrusted(loaded.dataset.status(point)))
             .map(|(_, point)| place(&grid.configuration(point)))
@@ -274,28 +285,29 @@ impl Slices {
                 let status = format!("{:?}", dataset.status(point)).to_lowercase();
                 Some(format!("{}: {}\n{status}", column.name(&dataset.grid), number(column.value(dataset, point))))
             });
-        plot.show(ui, |plot| {
+        let shown = plot.show(ui, |plot| {
             plot.image(image);
-            plot.line(Line::new("trail", trail).color(palette.force).width(1.2).allow_hover(false));
+            plot.line(Line::new("trail", trail).color(palette.force).width(FINE_CURVE).allow_hover(false));
             if !flagged.is_empty() {
-                let marks = Points::new("not converged", flagged).shape(MarkerShape::Cross).radius(3.5);
+                let marks = Points::new("not converged", flagged).shape(MarkerShape::Cross).radius(CROSS);
                 plot.points(marks.color(palette.flagged).allow_hover(false));
             }
-            // A ring with a rim on both sides shows on any colour.
-            for (radius, colour) in [(7.0, palette.here), (5.0, palette.stage), (2.5, palette.here)] {
+            for (radius, colour) in palette::ring(&palette) {
                 plot.points(Points::new("q", vec![here]).radius(radius).color(colour).allow_hover(false));
             }
         });
+        let name = || egui::WidgetInfo::labeled(egui::Role::Canvas, true, "Plane of C-space");
+        shown.response.widget_info(name);
     }
 
     /// Colour bar, or what the colours of the statuses mean.
     fn key(&self, ui: &mut Ui, dataset: &Dataset, map: ColourMap) {
-        let palette = theme::palette(ui.visuals());
+        let palette = palette::of(ui.visuals());
         if self.column == Column::Status {
             ui.horizontal_wrapped(|ui| {
                 for status in [Status::Free, Status::Contact, Status::Unconverged, Status::Overflow, Status::Outside] {
-                    let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), egui::Sense::hover());
-                    ui.painter().rect_filled(rect, 2.0, status_colour(status, &palette));
+                    let (rect, _) = ui.allocate_exact_size(vec2(SWATCH, SWATCH), egui::Sense::hover());
+                    ui.painter().rect_filled(rect, FINE_GAP, status_colour(status, &palette));
                     ui.label(RichText::new(format!("{status:?}").to_lowercase()).small());
                 }
             });
@@ -304,8 +316,8 @@ impl Slices {
         let [low, high] = map.range();
         ui.horizontal(|ui| {
             ui.label(RichText::new(number(low)).small());
-            let width = ui.available_width() - 60.0;
-            let (rect, _) = ui.allocate_exact_size(vec2(width.max(20.0), 8.0), egui::Sense::hover());
+            let width = ui.available_width() - RANGE_WIDTH;
+            let (rect, _) = ui.allocate_exact_size(vec2(width.max(LEAST_WIDTH), COLOUR_BAR), egui::Sense::hover());
             gradient(ui.painter(), rect, map, matches!(map, ColourMap::Root { .. }));
             ui.label(RichText::new(number(high)).small());
         });
@@ -351,7 +363,7 @@ fn picture(dataset: &Dataset, key: &Key, map: ColourMap, palette: &Palette) -> C
             (_, Status::Outside) => palette.absent,
             // Nothing is felt there, which is not the same as little.
             (Column::Torque(_) | Column::Energy | Column::Residual, Status::Free) => palette.free,
-            _ => theme::egui_colour(map.colour(key.column.value(dataset, point))),
+            _ => palette::egui_colour(map.colour(key.column.value(dataset, point))),
         }
     };
     ColorImage::new(size, plane(grid, key).map(|(_, point)| colour(point)).collect())
@@ -376,12 +388,14 @@ fn status_colour(status: Status, palette: &Palette) -> Color32 {
 /// A colour bar from left to right; `by_root`: the map's own scale is that of a square root.
 pub fn gradient(painter: &Painter, rect: Rect, map: ColourMap, by_root: bool) {
     const STEPS: usize = 48;
+    /// Overlap of neighbours, so that no ground shows between them [points].
+    const SEAM: f32 = 0.6;
     let [low, high] = map.range();
     for step in 0..STEPS {
         let share = (step as f64 + 0.5) / STEPS as f64;
         let value = low + (high - low) * if by_root { share * share } else { share };
         let left = rect.left() + rect.width() * step as f32 / STEPS as f32;
-        let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(rect.width() / STEPS as f32 + 0.6, rect.height()));
-        painter.rect_filled(cell.intersect(rect), 0.0, theme::egui_colour(map.colour(value)));
+        let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(rect.width() / STEPS as f32 + SEAM, rect.height()));
+        painter.rect_filled(cell.intersect(rect), 0.0, palette::egui_colour(map.colour(value)));
     }
 }

@@ -184,10 +184,14 @@ impl Stage {
     }
 }
 
-/// The light comes from above the eye's right shoulder, and goes with it.
+/// Whence the light comes, to the right of the eye, above and behind it, in any unit: over its right shoulder. It goes with
+/// the eye.
+const LIGHT: [f32; 3] = [0.45, 0.75, 0.65];
+
 fn view(size: [u32; 2], camera: &Camera, look: &Look, surface: Option<&Surface>) -> View {
     let [right, up] = camera.right_and_up();
-    let light = (0.45 * right + 0.75 * up + 0.65 * camera.backward()).normalize_or_zero();
+    let [across, above, behind] = LIGHT;
+    let light = (across * right + above * up + behind * camera.backward()).normalize_or_zero();
     let map = ColourMap::Pale { low: 0.0, high: 1.0 };
     let stop = |number: usize| {
         let [red, green, blue] = map.colour(number as f64 / 4.0).rgb.map(|channel| f32::from(channel) / 255.0);

@@ -1,223 +1,186 @@
-//! Colours, type and spacing of the window, light and dark: the palette of the figures (`report/colour.rs`), few accents,
-//! one scale of distances.
+//! Sizes and type of the window: one scale of distances, few widths. Everything is in points unless it says otherwise.
+//! Colours are in `palette.rs`.
 
-use crate::report::colour::{self, Colour};
-use eframe::egui::{
-    self, Color32, CornerRadius, FontFamily, FontId, Margin, RichText, Shadow, Stroke, TextStyle, Theme, Visuals, vec2,
-};
+use super::palette;
+use eframe::egui::{self, FontFamily, FontId, Margin, Rangef, RichText, TextStyle, Theme, vec2};
 use egui_plot::AxisHints;
 
-/// Distance between things that belong together, and between groups [points].
+// --- Distances ---
+
+/// Distance between things that belong together.
 pub const GAP: f32 = 6.0;
-/// See [`GAP`].
+/// Between groups, and from the edge of a panel.
 pub const GROUP_GAP: f32 = 12.0;
+/// Within a thing, such as a slider and its name.
+pub const FINE_GAP: f32 = 2.0;
+/// Around a panel.
+pub const PANEL_MARGIN: Margin = Margin::symmetric(12, 8);
+/// Around the bars above and below the panels.
+pub const BAR_MARGIN: Margin = Margin::symmetric(12, 5);
+/// Around a menu.
+const MENU_MARGIN: Margin = Margin::same(8);
+/// Around a window in the window.
+const WINDOW_MARGIN: Margin = Margin::same(14);
+/// Inside a button.
+const BUTTON_PADDING: egui::Vec2 = vec2(8.0, 3.0);
+/// Of what lies below a heading and belongs to it.
+const INDENT: f32 = 12.0;
+/// Radius of corners.
+pub const ROUNDING: u8 = 4;
+/// Shadow of a window in the window: how far it falls, and how soft it is.
+pub const SHADOW_DROP: i8 = 6;
+/// See [`SHADOW_DROP`].
+pub const SHADOW_BLUR: u8 = 24;
 
-/// What is not egui's own business.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Palette {
-    /// Behind the 3-D scene and the plots.
-    pub stage: Color32,
-    /// Links of the proxy.
-    pub link: Color32,
-    /// Its nodes.
-    pub node: Color32,
-    /// Contacting nodes, forces: what is felt.
-    pub force: Color32,
-    /// Where the device is.
-    pub ghost: Color32,
-    /// Axes of the scene and scale bar.
-    pub axis: Color32,
-    /// The current configuration in C-space.
-    pub here: Color32,
-    /// Points that are not to be trusted.
-    pub flagged: Color32,
-    /// Points where nothing is touched.
-    pub free: Color32,
-    /// Points without data.
-    pub absent: Color32,
-    /// Within its bound.
-    pub good: Color32,
-    /// Beyond its bound.
-    pub bad: Color32,
+// --- Type ---
+
+/// Letters of headings, of text, and of notes; of messages that point at a line.
+const HEADING: f32 = 15.0;
+const BODY: f32 = 12.5;
+const SMALL: f32 = 10.5;
+const MONOSPACE: f32 = 11.5;
+/// Letters of an axis' name.
+const AXIS_NAME: f32 = 11.0;
+
+// --- Lines ---
+
+/// Width of lines: frames; axes and bars; curves, those that are compared with them, and their samples in a legend.
+pub const HAIRLINE: f32 = 1.0;
+/// See [`HAIRLINE`].
+pub const AXIS_LINE: f32 = 1.5;
+/// See [`HAIRLINE`].
+pub const CURVE: f32 = 1.8;
+/// See [`HAIRLINE`].
+pub const FINE_CURVE: f32 = 1.2;
+/// Dash and gap of a dashed sample.
+pub const DASHES: [f32; 2] = [3.0, 2.5];
+/// A sample in a legend.
+pub const SAMPLE: egui::Vec2 = vec2(16.0, 10.0);
+/// A square in a key of colours.
+pub const SWATCH: f32 = 9.0;
+/// Height of a bar of colours.
+pub const COLOUR_BAR: f32 = 7.0;
+/// Half the length of a tick at the ends of the scale bar.
+pub const TICK: f32 = 3.0;
+/// Radius of a cross on a point that is not to be trusted.
+pub const CROSS: f32 = 3.5;
+
+// --- Widgets ---
+
+/// Least height of what can be clicked.
+const CLICKABLE: f32 = 20.0;
+/// Width of a slider and of a choice where nothing else is said.
+const SLIDER_WIDTH: f32 = 110.0;
+/// Width left for the number beside a slider, its gap included.
+pub const NUMBER_WIDTH: f32 = 66.0;
+/// The mark of a bound on a slider.
+pub const MARK_HEIGHT: f32 = 16.0;
+/// See [`MARK_HEIGHT`].
+pub const MARK_WIDTH: f32 = 2.0;
+/// Width of a choice: among joints, among words, among columns of the dataset, among times.
+pub const JOINT_WIDTH: f32 = 78.0;
+/// See [`JOINT_WIDTH`].
+pub const CHOICE_WIDTH: f32 = 92.0;
+/// See [`JOINT_WIDTH`].
+pub const COLUMN_WIDTH: f32 = 150.0;
+/// See [`JOINT_WIDTH`].
+pub const SPAN_WIDTH: f32 = 56.0;
+/// Width of the slider of a motion, and of the button that pauses it, whatever it says.
+pub const MOTION_WIDTH: f32 = 120.0;
+/// See [`MOTION_WIDTH`].
+pub const PAUSE_WIDTH: f32 = 52.0;
+/// A button that is alone.
+pub const LONE_BUTTON: egui::Vec2 = vec2(90.0, 24.0);
+/// A progress bar in the middle of the window, and in its status bar.
+pub const WIDE_PROGRESS: f32 = 330.0;
+/// See [`WIDE_PROGRESS`].
+pub const PROGRESS: f32 = 190.0;
+/// See [`WIDE_PROGRESS`].
+pub const PROGRESS_HEIGHT: f32 = 18.0;
+
+// --- Panels ---
+
+/// The window as it is opened, and how small it can be made.
+pub const WINDOW: [f32; 2] = [1280.0, 800.0];
+/// See [`WINDOW`].
+pub const LEAST_WINDOW: [f32; 2] = [900.0, 560.0];
+/// Width of the window below which plots lie under all other panels.
+pub const NARROW: f32 = 1150.0;
+/// Width of the controls, and how far it can be dragged.
+pub const CONTROLS_WIDTH: f32 = 232.0;
+/// See [`CONTROLS_WIDTH`].
+pub const CONTROLS_RANGE: std::ops::RangeInclusive<f32> = 200.0..=360.0;
+/// Height of the plots and width of C-space: this share of the window [1], within these limits.
+pub const SIDE_SHARE: f32 = 0.27;
+/// See [`SIDE_SHARE`].
+pub const PLOTS_RANGE: [f32; 2] = [130.0, 320.0];
+/// See [`SIDE_SHARE`].
+pub const SPACE_RANGE: [f32; 2] = [240.0, 420.0];
+/// Height from which on plane and cloud of C-space find room, one below the other.
+pub const ROOM_FOR_BOTH: f32 = 470.0;
+/// Height of everything about a plane but its heat map.
+pub const PLANE_WIDGETS: f32 = 150.0;
+/// Width of a message, and of the chooser of files; its height, that of its list, and the width of its field.
+pub const MESSAGE_WIDTH: f32 = 560.0;
+/// See [`MESSAGE_WIDTH`].
+pub const CHOOSER: egui::Vec2 = vec2(420.0, 380.0);
+/// See [`MESSAGE_WIDTH`].
+pub const LIST_HEIGHT: f32 = 220.0;
+/// See [`MESSAGE_WIDTH`].
+pub const FIELD_WIDTH: f32 = 290.0;
+
+/// Letters of notes, where a painter writes.
+#[must_use]
+pub fn small() -> FontId {
+    FontId::proportional(SMALL)
 }
 
-/// egui's colour of a figure's.
+/// The unit of several quantities: `N m`, or each once where they differ.
 #[must_use]
-pub fn egui_colour(colour: Colour) -> Color32 {
-    let [red, green, blue] = colour.rgb;
-    Color32::from_rgb(red, green, blue).gamma_multiply(colour.opacity)
-}
-
-/// Colour of series `number` in a plot: Okabe and Ito's, on dark ground the blue in its lighter shade.
-#[must_use]
-pub fn series(number: usize, dark: bool) -> Color32 {
-    const ON_DARK: [usize; 6] = [4, 5, 2, 3, 0, 1];
-    egui_colour(colour::series(if dark { ON_DARK[number % ON_DARK.len()] } else { number }))
-}
-
-/// The palette that goes with `visuals`.
-#[must_use]
-pub fn palette(visuals: &Visuals) -> Palette {
-    let hex = |number| egui_colour(Colour::hex(number));
-    if visuals.dark_mode {
-        Palette {
-            stage: hex(0x16_1a_20),
-            link: hex(0x8f_99_a8),
-            node: hex(0xd5_dc_e6),
-            force: hex(0xf0_8a_3c),
-            ghost: hex(0x56_b4_e9),
-            axis: hex(0x8a_94_a3),
-            here: hex(0xff_ff_ff),
-            flagged: hex(0xf0_3e_6e),
-            free: hex(0x24_2a_33),
-            absent: hex(0x10_13_17),
-            good: hex(0x3d_b8_8f),
-            bad: hex(0xf0_8a_3c),
-        }
-    } else {
-        Palette {
-            stage: hex(0xf6_f7_f9),
-            link: hex(0x8d_97_a5),
-            node: hex(0x2b_34_40),
-            force: hex(0xd5_5e_00),
-            ghost: hex(0x00_72_b2),
-            axis: hex(0x6b_75_82),
-            here: hex(0x22_2b_36),
-            flagged: hex(0xd0_1c_55),
-            free: hex(0xee_f1_f4),
-            absent: hex(0xd3_d8_de),
-            good: hex(0x00_80_5c),
-            bad: hex(0xc2_52_00),
+pub fn units(all: impl Iterator<Item = String>) -> String {
+    let mut units: Vec<String> = Vec::new();
+    for unit in all {
+        if !units.contains(&unit) {
+            units.push(unit);
         }
     }
+    units.join(" or ")
 }
 
 fn axis<'a>(hints: AxisHints<'a>, label: &str) -> AxisHints<'a> {
-    hints.label(RichText::new(label).size(11.0)).tick_label_font(FontId::proportional(10.5))
+    hints.label(RichText::new(label).size(AXIS_NAME)).tick_label_font(small())
 }
 
 /// The axis across, named `label`.
 #[must_use]
 pub fn across<'a>(label: &str) -> AxisHints<'a> {
-    axis(AxisHints::new_x().label_spacing(egui::Rangef::new(22.0, 34.0)), label)
+    axis(AxisHints::new_x().label_spacing(Rangef::new(22.0, 34.0)), label)
 }
 
 /// The axis up, named `label`.
 #[must_use]
 pub fn upward<'a>(label: &str) -> AxisHints<'a> {
-    axis(AxisHints::new_y().label_spacing(egui::Rangef::new(11.0, 15.0)).min_thickness(36.0), label)
-}
-
-/// Colour of a plot's grid lines; dense ones are fainter.
-#[must_use]
-pub fn grid(visuals: &Visuals) -> Color32 {
-    visuals.weak_text_color().gamma_multiply(0.45)
+    axis(AxisHints::new_y().label_spacing(Rangef::new(11.0, 15.0)).min_thickness(36.0), label)
 }
 
 /// Gives `ctx` type, spacing and both sets of colours.
 pub fn apply(ctx: &egui::Context) {
-    ctx.set_visuals_of(Theme::Light, light());
-    ctx.set_visuals_of(Theme::Dark, dark());
+    ctx.set_visuals_of(Theme::Light, palette::light());
+    ctx.set_visuals_of(Theme::Dark, palette::dark());
     ctx.all_styles_mut(|style| {
         let font = |size| FontId::new(size, FontFamily::Proportional);
-        style.text_styles.insert(TextStyle::Heading, font(15.0));
-        style.text_styles.insert(TextStyle::Body, font(12.5));
-        style.text_styles.insert(TextStyle::Button, font(12.5));
-        style.text_styles.insert(TextStyle::Small, font(10.5));
-        style.text_styles.insert(TextStyle::Monospace, FontId::new(11.5, FontFamily::Monospace));
+        style.text_styles.insert(TextStyle::Heading, font(HEADING));
+        style.text_styles.insert(TextStyle::Body, font(BODY));
+        style.text_styles.insert(TextStyle::Button, font(BODY));
+        style.text_styles.insert(TextStyle::Small, font(SMALL));
+        style.text_styles.insert(TextStyle::Monospace, FontId::new(MONOSPACE, FontFamily::Monospace));
         style.spacing.item_spacing = vec2(GAP, GAP);
-        style.spacing.button_padding = vec2(8.0, 3.0);
-        style.spacing.interact_size.y = 20.0;
-        style.spacing.slider_width = 110.0;
-        style.spacing.combo_width = 80.0;
-        style.spacing.indent = 12.0;
-        style.spacing.menu_margin = Margin::same(8);
-        style.spacing.window_margin = Margin::same(14);
+        style.spacing.button_padding = BUTTON_PADDING;
+        style.spacing.interact_size.y = CLICKABLE;
+        style.spacing.slider_width = SLIDER_WIDTH;
+        style.spacing.combo_width = JOINT_WIDTH;
+        style.spacing.indent = INDENT;
+        style.spacing.menu_margin = MENU_MARGIN;
+        style.spacing.window_margin = WINDOW_MARGIN;
     });
-}
-
-fn light() -> Visuals {
-    let ink = egui_colour(colour::INK);
-    let mut visuals = Visuals::light();
-    dress(&mut visuals, ink, egui_colour(colour::SOFT_INK), Color32::WHITE, Color32::from_rgb(0xfa, 0xfb, 0xfc));
-    let line = egui_colour(Colour::hex(0xd6_dc_e3));
-    visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, line);
-    visuals.window_stroke = Stroke::new(1.0, line);
-    for (widget, fill) in [
-        (&mut visuals.widgets.inactive, 0xec_ef_f3),
-        (&mut visuals.widgets.hovered, 0xe0_e5_eb),
-        (&mut visuals.widgets.active, 0xcf_d7_e0),
-        (&mut visuals.widgets.open, 0xe6_ea_ef),
-    ] {
-        widget.weak_bg_fill = egui_colour(Colour::hex(fill));
-        widget.bg_fill = widget.weak_bg_fill;
-        widget.bg_stroke = Stroke::NONE;
-        widget.fg_stroke.color = ink;
-    }
-    visuals.selection.bg_fill = egui_colour(Colour::hex(0xcf_e3_f2));
-    visuals.selection.stroke = Stroke::new(1.0, egui_colour(Colour::hex(0x00_4c_78)));
-    visuals.error_fg_color = egui_colour(Colour::hex(0xb0_1e_3c));
-    visuals.warn_fg_color = egui_colour(Colour::hex(0xa8_48_00));
-    visuals.hyperlink_color = egui_colour(colour::series(0));
-    visuals.faint_bg_color = egui_colour(Colour::hex(0xf1_f3_f6));
-    visuals
-}
-
-fn dark() -> Visuals {
-    let ink = egui_colour(Colour::hex(0xe3_e7_ed));
-    let mut visuals = Visuals::dark();
-    let (ground, panel) = (Color32::from_rgb(0x14, 0x17, 0x1c), Color32::from_rgb(0x1d, 0x21, 0x28));
-    dress(&mut visuals, ink, egui_colour(Colour::hex(0xa7_b0_bd)), ground, panel);
-    let line = egui_colour(Colour::hex(0x36_3d_48));
-    visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, line);
-    visuals.window_stroke = Stroke::new(1.0, line);
-    for (widget, fill) in [
-        (&mut visuals.widgets.inactive, 0x2c_33_3d),
-        (&mut visuals.widgets.hovered, 0x38_41_4d),
-        (&mut visuals.widgets.active, 0x46_51_60),
-        (&mut visuals.widgets.open, 0x31_38_43),
-    ] {
-        widget.weak_bg_fill = egui_colour(Colour::hex(fill));
-        widget.bg_fill = widget.weak_bg_fill;
-        widget.bg_stroke = Stroke::NONE;
-        widget.fg_stroke.color = ink;
-    }
-    visuals.selection.bg_fill = egui_colour(Colour::hex(0x1d_4a_68));
-    visuals.selection.stroke = Stroke::new(1.0, egui_colour(Colour::hex(0xc5_e4_f8)));
-    visuals.error_fg_color = egui_colour(Colour::hex(0xff_7d_94));
-    visuals.warn_fg_color = egui_colour(Colour::hex(0xf5_a3_5c));
-    visuals.hyperlink_color = egui_colour(colour::series(4));
-    visuals.faint_bg_color = egui_colour(Colour::hex(0x22_27_2f));
-    visuals
-}
-
-/// What both themes have in common: text in `ink`, notes in `soft`, fields on `ground`, panels on `panel`.
-fn dress(visuals: &mut Visuals, ink: Color32, soft: Color32, ground: Color32, panel: Color32) {
-    visuals.widgets.noninteractive.fg_stroke.color = ink;
-    visuals.weak_text_color = Some(soft);
-    visuals.extreme_bg_color = ground;
-    visuals.panel_fill = panel;
-    visuals.window_fill = panel;
-    visuals.widgets.noninteractive.bg_fill = panel;
-    visuals.widgets.noninteractive.weak_bg_fill = panel;
-    visuals.slider_trailing_fill = true;
-    visuals.indent_has_left_vline = false;
-    visuals.window_shadow = Shadow {
-        offset: [0, 6],
-        blur: 24,
-        spread: 0,
-        color: Color32::from_black_alpha(if visuals.dark_mode { 120 } else { 40 }),
-    };
-    visuals.popup_shadow = visuals.window_shadow;
-    let widgets = &mut visuals.widgets;
-    for widget in [
-        &mut widgets.noninteractive,
-        &mut widgets.inactive,
-        &mut widgets.hovered,
-        &mut widgets.active,
-        &mut widgets.open,
-    ] {
-        widget.corner_radius = CornerRadius::same(4);
-        widget.expansion = 0.0;
-    }
 }

@@ -1,6 +1,6 @@
 //! The viewer in a window of the desktop.
 
-use super::{Pace, Start, ViewError, Viewer, dress};
+use super::{Pace, Start, ViewError, Viewer, dress, theme};
 use crate::gpu::{AdapterChoice, Context};
 use eframe::{
     egui::{self, ViewportBuilder},
@@ -17,18 +17,20 @@ const FRAME: Duration = Duration::from_micros(16_667);
 /// Longest time that one frame makes up for [s]: after a pause of the window the object goes on from where it was.
 const LONGEST_FRAME: f64 = 0.2;
 
-/// Opens a window on `start` and returns when it is closed.
+/// Opens a window on `start` and returns when it is closed. A file that cannot be read is told before there is a window;
+/// what is wrong within it, in the window, where another one can be opened.
 ///
 /// # Errors
-/// When there is no device or no display.
+/// When the file cannot be read, or there is no device or no display.
 pub fn open(start: Start) -> Result<(), ViewError> {
+    start.check()?;
     let context = Arc::new(Context::open(AdapterChoice::Any)?);
     let (instance, adapter, device, queue) = context.shared();
     let options = eframe::NativeOptions {
         viewport: ViewportBuilder::default()
             .with_title("haptize")
-            .with_inner_size([1280.0, 800.0])
-            .with_min_inner_size([900.0, 560.0])
+            .with_inner_size(theme::WINDOW)
+            .with_min_inner_size(theme::LEAST_WINDOW)
             .with_drag_and_drop(true),
         wgpu_options: WgpuConfiguration {
             wgpu_setup: WgpuSetup::Existing(WgpuSetupExisting { instance, adapter, device, queue }),
@@ -48,7 +50,10 @@ pub fn open(start: Start) -> Result<(), ViewError> {
             Ok(Box::new(App { viewer, last: Instant::now() }))
         }),
     );
-    shown.map_err(|error| ViewError::Window(error.to_string()))
+    shown.map_err(|error| match error {
+        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => ViewError::NoDisplay,
+        other => ViewError::Window(other.to_string()),
+    })
 }
 
 struct App {

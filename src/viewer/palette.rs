@@ -1,0 +1,189 @@
+//! Colours of the window, light and dark: the palette of the figures (`report/colour.rs`), few accents.
+
+use super::theme::{HAIRLINE, ROUNDING, SHADOW_BLUR, SHADOW_DROP};
+use crate::report::colour::{self, Colour};
+use eframe::egui::{Color32, CornerRadius, Shadow, Stroke, Visuals};
+
+/// Strength of lines that only help to read others, over their colour's own [1].
+pub const FAINT: f32 = 0.45;
+
+/// What is not egui's own business.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Palette {
+    /// Behind the 3-D scene and the plots.
+    pub stage: Color32,
+    /// Links of the proxy.
+    pub link: Color32,
+    /// Its nodes.
+    pub node: Color32,
+    /// Contacting nodes, forces: what is felt.
+    pub force: Color32,
+    /// Where the device is.
+    pub ghost: Color32,
+    /// Axes of the scene and scale bar.
+    pub axis: Color32,
+    /// The current configuration in C-space.
+    pub here: Color32,
+    /// Points that are not to be trusted.
+    pub flagged: Color32,
+    /// Points where nothing is touched.
+    pub free: Color32,
+    /// Points without data.
+    pub absent: Color32,
+    /// Within its bound.
+    pub good: Color32,
+    /// Beyond its bound.
+    pub bad: Color32,
+}
+
+/// egui's colour of a figure's.
+#[must_use]
+pub fn egui_colour(colour: Colour) -> Color32 {
+    let [red, green, blue] = colour.rgb;
+    Color32::from_rgb(red, green, blue).gamma_multiply(colour.opacity)
+}
+
+/// Colour of series `number` in a plot: Okabe and Ito's, on dark ground the blue in its lighter shade.
+#[must_use]
+pub fn series(number: usize, dark: bool) -> Color32 {
+    const ON_DARK: [usize; 6] = [4, 5, 2, 3, 0, 1];
+    egui_colour(colour::series(if dark { ON_DARK[number % ON_DARK.len()] } else { number }))
+}
+
+/// The palette that goes with `visuals`.
+#[must_use]
+pub fn of(visuals: &Visuals) -> Palette {
+    let hex = |number| egui_colour(Colour::hex(number));
+    if visuals.dark_mode {
+        Palette {
+            stage: hex(0x16_1a_20),
+            link: hex(0x8f_99_a8),
+            node: hex(0xd5_dc_e6),
+            force: hex(0xf0_8a_3c),
+            ghost: hex(0x56_b4_e9),
+            axis: hex(0x8a_94_a3),
+            here: hex(0xff_ff_ff),
+            flagged: hex(0xf0_3e_6e),
+            free: hex(0x24_2a_33),
+            absent: hex(0x10_13_17),
+            good: hex(0x3d_b8_8f),
+            bad: hex(0xf0_8a_3c),
+        }
+    } else {
+        Palette {
+            stage: hex(0xf6_f7_f9),
+            link: hex(0x8d_97_a5),
+            node: hex(0x2b_34_40),
+            force: hex(0xd5_5e_00),
+            ghost: hex(0x00_72_b2),
+            axis: hex(0x6b_75_82),
+            here: hex(0x22_2b_36),
+            flagged: hex(0xd0_1c_55),
+            free: hex(0xee_f1_f4),
+            absent: hex(0xd3_d8_de),
+            good: hex(0x00_80_5c),
+            bad: hex(0xc2_52_00),
+        }
+    }
+}
+
+/// Colour of a plot's grid lines; dense ones are fainter.
+#[must_use]
+pub fn grid(visuals: &Visuals) -> Color32 {
+    visuals.weak_text_color().gamma_multiply(FAINT)
+}
+
+/// The current configuration wherever it is marked, as radius [points] and colour: a ring with a rim on both sides shows
+/// on any ground.
+#[must_use]
+pub fn ring(palette: &Palette) -> [(f32, Color32); 3] {
+    [(7.0, palette.here), (5.0, palette.stage), (2.5, palette.here)]
+}
+
+/// egui's own colours on light ground.
+pub fn light() -> Visuals {
+    let ink = egui_colour(colour::INK);
+    let mut visuals = Visuals::light();
+    dress(&mut visuals, ink, egui_colour(colour::SOFT_INK), Color32::WHITE, Color32::from_rgb(0xfa, 0xfb, 0xfc));
+    let line = egui_colour(Colour::hex(0xd6_dc_e3));
+    visuals.widgets.noninteractive.bg_stroke = Stroke::new(HAIRLINE, line);
+    visuals.window_stroke = Stroke::new(HAIRLINE, line);
+    for (widget, fill) in [
+        (&mut visuals.widgets.inactive, 0xec_ef_f3),
+        (&mut visuals.widgets.hovered, 0xe0_e5_eb),
+        (&mut visuals.widgets.active, 0xcf_d7_e0),
+        (&mut visuals.widgets.open, 0xe6_ea_ef),
+    ] {
+        widget.weak_bg_fill = egui_colour(Colour::hex(fill));
+        widget.bg_fill = widget.weak_bg_fill;
+        widget.bg_stroke = Stroke::NONE;
+        widget.fg_stroke.color = ink;
+    }
+    visuals.selection.bg_fill = egui_colour(Colour::hex(0xcf_e3_f2));
+    visuals.selection.stroke = Stroke::new(HAIRLINE, egui_colour(Colour::hex(0x00_4c_78)));
+    visuals.error_fg_color = egui_colour(Colour::hex(0xb0_1e_3c));
+    visuals.warn_fg_color = egui_colour(Colour::hex(0xa8_48_00));
+    visuals.hyperlink_color = egui_colour(colour::series(0));
+    visuals.faint_bg_color = egui_colour(Colour::hex(0xf1_f3_f6));
+    visuals
+}
+
+/// egui's own colours on dark ground.
+pub fn dark() -> Visuals {
+    let ink = egui_colour(Colour::hex(0xe3_e7_ed));
+    let mut visuals = Visuals::dark();
+    let (ground, panel) = (Color32::from_rgb(0x14, 0x17, 0x1c), Color32::from_rgb(0x1d, 0x21, 0x28));
+    dress(&mut visuals, ink, egui_colour(Colour::hex(0xa7_b0_bd)), ground, panel);
+    let line = egui_colour(Colour::hex(0x36_3d_48));
+    visuals.widgets.noninteractive.bg_stroke = Stroke::new(HAIRLINE, line);
+    visuals.window_stroke = Stroke::new(HAIRLINE, line);
+    for (widget, fill) in [
+        (&mut visuals.widgets.inactive, 0x2c_33_3d),
+        (&mut visuals.widgets.hovered, 0x38_41_4d),
+        (&mut visuals.widgets.active, 0x46_51_60),
+        (&mut visuals.widgets.open, 0x31_38_43),
+    ] {
+        widget.weak_bg_fill = egui_colour(Colour::hex(fill));
+        widget.bg_fill = widget.weak_bg_fill;
+        widget.bg_stroke = Stroke::NONE;
+        widget.fg_stroke.color = ink;
+    }
+    visuals.selection.bg_fill = egui_colour(Colour::hex(0x1d_4a_68));
+    visuals.selection.stroke = Stroke::new(HAIRLINE, egui_colour(Colour::hex(0xc5_e4_f8)));
+    visuals.error_fg_color = egui_colour(Colour::hex(0xff_7d_94));
+    visuals.warn_fg_color = egui_colour(Colour::hex(0xf5_a3_5c));
+    visuals.hyperlink_color = egui_colour(colour::series(4));
+    visuals.faint_bg_color = egui_colour(Colour::hex(0x22_27_2f));
+    visuals
+}
+
+/// What both themes have in common: text in `ink`, notes in `soft`, fields on `ground`, panels on `panel`.
+fn dress(visuals: &mut Visuals, ink: Color32, soft: Color32, ground: Color32, panel: Color32) {
+    visuals.widgets.noninteractive.fg_stroke.color = ink;
+    visuals.weak_text_color = Some(soft);
+    visuals.extreme_bg_color = ground;
+    visuals.panel_fill = panel;
+    visuals.window_fill = panel;
+    visuals.widgets.noninteractive.bg_fill = panel;
+    visuals.widgets.noninteractive.weak_bg_fill = panel;
+    visuals.slider_trailing_fill = true;
+    visuals.indent_has_left_vline = false;
+    visuals.window_shadow = Shadow {
+        offset: [0, SHADOW_DROP],
+        blur: SHADOW_BLUR,
+        spread: 0,
+        color: Color32::from_black_alpha(if visuals.dark_mode { 120 } else { 40 }),
+    };
+    visuals.popup_shadow = visuals.window_shadow;
+    let widgets = &mut visuals.widgets;
+    for widget in [
+        &mut widgets.noninteractive,
+        &mut widgets.inactive,
+        &mut widgets.hovered,
+        &mut widgets.active,
+        &mut widgets.open,
+    ] {
+        widget.corner_radius = CornerRadius::same(ROUNDING);
+        widget.expansion = 0.0;
+    }
+}
