@@ -121,6 +121,24 @@ fn broken_scenes_are_refused_with_place_and_remedy() {
 }
 
 #[test]
+fn a_gpu_that_is_asked_for_and_not_there_is_an_error_and_left_out_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("finger.toml"), FINGER).unwrap();
+    let bake = |backend: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_haptize"));
+        command.args(["bake", "finger.toml", "--json", "--backend", backend]).current_dir(folder.path());
+        command.env("VK_DRIVER_FILES", "/none").env("VK_ICD_FILENAMES", "/none").output().unwrap()
+    };
+    let refused = bake("gpu");
+    assert_eq!(refused.status.code(), Some(1));
+    let message = text(&refused.stderr);
+    assert!(message.contains("Vulkan driver") && message.contains("--backend cpu"), "{message}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no part is begun");
+    let taken: Value = serde_json::from_slice(&bake("auto").stdout).unwrap();
+    assert_eq!(taken["backend"], "cpu");
+}
+
+#[test]
 fn a_missing_or_broken_file_is_named() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("finger.toml"), FINGER).unwrap();

@@ -116,9 +116,12 @@ fn announce(progress: &Progress) {
     let Progress { points, done, footprint: Footprint { memory, disk }, .. } = progress;
     let disk = match disk.most {
         0 => String::new(),
-        _ => format!(", {} of disk (for a moment at the end twice that)", range(*disk)),
+        _ => format!(" and {} of disk, twice that for a moment at the end", range(*disk)),
     };
-    eprintln!("haptize: {points} points, {done} of them done; {} of memory beside the object's{disk}", range(*memory));
+    eprintln!(
+        "haptize: {points} points, {done} of them done; results take {} of memory{disk}, by how much is in contact",
+        range(*memory)
+    );
 }
 
 /// Rounded up, with unit.

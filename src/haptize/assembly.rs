@@ -7,78 +7,83 @@ use super::{
 };
 use crate::dataset::{self, Heading, Surface, Tensor, TensorContents, write_file};
 use std::{
-    io::{self, Write},
+    io::{self, Read, Write},
     path::Path,
+    sync::atomic::{AtomicBool, Ordering},
 };
 
 /// Memory that it takes: the buffers between part and file [bytes].
 pub(super) const BUFFERS: usize = part::BUFFER + dataset::BUFFER;
 
-/// Writes all points of `part` as the dataset `output`.
-pub(super) fn assemble(
-    part: &Part,
-    output: &Path,
-    heading: Heading<'_>,
-    surface: &Surface,
-    shape: Shape,
-) -> Result<(), dataset::Error> {
-    let of = |section| Contents::Section { part, section, joints: shape.joints };
-    let grid = heading.grid.counts();
-    let mut tensors = vec![
-        Tensor::new::<f64>("torque", [&grid[..], &[shape.joints]].concat(), of(Section::Torque)),
-        Tensor::new::<u8>("status", grid.clone(), of(Section::Status)),
-        Tensor::new::<f64>("energy", grid.clone(), of(Section::Energy)),
-        Tensor::new::<f32>("gap", grid.clone(), of(Section::Gap)),
-        Tensor::new::<f32>("residual", grid.clone(), of(Section::Residual)),
-        Tensor::new::<u32>("iterations", grid, of(Section::Iterations)),
-    ];
-    if shape.with_forces {
-        let forces = part.contacts();
-        let offsets = Contents::Offsets { part, joints: shape.joints };
-        tensors.push(Tensor::new::<u64>("contact_offsets", vec![heading.grid.points() + 1], offsets));
-        tensors.push(Tensor::new::<u32>("contact_nodes", vec![forces], of(Section::Nodes)));
-        tensors.push(Tensor::new::<f32>("contact_forces", vec![forces, 3], of(Section::Forces)));
+/// The results of a sweep on the disk.
+pub(super) struct Results<'a> {
+    pub part: &'a Part,
+    pub shape: Shape,
+    /// When this becomes true putting them together ends soon, in an error.
+    pub stop: &'a AtomicBool,
+}
+
+impl Results<'_> {
+    /// Writes all points as the dataset `output`.
+    pub fn assemble(&self, output: &Path, heading: Heading<'_>, surface: &Surface) -> Result<(), dataset::Error> {
+        let of = |section| Contents::Section(self, section);
+        let grid = heading.grid.counts();
+        let mut tensors = vec![
+            Tensor::new::<f64>("torque", [&grid[..], &[self.shape.joints]].concat(), of(Section::Torque)),
+            Tensor::new::<u8>("status", grid.clone(), of(Section::Status)),
+            Tensor::new::<f64>("energy", grid.clone(), of(Section::Energy)),
+            Tensor::new::<f32>("gap", grid.clone(), of(Section::Gap)),
+            Tensor::new::<f32>("residual", grid.clone(), of(Section::Residual)),
+            Tensor::new::<u32>("iterations", grid, of(Section::Iterations)),
+        ];
+        if self.shape.with_forces {
+            let forces = self.part.contacts();
+            let offsets = vec![heading.grid.points() + 1];
+            tensors.push(Tensor::new::<u64>("contact_offsets", offsets, Contents::Offsets(self)));
+            tensors.push(Tensor::new::<u32>("contact_nodes", vec![forces], of(Section::Nodes)));
+            tensors.push(Tensor::new::<f32>("contact_forces", vec![forces, 3], of(Section::Forces)));
+        }
+        let (nodes, triangles) = (&surface.nodes, &surface.triangles);
+        tensors.push(Tensor::new::<f64>(
+            "surface_nodes",
+            vec![nodes.len() / 3, 3],
+            Contents::Held(bytemuck::cast_slice(nodes)),
+        ));
+        tensors.push(Tensor::new::<u32>(
+            "surface_triangles",
+            vec![triangles.len() / 3, 3],
+            Contents::Held(bytemuck::cast_slice(triangles)),
+        ));
+        write_file(output, heading, tensors)
     }
-    let (nodes, triangles) = (&surface.nodes, &surface.triangles);
-    tensors.push(Tensor::new::<f64>(
-        "surface_nodes",
-        vec![nodes.len() / 3, 3],
-        Contents::Held(bytemuck::cast_slice(nodes)),
-    ));
-    tensors.push(Tensor::new::<u32>(
-        "surface_triangles",
-        vec![triangles.len() / 3, 3],
-        Contents::Held(bytemuck::cast_slice(triangles)),
-    ));
-    write_file(output, heading, tensors)
+
+    /// Hands a column of all points, block by block, to `take`.
+    fn column(&self, section: Section, take: &mut dyn FnMut(&mut dyn Read) -> io::Result<()>) -> io::Result<()> {
+        self.part.column(section, self.shape.joints, &mut |column| {
+            if self.stop.load(Ordering::Relaxed) { Err(io::Error::other("stopped")) } else { take(column) }
+        })
+    }
 }
 
 enum Contents<'a> {
     Held(&'a [u8]),
     /// A column of all points.
-    Section {
-        part: &'a Part,
-        section: Section,
-        joints: usize,
-    },
+    Section(&'a Results<'a>, Section),
     /// Sums of the points' numbers of contacts, from 0 on.
-    Offsets {
-        part: &'a Part,
-        joints: usize,
-    },
+    Offsets(&'a Results<'a>),
 }
 
 impl TensorContents for Contents<'_> {
     fn write(&self, writer: &mut impl Write) -> io::Result<()> {
-        match *self {
+        match self {
             Self::Held(bytes) => writer.write_all(bytes),
-            Self::Section { part, section, joints } => {
-                part.column(section, joints, &mut |column| io::copy(column, writer).map(drop))
+            Self::Section(results, section) => {
+                results.column(*section, &mut |column| io::copy(column, writer).map(drop))
             }
-            Self::Offsets { part, joints } => {
+            Self::Offsets(results) => {
                 let mut sum = 0_u64;
                 writer.write_all(&sum.to_le_bytes())?;
-                part.column(Section::Contacts, joints, &mut |column| {
+                results.column(Section::Contacts, &mut |column| {
                     let mut counts = Vec::new();
                     column.read_to_end(&mut counts)?;
                     for count in counts.as_chunks().0 {

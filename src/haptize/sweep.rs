@@ -5,7 +5,7 @@
 
 use super::{
     Backend, Footprint, FreeSpace, SweepError, SweepReport,
-    assembly::{self, assemble},
+    assembly::{self, Results},
     chunks::{Begun, together},
     columns::{Columns, Shape},
     footprint::{self, Bounds},
@@ -22,7 +22,7 @@ use clap::ValueEnum;
 use std::{
     ffi::OsString,
     path::{Path, PathBuf},
-    sync::atomic::AtomicBool,
+    sync::atomic::{AtomicBool, Ordering},
 };
 
 /// How far a sweep has come.
@@ -44,7 +44,7 @@ pub struct Progress {
 pub struct Run<'a> {
     /// Configurations handed to the backend at once, at least 1.
     pub chunk: usize,
-    /// When this becomes true the sweep stops after the chunk at hand.
+    /// When this becomes true the sweep stops after the chunk at hand, or while the file is put together.
     pub stop: &'a AtomicBool,
     /// Called at the start and after every chunk.
     pub progress: &'a mut dyn FnMut(Progress),
@@ -220,10 +220,18 @@ impl<'a> Sweep<'a> {
         }
         let footprint = self.footprint(run.chunk, false);
         let begun = Begun { tally, provenance };
+        let stop = run.stop;
         let (report, provenance) = self.solve(backend, run, begun, footprint, &mut part)?;
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
-        assemble(&part, output, heading, &self.surface, self.shape)
-            .map_err(|source| SweepError::Dataset { part: part.path().into(), source })?;
+        let results = Results { part: &part, shape: self.shape, stop };
+        results.assemble(output, heading, &self.surface).map_err(|source| {
+            let (part, points) = (part.path().to_path_buf(), report.points);
+            if stop.load(Ordering::Relaxed) {
+                SweepError::Stopped { done: points, points, part: Some(part) }
+            } else {
+                SweepError::Dataset { part, source }
+            }
+        })?;
         part.remove()?;
         Ok(report)
     }

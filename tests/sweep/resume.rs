@@ -23,6 +23,16 @@ fn a_stopped_sweep_continues_to_the_same_file() {
 }
 
 #[test]
+fn a_sweep_stopped_while_its_file_is_put_together_continues_to_the_same_file() {
+    let whole = uninterrupted();
+    let folder = stopped_after(POINTS);
+    let mut idle = MadeUp::default();
+    let report = bake(&sweep(), &mut idle, &folder.output(), true, 5, usize::MAX).unwrap();
+    assert_eq!((report.resumed_points, idle.solved), (POINTS, 0));
+    assert!(std::fs::read(folder.output()).unwrap() == whole);
+}
+
+#[test]
 fn a_part_cut_or_altered_anywhere_costs_work_but_never_a_wrong_number() {
     let whole = uninterrupted();
     let folder = stopped_after(6);
