@@ -1,21 +1,28 @@
 //! What accuracy costs: errors that fall, rows that repeat, fronts and offers that follow from the rows, files that appear.
 
+#![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
+
 use haptize::{
     report::accuracy::{self, Extent, Study},
-    scene::Scene,
+    scene::{EFFECTS, Scene},
 };
 use std::path::Path;
 
-#[test]
-fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
+/// The sphere on a grid so many times as coarse, so that bakes take little time.
+fn sphere(coarser: usize) -> Scene {
     let mut scene = Scene::load(Path::new("datasets/sphere.toml")).unwrap();
-    // Twice as coarse, so that the grids around it take little time.
     for axis in &mut scene.grid.axes {
         let cells = axis.count - 1;
-        (axis.count, axis.step) = (cells / 2 + 1, axis.step * cells as f64 / (cells / 2) as f64);
+        (axis.count, axis.step) = (cells / coarser + 1, axis.step * cells as f64 / (cells / coarser) as f64);
     }
+    scene
+}
+
+#[test]
+fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
+    let scene = sphere(2);
     let extent = Extent { configurations: 60, points: 4000 };
-    let found = accuracy::measure(&scene, extent, &mut |_| ()).unwrap();
+    let mut found = accuracy::measure(&scene, extent, &mut |_| ()).unwrap();
     assert!(found.in_contact > 20 && found.left_out == 0);
     // The reference is far better than anything that is compared with it.
     let least = found.of(Study::Spacing).map(|row| row.rms).fold(f64::INFINITY, f64::min);
@@ -25,6 +32,15 @@ fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
     }
     let by_tolerance: Vec<f64> = found.of(Study::Tolerance).map(|row| row.rms).collect();
     assert!(by_tolerance[0] > 10.0 * by_tolerance[by_tolerance.len() - 1], "{by_tolerance:?}");
+    // Graphics: ever better with the frame step, towards its second order, and with iterations, until f32 shows.
+    for series in ["position", "energy"] {
+        let errors = |study: Study| -> Vec<f64> {
+            found.of(study).filter(|row| row.series == series).map(|row| row.rms / row.size).collect()
+        };
+        let (steps, iterations) = (errors(Study::Frame), errors(Study::Iterations));
+        assert!(steps.is_sorted_by(|a, b| a > b) && steps[4] < 0.4 * steps[3], "{series}: {steps:?}");
+        assert!(iterations[0] > 1e-2 && iterations[6] < 1e-4, "{series}: {iterations:?}");
+    }
     // Nothing on the front is beaten, and everything beside it is.
     let front = found.front();
     assert!(front.windows(2).all(|pair| pair[0].points <= pair[1].points && pair[0].rms >= pair[1].rms));
@@ -46,9 +62,45 @@ fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
 
     let folder = tempfile::tempdir().unwrap();
     let files = accuracy::write_all(folder.path(), &found).unwrap();
+    assert!(files.iter().all(|file| !file.ends_with("effects.csv")), "not priced");
+    found.effects = Some(effects_are_priced_side_by_side(&sphere(4)));
+    let files = accuracy::write_all(folder.path(), &found).unwrap();
+    let prices = std::fs::read_to_string(folder.path().join("effects.csv")).unwrap();
+    assert_eq!(prices.lines().count(), 1 + 3 + EFFECTS.len());
+    assert!(
+        prices
+            .lines()
+            .all(|line| line.split('"').step_by(2).map(|part| part.matches(',').count()).sum::<usize>() == 18)
+    );
     assert!(files.iter().all(|file| std::fs::metadata(file).unwrap().len() > 1000), "{files:?}");
     let page = std::fs::read_to_string(folder.path().join("accuracy.html")).unwrap();
-    assert!(page.matches("<svg").count() == 4 && !page.contains("src=\"http"));
+    assert!(page.matches("<svg").count() == 5 && !page.contains("src=\"http"));
     let table = std::fs::read_to_string(folder.path().join("accuracy.csv")).unwrap();
     assert_eq!(table.lines().count(), found.rows.len() + 1);
+}
+
+/// Each effect alone and all together: what is counted is exact, what is timed is relative to the same run.
+fn effects_are_priced_side_by_side(scene: &Scene) -> accuracy::effects::Effects {
+    let priced = accuracy::effects::price(scene, &mut |_| ()).unwrap();
+    assert_eq!(priced.prices.len(), EFFECTS.len() + 3);
+    assert!(priced.in_contact > 0.2 && priced.nodes == 102, "{priced:?}");
+    let [plain, graphics] = ["plain", "graphics"].map(|name| priced.of(name).unwrap());
+    assert_eq!((plain.bake.least, plain.tick.least, graphics.frame.unwrap().least), (1.0, 1.0, 1.0));
+    for effect in EFFECTS {
+        let price = priced.of(effect.key).unwrap();
+        let like = if effect.needs_forces() { graphics } else { plain };
+        assert_eq!(price.dataset_bytes, like.dataset_bytes, "{}", effect.key);
+        assert_eq!((price.frame.is_some(), price.gpu_frame.is_some()), (effect.is_drawn(), effect.is_drawn()));
+        assert!(price.bake.least > 0.0 && price.tick.least <= price.tick.median && !price.setting.is_empty());
+    }
+    let together = priced.of("all together").unwrap();
+    assert!(graphics.dataset_bytes > plain.dataset_bytes && together.dataset_bytes == graphics.dataset_bytes);
+    assert_eq!(together.setting, "without quasi_static");
+    // Nothing on the device without graphics; with stiffening more than without.
+    let bytes = |name: &str| priced.of(name).unwrap().device.unwrap().bytes;
+    assert!(bytes("friction") == 0 && bytes("graphics") > 0 && bytes("smoothing") == bytes("graphics"));
+    assert!(bytes("stiffening") > bytes("gravity") && bytes("gravity") > bytes("graphics"));
+    assert!(bytes("quasi_static") < bytes("graphics") && bytes("all together") == bytes("stiffening"));
+    assert!(priced.notes.is_empty(), "{:?}", priced.notes);
+    priced
 }

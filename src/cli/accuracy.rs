@@ -22,13 +22,20 @@ pub struct Arguments {
     /// Grids with more points than this are left out.
     #[arg(long, default_value_t = 100_000)]
     points: usize,
+    /// Price every effect, too: the scene with it and without it, haptized, felt and drawn.
+    #[arg(long)]
+    effects: bool,
 }
 
 /// Measures the scene and writes what was found.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let scene = Scene::load(&arguments.scene)?;
     let extent = Extent { configurations: arguments.configurations.max(1), points: arguments.points };
-    let found = accuracy::measure(&scene, extent, &mut |what| eprintln!("haptize: {what} ..."))?;
+    let mut progress = |what: &str| eprintln!("haptize: {what} ...");
+    let mut found = accuracy::measure(&scene, extent, &mut progress)?;
+    if arguments.effects {
+        found.effects = Some(accuracy::effects::price(&scene, &mut progress)?);
+    }
     let files = accuracy::write_all(&arguments.output, &found)?;
     let mut json = serde_json::to_value(&found)?;
     json["offers"] = serde_json::to_value(accuracy::offers(&found))?;

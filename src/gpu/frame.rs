@@ -81,7 +81,7 @@ pub struct FrameUpdate {
 }
 
 /// What a frame update takes of the device.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct FrameCost {
     /// Memory of all its buffers [B].
     pub bytes: u64,

@@ -94,13 +94,19 @@ impl<'object> ObjectMotion<'object> {
     /// Kinetic, elastic and gravitational energy [J]: what no step raises without forces.
     #[must_use]
     pub fn energy(&self) -> f64 {
-        let moving = self.object.mass.iter().zip(self.velocity());
+        self.energy_of(&self.displacement, self.velocity())
+    }
+
+    /// The same with the nodes displaced by `displacement` [m] and moving at `velocity` [m/s].
+    #[must_use]
+    pub fn energy_of(&self, displacement: &[DVec3], velocity: &[DVec3]) -> f64 {
+        let moving = self.object.mass.iter().zip(velocity);
         let kinetic = 0.5 * moving.map(|(m, v)| m * v.length_squared()).sum::<f64>();
         let elastic = match &self.stiffening {
-            Some(stiffening) => stiffening.energy(self.object, &self.displacement),
-            None => self.object.stiffness.energy(&self.displacement),
+            Some(stiffening) => stiffening.energy(self.object, displacement),
+            None => self.object.stiffness.energy(displacement),
         };
-        let weight = self.weight.iter().flatten().zip(&self.displacement);
+        let weight = self.weight.iter().flatten().zip(displacement);
         kinetic + elastic - weight.map(|(w, u)| w.dot(*u)).sum::<f64>()
     }
 

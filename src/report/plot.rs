@@ -61,11 +61,11 @@ impl Scale {
         Self { range, title: title.into(), steps: Steps::Whole }
     }
 
-    /// An axis of equal ratios; `range` is cut to positive numbers.
+    /// An axis of equal ratios; `range` is cut to positive numbers, and is a tenth of a decade at least.
     #[must_use]
     pub fn logarithmic([low, high]: [f64; 2], title: impl Into<String>) -> Self {
         let low = if low > 0.0 { low } else { f64::MIN_POSITIVE };
-        Self { range: [low, high.max(10.0 * low)], title: title.into(), steps: Steps::Logarithmic }
+        Self { range: [low, high.max(10.0_f64.powf(0.1) * low)], title: title.into(), steps: Steps::Logarithmic }
     }
 
     /// Where `value` lies between the ends, 0 to 1; beyond that outside.

@@ -69,23 +69,47 @@ pub(super) fn ticks(range: [f64; 2], intervals: usize) -> Ticks {
     Ticks { marks, factor: if exponent == 0 { String::new() } else { format!("×10{}", superscript(exponent)) } }
 }
 
-/// The powers of ten inside `range`, both ends positive, every so many that there are at most `intervals` and one.
-pub(super) fn decades([low, high]: [f64; 2], intervals: usize) -> Ticks {
-    // The slack keeps ends that are powers of ten themselves.
-    let [first, last] = [(low.log10() - TICK_STEP).ceil() as i32, (high.log10() + TICK_STEP).floor() as i32];
-    let stride = (last - first).max(0) as usize / intervals.max(1) + 1;
-    let marks = (first..=last)
-        .step_by(stride)
-        .map(|exponent| {
-            let label = match exponent {
-                -3..0 => format!("{:.*}", -exponent as usize, 10_f64.powi(exponent)),
-                0..4 => format!("{:.0}", 10_f64.powi(exponent)),
-                _ => format!("10{}", superscript(exponent)),
-            };
-            (10_f64.powi(exponent), label)
-        })
-        .collect();
-    Ticks { marks, factor: String::new() }
+/// Powers of ten below which numbers between them are marked, too.
+const FEW_DECADES: usize = 4;
+
+/// Marks of a logarithmic axis, both ends positive, at most `intervals` of them and one: powers of ten, every so many; of few
+/// decades also the numbers between, 2 and 5 or 3, or round ones where the ends are close to each other.
+pub(super) fn decades(range: [f64; 2], intervals: usize) -> Ticks {
+    let powers = multiples(range, &[1]);
+    let few = || [&[1, 2, 5][..], &[1, 3]].map(|digits| multiples(range, digits)).into_iter();
+    let marks = match powers.len() {
+        0..FEW_DECADES => few().find(|marks| (2..=intervals + 1).contains(&marks.len())),
+        _ => None,
+    };
+    match marks {
+        None if powers.len() < 2 => ticks(range, intervals),
+        None => {
+            let stride = (powers.len() - 1) / intervals.max(1) + 1;
+            Ticks { marks: powers.into_iter().step_by(stride).collect(), factor: String::new() }
+        }
+        Some(marks) => Ticks { marks, factor: String::new() },
+    }
+}
+
+/// `digits` times all powers of ten, as far as they lie inside the range.
+fn multiples([low, high]: [f64; 2], digits: &[u8]) -> Vec<(f64, String)> {
+    // The slack keeps ends that are marks themselves.
+    let inside = |value: &f64| *value >= low * (1.0 - TICK_STEP) && *value <= high * (1.0 + TICK_STEP);
+    let [first, last] = [low, high].map(|end| end.log10().floor() as i32);
+    let mark = |exponent: i32, digit: u8| {
+        let value = f64::from(digit) * 10_f64.powi(exponent);
+        let label = match exponent {
+            -3..0 => format!("{value:.*}", -exponent as usize),
+            0..4 => format!("{value:.0}"),
+            _ if digit == 1 => format!("10{}", superscript(exponent)),
+            _ => format!("{digit}·10{}", superscript(exponent)),
+        };
+        (value, label)
+    };
+    (first..=last + 1)
+        .flat_map(|exponent| digits.iter().map(move |digit| mark(exponent, *digit)))
+        .filter(|(value, _)| inside(value))
+        .collect()
 }
 
 /// `value` with `decimals` digits after the point and a typographic minus.
@@ -156,6 +180,22 @@ mod tests {
         let labels: Vec<String> = decades([0.01, 20_000.0], 9).marks.into_iter().map(|(_, label)| label).collect();
         assert_eq!(labels, ["0.01", "0.1", "1", "10", "100", "1000", "10⁴"]);
         assert!(decades([1e-300, 1e300], 9).marks.len() <= 10);
+    }
+
+    #[test]
+    fn a_few_decades_have_numbers_between_the_powers_of_ten() {
+        let labels = |range| decades(range, 7).marks.into_iter().map(|(_, label)| label).collect::<Vec<_>>();
+        assert_eq!(labels([0.08, 1.1]), ["0.1", "0.2", "0.5", "1"]);
+        assert_eq!(labels([90.0, 6e4]), ["100", "300", "1000", "3000", "10⁴", "3·10⁴"]);
+        // No multiple of 1, 2 or 5 twice: round numbers.
+        assert_eq!(labels([2.1, 4.3]), ["2.5", "3.0", "3.5", "4.0"]);
+        for low in [1e-7, 0.3, 2.0, 7e5] {
+            for ratio in [1.2, 2.0, 9.0, 40.0, 900.0, 1e5] {
+                let marks = decades([low, ratio * low], 7).marks;
+                assert!((2..=8).contains(&marks.len()), "{low} {ratio}: {marks:?}");
+                assert!(marks.iter().all(|(at, _)| (low * 0.999..=low * ratio * 1.001).contains(at)));
+            }
+        }
     }
 
     #[test]

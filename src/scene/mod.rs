@@ -5,11 +5,13 @@
 
 mod check;
 mod convert;
+mod effects;
 mod error;
 mod file;
 mod scan;
 mod spec;
 
+pub use effects::{EFFECTS, Effect};
 pub use error::{Diagnostic, SceneError};
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
 pub use spec::{

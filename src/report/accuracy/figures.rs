@@ -25,16 +25,23 @@ struct Series {
     colour: usize,
 }
 
-/// Whole decades around positive numbers; one decade where there are none.
-fn decades(values: impl Iterator<Item = f64>) -> [f64; 2] {
+/// Ends of a logarithmic axis around positive numbers, with room for a mark at each; one decade where there are none.
+fn around(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let (low, high) = values
         .filter(|value| *value > 0.0 && value.is_finite())
-        .fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
-    if high == 0.0 {
+        .map(f64::log10)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| (low.min(log), high.max(log)));
+    if low > high {
         return [0.1, 1.0];
     }
-    let (low, high) = (low.log10().floor(), high.log10().ceil());
-    [10.0_f64.powf(low), 10.0_f64.powf(if high > low { high } else { low + 1.0 })]
+    let spare = (0.06 * (high - low)).max(0.1);
+    [low - spare, high + spare].map(|log| 10.0_f64.powf(log))
+}
+
+/// Widths of a curve and its marks: the first are the widest, so that a curve that coincides with a later one shows around it.
+fn nested(number: usize, count: usize) -> (f64, f64) {
+    let around = count.saturating_sub(number + 1).min(2) as f64;
+    (1.9 + 2.2 * around, 3.6 + 1.7 * around)
 }
 
 fn panel(canvas: &mut Canvas, side: usize, across: &str, up: &str, curves: &[Series], front: &[(f64, f64)]) {
@@ -44,20 +51,22 @@ fn panel(canvas: &mut Canvas, side: usize, across: &str, up: &str, curves: &[Ser
     let all = || curves.iter().flat_map(|curve| &curve.points);
     let panel = Panel {
         area,
-        across: Scale::logarithmic(decades(all().map(|p| p.0)), across),
-        up: Scale::logarithmic(decades(all().map(|p| p.1)), up),
+        across: Scale::logarithmic(around(all().map(|p| p.0)), across),
+        up: Scale::logarithmic(around(all().map(|p| p.1)), up),
     };
     panel.grid(canvas, true);
     for &point in front {
-        canvas.disc(panel.place(point), 8.0, colour::series(5).with_opacity(0.45));
+        canvas.disc(panel.place(point), 10.0, colour::series(5).with_opacity(0.45));
     }
-    for curve in curves {
+    let solid = curves.iter().filter(|curve| !curve.dashed).count();
+    for (number, curve) in curves.iter().enumerate() {
         let ink = colour::series(curve.colour);
+        let (width, radius) = nested(number % solid.max(1), solid);
         let shown: Vec<(f64, f64)> =
             curve.points.iter().map(|&(x, y)| if x > 0.0 && y > 0.0 { (x, y) } else { (f64::NAN, f64::NAN) }).collect();
-        panel.curve(canvas, &shown, ink, if curve.dashed { 1.4 } else { 1.9 }, curve.dashed);
+        panel.curve(canvas, &shown, ink, if curve.dashed { 1.4 } else { width }, curve.dashed);
         if !curve.dashed {
-            shown.iter().filter(|p| p.0.is_finite()).for_each(|&point| canvas.disc(panel.place(point), 3.6, ink));
+            shown.iter().filter(|p| p.0.is_finite()).for_each(|&point| canvas.disc(panel.place(point), radius, ink));
         }
     }
     if all().next().is_none() {
@@ -124,13 +133,14 @@ pub(super) fn spacing(accuracy: &Accuracy) -> Canvas {
     canvas
 }
 
-/// Work around loops against their size.
+/// Work around loops against their size, and what a look-up costs.
 #[must_use]
 pub(super) fn loops(accuracy: &Accuracy) -> Canvas {
     let mut canvas = sheet(
         "Work of the contact torque around closed loops, which a passive object never gives",
         &format!(
-            "squares in the plane of two joints, rms over loops; the object stores {:.3} J at most; zero is drawn at the rounding of that",
+            "squares in the plane of two joints, rms over loops; the object stores {:.3} J at most, and zero is drawn at the \
+             rounding of that",
             accuracy.greatest_energy
         ),
     );
@@ -145,27 +155,13 @@ pub(super) fn loops(accuracy: &Accuracy) -> Canvas {
         curves[at].points.push((entry.side, entry.work.max(floor)));
     }
     panel(&mut canvas, 0, &format!("Side of the loop [{}]", accuracy.unit), "Work around the loop [J]", &curves, &[]);
-    let relative: Vec<Series> = curves
-        .iter()
-        .map(|curve| Series {
-            name: curve.name.clone(),
-            points: curve
-                .points
-                .iter()
-                .map(|&(x, y)| (x, y / accuracy.greatest_energy.max(f64::MIN_POSITIVE)))
-                .collect(),
-            ..*curve
-        })
-        .collect();
-    panel(
-        &mut canvas,
-        1,
-        &format!("Side of the loop [{}]", accuracy.unit),
-        "Work over the greatest energy [1]",
-        &relative,
-        &[],
-    );
-    legend(&mut canvas, &curves, Vec::new());
+    let mut looked = Vec::new();
+    for (number, row) in accuracy.of(Study::Lookup).enumerate() {
+        let points = vec![(row.cost.least, row.rms)];
+        looked.push(Series { name: row.setting.clone(), points, dashed: false, colour: number });
+    }
+    panel(&mut canvas, 1, "Time of a look-up, relative to linear's [1]", "Rms error of the torque [N m]", &looked, &[]);
+    legend(&mut canvas, &looked, Vec::new());
     canvas
 }
 
@@ -194,24 +190,21 @@ pub(super) fn solver(accuracy: &Accuracy) -> Canvas {
     canvas
 }
 
-/// Look-up and graphics.
+/// Frame step and iterations of the graphics.
 #[must_use]
-pub(super) fn loop_costs(accuracy: &Accuracy) -> Canvas {
+pub(super) fn graphics(accuracy: &Accuracy) -> Canvas {
     let mut canvas = sheet(
-        "What the loops pay",
-        "left: time of a look-up, relative to linear's; right: the object's nodes against the frame step",
+        "Error of what is drawn",
+        "a push and its release, relative to the rms of positions and energy; left: frame step; right: iterations on the GPU",
     );
-    let mut looked = Vec::new();
-    for (number, row) in accuracy.of(Study::Lookup).enumerate() {
-        let points = vec![(row.cost.least, row.rms)];
-        looked.push(Series { name: row.setting.clone(), points, dashed: false, colour: number });
-    }
-    panel(&mut canvas, 0, "Time of a look-up [1]", "Rms error [N m]", &looked, &[]);
-    let frames = worst_too(
-        series(accuracy, Study::Frame, |row| (row.value, row.rms)),
-        series(accuracy, Study::Frame, |row| (row.value, row.worst)),
-    );
-    panel(&mut canvas, 1, "Frame step [s]", "Error of the nodes, rms and worst [m]", &frames, &[]);
-    legend(&mut canvas, &looked, Vec::new());
+    let by = |study: Study| {
+        let worst = series(accuracy, study, |row| (row.value, row.worst / row.size));
+        worst_too(series(accuracy, study, |row| (row.value, row.rms / row.size)), worst)
+    };
+    let steps = by(Study::Frame);
+    panel(&mut canvas, 0, "Frame step [s]", "Relative error [1]", &steps, &[]);
+    panel(&mut canvas, 1, "Iterations a frame [1]", "Relative error [1]", &by(Study::Iterations), &[]);
+    let dashes = Entry { name: "worst".into(), colour: colour::SOFT_INK, mark: Mark::Dashes };
+    legend(&mut canvas, &steps, vec![dashes]);
     canvas
 }

@@ -44,7 +44,8 @@ fn spacing_of(scene: &Scene) -> f64 {
     (axes.iter().map(|axis| axis.step.ln()).sum::<f64>() / axes.len().max(1) as f64).exp()
 }
 
-fn baked(scene: &Scene) -> Result<Dataset, AccuracyError> {
+/// The dataset of `scene`.
+pub(super) fn baked(scene: &Scene) -> Result<Dataset, AccuracyError> {
     let stop = AtomicBool::new(false);
     let bake = Bake { scene, backend: BACKEND, date: "", stop: &stop, progress: &mut |_| () };
     Ok(bake.in_memory()?.0)
@@ -90,8 +91,10 @@ pub(super) fn spacing(
                 points: count,
                 bytes: dataset.summary().bytes,
                 cost: cost.over(own_cost.least),
+                unit: "N m",
                 rms,
                 worst,
+                size: reference.torque,
             });
         }
     }
@@ -126,8 +129,10 @@ pub(super) fn look_up(scene: &Scene, own: &Dataset, study: &mut Accuracy) -> Res
             points: own.grid.points(),
             bytes: 0,
             cost: Cost::over(cost, baseline),
+            unit: "N m",
             rms,
             worst,
+            size: study.torque,
         });
     }
     Ok(())

@@ -10,6 +10,7 @@
 
 mod choice;
 mod dynamics;
+pub mod effects;
 mod figures;
 mod grids;
 mod page;
@@ -21,11 +22,13 @@ pub use page::{describe, write_all};
 
 use crate::{
     contact::Model,
+    device::MotionError,
+    gpu::FrameError,
     haptize::{BackendChoice, BackendError, BakeError},
     object::{Object, ObjectError},
     proxy::Chain,
-    render::{field::FieldError, graphics::GraphicsError},
-    scene::{JointKind, Scene},
+    render::{field::FieldError, graphics::GraphicsError, session::SessionError, setup::SetupError},
+    scene::{JointKind, Scene, SceneError},
 };
 use reference::Reference;
 use serde::Serialize;
@@ -50,8 +53,10 @@ pub enum Study {
     Nodes,
     /// Interpolation; cost is a look-up.
     Lookup,
-    /// Frame step of the graphics; error is in metres, cost is a simulated second.
+    /// Frame step of the graphics; cost is the same simulated time.
     Frame,
+    /// Iterations of the graphics solver on the GPU; cost is a frame.
+    Iterations,
 }
 
 /// Ratio of times, with the spread of the runs.
@@ -82,10 +87,14 @@ pub struct Row {
     pub bytes: usize,
     /// Time, relative to the least of the study's baseline.
     pub cost: Cost,
-    /// Root mean square of the error [N m; m for frames].
+    /// Unit of the errors: N m, or m and J for graphics.
+    pub unit: &'static str,
+    /// Root mean square of the error, in that unit.
     pub rms: f64,
-    /// Greatest error [N m; m for frames].
+    /// Greatest error.
     pub worst: f64,
+    /// Root mean square of the reference itself: what errors are relative to.
+    pub size: f64,
 }
 
 /// Work around loops of one size.
@@ -126,6 +135,8 @@ pub struct Accuracy {
     pub loops: Vec<Loops>,
     /// What could not be measured here, and why.
     pub notes: Vec<String>,
+    /// What effects cost, where they were priced ([`effects::price`]).
+    pub effects: Option<effects::Effects>,
 }
 
 /// How much is measured.
@@ -155,6 +166,21 @@ pub enum AccuracyError {
     /// The object cannot be moved.
     #[error(transparent)]
     Graphics(#[from] GraphicsError),
+    /// A variant of the scene is none.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A dataset cannot be rendered.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// The scene's motion cannot be followed.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    /// The loop cannot run.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The object cannot be moved on the GPU.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
     /// Nothing to compare with.
     #[error(
         "the proxy touches nothing, or contact converges nowhere, at {0} random configurations: give the scene's \
@@ -186,6 +212,7 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
         rows: Vec::new(),
         loops: Vec::new(),
         notes: Vec::new(),
+        effects: None,
     };
     progress("grid spacing and interpolation");
     let own = grids::spacing(scene, &reference, extent.points, &mut study)?;
@@ -194,12 +221,11 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
     grids::look_up(scene, &own, &mut study)?;
     grids::loops(scene, &own, &reference, &mut study)?;
     progress("contact solver");
-    solver::tolerance(scene, &model, &reference, &mut study)?;
-    solver::algorithm(scene, &model, &reference, &mut study)?;
+    solver::settings(scene, &model, &reference, &mut study)?;
     solver::arithmetic(&model, &reference, &mut study)?;
     solver::nodes(scene, &chain, &reference, &mut study)?;
     progress("graphics");
-    dynamics::frames(scene, &object, &own, &mut study)?;
+    dynamics::graphics(scene, &object, &own, &mut study)?;
     Ok(study)
 }
 
@@ -226,11 +252,16 @@ fn timed<T, E>(mut work: impl FnMut() -> Result<T, E>) -> Result<(Cost, T), E> {
         run(slot)?;
     }
     let result = run(&mut seconds[0])?;
-    seconds.sort_unstable_by(f64::total_cmp);
-    Ok((Cost { median: seconds[REPEATS / 2], least: seconds[0], greatest: seconds[REPEATS - 1] }, result))
+    Ok((Cost::of(seconds), result))
 }
 
 impl Cost {
+    /// Median and spread of `runs`.
+    fn of(mut runs: [f64; REPEATS]) -> Self {
+        runs.sort_unstable_by(f64::total_cmp);
+        Self { median: runs[REPEATS / 2], least: runs[0], greatest: runs[REPEATS - 1] }
+    }
+
     /// Relative to `baseline` [s].
     fn over(self, baseline: f64) -> Self {
         let baseline = baseline.max(f64::MIN_POSITIVE);

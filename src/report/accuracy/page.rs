@@ -3,6 +3,7 @@
 use super::{
     Accuracy, Study,
     choice::{TARGETS, offers},
+    effects::{self, Effects},
     figures,
 };
 use crate::{
@@ -14,7 +15,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Writes `accuracy-*.{svg,png}`, `accuracy.csv` and `accuracy.html` into `folder`, and returns their paths.
+/// Writes `accuracy-*.{svg,png}`, `accuracy.csv` and `accuracy.html` into `folder`, and returns their paths; where effects
+/// were priced, also `effects.{svg,png,csv}`.
 ///
 /// # Errors
 /// [`ReportError::Write`] when a file cannot be written.
@@ -32,8 +34,9 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
         (
             "accuracy-loops",
             figures::loops(accuracy),
-            "Linear torque, component by component, is no gradient: it gives or takes energy around a loop. The \
-             potential's work is zero to rounding. Where linear and gap-field coincide, the latter covers the former.",
+            "Left: linear torque, component by component, is no gradient: it gives or takes energy around a loop. The \
+             potential's work is zero to rounding. Where curves coincide, the first shows around the second. Right: what a \
+             look-up of each costs at the scene's own spacing.",
         ),
         (
             "accuracy-solver",
@@ -44,10 +47,12 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
              finest object is no better than the others.",
         ),
         (
-            "accuracy-loop",
-            figures::loop_costs(accuracy),
-            "Interpolations by the time of one look-up; the graphics by its frame step, second order where the step \
-             follows the object's vibration.",
+            "accuracy-graphics",
+            figures::graphics(accuracy),
+            "Errors of the nodes' positions and of the object's energy, relative to what they are themselves. Left: by the \
+             frame step, against a step of 1/3840 s; where the object's vibration is followed they fall with its square. \
+             Right: by the iterations of the GPU's solver, against an exact one at the same step; the floor is f32. Few \
+             iterations move the object sluggishly, and never make it gain energy.",
         ),
     ];
     let mut files = Vec::new();
@@ -55,21 +60,25 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
         files.extend(write_both(folder, name, canvas)?);
     }
     files.push(write(folder.join("accuracy.csv"), csv(accuracy).as_bytes())?);
-    let html = page(accuracy, &sheets).unwrap_or_default();
+    let priced = accuracy.effects.as_ref().map(|priced| (priced, effects::figure(priced)));
+    if let Some((effects, figure)) = &priced {
+        files.extend(write_both(folder, "effects", figure)?);
+        files.push(write(folder.join("effects.csv"), effects::csv(effects).as_bytes())?);
+    }
+    let html = page(accuracy, &sheets, priced.as_ref()).unwrap_or_default();
     files.push(write(folder.join("accuracy.html"), html.as_bytes())?);
     Ok(files)
 }
 
 fn csv(accuracy: &Accuracy) -> String {
     let mut text =
-        "study,series,setting,value,points,bytes,cost_median,cost_least,cost_greatest,rms,worst,rms_relative\n"
+        "study,series,setting,value,points,bytes,cost_median,cost_least,cost_greatest,unit,rms,worst,rms_relative\n"
             .to_owned();
     for row in &accuracy.rows {
-        let relative = if row.study == Study::Frame { f64::NAN } else { row.rms / accuracy.torque };
         // A String takes everything.
         let _ = writeln!(
             text,
-            "{},{},\"{}\",{},{},{},{},{},{},{},{},{}",
+            "{},{},\"{}\",{},{},{},{},{},{},{},{},{},{}",
             study_name(row.study),
             row.series,
             row.setting.replace('"', "'"),
@@ -79,9 +88,10 @@ fn csv(accuracy: &Accuracy) -> String {
             row.cost.median,
             row.cost.least,
             row.cost.greatest,
+            row.unit,
             row.rms,
             row.worst,
-            relative
+            row.rms / row.size
         );
     }
     text
@@ -96,6 +106,7 @@ fn study_name(study: Study) -> &'static str {
         Study::Nodes => "nodes",
         Study::Lookup => "look-up",
         Study::Frame => "frame",
+        Study::Iterations => "iterations",
     }
 }
 
@@ -143,7 +154,8 @@ pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
             100.0 * least
         )?;
     }
-    accuracy.notes.iter().try_for_each(|note| writeln!(text, "  note         {note}"))
+    accuracy.notes.iter().try_for_each(|note| writeln!(text, "  note         {note}"))?;
+    accuracy.effects.as_ref().map_or(Ok(()), |effects| effects::describe(text, effects))
 }
 
 /// The smallest error on offer, where smaller ones were asked for in vain; the greatest that was asked for, where there is
@@ -154,11 +166,16 @@ fn unreached(accuracy: &Accuracy) -> Option<f64> {
     (offers.len() < TARGETS.len()).then_some(least)
 }
 
-fn escaped(text: &str) -> String {
+/// `text` between tags.
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-fn page(accuracy: &Accuracy, sheets: &[(&str, Canvas, &str)]) -> Result<String, fmt::Error> {
+fn page(
+    accuracy: &Accuracy,
+    sheets: &[(&str, Canvas, &str)],
+    priced: Option<&(&Effects, Canvas)>,
+) -> Result<String, fmt::Error> {
     let mut html = String::new();
     let name = escaped(&accuracy.scene);
     write!(
@@ -206,14 +223,17 @@ fn page(accuracy: &Accuracy, sheets: &[(&str, Canvas, &str)]) -> Result<String, 
     for (_, canvas, caption) in sheets {
         writeln!(html, "<figure>{}<figcaption>{caption}</figcaption></figure>", canvas.svg())?;
     }
+    if let Some((effects, figure)) = priced {
+        effects::html(&mut html, effects, figure)?;
+    }
     html.push_str(
         "<h2>All rows</h2>\n<table><tr><th>study<th>series<th>setting<th>points or iterations<th>bytes<th>time",
     );
-    html.push_str("<th>median<th>most<th>rms<th>worst<th>rms/torque</tr>\n");
+    html.push_str("<th>median<th>most<th>rms<th>worst<th><th>relative</tr>\n");
     for row in &accuracy.rows {
         writeln!(
             html,
-            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{:.3}<td>{:.3}<td>{:.3}<td>{:.3e}<td>{:.3e}<td>{}</tr>",
+            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{:.3}<td>{:.3}<td>{:.3}<td>{:.3e}<td>{:.3e}<td>{}<td>{:.2} %</tr>",
             study_name(row.study),
             escaped(&row.series),
             escaped(&row.setting),
@@ -224,11 +244,8 @@ fn page(accuracy: &Accuracy, sheets: &[(&str, Canvas, &str)]) -> Result<String, 
             row.cost.greatest,
             row.rms,
             row.worst,
-            if row.study == Study::Frame {
-                "m".to_owned()
-            } else {
-                format!("{:.2} %", 100.0 * row.rms / accuracy.torque)
-            }
+            row.unit,
+            100.0 * row.rms / row.size
         )?;
     }
     html.push_str("</table>\n");

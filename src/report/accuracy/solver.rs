@@ -45,52 +45,37 @@ fn row(
         points: iterations.round() as usize,
         bytes: 0,
         cost,
+        unit: "N m",
         rms,
         worst,
+        size: reference.torque,
     }
 }
 
-fn solved(
-    model: &Model<'_>,
-    contact: ContactSpec,
-    reference: &Reference,
-) -> Result<(Cost, Vec<Equilibrium>), AccuracyError> {
-    timed(|| equilibria(model, contact, &reference.places))
-}
-
-/// Error and time against the tolerance.
-pub(super) fn tolerance(
+/// Error and time against tolerance and algorithm, relative to the time of the scene as it is.
+pub(super) fn settings(
     scene: &Scene,
     model: &Model<'_>,
     reference: &Reference,
     study: &mut Accuracy,
 ) -> Result<(), AccuracyError> {
-    let (baseline, _) = solved(model, scene.contact, reference)?;
-    for tolerance in TOLERANCES {
-        let (cost, found) = solved(model, ContactSpec { tolerance, ..scene.contact }, reference)?;
-        let cost = cost.over(baseline.least);
-        let setting = format!("{tolerance:.0e}");
-        study.rows.push(row(Study::Tolerance, "energy", setting, tolerance, cost, reference, &found));
-    }
-    Ok(())
-}
-
-/// Error and time against the algorithm.
-pub(super) fn algorithm(
-    scene: &Scene,
-    model: &Model<'_>,
-    reference: &Reference,
-    study: &mut Accuracy,
-) -> Result<(), AccuracyError> {
-    let (baseline, _) = solved(model, scene.contact, reference)?;
-    for (algorithm, name) in
-        [(Algorithm::Linearised, "linearised"), (Algorithm::Paper, "paper"), (Algorithm::Energy, "energy")]
-    {
-        let (cost, found) = solved(model, ContactSpec { algorithm, ..scene.contact }, reference)?;
+    let tolerances = TOLERANCES.map(|tolerance| {
+        let contact = ContactSpec { tolerance, ..scene.contact };
+        (Study::Tolerance, "energy", format!("{tolerance:.0e}"), tolerance, contact)
+    });
+    let algorithms =
+        [(Algorithm::Linearised, "linearised"), (Algorithm::Paper, "paper"), (Algorithm::Energy, "energy")];
+    let algorithms = algorithms.map(|(algorithm, name)| {
+        (Study::Algorithm, name, name.to_owned(), 0.0, ContactSpec { algorithm, ..scene.contact })
+    });
+    let (baseline, _) = timed(|| equilibria(model, scene.contact, &reference.places))?;
+    for (varied, series, mut setting, value, contact) in tolerances.into_iter().chain(algorithms) {
+        let (cost, found) = timed(|| equilibria(model, contact, &reference.places))?;
         let lost = found.iter().filter(|e| e.status == Status::Unconverged).count();
-        let setting = format!("{name}, {lost} of {} not converged", reference.in_contact);
-        let cost = cost.over(baseline.least);
-        study.rows.push(row(Study::Algorithm, name, setting, 0.0, cost, reference, &found));
+        if lost > 0 {
+            setting += &format!(", {lost} of {} not converged", reference.in_contact);
+        }
+        study.rows.push(row(varied, series, setting, value, cost.over(baseline.least), reference, &found));
     }
     Ok(())
 }

@@ -6,7 +6,7 @@
 use super::{Bound, Case, Effort, Failure, Outcome, Setting};
 use crate::{
     gpu::{FrameMethod, FrameUpdate},
-    object::{Object, Stiffening},
+    object::Object,
     render::object_motion::ObjectMotion,
     scene::{
         GraphicsEffects, GroundNodes, GroundSpec, Material, ObjectSpec, Shape, SpringKind, SpringSpec, StiffeningSpec,
@@ -124,7 +124,6 @@ fn cut_short(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let Some(context) = &setting.gpu else { return Ok(Vec::new()) };
     let object = sphere(SpringKind::Axial, 300.0, setting.effort)?;
     let spec = StiffeningSpec { factor: 10.0, strain: 0.02 };
-    let law = Stiffening::new(&object, spec.factor, spec.strain);
     let stiff = GraphicsEffects { stiffening: Some(spec), ..GraphicsEffects::default() };
     let (count, pushed) = frames(setting.effort);
     let rest = vec![DVec3::ZERO; object.rest.len()];
@@ -135,14 +134,12 @@ fn cut_short(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
             for period in [1e-3, 1.0] {
                 let method = FrameMethod::Iterations(iterations);
                 let mut update = FrameUpdate::new(Arc::clone(context), &object, period, method, &effects)?;
+                let twin = ObjectMotion::new(&object, period, &effects)?;
                 let (mut before, mut gain, mut most) = (f64::NAN, f64::NEG_INFINITY, f64::MIN_POSITIVE);
                 for frame in 0..count {
                     update.step(&if frame < pushed { push(&object, frame, 0.3) } else { rest.clone() })?;
                     let (u, v) = update.read()?;
-                    let moving = object.mass.iter().zip(&v);
-                    let kinetic: f64 = moving.map(|(m, v)| 0.5 * m * v.length_squared()).sum();
-                    let elastic = if effects == stiff { law.energy(&object, &u) } else { object.stiffness.energy(&u) };
-                    let after = kinetic + elastic;
+                    let after = twin.energy_of(&u, &v);
                     most = f64::max(most, after);
                     // The device keeps no v_hat: only without forces is the work known.
                     if frame > pushed {

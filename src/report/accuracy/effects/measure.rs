@@ -1,0 +1,255 @@
+//! The rounds in which the variants of a scene are haptized, felt and drawn.
+
+use super::{
+    super::{AccuracyError, Cost, REPEATS, dynamics::deepest, grids::baked},
+    Baseline, Effects, Price,
+};
+use crate::{
+    JointVector,
+    dataset::Dataset,
+    device::{Motion, Recorded},
+    gpu::{AdapterChoice, Context, FrameCost, FrameError, FrameMethod, FrameUpdate},
+    render::{
+        graphics::{ContactForces, Graphics, Smoothing},
+        session,
+        setup::Setup,
+    },
+    scene::{EFFECTS, Effect, Scene, Waypoint},
+};
+use glam::DVec3;
+use std::{sync::Arc, time::Instant};
+
+/// A variant of the scene.
+struct Variant {
+    name: String,
+    setting: String,
+    scene: Scene,
+}
+
+/// Seconds of each variant in each round; none where the variant does not do the work.
+type Times = Vec<Option<[f64; REPEATS]>>;
+
+/// Prices the effects of `scene`. `progress` is told what comes next.
+///
+/// # Errors
+/// When a variant cannot be haptized, felt or drawn. A machine without a GPU is none: a note says so.
+pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, AccuracyError> {
+    let mut notes = Vec::new();
+    let variants = variants(scene, &mut notes)?;
+    progress("effects: bake");
+    let mut datasets: Vec<Option<Dataset>> = variants.iter().map(|_| None).collect();
+    let bakes = rounds(variants.len(), 1, |k| {
+        let begun = Instant::now();
+        let dataset = baked(&variants[k].scene)?;
+        let seconds = begun.elapsed().as_secs_f64();
+        datasets[k] = Some(dataset);
+        Ok(Some(seconds))
+    })?;
+    let datasets: Vec<Dataset> = datasets.into_iter().flatten().collect();
+    let setups: Vec<Setup> = datasets.iter().map(Setup::new).collect::<Result<_, _>>()?;
+    progress("effects: ticks");
+    let motion = motion(scene, &datasets[0])?;
+    let feel = |k: usize| {
+        let (setup, data): (&Setup, &Dataset) = (&setups[k], &datasets[k]);
+        let plan = setup.plan(data, motion.duration(), 0);
+        let begun = Instant::now();
+        let trace = session::run(&setup.haptics, &mut Recorded::new(motion.clone()), None, &plan)?;
+        Ok::<_, AccuracyError>((begun.elapsed().as_secs_f64() / plan.ticks.max(1) as f64, trace))
+    };
+    let felt = feel(0)?.1;
+    let mut faults = Vec::new();
+    let ticks = rounds(variants.len(), TRIES, |k| {
+        let (seconds, trace) = feel(k)?;
+        if trace.ticks.iter().any(|tick| tick.fault.is_some()) && !faults.contains(&variants[k].name) {
+            faults.push(variants[k].name.clone());
+        }
+        Ok(Some(seconds))
+    })?;
+    if !faults.is_empty() {
+        notes.push(format!("the loop let go along the motion, so that its tick is too cheap: {}", faults.join(", ")));
+    }
+    progress("effects: frames");
+    let rate = setups.iter().find_map(|setup| setup.scene.graphics).map_or(0.0, |graphics| graphics.rate);
+    let frames = (motion.duration() * rate) as usize;
+    // The same forces for all: those of the plain scene.
+    let places: Vec<(JointVector, f64)> = (0..frames)
+        .map(|frame| felt.ticks[frame * felt.ticks.len() / frames].proxy)
+        .map(|q| (q, setups[PLAIN].haptics.field().sample(&q)))
+        .map(|(q, sample)| (q, if sample.contact { sample.share } else { 0.0 }))
+        .collect();
+    let mut drawn: Vec<Option<Graphics<'_>>> =
+        setups.iter().zip(&datasets).map(|(setup, data)| setup.graphics(data)).collect::<Result<_, _>>()?;
+    let frames = rounds(variants.len(), TRIES, |k| {
+        let Some(graphics) = &mut drawn[k] else { return Ok(None) };
+        let begun = Instant::now();
+        places.iter().for_each(|(q, share)| graphics.frame(q, *share));
+        Ok(Some(begun.elapsed().as_secs_f64() / places.len() as f64))
+    })?;
+    let mut device = match on_the_device(&setups, &datasets) {
+        Ok(device) => device,
+        Err(error) => {
+            notes.push(format!("frames on a GPU are not priced: {error}"));
+            Device { adapter: None, bodies: variants.iter().map(|_| None).collect() }
+        }
+    };
+    let gpu_frames = rounds(variants.len(), 1, |k| {
+        let Some(body) = &mut device.bodies[k] else { return Ok(None) };
+        let begun = Instant::now();
+        body.play(&places)?;
+        Ok(Some(begun.elapsed().as_secs_f64() / places.len() as f64))
+    })?;
+    let takes = |k: usize| match (&device.bodies[k], &device.adapter) {
+        (Some(body), _) => Some(body.update.takes()),
+        (None, adapter) => adapter.as_ref().map(|_| FrameCost::default()),
+    };
+    let least = |times: &Times, k: usize| times[k].map(|times| Cost::of(times).least);
+    let contacts = felt.ticks.iter().filter(|tick| tick.contact).count();
+    Ok(Effects {
+        baseline: Baseline {
+            bake: least(&bakes, PLAIN).unwrap_or(0.0),
+            tick: least(&ticks, PLAIN).unwrap_or(0.0),
+            frame: least(&frames, GRAPHICS).unwrap_or(0.0),
+            gpu_frame: least(&gpu_frames, GRAPHICS),
+        },
+        prices: (0..variants.len())
+            .map(|k| Price {
+                name: variants[k].name.clone(),
+                setting: variants[k].setting.clone(),
+                bake: cost(&bakes, k, PLAIN).unwrap_or_default(),
+                tick: cost(&ticks, k, PLAIN).unwrap_or_default(),
+                frame: cost(&frames, k, GRAPHICS),
+                gpu_frame: cost(&gpu_frames, k, GRAPHICS),
+                device: takes(k),
+                dataset_bytes: datasets[k].summary().bytes,
+            })
+            .collect(),
+        in_contact: contacts as f64 / felt.ticks.len().max(1) as f64,
+        nodes: setups.iter().find_map(|setup| setup.object.as_ref()).map_or(0, |object| object.rest.len()),
+        adapter: device.adapter,
+        notes,
+    })
+}
+
+/// Numbers of the two baselines among the variants.
+const PLAIN: usize = 0;
+const GRAPHICS: usize = 1;
+
+/// Plain, graphics, each effect that can act, and all that can act together.
+fn variants(scene: &Scene, notes: &mut Vec<String>) -> Result<Vec<Variant>, AccuracyError> {
+    let variant = |name: &str, setting: String, scene| Variant { name: name.to_owned(), setting, scene };
+    let mut variants = vec![
+        variant("plain", String::new(), scene.with_effects(false, &[])?),
+        variant("graphics", String::new(), scene.with_effects(true, &[])?),
+    ];
+    let mut together: Vec<Effect> = Vec::new();
+    let mut left_out = Vec::new();
+    for effect in EFFECTS {
+        match scene.with_effects(false, &[effect]) {
+            Ok(with) => variants.push(variant(effect.key, effect.value(scene).to_string(), with)),
+            Err(error) => {
+                notes.push(format!("{} is not priced: {error}", effect.key));
+                continue;
+            }
+        }
+        together.push(effect);
+        if scene.with_effects(true, &together).is_err() {
+            together.pop();
+            left_out.push(effect.key);
+        }
+    }
+    let setting = if left_out.is_empty() { String::new() } else { format!("without {}", left_out.join(", ")) };
+    variants.push(variant("all together", setting, scene.with_effects(true, &together)?));
+    Ok(variants)
+}
+
+/// Runs of a loop in one round, of which the fastest counts: they take milliseconds, and whatever else a machine does adds to
+/// them.
+const TRIES: usize = 3;
+
+/// Seconds that `work` takes of each of `count` variants, round by round, the least of `tries`.
+fn rounds(
+    count: usize,
+    tries: usize,
+    mut work: impl FnMut(usize) -> Result<Option<f64>, AccuracyError>,
+) -> Result<Times, AccuracyError> {
+    let mut times: Times = vec![Some([0.0; REPEATS]); count];
+    for round in 0..REPEATS {
+        for step in 0..count {
+            let k = if round % 2 == 0 { step } else { count - 1 - step };
+            for attempt in 0..tries {
+                let seconds = work(k)?;
+                times[k] = times[k].zip(seconds).map(|(mut times, seconds)| {
+                    times[round] = if attempt == 0 { seconds } else { seconds.min(times[round]) };
+                    times
+                });
+            }
+        }
+    }
+    Ok(times)
+}
+
+/// Times of variant `k` over the least of `baseline`.
+fn cost(times: &Times, k: usize, baseline: usize) -> Option<Cost> {
+    let (times, whole) = times[k].zip(times[baseline])?;
+    Some(Cost::of(times).over(Cost::of(whole).least))
+}
+
+/// The scene's first motion; where it has none, from the grid point farthest from contact to the deepest, and back.
+fn motion(scene: &Scene, own: &Dataset) -> Result<Motion, AccuracyError> {
+    let named = [&scene.motion.press, &scene.motion.scrape].into_iter().find(|waypoints| !waypoints.is_empty());
+    let gap = |point: &usize| own.gap.as_ref().map_or(0.0, |gap| gap[*point]);
+    let freest = (0..own.grid.points()).max_by(|a, b| gap(a).total_cmp(&gap(b))).unwrap_or(0);
+    let way = [(0.0, freest), (2.0, deepest(own)), (3.0, deepest(own)), (5.0, freest)];
+    let waypoints = named
+        .cloned()
+        .unwrap_or_else(|| way.map(|(time, point)| Waypoint { time, q: own.grid.configuration(point) }).to_vec());
+    Ok(Motion::through(&waypoints, own.grid.joints())?)
+}
+
+/// What is drawn on the GPU.
+struct Device {
+    adapter: Option<String>,
+    /// One per variant; none without graphics.
+    bodies: Vec<Option<Body>>,
+}
+
+/// The object of one variant on the GPU: forces are interpolated and smoothed by the host.
+struct Body {
+    contact: ContactForces,
+    forces: Vec<DVec3>,
+    smoothing: Option<Smoothing>,
+    update: FrameUpdate,
+}
+
+impl Body {
+    /// A frame for each of `places`, and a wait for the last.
+    fn play(&mut self, places: &[(JointVector, f64)]) -> Result<(), FrameError> {
+        for (q, share) in places {
+            self.contact.interpolate(q, *share, &mut self.forces);
+            let forces = match &mut self.smoothing {
+                Some(smoothing) => smoothing.toward(&self.forces),
+                None => &self.forces,
+            };
+            self.update.step(forces)?;
+        }
+        self.update.read()?;
+        Ok(())
+    }
+}
+
+fn on_the_device(setups: &[Setup], datasets: &[Dataset]) -> Result<Device, AccuracyError> {
+    let context = Arc::new(Context::open(AdapterChoice::Any).map_err(FrameError::from)?);
+    let body = |(setup, data): (&Setup, &Dataset)| -> Result<Option<Body>, AccuracyError> {
+        let (Some(object), Some(graphics)) = (&setup.object, &setup.scene.graphics) else { return Ok(None) };
+        let (nodes, period) = (object.rest.len(), 1.0 / graphics.rate);
+        let method = FrameMethod::suitable(nodes);
+        Ok(Some(Body {
+            contact: ContactForces::new(data, nodes)?,
+            forces: vec![DVec3::ZERO; nodes],
+            smoothing: graphics.effects.smoothing.map(|time| Smoothing::new(time, period, nodes)),
+            update: FrameUpdate::new(Arc::clone(&context), object, period, method, &graphics.effects)?,
+        }))
+    };
+    let bodies = setups.iter().zip(datasets).map(body).collect::<Result<_, _>>()?;
+    Ok(Device { adapter: Some(context.adapter().name.clone()), bodies })
+}

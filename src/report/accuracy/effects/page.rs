@@ -1,0 +1,94 @@
+//! Prices as text, as CSV and as a section of the page.
+
+use super::{
+    super::{Cost, page::escaped},
+    Effects,
+};
+use crate::report::canvas::Canvas;
+use std::fmt::{self, Write as _};
+
+/// The table, for people.
+///
+/// # Errors
+/// None in a `String`.
+pub(in super::super) fn describe(text: &mut String, effects: &Effects) -> fmt::Result {
+    writeln!(
+        text,
+        "  effects, times relative to the plain scene (frames and GPU memory: to graphics alone), least of the rounds"
+    )?;
+    write!(text, "    {:<18}", "")?;
+    for (title, _) in effects.heads() {
+        write!(text, "{title:>12}")?;
+    }
+    writeln!(text)?;
+    for price in &effects.prices {
+        write!(text, "    {:<18}", price.name)?;
+        for cost in effects.columns(price) {
+            write!(text, "{:>12}", cost.map_or_else(|| "-".to_owned(), |cost| format!("{:.2}", cost.least)))?;
+        }
+        writeln!(text)?;
+    }
+    effects.notes.iter().try_for_each(|note| writeln!(text, "  note         {note}"))
+}
+
+/// All prices, a row each.
+pub(in super::super) fn csv(effects: &Effects) -> String {
+    let mut text = "name,setting".to_owned();
+    for what in ["bake", "tick", "frame", "gpu_frame"] {
+        // A String takes everything, here and below.
+        let _ = write!(text, ",{what}_median,{what}_least,{what}_greatest");
+    }
+    text.push_str(",device_bytes,device_buffers,dispatches,pipelines,dataset_bytes\n");
+    for price in &effects.prices {
+        let _ = write!(text, "{},\"{}\"", price.name, price.setting.replace('"', "'"));
+        for cost in [Some(price.bake), Some(price.tick), price.frame, price.gpu_frame] {
+            let _ = match cost {
+                Some(Cost { median, least, greatest }) => write!(text, ",{median},{least},{greatest}"),
+                None => write!(text, ",,,"),
+            };
+        }
+        let _ = match price.device {
+            Some(takes) => {
+                write!(text, ",{},{},{},{}", takes.bytes, takes.buffers, takes.dispatches, takes.pipelines)
+            }
+            None => write!(text, ",,,,"),
+        };
+        let _ = writeln!(text, ",{}", price.dataset_bytes);
+    }
+    text
+}
+
+/// The section of the page: figure and table.
+///
+/// # Errors
+/// None in a `String`.
+pub(in super::super) fn html(html: &mut String, effects: &Effects, figure: &Canvas) -> fmt::Result {
+    writeln!(html, "<h2>What each effect costs</h2>")?;
+    let caption = "Dots are the least of the rounds over the least of the baseline, lines reach up to the greatest. An effect \
+                   of the tick costs no frame, one of the graphics no tick; friction and contact damping have contact \
+                   forces stored, which the size of the dataset shows. In the table: least (median, greatest).";
+    writeln!(html, "<figure>{}<figcaption>{caption}</figcaption></figure>", figure.svg())?;
+    write!(html, "<table><tr><th>effect<th>value")?;
+    for (title, takes) in effects.heads() {
+        write!(html, "<th>{title}<br>{takes}")?;
+    }
+    writeln!(html, "<th>GPU dispatches<th>pipelines</tr>")?;
+    for price in &effects.prices {
+        write!(html, "<tr><td>{}<td>{}", escaped(&price.name), escaped(&price.setting))?;
+        for cost in effects.columns(price) {
+            match cost {
+                Some(Cost { median, least, greatest }) if least < greatest => {
+                    write!(html, "<td>{least:.2} ({median:.2}, {greatest:.2})")?;
+                }
+                Some(Cost { least, .. }) => write!(html, "<td>{least:.2}")?,
+                None => write!(html, "<td>–")?,
+            }
+        }
+        match price.device {
+            Some(takes) => writeln!(html, "<td>{}<td>{}</tr>", takes.dispatches, takes.pipelines)?,
+            None => writeln!(html, "<td>–<td>–</tr>")?,
+        }
+    }
+    writeln!(html, "</table>")?;
+    effects.notes.iter().try_for_each(|note| writeln!(html, "<p>Note: {}</p>", escaped(note)))
+}

@@ -1,0 +1,129 @@
+//! The effects that a scene may name, and a scene with any of them put in or left out: for pricing them, and for proving that
+//! what is not named is not there.
+
+use super::{Scene, SceneError};
+use toml::{Table, Value};
+
+/// An effect of a loop: absent unless the scene names it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Effect {
+    /// Table of the scene's file that it stands in, `haptics` or `graphics`.
+    pub table: &'static str,
+    /// Its key there.
+    pub key: &'static str,
+    /// Its value where a scene does not give one: TOML, with figures that suit a desktop device and soft objects.
+    usual: &'static str,
+}
+
+/// All effects, those of the tick first.
+pub const EFFECTS: [Effect; 9] = [
+    Effect { table: "haptics", key: "friction", usual: "{ coefficient = 0.4 }" },
+    Effect { table: "haptics", key: "contact_damping", usual: "1.0" },
+    Effect { table: "haptics", key: "four_channel", usual: "{}" },
+    Effect { table: "haptics", key: "passivity_control", usual: "true" },
+    Effect { table: "haptics", key: "proxy_inertia", usual: "\"configuration\"" },
+    Effect { table: "graphics", key: "gravity", usual: "[0.0, 0.0, -9.81]" },
+    Effect { table: "graphics", key: "stiffening", usual: "{ factor = 4.0, strain = 0.1 }" },
+    Effect { table: "graphics", key: "smoothing", usual: "0.05" },
+    Effect { table: "graphics", key: "quasi_static", usual: "true" },
+];
+
+impl Effect {
+    /// Whether it acts on what is drawn, and so needs `[graphics]`; else on what is felt.
+    #[must_use]
+    pub fn is_drawn(&self) -> bool {
+        self.table == "graphics"
+    }
+
+    /// Whether it acts at contacts, and so has their forces stored.
+    #[must_use]
+    pub fn needs_forces(&self) -> bool {
+        self.is_drawn() || matches!(self.key, "friction" | "contact_damping")
+    }
+
+    /// Its value in `scene`; the usual one where the scene does not name it, or says that it is off.
+    #[must_use]
+    pub fn value(&self, scene: &Scene) -> Value {
+        let given = table_of(scene).get(self.table).and_then(|table| table.get(self.key)).cloned();
+        let is_on = |value: &Value| *value != Value::Boolean(false) && value.as_str() != Some("constant");
+        let usual = || Some(format!("usual = {}", self.usual).parse::<Table>().ok()?.remove("usual")?);
+        given.filter(is_on).or_else(usual).unwrap_or(Value::Boolean(true))
+    }
+}
+
+impl Scene {
+    /// The same scene with `effects` and no others, and with or without its graphics loop, which effects on what is drawn
+    /// bring with them. Its text says so, without the comments.
+    ///
+    /// # Errors
+    /// When the effects cannot act here, or not together.
+    pub fn with_effects(&self, graphics: bool, effects: &[Effect]) -> Result<Self, SceneError> {
+        let mut text = table_of(self);
+        if !graphics {
+            text.remove("graphics");
+        }
+        for Effect { table, key, .. } in EFFECTS {
+            if let Some(Value::Table(table)) = text.get_mut(table) {
+                table.remove(key);
+            }
+        }
+        let named = effects.iter().map(|effect| (effect.table, Some((effect.key, effect.value(self)))));
+        for (table, entry) in graphics.then_some(("graphics", None)).into_iter().chain(named) {
+            let table = text.entry(table).or_insert_with(|| Value::Table(Table::new()));
+            if let (Some(table), Some((key, value))) = (table.as_table_mut(), entry) {
+                table.insert(key.to_owned(), value);
+            }
+        }
+        let Self { text, haptics, graphics, .. } = Self::parse(&text.to_string(), &self.path)?;
+        Ok(Self { text, haptics, graphics, ..self.clone() })
+    }
+}
+
+/// The text of `scene`, which was read from it, as tables.
+fn table_of(scene: &Scene) -> Table {
+    scene.text.parse().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sphere() -> Scene {
+        Scene::parse(include_str!("../../datasets/sphere.toml"), "sphere.toml").unwrap()
+    }
+
+    #[test]
+    fn each_effect_can_be_put_in_alone_and_is_the_only_one() {
+        let plain = sphere().with_effects(false, &[]).unwrap();
+        assert_eq!(plain.graphics, None);
+        assert_eq!(
+            Scene { text: String::new(), graphics: None, ..sphere() },
+            Scene { text: String::new(), ..plain.clone() }
+        );
+        for effect in EFFECTS {
+            let scene = sphere().with_effects(false, &[effect]).unwrap();
+            assert_eq!(scene.graphics.is_some(), effect.is_drawn());
+            assert_ne!((&scene.haptics, scene.graphics), (&plain.haptics, None), "{}", effect.key);
+            assert_eq!(scene.with_effects(false, &[]).unwrap(), plain, "{}", effect.key);
+            // What is named is what is parsed.
+            assert_eq!(scene.text.matches(effect.key).count(), 1, "{}", scene.text);
+        }
+    }
+
+    #[test]
+    fn a_scene_keeps_its_own_values_and_what_is_off_takes_the_usual_one() {
+        let text = sphere()
+            .text
+            .replace("rate = 1000.0 ", "rate = 1000.0\npassivity_control = false\ncontact_damping = 7.5\n# ");
+        let scene = Scene::parse(&text, "s.toml").unwrap();
+        let value = |key: &str| EFFECTS.iter().find(|effect| effect.key == key).unwrap().value(&scene);
+        assert_eq!((value("contact_damping"), value("passivity_control")), (Value::Float(7.5), Value::Boolean(true)));
+    }
+
+    #[test]
+    fn effects_that_exclude_each_other_are_refused() {
+        let [.., stiffening, _, quasi_static] = EFFECTS;
+        let message = sphere().with_effects(true, &[stiffening, quasi_static]).unwrap_err().to_string();
+        assert!(message.contains("leave out one"), "{message}");
+    }
+}
