@@ -60,6 +60,12 @@ pub enum SetupError {
     /// An effect that the scene names cannot act.
     #[error("the scene in the dataset: {0}")]
     Effect(#[from] EffectError),
+    /// An effect on what is drawn, and nothing to draw.
+    #[error(
+        "the scene in the dataset: {0} acts on the object that contact forces move, and the dataset does not hold the contact \
+         forces and the surface of one: bake a virtual object again with this scene, or leave {0} out"
+    )]
+    NothingDrawn(&'static str),
     /// The torques cannot be interpolated.
     #[error(transparent)]
     Field(#[from] FieldError),
@@ -100,7 +106,10 @@ impl Setup {
                 let triangles = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
                 Some(Object::from_surface(object, nodes, triangles)?)
             }
-            _ => None,
+            _ => match scene.graphics.and_then(|graphics| graphics.effects.named()) {
+                Some(effect) => return Err(SetupError::NothingDrawn(effect)),
+                None => None,
+            },
         };
         Ok(Self { scene, chain, haptics, object, bounds, exceeded })
     }

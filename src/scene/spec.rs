@@ -381,6 +381,21 @@ pub struct GraphicsEffects {
     pub quasi_static: bool,
 }
 
+impl GraphicsEffects {
+    /// The key of the first effect that the scene names.
+    #[must_use]
+    pub fn named(&self) -> Option<&'static str> {
+        [
+            ("gravity", self.gravity.is_some()),
+            ("stiffening", self.stiffening.is_some()),
+            ("smoothing", self.smoothing.is_some()),
+            ("quasi_static", self.quasi_static),
+        ]
+        .into_iter()
+        .find_map(|(key, is_named)| is_named.then_some(key))
+    }
+}
+
 /// How springs stiffen with strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StiffeningSpec {

@@ -129,6 +129,10 @@ fn four_channel(checker: &Checker<'_>, table: &FourChannelTable) -> Result<FourC
             return Err(checker.error(channels.span(), message));
         }
     };
+    if let (Some(given), [0.0, 0.0, 0.0, 0.0]) = (&table.channels, channels) {
+        let message = "four_channel cannot act where all of its channels are zero: leave it out";
+        return Err(checker.error(given.span(), message));
+    }
     let filter = table.filter.as_ref().map(|value| checker.positive("filter", value));
     Ok(FourChannelSpec { channels, filter: filter.unwrap_or(Ok(CHANNEL_FILTER))? })
 }
