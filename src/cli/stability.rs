@@ -3,9 +3,9 @@
 use super::{Failure, Report, bar::bar};
 use haptize::{
     gpu::{AdapterChoice, Context},
-    report::stability::{Bound, Case, Effort, Outcome, Setting, cases, table},
+    report::stability::{Bound, Case, Effort, Outcome, Setting, cases, table, write_all},
 };
-use std::{sync::Arc, time::Instant};
+use std::{path::PathBuf, sync::Arc, time::Instant};
 
 /// Which cases, on what.
 #[derive(clap::Args)]
@@ -18,6 +18,9 @@ pub struct Arguments {
     /// Leave out what concerns the GPU.
     #[arg(long)]
     no_gpu: bool,
+    /// A folder to write the table (Markdown) and a picture of it to.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
 }
 
 /// Runs the cases one after another; whole only if every figure keeps its bound.
@@ -48,7 +51,14 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             Ok::<_, serde_json::Error>(row)
         })
         .collect::<Result<_, _>>()?;
-    let json = serde_json::json!({ "outcomes": rows, "failed": failed, "adapter": adapter, "seconds": seconds });
+    let files = match &arguments.output {
+        Some(folder) => write_all(folder, &outcomes, &adapter)?,
+        None => Vec::new(),
+    };
+    let json = serde_json::json!({
+        "outcomes": rows, "failed": failed, "adapter": adapter, "seconds": seconds,
+        "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
+    });
     let mut text = String::new();
     for room in ["contact", "gridization", "loop", "graphics"] {
         let of_room = outcomes.iter().filter(|(of, _)| *of == room).map(|(_, outcome)| outcome.clone());
@@ -59,6 +69,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     let count = outcomes.len();
     text += &format!("{} of {count} figures keep their bounds; {seconds:.1} s, {adapter}\n", count - failed);
+    if let Some(folder) = &arguments.output {
+        text += &format!("{} files in {}\n", files.len(), folder.display());
+    }
     Ok(Report { text, json, whole: failed == 0 })
 }
 

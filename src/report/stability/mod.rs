@@ -4,11 +4,14 @@
 //! that it measured: the worst one found, the bound that it must keep, and so whether it passed. One file a room holds
 //! its cases; tests run them at [`Effort::Sample`], the whole table takes [`Effort::Full`].
 
-mod contact;
+pub mod contact;
 pub mod coupling;
+mod figure;
 mod graphics;
 mod gridization;
 pub mod worlds;
+
+pub use figure::write_all;
 
 use crate::gpu::Context;
 use serde::Serialize;
