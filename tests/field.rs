@@ -121,7 +121,7 @@ fn potential_makes_no_energy_around_loops_and_linear_does() {
 fn ball(count: usize) -> Dataset {
     let grid = synthetic::grid(&[(-0.61, 1.2 / (count - 1) as f64, count); 3]);
     let depth = |q: &[f64]| 0.5 - q.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let mut data = synthetic::dataset(grid, |q| {
+    let mut data = Dataset::of_field(grid, |q| {
         let energy = 2.0 * depth(q).max(0.0).powi(2) * (1.0 + depth(q));
         (push(q), energy, if depth(q) > 0.0 { Status::Contact } else { Status::Free })
     });

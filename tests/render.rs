@@ -32,7 +32,7 @@ use haptize::{
     },
 };
 use std::sync::atomic::AtomicBool;
-use synthetic::{dataset, grid, half_space};
+use synthetic::{grid, half_space};
 
 fn vector(values: &[f64]) -> JointVector {
     JointVector::from_slice(values)
@@ -461,7 +461,7 @@ fn under_constant_forces_the_object_settles_where_its_springs_balance_them() {
 
 /// A dataset in one joint over a sphere: node 3 is pushed from 0.2 rad on, node 7 with it from 0.4 rad on.
 fn pushed() -> Dataset {
-    let mut data = dataset(grid(&[(0.0, 0.2, 4)]), |q| {
+    let mut data = Dataset::of_field(grid(&[(0.0, 0.2, 4)]), |q| {
         (vector(&[-q[0]]), 0.0, if q[0] > 0.1 { Status::Contact } else { Status::Free })
     });
     let forces: Vec<f32> = vec![0.0, 0.0, -1.0, 0.0, 0.0, -2.0, 1.0, 0.0, 0.0, 0.0, 0.0, -3.0, 2.0, 0.0, 0.0];

@@ -12,6 +12,7 @@ mod error;
 mod export;
 mod file;
 mod grid;
+mod known;
 mod read;
 mod summary;
 

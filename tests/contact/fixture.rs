@@ -1,41 +1,17 @@
-//! Objects, proxies and configurations that the tests share.
+//! Objects, proxies and configurations that the tests share, made of those of the hard cases.
 
 use glam::DVec3;
-use haptize::object::Object;
-use haptize::proxy::Chain;
-use haptize::scene::{
-    Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
-    ProxySpec, Shape, SpringKind, SpringSpec,
+pub use haptize::report::stability::contact::world::Sequence;
+use haptize::{
+    object::Object,
+    proxy::Chain,
+    report::stability::contact::world::{self, Ball, PAPER, joint},
+    scene::{Algorithm, ContactSpec, JointKind, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind},
 };
-
-/// A fixed pseudo-random sequence in [-1, 1).
-pub struct Sequence(u64);
-
-impl Sequence {
-    pub fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    /// Uniform in `[low, high)`.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * 0.5 * (self.next() + 1.0)
-    }
-}
 
 /// Springs of 300 N/m and ground of 100 N/m at every node.
 pub fn spec(shape: Shape, kind: SpringKind) -> ObjectSpec {
-    ObjectSpec {
-        shape,
-        material: Material::Springs(SpringSpec { kind, stiffness: 300.0 }),
-        ground: GroundSpec { stiffness: 100.0, nodes: GroundNodes::All },
-        node_mass: 0.01,
-        node_damping: 0.1,
-    }
+    ObjectSpec { shape, ..world::sphere_spec(Ball { springs: kind, ..PAPER }, SPHERE_CENTRE, 1.0, 1.0) }
 }
 
 /// Where the sphere of [`sphere`] lies [m].
@@ -43,42 +19,24 @@ pub const SPHERE_CENTRE: DVec3 = DVec3::new(0.16, 0.0, 0.0);
 
 /// The paper's sphere of 102 nodes, radius 50 mm.
 pub fn sphere(kind: SpringKind) -> Object {
-    Object::build(&spec(Shape::Sphere { centre: SPHERE_CENTRE, radius: 0.05, rings: 10, segments: 10 }, kind)).unwrap()
+    Object::build(&world::sphere_spec(Ball { springs: kind, ..PAPER }, SPHERE_CENTRE, 1.0, 1.0)).unwrap()
 }
 
 /// An object on a surface given by nodes and triangles.
 pub fn object(nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Object {
-    let shape = Shape::Sphere { centre: DVec3::ZERO, radius: 1.0, rings: 3, segments: 3 };
-    Object::from_surface(&spec(shape, SpringKind::Isotropic), nodes, triangles).unwrap()
+    world::object(nodes, triangles).unwrap()
 }
 
 /// The same object held at every node by springs of this stiffness [N/m].
 pub fn grounded(object: &Object, stiffness: f64) -> Object {
-    let shape = Shape::Sphere { centre: DVec3::ZERO, radius: 1.0, rings: 3, segments: 3 };
-    let mut spec = spec(shape, SpringKind::Isotropic);
+    let mut spec = world::sphere_spec(PAPER, SPHERE_CENTRE, 1.0, 1.0);
     spec.ground.stiffness = stiffness;
     Object::from_surface(&spec, object.rest.clone(), object.triangles.clone()).unwrap()
 }
 
-/// A torus around z in place of the sphere: a surface with concave parts. Radii 35 and 16 mm.
+/// A torus in place of the sphere: a surface with concave parts.
 pub fn torus() -> Object {
-    let (around, across) = (18u32, 8u32);
-    let mut nodes = Vec::new();
-    let mut triangles = Vec::new();
-    for i in 0..around {
-        for j in 0..across {
-            let (a, b) = (
-                std::f64::consts::TAU * f64::from(i) / f64::from(around),
-                std::f64::consts::TAU * f64::from(j) / f64::from(across),
-            );
-            let from_axis = 0.035 + 0.016 * b.cos();
-            nodes.push(SPHERE_CENTRE + DVec3::new(from_axis * a.cos(), from_axis * a.sin(), 0.016 * b.sin()));
-            let at = |i: u32, j: u32| (i % around) * across + j % across;
-            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
-            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
-        }
-    }
-    object(nodes, triangles)
+    world::torus(SPHERE_CENTRE).unwrap()
 }
 
 /// A regular octahedron of edge 0.1 m around the origin.
@@ -87,21 +45,6 @@ pub fn octahedron() -> Object {
     let nodes = vec![DVec3::X * r, DVec3::Y * r, DVec3::Z * r, -DVec3::X * r, -DVec3::Y * r, -DVec3::Z * r];
     let triangles = vec![[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
     object(nodes, triangles)
-}
-
-pub fn joint(kind: JointKind, origin: DVec3, axis: DVec3, nodes: Vec<ProxyNodeSpec>) -> JointSpec {
-    JointSpec {
-        name: "joint".into(),
-        kind,
-        origin,
-        axis,
-        limits: [-10.0, 10.0],
-        mass: 0.1,
-        centre_of_mass: DVec3::ZERO,
-        inertia: DVec3::splat(1e-4),
-        rotor_inertia: 1e-3,
-        nodes,
-    }
 }
 
 /// Nodes along x from `from` to `to` [m].
@@ -141,12 +84,12 @@ pub fn probe(from: DVec3, axis: DVec3) -> Chain {
 
 /// The same with a radius.
 pub fn ball(from: DVec3, axis: DVec3, radius: f64) -> Chain {
-    let node = ProxyNodeSpec { position: DVec3::ZERO, radius };
-    Chain::new(&ProxySpec { joints: vec![joint(JointKind::Prismatic, from, axis, vec![node])] })
+    world::probe(from, axis, radius)
 }
 
+/// Contact springs Kc [N/m], and few iterations: what converges here does so soon.
 pub fn contact(algorithm: Algorithm, stiffness: f64) -> ContactSpec {
-    ContactSpec { stiffness, algorithm, tolerance: 1e-8, max_iterations: 100 }
+    ContactSpec { algorithm, max_iterations: 100, ..world::contact(stiffness) }
 }
 
 /// Joint coordinates of [`arm`] at random, about a third of them in contact with the sphere.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::contact::Status;
-use crate::render::synthetic::{dataset, grid, half_space};
+use crate::render::synthetic::{grid, half_space};
 
 /// So steep a layer that it holds nothing back.
 const SOFT: f64 = 1e6;
@@ -32,7 +32,7 @@ fn multilinear(q: &JointVector) -> JointVector {
 #[test]
 fn multilinear_fields_are_reproduced_in_one_to_six_joints() {
     for joints in 1..=MAX_JOINTS {
-        let data = dataset(grid(&vec![(-0.4, 0.2, 5); joints]), |q| (multilinear(q), 1.0, Status::Contact));
+        let data = Dataset::of_field(grid(&vec![(-0.4, 0.2, 5); joints]), |q| (multilinear(q), 1.0, Status::Contact));
         let field = rendered(&data, SOFT);
         let mut q = JointVector::zeros(joints);
         for k in 0..50 {
@@ -83,7 +83,7 @@ fn steepest(field: &TorqueField, count: usize, reach: f64) -> f64 {
 #[test]
 fn torque_is_continuous_with_the_stated_bound_whatever_the_data() {
     for (joints, count) in [(1, 40), (2, 9), (3, 7), (6, 3)] {
-        let wild = dataset(centred(joints, count), |q| {
+        let wild = Dataset::of_field(centred(joints, count), |q| {
             let noise = |a: usize| (q.iter().map(|x| 7e3 * x).sum::<f64>() + 5.0 * a as f64).sin();
             let status = if noise(9) > -0.3 { Status::Contact } else { Status::Free };
             (vector(&(0..joints).map(noise).collect::<Vec<_>>()), 0.0, status)
@@ -103,7 +103,7 @@ fn torque_is_continuous_with_the_stated_bound_whatever_the_data() {
 fn a_jump_at_contact_is_felt_with_the_slope_of_the_layer_alone() {
     for (joints, count) in [(1, 9), (2, 9), (3, 9), (6, 4)] {
         // One newton metre at once, then 1 N m/rad in each joint: along a fixed direction.
-        let jump = dataset(centred(joints, count), |q| {
+        let jump = Dataset::of_field(centred(joints, count), |q| {
             let depth = q.iter().sum::<f64>();
             let inside = depth > 0.05;
             let tau = vector(&vec![if inside { -1.0 - depth } else { 0.0 }; q.len()]);
@@ -122,7 +122,7 @@ fn a_jump_at_contact_is_felt_with_the_slope_of_the_layer_alone() {
 
 #[test]
 fn the_layer_holds_a_jump_to_the_slope_and_leaves_a_soft_object_alone() {
-    let jump = dataset(grid(&[(-0.5, 0.1, 21)]), |q| {
+    let jump = Dataset::of_field(grid(&[(-0.5, 0.1, 21)]), |q| {
         let inside = q[0] > 0.01;
         (vector(&[if inside { -1.0 } else { 0.0 }]), 0.0, if inside { Status::Contact } else { Status::Free })
     });
@@ -143,7 +143,8 @@ fn the_layer_holds_a_jump_to_the_slope_and_leaves_a_soft_object_alone() {
 
 #[test]
 fn torque_fades_out_over_one_cell_beyond_the_grid() {
-    let data = dataset(grid(&[(0.0, 0.1, 3), (0.0, 0.1, 3)]), |_| (vector(&[1.0, -2.0]), 0.0, Status::Contact));
+    let data =
+        Dataset::of_field(grid(&[(0.0, 0.1, 3), (0.0, 0.1, 3)]), |_| (vector(&[1.0, -2.0]), 0.0, Status::Contact));
     let field = rendered(&data, 1.0);
     let at = |x: f64| field.sample(&[x, 0.05]);
     assert!(!at(0.2).flags.contains(Flags::OUTSIDE));
@@ -157,7 +158,7 @@ fn torque_fades_out_over_one_cell_beyond_the_grid() {
 
 #[test]
 fn torque_fades_out_towards_absent_points_without_making_a_boundary_there() {
-    let data = dataset(grid(&[(0.0, 0.1, 8)]), |q| {
+    let data = Dataset::of_field(grid(&[(0.0, 0.1, 8)]), |q| {
         let status = if q[0] > 0.45 { Status::Outside } else { Status::Contact };
         (vector(&[if q[0] > 0.45 { f64::NAN } else { 1.0 }]), q[0], status)
     });
@@ -171,7 +172,7 @@ fn torque_fades_out_towards_absent_points_without_making_a_boundary_there() {
 
 #[test]
 fn unconverged_points_are_used_and_flagged() {
-    let data = dataset(grid(&[(0.0, 0.1, 3)]), |q| {
+    let data = Dataset::of_field(grid(&[(0.0, 0.1, 3)]), |q| {
         (vector(&[1.0]), 0.0, if q[0] > 0.15 { Status::Unconverged } else { Status::Contact })
     });
     let field = rendered(&data, SOFT);
@@ -268,7 +269,7 @@ fn a_linear_object_is_rendered_exactly_by_its_gap_and_by_its_potential() {
 
 /// A curved potential that begins at the surface of a ball of radius 0.6.
 fn ball(grid: crate::dataset::Grid) -> Dataset {
-    dataset(grid, |q| {
+    Dataset::of_field(grid, |q| {
         let (tau, energy) = push(q);
         (tau, energy, if energy > 0.0 { Status::Contact } else { Status::Free })
     })
@@ -343,7 +344,7 @@ fn every_interpolation_is_continuous_over_faces_edges_and_the_rim() {
 
 #[test]
 fn potential_fades_out_towards_absent_points_and_beyond_the_grid() {
-    let data = dataset(grid(&[(0.0, 0.1, 8)]), |q| {
+    let data = Dataset::of_field(grid(&[(0.0, 0.1, 8)]), |q| {
         let absent = q[0] > 0.45;
         let tau = if absent { f64::NAN } else { -2.0 * (q[0] + 0.1) };
         (vector(&[tau]), (q[0] + 0.1).powi(2), if absent { Status::Outside } else { Status::Contact })
@@ -363,7 +364,7 @@ fn potential_fades_out_towards_absent_points_and_beyond_the_grid() {
 #[test]
 fn contradictory_energies_and_torques_stay_bounded() {
     // Overflowed and unconverged points may hold a torque without energy, or the other way round.
-    let data = dataset(grid(&[(0.0, 0.1, 9), (0.0, 0.1, 9)]), |q| {
+    let data = Dataset::of_field(grid(&[(0.0, 0.1, 9), (0.0, 0.1, 9)]), |q| {
         let odd = ((q[0] + 3.0 * q[1]) * 10.0).round() as i64 % 3;
         let depth = q[0] - 0.05;
         let state = [Status::Contact, Status::Unconverged, Status::Overflow][odd as usize];

@@ -2,8 +2,7 @@
 
 use crate::{
     JointVector,
-    contact::Status,
-    dataset::{Axis, Contacts, Dataset, Grid, Provenance, Surface},
+    dataset::{Axis, Contacts, Dataset, Grid, Surface},
 };
 use std::fmt::Write;
 
@@ -61,8 +60,12 @@ pub fn block(haptics: &str) -> Dataset {
         triangles: vec![0_u32, 1, 2].into(),
     };
     let direction = JointVector::from_slice(&[0.0, 1.0]);
-    let world = wall(grid, &direction, BLOCK_STIFFNESS, block_scene(haptics));
-    Dataset { contacts: Some(contacts), surface: Some(surface), ..world }
+    Dataset {
+        contacts: Some(contacts),
+        surface: Some(surface),
+        scene: block_scene(haptics),
+        ..Dataset::of_half_space(grid, &direction, BLOCK_STIFFNESS)
+    }
 }
 
 /// A half space in C-space for an arm of `joints` revolute joints: pressed by all joints alike.
@@ -93,7 +96,7 @@ nodes = [{{ at = [0.1, 0.0, 0.0] }}]
     let axes: Vec<_> = (0..joints).map(|_| ("q", "rad", count, step)).collect();
     let mut direction = JointVector::zeros(joints);
     direction.fill(1.0 / (joints as f64).sqrt());
-    wall(grid(&axes), &direction, HALF_SPACE_STIFFNESS, scene + haptics)
+    Dataset { scene: scene + haptics, ..Dataset::of_half_space(grid(&axes), &direction, HALF_SPACE_STIFFNESS) }
 }
 
 /// Axes of (name, unit, count, step), centred on zero.
@@ -106,28 +109,4 @@ fn grid(axes: &[(&str, &str, usize, f64)]) -> Grid {
         count,
     };
     Grid { axes: axes.iter().map(axis).collect() }
-}
-
-/// `U = 1/2 k max(0, direction . q)^2` over `grid`.
-fn wall(grid: Grid, direction: &JointVector, stiffness: f64, scene: String) -> Dataset {
-    let (mut torque, mut energy, mut status) = (Vec::new(), Vec::new(), Vec::new());
-    for point in 0..grid.points() {
-        let depth = grid.configuration(point).dot(direction).max(0.0);
-        torque.extend(direction.iter().map(|part| -stiffness * depth * part));
-        energy.push(0.5 * stiffness * depth * depth);
-        status.push(if depth > 0.0 { Status::Contact } else { Status::Free } as u8);
-    }
-    Dataset {
-        grid,
-        torque: torque.into(),
-        energy: Some(energy.into()),
-        gap: None,
-        status: status.into(),
-        residual: None,
-        iterations: None,
-        contacts: None,
-        surface: None,
-        scene,
-        provenance: Provenance::default(),
-    }
 }

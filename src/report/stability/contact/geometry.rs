@@ -162,7 +162,7 @@ pub fn right_through(_: &Setting) -> Result<Vec<Outcome>, Failure> {
 
 /// The bar in the hole and the groove of a torus.
 pub fn concave(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
-    let object = torus()?;
+    let object = torus(DVec3::ZERO)?;
     let count = if setting.effort == super::super::Effort::Full { 200 } else { 30 };
     let mut outcomes = Vec::new();
     for (name, radius) in [("points", 0.0), ("balls", 0.004)] {

@@ -6,7 +6,7 @@ mod kinematics;
 mod meshes;
 mod stiffness;
 mod units;
-mod world;
+pub mod world;
 
 use super::Case;
 

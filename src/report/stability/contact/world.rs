@@ -1,4 +1,4 @@
-//! What the cases touch, and with what.
+//! What the cases, and tests of contact, touch, and with what.
 
 use super::super::Failure;
 use crate::{
@@ -26,6 +26,8 @@ pub const ITERATIONS: u32 = 400;
 pub struct Sequence(u64);
 
 impl Sequence {
+    /// The sequence of this number.
+    #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -42,6 +44,7 @@ impl Sequence {
 pub struct Ball {
     /// Rings, and nodes of each: 10 for 102 nodes, 45 for 2,027.
     pub rings: usize,
+    /// How its springs resist.
     pub springs: SpringKind,
     /// Kg [N/m].
     pub ground: f64,
@@ -53,6 +56,7 @@ pub struct Ball {
 pub const PAPER: Ball = Ball { rings: 10, springs: SpringKind::Isotropic, ground: 100.0, patch: false };
 
 /// The specification of a sphere around `centre`, all lengths times `scale`, all stiffnesses times `stiffness`.
+#[must_use]
 pub fn sphere_spec(ball: Ball, centre: DVec3, scale: f64, stiffness: f64) -> ObjectSpec {
     let Ball { rings, springs, ground, patch } = ball;
     let radius = RADIUS * scale;
@@ -69,17 +73,26 @@ pub fn sphere_spec(ball: Ball, centre: DVec3, scale: f64, stiffness: f64) -> Obj
 }
 
 /// A sphere around the origin.
+///
+/// # Errors
+/// When it cannot be built.
 pub fn sphere(ball: Ball) -> Result<Object, Failure> {
     Ok(Object::build(&sphere_spec(ball, DVec3::ZERO, 1.0, 1.0))?)
 }
 
 /// A surface with springs of 300 N/m, held at every node by 100 N/m.
+///
+/// # Errors
+/// When it is no closed surface.
 pub fn object(nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Object, Failure> {
     Ok(Object::from_surface(&sphere_spec(PAPER, DVec3::ZERO, 1.0, 1.0), nodes, triangles)?)
 }
 
-/// A torus around z, radii 35 and 16 mm: a surface with concave parts.
-pub fn torus() -> Result<Object, Failure> {
+/// A torus around an axis along z through `centre`, radii 35 and 16 mm: a surface with concave parts.
+///
+/// # Errors
+/// None.
+pub fn torus(centre: DVec3) -> Result<Object, Failure> {
     let (around, across) = (18_u32, 8_u32);
     let at = |i: u32, j: u32| (i % around) * across + j % across;
     let mut nodes = Vec::new();
@@ -88,7 +101,7 @@ pub fn torus() -> Result<Object, Failure> {
         for j in 0..across {
             let (a, b) = (TAU * f64::from(i) / f64::from(around), TAU * f64::from(j) / f64::from(across));
             let from_axis = 0.035 + 0.016 * b.cos();
-            nodes.push(DVec3::new(from_axis * a.cos(), from_axis * a.sin(), 0.016 * b.sin()));
+            nodes.push(centre + DVec3::new(from_axis * a.cos(), from_axis * a.sin(), 0.016 * b.sin()));
             triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
             triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
         }
@@ -97,6 +110,7 @@ pub fn torus() -> Result<Object, Failure> {
 }
 
 /// A joint at `origin` of its parent, with nodes.
+#[must_use]
 pub fn joint(kind: JointKind, origin: DVec3, axis: DVec3, nodes: Vec<ProxyNodeSpec>) -> JointSpec {
     JointSpec {
         name: "joint".into(),
@@ -113,12 +127,14 @@ pub fn joint(kind: JointKind, origin: DVec3, axis: DVec3, nodes: Vec<ProxyNodeSp
 }
 
 /// One node that slides from `from` along `axis`.
+#[must_use]
 pub fn probe(from: DVec3, axis: DVec3, radius: f64) -> Chain {
     let nodes = vec![ProxyNodeSpec { position: DVec3::ZERO, radius }];
     Chain::new(&ProxySpec { joints: vec![joint(JointKind::Prismatic, from, axis, nodes)] })
 }
 
 /// A bent bar of 17 nodes that floats: three slides, three turns.
+#[must_use]
 pub fn floating_bar(radius: f64) -> Chain {
     use JointKind::{Prismatic, Revolute};
     let straight = (0..11).map(|k| DVec3::X * (0.01 * f64::from(k) - 0.05));
@@ -139,6 +155,7 @@ pub fn floating_bar(radius: f64) -> Chain {
 
 /// Random configurations of [`floating_bar`] whose deepest node lies between `least` and `most` below the surface of a sphere
 /// around the origin [m].
+#[must_use]
 pub fn pressed(model: &Model<'_>, seed: u64, count: usize, least: f64, most: f64) -> Vec<Vec<f64>> {
     let mut sequence = Sequence::new(seed);
     let mut solver = Solver::new(model);
@@ -168,6 +185,7 @@ pub fn pressed(model: &Model<'_>, seed: u64, count: usize, least: f64, most: f64
 }
 
 /// The energy form with contact springs Kc [N/m]; infinity is rigid.
+#[must_use]
 pub fn contact(stiffness: f64) -> ContactSpec {
     ContactSpec { stiffness, algorithm: Algorithm::Energy, tolerance: 1e-8, max_iterations: ITERATIONS }
 }
