@@ -46,7 +46,7 @@ impl Effect {
     pub fn value(&self, scene: &Scene) -> Value {
         let given = table_of(scene).get(self.table).and_then(|table| table.get(self.key)).cloned();
         let is_on = |value: &Value| *value != Value::Boolean(false) && value.as_str() != Some("constant");
-        let usual = || Some(format!("usual = {}", self.usual).parse::<Table>().ok()?.remove("usual")?);
+        let usual = || format!("usual = {}", self.usual).parse::<Table>().ok()?.remove("usual");
         given.filter(is_on).or_else(usual).unwrap_or(Value::Boolean(true))
     }
 }

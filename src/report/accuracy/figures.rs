@@ -39,9 +39,10 @@ fn around(values: impl Iterator<Item = f64>) -> [f64; 2] {
 }
 
 /// Widths of a curve and its marks: the first are the widest, so that a curve that coincides with a later one shows around it.
-fn nested(number: usize, count: usize) -> (f64, f64) {
-    let around = count.saturating_sub(number + 1).min(2) as f64;
-    (1.9 + 2.2 * around, 3.6 + 1.7 * around)
+/// A single mark is as large as any other.
+fn nested(curve: &Series, number: usize, count: usize) -> (f64, f64) {
+    let around = if curve.points.len() > 1 { count.saturating_sub(number + 1).min(2) as f64 } else { 0.5 };
+    (1.9 + 1.5 * around, 3.6 + 1.3 * around)
 }
 
 fn panel(canvas: &mut Canvas, side: usize, across: &str, up: &str, curves: &[Series], front: &[(f64, f64)]) {
@@ -58,10 +59,10 @@ fn panel(canvas: &mut Canvas, side: usize, across: &str, up: &str, curves: &[Ser
     for &point in front {
         canvas.disc(panel.place(point), 10.0, colour::series(5).with_opacity(0.45));
     }
-    let solid = curves.iter().filter(|curve| !curve.dashed).count();
+    let solid = curves.iter().filter(|curve| !curve.dashed && curve.points.len() > 1).count();
     for (number, curve) in curves.iter().enumerate() {
         let ink = colour::series(curve.colour);
-        let (width, radius) = nested(number % solid.max(1), solid);
+        let (width, radius) = nested(curve, number % solid.max(1), solid);
         let shown: Vec<(f64, f64)> =
             curve.points.iter().map(|&(x, y)| if x > 0.0 && y > 0.0 { (x, y) } else { (f64::NAN, f64::NAN) }).collect();
         panel.curve(canvas, &shown, ink, if curve.dashed { 1.4 } else { width }, curve.dashed);

@@ -65,11 +65,15 @@ fn base_line(top: f64) -> f64 {
 fn draw(canvas: &mut Canvas, area: Area, costs: &[Option<Cost>]) {
     // One round that was interrupted does not set the scale: its line is cut.
     let ends = costs.iter().flatten().flat_map(|cost| [cost.least, cost.median]).chain([0.95, 1.05]);
-    let range = ticks::range(ends, 0.05);
+    let [low, high] = ticks::range(ends, 0.0);
+    // Equal lengths are equal ratios where there are large ones.
+    let wide = low > 0.0 && high > 5.0 * low;
+    let along = |ratio: f64| if wide { ratio.log10() } else { ratio };
+    let spare = 0.05 * (along(high) - along(low));
+    let [left, right] = [along(low) - spare, along(high) + spare];
     // Numbers stand at the right end, clear of all dots.
-    let length = area.width - NUMBER;
-    let place = |ratio: f64| area.x + (ratio - range[0]) / (range[1] - range[0]) * length;
-    let marks = ticks::ticks(range, 2);
+    let place = |ratio: f64| area.x + (along(ratio) - left) / (right - left) * (area.width - NUMBER);
+    let marks = if wide { ticks::decades([low, high], 2) } else { ticks::ticks([left, right], 2) };
     for (value, label) in &marks.marks {
         let x = place(*value);
         canvas.polyline(&[(x, area.y), (x, area.bottom())], colour::GRID, 1.0, None);
@@ -85,7 +89,8 @@ fn draw(canvas: &mut Canvas, area: Area, costs: &[Option<Cost>]) {
             continue;
         };
         let ink = colour::series(usize::from(cost.least > usual));
-        let ends = [cost.least, cost.greatest.min(range[1])].map(|ratio| (place(ratio), middle));
+        let end = place(cost.greatest).min(area.right() - NUMBER);
+        let ends = [(place(cost.least), middle), (end, middle)];
         canvas.polyline(&ends, ink.with_opacity(0.6), 2.2, None);
         canvas.disc(ends[0], 3.6, ink);
         canvas.text((area.right(), base_line(top)), &format!("{:.2}", cost.least), TICK.anchored(Anchor::End));
