@@ -380,3 +380,8 @@ pub const REFERENCE_TOLERANCE: f64 = 1e-11;
 /// How much finer than the finest measured grid the measured order is trusted [1]: two octaves, as many as it was measured
 /// over. What takes more is not offered.
 pub const FARTHEST_EXTRAPOLATION: f64 = 4.0;
+
+/// R - min e_t / w^2 of a blended depth (`contact/blend.rs`) up to which triangles are gathered at first: 1/sqrt(a) = 1.2 for one
+/// triangle of half the area 2.3 w^2, more only where all triangles near are small and few; then it is raised to what is
+/// needed [1].
+pub const BLEND_SPREAD: f64 = 1.2;

@@ -10,7 +10,7 @@ use haptize::haptize::Backend;
 use haptize::object::Object;
 use haptize::proxy::Chain;
 use haptize::render::graphics::ObjectMotion;
-use haptize::scene::{Algorithm, GraphicsEffects, Scene, StiffeningSpec};
+use haptize::scene::{Algorithm, Blending, GraphicsEffects, Scene, StiffeningSpec};
 use std::sync::{Arc, OnceLock};
 
 /// One device for all tests of this process: opening one costs a second, and drivers dislike many.
@@ -336,6 +336,17 @@ fn without_forces_the_objects_energy_never_rises_however_few_the_iterations() {
         });
         assert!(greatest.get() > 1e-6 && before.get() < 0.9 * greatest.get(), "{method:?}: it moved, and came to rest");
     }
+}
+
+/// The kernels know facets as they are: a scene that blends them is refused, and left to the CPU where the choice is free.
+#[test]
+fn blended_facets_are_refused() {
+    let (scene, object, chain) = load("sphere.toml");
+    let mut model = Model::new(&object, &chain, scene.contact);
+    assert!(GpuSolver::new(context(), &model).is_ok());
+    model.set_blending(Blending::Mesh);
+    let refusal = GpuSolver::new(context(), &model).err().unwrap();
+    assert!(matches!(refusal, GpuError::Blending) && refusal.to_string().contains("--backend cpu"), "{refusal}");
 }
 
 #[test]

@@ -98,11 +98,13 @@ fn describe(text: &mut String, inspection: &Inspection) -> fmt::Result {
     writeln!(text, "proxy nodes: x [m] (force [N] on object nodes with weights, J by columns)")?;
     for (number, node) in proxy_nodes.iter().enumerate() {
         writeln!(text, "  {number:<3} {:<10} {}", node.link, numbers(&node.position.to_array()))?;
-        if let Some(contact) = node.contact {
+        for contact in &node.contacts {
             let carriers =
                 contact.nodes.iter().zip(contact.weights).map(|(node, weight)| format!("{node} ({weight:.3})"));
             let carriers = carriers.collect::<Vec<_>>().join(" ");
             writeln!(text, "      force {} on {carriers}", numbers(&contact.force.to_array()))?;
+        }
+        if !node.contacts.is_empty() {
             let columns: Vec<_> = node.jacobian.iter().map(|column| numbers(&column.to_array())).collect();
             writeln!(text, "      J     {}", columns.join("  "))?;
         }

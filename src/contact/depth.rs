@@ -32,10 +32,13 @@ pub struct Contact {
     pub weights: [f64; 3],
     /// Outward unit direction N.
     pub normal: DVec3,
-    /// r + s, positive in contact [m].
+    /// r + s, or of a point node the smooth depth of [`super::blend`]; positive in contact [m].
     pub depth: f64,
-    /// How often the spring counts: one, or what [`super::features`] says of nodes with a radius.
+    /// How often the spring counts: one, or what [`super::features`] says of nodes with a radius, or what a smooth depth changes
+    /// by with the row's own distance.
     pub share: f64,
+    /// What it is part of, where it is one of the rows of a smooth depth; see [`super::blend`].
+    pub part: Option<super::blend::Part>,
     /// Force lambda by which the curvature counts; kc depth at the solution [N].
     pub multiplier: f64,
     /// Second derivative of s.
@@ -98,7 +101,8 @@ pub fn measure(
 }
 
 /// In-plane gradients of the three barycentric weights [1/m].
-fn face_gradients(corners: [DVec3; 3]) -> [DVec3; 3] {
+#[must_use]
+pub fn face_gradients(corners: [DVec3; 3]) -> [DVec3; 3] {
     let [a, b, c] = corners;
     let area_vector = (b - a).cross(c - a);
     let square = area_vector.length_squared().max(MINIMUM_SQUARE);
@@ -126,20 +130,27 @@ pub fn second_variation(contact: &Contact, v: [DVec3; 3]) -> [DVec3; 3] {
     product
 }
 
-/// Product of the Hessian of 1/2 kc depth^2 with node displacements `v` [m]: one vector per node [N]. The force kc depth that
-/// weighs the curvature is the contact's multiplier.
-#[must_use]
-pub fn hessian_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3] {
-    let Contact { weights, normal, .. } = contact;
-    let mut deepening = 0.0;
-    for j in 0..3 {
-        deepening += weights[j] * normal.dot(v[j]);
+impl Contact {
+    /// A spring of its own on the feature that [`measure`] found.
+    #[must_use]
+    pub fn new(proxy_node: u32, nodes: [u32; 3], weights: [f64; 3], measured: (DVec3, f64, Curvature)) -> Self {
+        let (normal, depth, curvature) = measured;
+        Self { proxy_node, nodes, weights, normal, depth, share: 1.0, part: None, multiplier: 0.0, curvature }
     }
-    let mut product = second_variation(contact, v);
-    for j in 0..3 {
-        product[j] = (*normal * (kc * deepening * weights[j]) + product[j] * contact.multiplier) * contact.share;
+
+    /// What displacements `v` of its nodes bring the feature nearer by, to first order [m].
+    #[must_use]
+    pub fn deepening(&self, v: [DVec3; 3]) -> f64 {
+        self.weights[0] * self.normal.dot(v[0])
+            + self.weights[1] * self.normal.dot(v[1])
+            + self.weights[2] * self.normal.dot(v[2])
     }
-    product
+
+    /// What a force `push` along the depth gives to the feature's nodes: push p w_j N [N].
+    #[must_use]
+    pub fn spread(&self, push: f64) -> [DVec3; 3] {
+        self.weights.map(|weight| self.normal * (push * self.share * weight))
+    }
 }
 
 #[cfg(test)]
@@ -161,20 +172,15 @@ mod tests {
         let point = closest_point(x, corners);
         let face = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
         let pseudonormal = if point.feature == Feature::Face { face } else { outward };
-        let (normal, depth, curvature) = measure(x, radius, corners, point.weights, point.feature, pseudonormal);
-        (
-            point.feature,
-            Contact {
-                proxy_node: 0,
-                nodes: [0, 1, 2],
-                weights: point.weights,
-                normal,
-                depth,
-                share: 1.0,
-                curvature,
-                multiplier: 3.0 * depth,
-            },
-        )
+        let measured = measure(x, radius, corners, point.weights, point.feature, pseudonormal);
+        (point.feature, Contact { multiplier: 3.0 * measured.1, ..Contact::new(0, [0, 1, 2], point.weights, measured) })
+    }
+
+    /// Product of the Hessian of 1/2 kc depth^2 with `v`.
+    fn hessian_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3] {
+        let bend = second_variation(contact, v);
+        let stretch = contact.normal * (kc * contact.deepening(v));
+        [0, 1, 2].map(|j| stretch * contact.weights[j] + bend[j] * contact.multiplier)
     }
 
     fn inner(a: [DVec3; 3], b: [DVec3; 3]) -> f64 {

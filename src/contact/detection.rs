@@ -9,11 +9,13 @@
 //! Triangles within D + 2 margin at rest are listed once per configuration and node, and again only when m outgrows the
 //! margin. Ties go to the lower triangle number.
 
+use super::blend::{self, Blend};
 use super::closest_point::{ClosestPoint, Feature, closest_point, point_at};
 use super::depth::{Contact, measure};
 use super::features::{Features, Felt};
 use super::model::Model;
 use super::surface;
+use crate::tolerances::BLEND_SPREAD;
 use glam::DVec3;
 
 /// A triangle that may be closest, with the squared distance to its box at rest [m^2].
@@ -21,6 +23,14 @@ use glam::DVec3;
 struct Candidate {
     triangle: u32,
     rest_distance: f64,
+}
+
+impl Candidate {
+    /// A lower bound of its distance once the surface nodes have moved by `moved` [m].
+    fn at_least(&self, model: &Model, moved: &[f64]) -> f64 {
+        let [a, b, c] = model.object.triangles[self.triangle as usize].map(|node| moved[node as usize]);
+        (self.rest_distance - a.max(b).max(c)).max(0.0)
+    }
 }
 
 /// Where a proxy node stands at rest, and its candidates.
@@ -34,6 +44,8 @@ struct Standing {
     inside: bool,
     /// Largest displacement for which the candidates hold [m]; negative when there are none yet.
     margin: f64,
+    /// Greatest R - min e_t / w^2 (see [`super::blend`]) for which they hold [1].
+    spread: f64,
     /// Candidates: from, to.
     from: usize,
     to: usize,
@@ -81,7 +93,8 @@ impl Closest {
 pub enum Walls {
     /// The closest one.
     Closest,
-    /// All within its radius: see [`super::features`].
+    /// All that it feels: within its radius (see [`super::features`]), or what is near a point (see
+    /// [`super::blend`]).
     All,
 }
 
@@ -95,6 +108,9 @@ pub struct Detection {
     moved: Vec<f64>,
     /// Of the node at hand.
     features: Features,
+    blend: Blend,
+    /// Of a point at rest.
+    rows: Vec<Contact>,
     /// Depth of the deepest node at rest, which the surface is expected to move by [m].
     expected: f64,
 }
@@ -110,6 +126,8 @@ impl Detection {
             candidates: Vec::new(),
             moved: vec![0.0; model.rest.len()],
             features: Features::default(),
+            blend: Blend::default(),
+            rows: Vec::new(),
             expected: 0.0,
         }
     }
@@ -137,8 +155,8 @@ impl Detection {
         deepest
     }
 
-    /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns its gap: the smallest signed
-    /// distance of a proxy node to the surface at rest, less its radius [m].
+    /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns the smallest signed distance of a
+    /// proxy node to the surface at rest, less its radius [m]. The gap ([`Detection::gap`]) is at least that.
     pub fn take_up(&mut self, model: &Model, nodes: &[DVec3]) -> f64 {
         self.candidates.clear();
         let mut gap = f64::MAX;
@@ -148,6 +166,7 @@ impl Detection {
             let radius = model.chain.nodes[i].radius;
             let standing = &mut self.standings[i];
             standing.margin = -1.0;
+            standing.spread = BLEND_SPREAD;
             standing.watched = false;
             // Outside the surface's box the node is outside the surface, and the box bounds its distance.
             let to_box = model.bounds.distance_squared(x);
@@ -163,6 +182,37 @@ impl Detection {
         }
         self.expected = (-gap).max(0.0);
         gap
+    }
+
+    /// The gap of the configuration taken up: the smallest signed distance of a proxy node to the surface at rest, less its
+    /// radius; for point nodes to the smooth surface (see [`super::blend`]) [m].
+    pub fn gap(&mut self, model: &Model) -> f64 {
+        let mut gap = f64::MAX;
+        for i in 0..self.nodes.len() {
+            let radius = model.chain.nodes[i].radius;
+            let signed = |standing: &Standing| if standing.inside { -standing.distance } else { standing.distance };
+            let nearest = radius + model.bulge(radius);
+            if signed(&self.standings[i]) - nearest >= gap {
+                continue;
+            }
+            if !self.standings[i].exact {
+                find_standing(model, self.nodes[i], &mut self.standings[i]);
+            }
+            let distance = signed(&self.standings[i]);
+            if distance - nearest < gap {
+                let smooth = model.bulge(radius) > 0.0;
+                gap = gap.min(if smooth { -self.depth_at_rest(model, i) } else { distance - radius });
+            }
+        }
+        gap
+    }
+
+    /// Smooth depth of point node `i` at rest [m].
+    fn depth_at_rest(&mut self, model: &Model, i: usize) -> f64 {
+        self.rows.clear();
+        let Self { blend, rows, nodes, standings, .. } = self;
+        blended_at_rest(model, i, nodes[i], standings[i].distance, blend, rows);
+        rows.first().map_or(f64::NAN, |row| row.depth)
     }
 
     /// Contacts with the surface displaced by `displacement`, i.e. at `positions` relative to the model's centre [m], in
@@ -186,30 +236,50 @@ impl Detection {
             let x = self.nodes[i];
             let radius = model.chain.nodes[i].radius;
             let standing = &mut self.standings[i];
-            if !standing.inside && standing.distance - radius > moved * (1.0 + 1e3 * f64::EPSILON) {
+            let bulge = model.bulge(radius);
+            let smooth = walls == Walls::All && bulge > 0.0;
+            if !standing.inside && standing.distance - radius - bulge > moved * (1.0 + 1e3 * f64::EPSILON) {
                 continue;
             }
             if !standing.exact {
                 find_standing(model, x, standing);
-                if !standing.inside && standing.distance - radius > moved * (1.0 + 1e3 * f64::EPSILON) {
+                if !standing.inside && standing.distance - radius - bulge > moved * (1.0 + 1e3 * f64::EPSILON) {
                     continue;
                 }
             }
             if standing.margin < moved {
                 standing.margin = (2.0 * moved).max(self.expected);
-                standing.from = self.candidates.len();
-                let reach = (standing.distance + 2.0 * standing.margin).max(radius + standing.margin);
-                let candidates = &mut self.candidates;
-                model.bounds.search(x, reach * reach, |triangle, square| {
-                    candidates.push(Candidate { triangle, rest_distance: square.sqrt() });
-                    reach * reach
-                });
-                standing.to = self.candidates.len();
+                list(model, x, radius, standing, &mut self.candidates);
             }
             self.features.clear();
             let felt = (walls == Walls::All && radius > 0.0).then_some((radius, &mut self.features));
             let closest = closest_deformed(model, x, standing, &self.candidates, &self.moved, positions, felt);
             standing.last = closest.triangle;
+            if smooth {
+                let distance = closest.distance_squared.sqrt();
+                let spread = loop {
+                    let reach = blend::reach(model, distance, standing.spread);
+                    self.blend.clear();
+                    for candidate in &self.candidates[standing.from..standing.to] {
+                        if candidate.at_least(model, &self.moved) <= reach {
+                            self.blend.consider(model, x, reach, positions, candidate.triangle);
+                        }
+                    }
+                    let spread = self.blend.spread();
+                    if spread <= standing.spread || !spread.is_finite() {
+                        break spread;
+                    }
+                    standing.spread = spread;
+                    list(model, x, radius, standing, &mut self.candidates);
+                };
+                let first = contacts.len();
+                self.blend.rows(model, i, x, positions, spread, contacts);
+                standing.watched |= contacts.get(first).is_some_and(|row| row.depth > 0.0);
+                if !standing.watched {
+                    contacts.truncate(first);
+                }
+                continue;
+            }
             let Some(contact) = contact_at(model, i, x, radius, positions, closest.triangle, closest.point) else {
                 continue;
             };
@@ -246,16 +316,21 @@ impl Detection {
             let x = self.nodes[i];
             let radius = model.chain.nodes[i].radius;
             let standing = &mut self.standings[i];
-            if !standing.inside && standing.distance - radius > reach {
+            if !standing.inside && standing.distance - radius - model.bulge(radius) > reach {
                 continue;
             }
             let closest = find_standing(model, x, standing);
-            if let Some(mut contact) = contact_at(model, i, x, radius, &model.rest, closest.triangle, closest.point)
-                && contact.depth >= -reach
-            {
-                contact.curvature = Default::default();
-                rows.push(contact);
+            let first = rows.len();
+            if model.bulge(radius) > 0.0 {
+                blended_at_rest(model, i, x, standing.distance, &mut self.blend, rows);
+            } else {
+                let Closest { triangle, point, .. } = closest;
+                rows.extend(contact_at(model, i, x, radius, &model.rest, triangle, point));
             }
+            if rows.get(first).is_none_or(|row| row.depth < -reach) {
+                rows.truncate(first);
+            }
+            blend::freeze(&mut rows[first..]);
         }
     }
 }
@@ -300,8 +375,7 @@ fn closest_deformed(
         closest.consider(x, positions, triangles, standing.last);
     }
     for candidate in &candidates[standing.from..standing.to] {
-        let [a, b, c] = triangles[candidate.triangle as usize].map(|node| moved[node as usize]);
-        let nearest = (candidate.rest_distance - a.max(b).max(c)).max(0.0);
+        let nearest = candidate.at_least(model, moved);
         let nearest = nearest * nearest - slack;
         if let Some((radius, features)) = &mut felt
             && nearest < *radius * *radius
@@ -315,6 +389,37 @@ fn closest_deformed(
         }
     }
     closest
+}
+
+/// Lists the triangles that may matter to the node at `x` while the surface moves by no more than its standing's margin.
+fn list(model: &Model, x: DVec3, radius: f64, standing: &mut Standing, candidates: &mut Vec<Candidate>) {
+    standing.from = candidates.len();
+    let closest = standing.distance + 2.0 * standing.margin;
+    let smooth = if model.bulge(radius) > 0.0 { model.blending * standing.spread.sqrt() } else { 0.0 };
+    let reach = (closest + smooth).max(radius + standing.margin);
+    model.bounds.search(x, reach * reach, |triangle, square| {
+        candidates.push(Candidate { triangle, rest_distance: square.sqrt() });
+        reach * reach
+    });
+    standing.to = candidates.len();
+}
+
+/// Adds the rows of the smooth depth at rest of point node `i` at `x`, whose closest triangle is at `distance`.
+fn blended_at_rest(model: &Model, i: usize, x: DVec3, distance: f64, blend: &mut Blend, rows: &mut Vec<Contact>) {
+    let mut spread = BLEND_SPREAD;
+    loop {
+        let reach = blend::reach(model, distance, spread);
+        blend.clear();
+        model.bounds.search(x, reach * reach, |t, _| {
+            blend.consider(model, x, reach, &model.rest, t);
+            reach * reach
+        });
+        let needed = blend.spread();
+        if needed <= spread || !needed.is_finite() {
+            return blend.rows(model, i, x, &model.rest, needed, rows);
+        }
+        spread = needed;
+    }
 }
 
 /// The contact (or near miss, with depth <= 0) of proxy node `i` with a feature of `triangle`.
@@ -331,9 +436,8 @@ fn contact_at(
     let nodes = *model.object.triangles.get(t)?;
     let ClosestPoint { weights, feature } = point;
     let pseudonormal = surface::pseudonormal(positions, &model.object.triangles, &model.object.topology, t, feature);
-    let (normal, depth, curvature) =
-        measure(x, radius, surface::corners(positions, nodes), weights, feature, pseudonormal);
-    Some(Contact { proxy_node: i as u32, nodes, weights, normal, depth, share: 1.0, curvature, multiplier: 0.0 })
+    let measured = measure(x, radius, surface::corners(positions, nodes), weights, feature, pseudonormal);
+    Some(Contact::new(i as u32, nodes, weights, measured))
 }
 
 #[cfg(test)]
@@ -342,8 +446,8 @@ mod tests {
     use crate::object::Object;
     use crate::proxy::Chain;
     use crate::scene::{
-        Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
-        ProxySpec, Shape, SpringKind, SpringSpec,
+        Algorithm, Blending, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec,
+        ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
     };
 
     /// A fixed pseudo-random sequence in [-1, 1).
@@ -410,8 +514,13 @@ mod tests {
         let mut compared = 0;
         for radius in [0.0, 0.01] {
             let chain = nodes(30, radius);
-            let contact =
-                ContactSpec { stiffness: 1.0, algorithm: Algorithm::Energy, tolerance: 1e-8, max_iterations: 1 };
+            let contact = ContactSpec {
+                stiffness: 1.0,
+                algorithm: Algorithm::Energy,
+                tolerance: 1e-8,
+                max_iterations: 1,
+                blending: Blending::Width(0.0),
+            };
             let model = Model::new(&object, &chain, contact);
             let mut detection = Detection::new(&model);
             for _ in 0..40 {

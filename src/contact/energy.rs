@@ -12,6 +12,7 @@
 //! With the geometry frozen at rest (`linearised`) the same steps minimise the convex
 //! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`.
 
+use super::blend::{strength, together};
 use super::depth::Contact;
 use super::detection::{Detection, Walls};
 use super::model::Model;
@@ -181,7 +182,7 @@ impl EnergySearch {
             model,
             &self.state.displacement,
             &self.state.positions,
-            Walls::All,
+            if geometry == Geometry::Frozen { Walls::Closest } else { Walls::All },
             &mut self.state.contacts,
         );
         if geometry == Geometry::Frozen {
@@ -276,7 +277,8 @@ impl EnergySearch {
     fn energy_rounding(&self, nodes: &[DVec3]) -> f64 {
         let mut size = self.state.energy;
         for contact in &self.state.contacts {
-            size += self.kc * contact.depth.max(0.0) * nodes[contact.proxy_node as usize].length();
+            size +=
+                self.kc * contact.share.abs() * contact.depth.max(0.0) * nodes[contact.proxy_node as usize].length();
         }
         ENERGY_ROUNDING * size
     }
@@ -286,21 +288,24 @@ impl EnergySearch {
 #[must_use]
 pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
     let mut sum = 0.0;
-    for contact in contacts {
-        let depth = contact.depth.max(0.0);
-        sum += contact.share * depth * depth;
+    for rows in contacts.chunk_by(together) {
+        let depth = rows[0].depth.max(0.0);
+        sum += strength(rows) * depth * depth;
     }
     0.5 * kc * sum
 }
 
-/// Rows of the frozen problem that touch at `displacement`, with their depth there.
+/// Rows of the frozen problem with their depths at `displacement`.
 fn frozen_contacts(rows: &[Contact], displacement: &[f64], contacts: &mut Vec<Contact>) {
     contacts.clear();
-    for row in rows {
-        let mut depth = row.depth;
-        for (&node, weight) in row.nodes.iter().zip(row.weights) {
-            depth += weight * row.normal.dot(DVec3::from_slice(&displacement[3 * node as usize..]));
-        }
-        contacts.push(Contact { depth, ..*row });
+    for rows in rows.chunk_by(together) {
+        let moves = |row: &Contact| row.nodes.map(|node| DVec3::from_slice(&displacement[3 * node as usize..]));
+        let change = |row: &Contact| row.deepening(moves(row));
+        let depth = rows[0].depth
+            + match rows {
+                [row] if row.part.is_none() => change(row),
+                _ => rows.iter().map(|row| row.share * change(row)).sum(),
+            };
+        contacts.extend(rows.iter().map(|row| Contact { depth, ..*row }));
     }
 }

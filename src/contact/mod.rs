@@ -5,6 +5,7 @@
 use crate::JointVector;
 use glam::DVec3;
 
+mod blend;
 mod bounding_volumes;
 pub(crate) mod closest_point;
 pub(crate) mod depth;

@@ -1,5 +1,6 @@
 //! What contact needs to know of object and proxy, computed once and shared by all threads.
 
+use super::blend;
 use super::bounding_volumes::BoundingVolumes;
 use super::closest_point::Feature;
 use super::reach;
@@ -7,7 +8,7 @@ use super::surface;
 use crate::JointVector;
 use crate::object::{Compliance, Object, ObjectError};
 use crate::proxy::Chain;
-use crate::scene::ContactSpec;
+use crate::scene::{Algorithm, Blending, ContactSpec};
 use crate::tolerances::RIGID_STIFFNESS;
 use glam::DVec3;
 
@@ -25,6 +26,8 @@ pub struct Model<'a> {
     /// normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
     /// [`RIGID_STIFFNESS`] [N/m].
     pub kc: f64,
+    /// Width w over which facets pass into each other for point nodes, zero where they are sharp; see [`super::blend`] [m].
+    pub blending: f64,
     /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
     /// loses no digits.
     pub centre: DVec3,
@@ -36,6 +39,8 @@ pub struct Model<'a> {
     pub softest: f64,
     /// The triangles at rest, for closest-point queries.
     pub bounds: BoundingVolumes,
+    /// Areas of the triangles at rest [m^2].
+    pub rest_areas: Vec<f64>,
     /// Unit normals of the triangles at rest.
     pub rest_normals: Vec<DVec3>,
     /// Angle-weighted pseudonormals of the surface nodes at rest, not of length one.
@@ -83,6 +88,8 @@ impl<'a> Model<'a> {
         let rest_normals = (0..triangles.len())
             .map(|t| surface::pseudonormal(&rest, triangles, &object.topology, t, Feature::Face))
             .collect();
+        let area = |nodes: &[u32; 3]| 0.5 * surface::area_vector(surface::corners(&rest, *nodes)).length();
+        let rest_areas = triangles.iter().map(area).collect();
         let mut rest_pseudonormals = vec![DVec3::ZERO; rest.len()];
         for (t, triangle) in triangles.iter().enumerate() {
             for (k, &node) in triangle.iter().enumerate() {
@@ -100,16 +107,37 @@ impl<'a> Model<'a> {
             compliance,
             contact,
             kc: 0.0,
+            blending: 0.0,
             centre,
             extent,
             rest,
             softest,
             bounds,
+            rest_areas,
             rest_normals,
             rest_pseudonormals,
         };
+        model.set_blending(contact.blending);
         model.set_stiffness(contact.stiffness);
         model
+    }
+
+    /// Takes another blending.
+    pub fn set_blending(&mut self, blending: Blending) {
+        self.contact.blending = blending;
+        let points = self.chain.nodes.iter().any(|node| node.radius == 0.0);
+        self.blending = match blending {
+            _ if !points || self.contact.algorithm == Algorithm::Paper => 0.0,
+            Blending::Width(width) => width,
+            Blending::Mesh => blend::width(&self.rest, &self.object.triangles, &self.bounds),
+        };
+    }
+
+    /// By how much a proxy node's gap may be less than its signed distance to the surface less its radius: where smooth facets
+    /// bulge [m].
+    #[must_use]
+    pub fn bulge(&self, radius: f64) -> f64 {
+        if radius == 0.0 { self.blending } else { 0.0 }
     }
 
     /// Takes another contact stiffness Kc; infinity is rigid [N/m].

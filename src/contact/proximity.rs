@@ -18,16 +18,24 @@ impl<'a> Proximity<'a> {
         Self { model, pose: model.chain.new_pose(), detection: Detection::new(model) }
     }
 
-    /// The gap at the joint coordinates `q`, as [`super::Equilibrium::gap`] has it: the smallest signed distance of a proxy
-    /// node to the surface at rest, less its radius [m].
+    /// A lower bound of the gap at the joint coordinates `q`, [`super::Equilibrium::gap`], which no proxy node changes by more
+    /// than it moves: where facets are sharp, the gap itself [m].
     pub fn gap(&mut self, q: &[f64]) -> f64 {
         self.model.chain.pose(q, &mut self.pose);
-        self.detection.take_up(self.model, &self.pose.nodes)
+        let distance = self.detection.take_up(self.model, &self.pose.nodes);
+        if self.model.blending == 0.0 {
+            return distance;
+        }
+        self.clearances().fold(f64::INFINITY, f64::min)
     }
 
-    /// A lower bound of what each proxy node contributes to the last gap, its signed distance less its radius [m].
+    /// A lower bound of what each proxy node contributes to the last gap [m].
     pub fn clearances(&self) -> impl Iterator<Item = f64> {
-        self.detection.distances().zip(&self.model.chain.nodes).map(|(distance, node)| distance - node.radius)
+        let nodes = self.model.chain.nodes.iter();
+        self.detection
+            .distances()
+            .zip(nodes)
+            .map(|(distance, node)| distance - node.radius - self.model.bulge(node.radius))
     }
 
     /// The proxy's pose at the last configuration measured.

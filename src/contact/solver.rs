@@ -61,7 +61,7 @@ impl<'a> Solver<'a> {
             return unknown(joints);
         }
         model.chain.pose(q, &mut self.pose);
-        let gap = self.detection.take_up(model, &self.pose.nodes);
+        let gap = self.take_up();
         if !gap.is_finite() {
             return unknown(joints);
         }
@@ -97,7 +97,16 @@ impl<'a> Solver<'a> {
             return f64::NAN;
         }
         self.model.chain.pose(q, &mut self.pose);
-        self.detection.take_up(self.model, &self.pose.nodes)
+        self.take_up()
+    }
+
+    /// The gap of the configuration posed last, which detection takes up [m].
+    fn take_up(&mut self) -> f64 {
+        let distance = self.detection.take_up(self.model, &self.pose.nodes);
+        if self.model.blending == 0.0 || !distance.is_finite() {
+            return distance;
+        }
+        self.detection.gap(self.model)
     }
 
     /// Displacement u of the surface nodes at the last configuration solved, three numbers a node [m].

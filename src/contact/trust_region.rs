@@ -19,7 +19,8 @@
 // Indexed loops as in the kernel of the same name.
 #![allow(clippy::needless_range_loop)]
 
-use super::depth::{Contact, hessian_product, second_variation};
+use super::blend::{deepening, strength, together, vary};
+use super::depth::Contact;
 use super::support::{Support, dot, root};
 use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES};
 use glam::DVec3;
@@ -65,6 +66,8 @@ pub struct TrustRegion {
     direction_force: Vec<f64>,
     direction: Vec<f64>,
     image: Vec<f64>,
+    /// What the rows of one depth are brought nearer by [m].
+    own: Vec<f64>,
 }
 
 impl TrustRegion {
@@ -136,7 +139,7 @@ impl TrustRegion {
                 break;
             }
             self.image.copy_from_slice(&self.direction_force);
-            add_contact_hessian(springs, &self.touching, &self.direction, &mut self.image);
+            add_contact_hessian(springs, &self.touching, &self.direction, &mut self.own, &mut self.image);
             let curvature = dot(&self.direction, &self.image);
             let to_boundary = self.share_to_boundary(radius);
             let share = square / curvature;
@@ -179,24 +182,23 @@ impl TrustRegion {
 
     /// What the step deepens each contact by: g_i . du.
     fn deepen(&mut self, springs: Springs) {
-        for (k, contact) in springs.contacts.iter().enumerate() {
-            let v = nodes_of(&self.displacement, springs.slots[k]);
-            let mut deepening = 0.0;
-            for j in 0..3 {
-                deepening += contact.weights[j] * contact.normal.dot(v[j]);
-            }
-            self.deepening[k] = deepening;
-        }
+        let Self { deepening: all, displacement, own, .. } = self;
+        springs.for_each_depth(|first, rows| {
+            let v = |k: usize| nodes_of(displacement, springs.slots[first + k]);
+            all[first..first + rows.len()].fill(deepening(rows, v, own));
+        });
     }
 
     /// m(0) - m(df), in differences that do not cancel near the solution [J].
-    fn decrease(&self, springs: Springs, residual: &[f64]) -> f64 {
+    fn decrease(&mut self, springs: Springs, residual: &[f64]) -> f64 {
         let mut decrease = dot(&self.displacement, residual) - 0.5 * dot(&self.displacement, &self.force);
-        for (k, contact) in springs.contacts.iter().enumerate() {
-            let v = nodes_of(&self.displacement, springs.slots[k]);
-            let deepening = self.deepening[k];
-            let before = contact.depth.max(0.0);
-            let after = (contact.depth + deepening).max(0.0);
+        let Self { displacement, own, .. } = self;
+        springs.for_each_depth(|first, rows| {
+            let v = |k: usize| nodes_of(displacement, springs.slots[first + k]);
+            let Contact { depth, multiplier, .. } = rows[0];
+            let deepening = deepening(rows, v, own);
+            let before = depth.max(0.0);
+            let after = (depth + deepening).max(0.0);
             // The part of 1/2 kc depth^2 that is of first order is in the residual.
             let stretch = if before > 0.0 && after > 0.0 {
                 deepening * deepening
@@ -204,11 +206,10 @@ impl TrustRegion {
                 after * after - before * (before + 2.0 * deepening)
             };
             let mut bending = 0.0;
-            for (v, bend) in v.into_iter().zip(second_variation(contact, v)) {
-                bending += v.dot(bend);
-            }
-            decrease -= 0.5 * contact.share * (springs.kc * stretch + contact.multiplier * bending);
-        }
+            vary(rows, v, own, |k, bend| bending += inner(v(k), bend));
+            let share = strength(rows);
+            decrease -= 0.5 * (share * springs.kc * stretch + multiplier * bending);
+        });
         decrease
     }
 
@@ -228,40 +229,62 @@ impl TrustRegion {
         for k in 0..residual.len() {
             self.residual[k] = residual[k] - self.force[k];
         }
-        for (k, contact) in springs.contacts.iter().enumerate() {
-            let v = nodes_of(&self.displacement, springs.slots[k]);
-            let push = springs.kc * ((contact.depth + self.deepening[k]).max(0.0) - contact.depth.max(0.0));
-            let mut force = second_variation(contact, v);
-            for j in 0..3 {
-                force[j] =
-                    -(contact.normal * (push * contact.weights[j]) + force[j] * contact.multiplier) * contact.share;
-            }
-            add_on_nodes(force, springs.slots[k], &mut self.residual);
+        let Self { displacement, own, residual, .. } = self;
+        springs.for_each_depth(|first, rows| {
+            let v = |k: usize| nodes_of(displacement, springs.slots[first + k]);
+            let Contact { depth, multiplier, .. } = rows[0];
+            let push = springs.kc * ((depth + deepening(rows, v, own)).max(0.0) - depth.max(0.0));
+            vary(rows, v, own, |k, bend| {
+                let spread = rows[k].spread(push);
+                let force = [0, 1, 2].map(|j| -(spread[j] + bend[j] * multiplier));
+                add_on_nodes(force, springs.slots[first + k], residual);
+            });
+        });
+    }
+}
+
+impl<'a> Springs<'a> {
+    /// Visits the rows of each depth, with the place of the first.
+    fn for_each_depth(self, mut visit: impl FnMut(usize, &'a [Contact])) {
+        let mut first = 0;
+        for rows in self.contacts.chunk_by(together) {
+            visit(first, rows);
+            first += rows.len();
         }
     }
 }
 
 /// Adds B p, the product of the Hessian of the contact terms with the displacement `p` on the support, to `product`.
-pub fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], product: &mut [f64]) {
-    for (k, contact) in springs.contacts.iter().enumerate() {
-        if touching[k] || contact.multiplier != 0.0 {
-            let kc = if touching[k] { springs.kc } else { 0.0 };
-            add_on_nodes(hessian_product(contact, kc, nodes_of(p, springs.slots[k])), springs.slots[k], product);
+fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], own: &mut Vec<f64>, product: &mut [f64]) {
+    springs.for_each_depth(|first, rows| {
+        let multiplier = rows[0].multiplier;
+        if !touching[first] && multiplier == 0.0 {
+            return;
         }
-    }
+        let v = |k: usize| nodes_of(p, springs.slots[first + k]);
+        let deepening = deepening(rows, v, own);
+        let push = if touching[first] { springs.kc * deepening } else { 0.0 };
+        vary(rows, v, own, |k, bend| {
+            let spread = rows[k].spread(push);
+            add_on_nodes([0, 1, 2].map(|j| spread[j] + bend[j] * multiplier), springs.slots[first + k], product);
+        });
+    });
 }
 
 /// Adds the forces of the contact springs on the object's nodes, -kc depth_i w_ij N_i, to `forces` on the support.
 pub fn add_contact_forces(springs: Springs, forces: &mut [f64]) {
-    for (k, contact) in springs.contacts.iter().enumerate() {
-        let push = contact.normal * (-springs.kc * contact.share * contact.depth.max(0.0));
-        add_on_nodes(contact.weights.map(|weight| push * weight), springs.slots[k], forces);
+    for (contact, &slots) in springs.contacts.iter().zip(springs.slots) {
+        add_on_nodes(contact.spread(-springs.kc * contact.depth.max(0.0)), slots, forces);
     }
 }
 
 /// The three nodes' parts of a vector on the support.
 fn nodes_of(vector: &[f64], slots: [usize; 3]) -> [DVec3; 3] {
     slots.map(|slot| DVec3::from_slice(&vector[3 * slot..]))
+}
+
+fn inner(a: [DVec3; 3], b: [DVec3; 3]) -> f64 {
+    a[0].dot(b[0]) + a[1].dot(b[1]) + a[2].dot(b[2])
 }
 
 /// Adds one vector for each of three nodes to a vector on the support.

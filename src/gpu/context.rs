@@ -76,6 +76,9 @@ pub enum GpuError {
         /// Nodes that are taken.
         limit: usize,
     },
+    /// The kernels take facets as they are.
+    #[error("the GPU does not solve contact with blending. Use --backend cpu, or leave `blending` out of [contact]")]
+    Blending,
     /// Outputs that no invocation wrote: a dispatch was cut short.
     #[error(
         "the GPU left {count} of {total} results unwritten. Use --backend cpu, and report this with `haptize doctor`"

@@ -188,20 +188,11 @@ fn depth_and_its_derivatives_are_the_twins() {
         }
         compared += 1;
         let face = unit_or_zero(doubled);
-        let (normal, depth, curvature) = measure(DVec3::ZERO, 0.0, corners, point.weights, point.feature, face);
+        let measured @ (normal, depth, _) = measure(DVec3::ZERO, 0.0, corners, point.weights, point.feature, face);
         assert!((depth - f64::from(answer.depth)).abs() < 4.0 * DISTANCE_ROUNDING);
         // Directions: rounding over the shortest length that is divided by.
         assert!(normal.distance(vector(&answer.normal)) < 1e-4, "{normal} {:?}", answer.normal);
-        let contact = Contact {
-            proxy_node: 0,
-            nodes: [0, 1, 2],
-            weights: point.weights,
-            normal,
-            depth,
-            share: 1.0,
-            multiplier: 0.0,
-            curvature,
-        };
+        let contact = Contact::new(0, [0, 1, 2], point.weights, measured);
         let moves = question.moves.map(|v| vector(&v));
         let reference = second_variation(&contact, moves);
         let size = reference.iter().map(|v| v.length()).fold(0.0, f64::max);

@@ -39,8 +39,8 @@ pub struct ProxyNode {
     pub position: DVec3,
     /// Columns of J_i, one per joint [m/rad, or 1].
     pub jacobian: Vec<DVec3>,
-    /// What it touches, where it does.
-    pub contact: Option<Contact>,
+    /// What it touches: nothing, one feature of the surface, or all that its radius or its blended depth involve.
+    pub contacts: Vec<Contact>,
 }
 
 /// A contact of a proxy node.
@@ -86,11 +86,12 @@ impl Inspection {
                 link: chain.joints[specified.link].name.clone(),
                 position,
                 jacobian: (0..chain.joints.len()).map(|joint| chain.jacobian_column(pose, node, joint)).collect(),
-                contact: equilibrium
+                contacts: equilibrium
                     .touches
                     .iter()
-                    .find(|touch| touch.proxy_node as usize == node)
-                    .map(|touch| Contact { force: touch.force, nodes: touch.nodes, weights: touch.weights }),
+                    .filter(|touch| touch.proxy_node as usize == node)
+                    .map(|touch| Contact { force: touch.force, nodes: touch.nodes, weights: touch.weights })
+                    .collect(),
             });
         let proxy_nodes = proxy_nodes.collect();
         let Equilibrium { status, iterations, residual, energy, gap, torque, .. } = equilibrium;
@@ -112,7 +113,7 @@ impl Inspection {
     pub fn torque_of_contacts(&self) -> JointVector {
         let mut torque = JointVector::zeros(self.q.len());
         for node in &self.proxy_nodes {
-            if let Some(contact) = node.contact {
+            for contact in &node.contacts {
                 torque.iter_mut().zip(&node.jacobian).for_each(|(tau, column)| *tau += column.dot(contact.force));
             }
         }

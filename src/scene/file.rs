@@ -115,10 +115,11 @@ pub(super) struct NodesTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ContactTable {
-    pub stiffness: Spanned<ContactStiffness>,
+    pub stiffness: Spanned<NumberOr<Rigid>>,
     pub algorithm: Option<Algorithm>,
     pub tolerance: Option<Number>,
     pub max_iterations: Option<Spanned<u32>>,
+    pub blending: Option<Spanned<NumberOr<Mesh>>>,
 }
 
 #[derive(Deserialize)]
@@ -284,41 +285,62 @@ pub(super) struct SimulatedTable {
     pub joint_friction: Option<Number>,
 }
 
-/// A number, or "rigid".
+/// A number, or one word instead.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum ContactStiffness {
-    Springs(f64),
-    Rigid,
+pub(super) enum NumberOr<W> {
+    Number(f64),
+    Word(W),
 }
 
-impl<'de> Deserialize<'de> for ContactStiffness {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct NumberOrRigid;
+/// A word that may stand instead of a number.
+pub(super) trait Word: Default {
+    const WORD: &'static str;
+}
 
-        impl Visitor<'_> for NumberOrRigid {
-            type Value = ContactStiffness;
+/// Contact as stiff as makes no difference.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Rigid;
+
+impl Word for Rigid {
+    const WORD: &'static str = "rigid";
+}
+
+/// As the object's mesh suggests.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Mesh;
+
+impl Word for Mesh {
+    const WORD: &'static str = "mesh";
+}
+
+impl<'de, W: Word> Deserialize<'de> for NumberOr<W> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visit<W>(std::marker::PhantomData<W>);
+
+        impl<W: Word> Visitor<'_> for Visit<W> {
+            type Value = NumberOr<W>;
 
             fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("a number or \"rigid\"")
+                write!(f, "a number or {:?}", W::WORD)
             }
 
-            fn visit_f64<E>(self, value: f64) -> Result<ContactStiffness, E> {
-                Ok(ContactStiffness::Springs(value))
+            fn visit_f64<E>(self, value: f64) -> Result<Self::Value, E> {
+                Ok(NumberOr::Number(value))
             }
 
-            fn visit_i64<E>(self, value: i64) -> Result<ContactStiffness, E> {
-                Ok(ContactStiffness::Springs(value as f64))
+            fn visit_i64<E>(self, value: i64) -> Result<Self::Value, E> {
+                Ok(NumberOr::Number(value as f64))
             }
 
-            fn visit_str<E: serde::de::Error>(self, value: &str) -> Result<ContactStiffness, E> {
-                match value {
-                    "rigid" => Ok(ContactStiffness::Rigid),
-                    _ => Err(E::invalid_value(serde::de::Unexpected::Str(value), &self)),
+            fn visit_str<E: serde::de::Error>(self, value: &str) -> Result<Self::Value, E> {
+                if value == W::WORD {
+                    return Ok(NumberOr::Word(W::default()));
                 }
+                Err(E::invalid_value(serde::de::Unexpected::Str(value), &self))
             }
         }
 
-        deserializer.deserialize_any(NumberOrRigid)
+        deserializer.deserialize_any(Visit(std::marker::PhantomData))
     }
 }
 

@@ -182,6 +182,18 @@ pub struct ContactSpec {
     pub tolerance: f64,
     /// After as many a configuration that has not converged is flagged.
     pub max_iterations: u32,
+    /// Over what width facets pass into each other for nodes without a radius.
+    pub blending: Blending,
+}
+
+/// Over what width along the surface its facets pass into each other, for proxy nodes without a radius, so that their depth has
+/// a continuous gradient.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Blending {
+    /// As the mesh suggests: half its mean edge, less where the object is thin.
+    Mesh,
+    /// So much; zero leaves facets as they are [m].
+    Width(f64),
 }
 
 /// How equation (2) is solved for one configuration.

@@ -4,6 +4,7 @@
 
 mod analytic;
 mod balance;
+mod blending;
 mod comparison;
 mod convex;
 mod fixture;

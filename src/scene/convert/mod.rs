@@ -10,8 +10,8 @@ mod scan;
 
 use super::check::Checker;
 use super::error::SceneError;
-use super::file::{ContactStiffness, ContactTable, SceneTable};
-use super::{Algorithm, ContactSpec, Rendering, ScanScene, Scene};
+use super::file::{ContactTable, NumberOr, SceneTable};
+use super::{Algorithm, Blending, ContactSpec, Rendering, ScanScene, Scene};
 use toml::Spanned;
 
 /// Default relative residual of the contact solver, in the energy norm [1]. Forces are promised to balance K u to 1e-6 of the
@@ -77,6 +77,21 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
     })
 }
 
+fn blending(checker: &Checker<'_>, table: &ContactTable) -> Result<Blending, SceneError> {
+    let Some(value) = &table.blending else { return Ok(Blending::Width(0.0)) };
+    if table.algorithm == Some(Algorithm::Paper) {
+        let reason =
+            "blending acts on the energy form: the paper's iteration takes facets as they are; leave one of them out";
+        return Err(checker.error(value.span(), reason));
+    }
+    match value.get_ref() {
+        NumberOr::Number(width) => {
+            Ok(Blending::Width(checker.not_negative("blending", &Spanned::new(value.span(), *width))?))
+        }
+        NumberOr::Word(_) => Ok(Blending::Mesh),
+    }
+}
+
 fn contact(checker: &Checker<'_>, table: &ContactTable) -> Result<ContactSpec, SceneError> {
     let tolerance = table.tolerance.as_ref().map(|value| checker.between("tolerance", value, 0.0, 1.0));
     let max_iterations = match &table.max_iterations {
@@ -88,13 +103,12 @@ fn contact(checker: &Checker<'_>, table: &ContactTable) -> Result<ContactSpec, S
     };
     Ok(ContactSpec {
         stiffness: match table.stiffness.get_ref() {
-            ContactStiffness::Springs(value) => {
-                checker.positive("stiffness", &Spanned::new(table.stiffness.span(), *value))?
-            }
-            ContactStiffness::Rigid => f64::INFINITY,
+            NumberOr::Number(value) => checker.positive("stiffness", &Spanned::new(table.stiffness.span(), *value))?,
+            NumberOr::Word(_) => f64::INFINITY,
         },
         algorithm: table.algorithm.unwrap_or(Algorithm::Energy),
         tolerance: tolerance.unwrap_or(Ok(CONTACT_TOLERANCE))?,
         max_iterations,
+        blending: blending(checker, table)?,
     })
 }

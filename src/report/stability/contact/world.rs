@@ -6,8 +6,8 @@ use crate::{
     object::Object,
     proxy::Chain,
     scene::{
-        Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
-        ProxySpec, Shape, SpringKind, SpringSpec,
+        Algorithm, Blending, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec,
+        ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
     },
 };
 use glam::DVec3;
@@ -187,5 +187,11 @@ pub fn pressed(model: &Model<'_>, seed: u64, count: usize, least: f64, most: f64
 /// The energy form with contact springs Kc [N/m]; infinity is rigid.
 #[must_use]
 pub fn contact(stiffness: f64) -> ContactSpec {
-    ContactSpec { stiffness, algorithm: Algorithm::Energy, tolerance: 1e-8, max_iterations: ITERATIONS }
+    ContactSpec {
+        stiffness,
+        algorithm: Algorithm::Energy,
+        tolerance: 1e-8,
+        max_iterations: ITERATIONS,
+        blending: Blending::Width(0.0),
+    }
 }

@@ -1,0 +1,154 @@
+//! Facets that pass into each other: continuous torque, exact depth below a plane, one smooth surface from inside and outside.
+
+use crate::fixture::{arm, contact, octahedron, probe, random_configurations, sphere};
+use glam::DVec3;
+use haptize::JointVector;
+use haptize::contact::{Model, Solver, Status};
+use haptize::haptize::Inspection;
+use haptize::proxy::Chain;
+use haptize::scene::{Algorithm, Blending, ContactSpec, SpringKind};
+
+fn blended(algorithm: Algorithm, stiffness: f64, blending: Blending) -> ContactSpec {
+    ContactSpec { blending, ..contact(algorithm, stiffness) }
+}
+
+/// Largest change of torque between neighbours of `steps` + 1 configurations on the way from `a` to `b`, over its size.
+fn largest_step(solver: &mut Solver, a: &[f64], b: &[f64], steps: u32) -> f64 {
+    let (mut largest, mut size) = (0.0f64, 0.0f64);
+    let mut before: Option<JointVector> = None;
+    for k in 0..=steps {
+        let share = f64::from(k) / f64::from(steps);
+        let q: Vec<f64> = a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
+        let now = solver.solve(&q).torque;
+        size = size.max(now.norm());
+        if let Some(before) = before {
+            let change = before.iter().zip(now.iter()).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt();
+            largest = largest.max(change);
+        }
+        before = Some(now);
+    }
+    largest / size.max(1e-9)
+}
+
+/// Ten times finer steps change torque ten times less, where sharp facets make it jump. The paths are as deep as a tenth of the
+/// radius: deeper, this sphere of springs without bending stiffness may buckle from one equilibrium to another, whatever the
+/// facets are.
+#[test]
+fn torque_is_continuous_along_paths() {
+    let object = sphere(SpringKind::Isotropic);
+    let chain = Chain::new(&arm(0.0));
+    let sharp = Model::new(&object, &chain, contact(Algorithm::Energy, 500.0));
+    let smooth = Model::new(&object, &chain, blended(Algorithm::Energy, 500.0, Blending::Mesh));
+    assert!(smooth.blending > 0.004 && smooth.blending < 0.02, "{} m", smooth.blending);
+    let (mut sharp, mut smooth) = (Solver::new(&sharp), Solver::new(&smooth));
+    let (mut paths, mut jumps) = (0, 0);
+    for q in random_configurations(21, 1200) {
+        let gap = smooth.gap(&q);
+        if !(-0.005..-0.001).contains(&gap) || paths == 16 {
+            continue;
+        }
+        paths += 1;
+        let end: Vec<f64> = q.iter().zip([0.05, -0.0025, 0.005]).map(|(q, step)| q + step).collect();
+        let (coarse, fine) = (largest_step(&mut smooth, &q, &end, 100), largest_step(&mut smooth, &q, &end, 1000));
+        assert!(fine < coarse / 7.0, "{coarse} to {fine} from {q:?}");
+        let (coarse, fine) = (largest_step(&mut sharp, &q, &end, 100), largest_step(&mut sharp, &q, &end, 1000));
+        jumps += usize::from(fine > coarse / 2.0);
+    }
+    assert!(paths == 16 && jumps >= 2, "{jumps} of {paths} jump between sharp facets");
+}
+
+/// tau = -dU/dq everywhere, without a kink to leave out, down to a tenth of the radius as above.
+#[test]
+fn torque_is_minus_the_gradient_of_stored_energy() {
+    let h = 2e-6;
+    let object = sphere(SpringKind::Isotropic);
+    let chain = Chain::new(&arm(0.0));
+    let model = Model::new(&object, &chain, blended(Algorithm::Energy, 500.0, Blending::Mesh));
+    let mut solver = Solver::new(&model);
+    let mut derivatives = 0;
+    for q in random_configurations(6, 400) {
+        let here = solver.solve(&q);
+        if here.status != Status::Contact || here.gap < -0.005 {
+            continue;
+        }
+        for joint in 0..q.len() {
+            let mut at = |step: f64| {
+                let mut q = q.clone();
+                q[joint] += step;
+                solver.solve(&q).energy
+            };
+            let slope = (at(h) - at(-h)) / (2.0 * h);
+            let scale = here.torque.norm().max(1e-3);
+            assert!((slope + here.torque[joint]).abs() < 1e-5 * scale, "{slope} against {:?}", here.torque);
+            derivatives += 1;
+        }
+    }
+    assert!(derivatives > 40, "{derivatives}");
+}
+
+/// On the middle of a face, farther from its edges than facets blend, nothing changes.
+#[test]
+fn below_a_plane_nothing_changes() {
+    let object = octahedron();
+    let middle = DVec3::splat(0.1 / 2.0f64.sqrt() / 3.0);
+    let chain = probe(middle, -DVec3::ONE.normalize());
+    let sharp = Model::new(&object, &chain, contact(Algorithm::Energy, 500.0));
+    let smooth = Model::new(&object, &chain, blended(Algorithm::Energy, 500.0, Blending::Width(0.015)));
+    let near = Model::new(&object, &chain, blended(Algorithm::Energy, 500.0, Blending::Width(0.05)));
+    for depth in [-0.001, 0.001, 0.003] {
+        let [sharp, smooth, near] = [&sharp, &smooth, &near].map(|model| Solver::new(model).solve(&[depth]));
+        assert_eq!(sharp.status, smooth.status);
+        assert!((sharp.gap - smooth.gap).abs() < 1e-15);
+        assert!((sharp.energy - smooth.energy).abs() <= 1e-9 * sharp.energy);
+        assert!((sharp.torque[0] - smooth.torque[0]).abs() <= 1e-9 * sharp.torque[0].abs());
+        assert!((sharp.gap - near.gap).abs() > 1e-6, "wide enough to feel the other faces");
+    }
+}
+
+/// The gap is one continuous function inside and outside, contact begins where it is zero, and linearised contact tends to the
+/// energy form there.
+#[test]
+fn one_surface_decides_contact_from_inside_and_outside() {
+    let object = sphere(SpringKind::Isotropic);
+    let chain = probe(crate::fixture::SPHERE_CENTRE + DVec3::new(0.011, 0.007, 0.056), -DVec3::Z);
+    let model = Model::new(&object, &chain, blended(Algorithm::Energy, 500.0, Blending::Mesh));
+    let frozen = Model::new(&object, &chain, blended(Algorithm::Linearised, 500.0, Blending::Mesh));
+    let (mut solver, mut frozen) = (Solver::new(&model), Solver::new(&frozen));
+    let (mut before, mut inside, mut outside) = (None::<f64>, 0, 0);
+    for k in 0..=400 {
+        let result = solver.solve(&[f64::from(k) * 2.5e-5]);
+        assert_eq!(result.status == Status::Free, result.gap >= 0.0);
+        if let Some(before) = before {
+            // No steeper than the node moves, but for the slope of the blend.
+            assert!((result.gap - before).abs() < 1.5 * 2.5e-5 && result.gap < before, "{before} to {}", result.gap);
+        }
+        before = Some(result.gap);
+        *(if result.gap < 0.0 { &mut inside } else { &mut outside }) += 1;
+        if result.gap < 0.0 && result.gap > -1e-4 {
+            let linear = frozen.solve(&[f64::from(k) * 2.5e-5]);
+            assert!(
+                (linear.torque[0] / result.torque[0] - 1.0).abs() < 0.01,
+                "{} {}",
+                linear.torque[0],
+                result.torque[0]
+            );
+        }
+    }
+    assert!(inside > 50 && outside > 50);
+}
+
+/// A depth made of many features is told whole: their forces make the torque.
+#[test]
+fn an_inspection_tells_all_features_of_a_blended_depth() {
+    let object = sphere(SpringKind::Isotropic);
+    let chain = Chain::new(&arm(0.0));
+    let model = Model::new(&object, &chain, blended(Algorithm::Energy, 500.0, Blending::Mesh));
+    let mut solver = Solver::new(&model);
+    let touching = |q: &Vec<f64>| solver.solve(q).status == Status::Contact;
+    let q = random_configurations(6, 60).into_iter().find(touching).unwrap();
+    let inspection = Inspection::new(&model, &q);
+    assert!(inspection.proxy_nodes.iter().any(|node| node.contacts.len() > 1));
+    for (found, expected) in inspection.torque_of_contacts().iter().zip(&inspection.torque) {
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
+}
