@@ -90,7 +90,8 @@ impl<'a> FreeSpace<'a> {
         }
         let sheet = line * count;
         // Slabs of equally many lines, as nearly as can be.
-        let lines = line * count.div_ceil(sheet.div_ceil(self.most).min(count));
+        let fitting = (self.most / line).max(1);
+        let lines = line * count.div_ceil(count.div_ceil(fitting));
         let start = point / sheet * sheet;
         let first = start + (point - start) / lines * lines;
         first..(first + lines).min(start + sheet)
