@@ -202,36 +202,3 @@ fn scenes_name_effects_or_have_none_and_what_cannot_act_is_an_error_with_its_lin
     let message = Rendering::parse(&format!("{scan}\n[graphics]\nsmoothing = 0.1\n"), "scan.toml").unwrap_err();
     assert!(message.to_string().contains("the scene has none: leave it out"), "{message}");
 }
-
-/// Printed, not judged: a frame of 10,000 nodes at 60 Hz has 16.7 ms.
-#[test]
-#[ignore = "measures time: run it alone, on an idle machine"]
-fn measure_a_frame_of_ten_thousand_nodes() {
-    use std::time::Instant;
-    for kind in [SpringKind::Isotropic, SpringKind::Axial] {
-        let began = Instant::now();
-        let object = sphere(kind, 300.0, 100);
-        let built = began.elapsed();
-        for effects in [effects(4.0)[0], effects(4.0)[3], GraphicsEffects { quasi_static: true, ..NONE }] {
-            let began = Instant::now();
-            let mut motion = ObjectMotion::new(&object, 1.0 / 60.0, &effects).unwrap();
-            let factorised = began.elapsed();
-            let forces = push(object.rest.len(), 0, 1e-3);
-            let mut costs: Vec<f64> = (0..60)
-                .map(|_| {
-                    let began = Instant::now();
-                    motion.step(&forces);
-                    began.elapsed().as_secs_f64() * 1e3
-                })
-                .collect();
-            costs.sort_by(f64::total_cmp);
-            println!(
-                "{kind:?} {} nodes, {:.0} MB: built {built:.2?}, set up {factorised:.2?}, frame {:.1} ms, 95 % {:.1} ms; {effects:?}",
-                object.rest.len(),
-                motion.bytes() as f64 * 1e-6,
-                costs[30],
-                costs[57]
-            );
-        }
-    }
-}

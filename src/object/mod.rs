@@ -18,6 +18,7 @@ mod sphere;
 mod springs;
 mod stiffening;
 mod stiffness;
+mod substitution;
 mod topology;
 
 pub use compliance::Compliance;

@@ -40,6 +40,12 @@ impl Stiffness {
         self.offsets.len().saturating_sub(1)
     }
 
+    /// Whether every block is a multiple of the identity, so that K acts on the three coordinates alike and apart.
+    #[must_use]
+    pub fn is_isotropic(&self) -> bool {
+        self.blocks.iter().all(|block| *block == DMat3::from_diagonal(DVec3::splat(block.x_axis.x)))
+    }
+
     /// Column and block of each stored entry of row `node`, ascending.
     pub fn row(&self, node: usize) -> impl Iterator<Item = (usize, &DMat3)> {
         let range = self.offsets[node]..self.offsets[node + 1];

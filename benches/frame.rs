@@ -1,0 +1,100 @@
+//! What one frame of the object in motion costs on the CPU, at 10,000 and 100,000 nodes: isotropic springs, which are solved
+//! coordinate by coordinate, beside axial ones, which need the whole matrix; and the time and memory of what is made once.
+//!
+//!     cargo bench --bench frame
+
+#![allow(clippy::unwrap_used)] // A benchmark may stop.
+
+use glam::DVec3;
+use haptize::{
+    object::Object,
+    render::object_motion::ObjectMotion,
+    scene::{
+        GraphicsEffects, GroundNodes, GroundSpec, Material, ObjectSpec, Shape, SpringKind, SpringSpec, StiffeningSpec,
+    },
+};
+use std::time::{Duration, Instant};
+
+/// Frames a figure is taken from.
+const FRAMES: usize = 40;
+
+/// Time that this thread has been computing, whatever else the machine does meanwhile.
+#[cfg(unix)]
+fn processor_time() -> Duration {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `time` is valid for writing, and every thread has such a clock.
+    unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
+    Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec as u32)
+}
+
+/// Where the system does not tell: time that passes.
+#[cfg(not(unix))]
+fn processor_time() -> Duration {
+    static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
+    START.get_or_init(Instant::now).elapsed()
+}
+
+fn sphere(kind: SpringKind, rings: usize) -> Object {
+    Object::build(&ObjectSpec {
+        shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings, segments: rings },
+        material: Material::Springs(SpringSpec { kind, stiffness: 300.0 }),
+        ground: GroundSpec { stiffness: 90.0, nodes: GroundNodes::All },
+        node_mass: 1e-3,
+        node_damping: 0.02,
+    })
+    .unwrap()
+}
+
+/// Processor time of `work` [s], and what it made.
+fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let start = processor_time();
+    let made = work();
+    ((processor_time() - start).as_secs_f64(), made)
+}
+
+fn main() {
+    let effects = [
+        ("dynamics", GraphicsEffects::default()),
+        (
+            "stiffening",
+            GraphicsEffects { stiffening: Some(StiffeningSpec { factor: 4.0, strain: 0.05 }), ..Default::default() },
+        ),
+        ("quasi-static", GraphicsEffects { quasi_static: true, ..Default::default() }),
+    ];
+    println!(
+        "  nodes  springs    effects       built [s]  set up [s]  factor [MB]  frame [ms]  passed: median, 95 % [ms]  over isotropic"
+    );
+    for rings in [100, 316] {
+        let mut isotropic = [0.0; 3];
+        for kind in [SpringKind::Isotropic, SpringKind::Axial] {
+            let (built, object) = timed(|| sphere(kind, rings));
+            let nodes = object.rest.len();
+            let forces: Vec<DVec3> = (0..nodes).map(|k| DVec3::new(1e-4, 0.0, -1e-3 * (k % 7) as f64)).collect();
+            for (number, (name, effects)) in effects.iter().enumerate() {
+                let (set_up, motion) = timed(|| ObjectMotion::new(&object, 1.0 / 60.0, effects));
+                let mut motion = motion.unwrap();
+                let mut costs: Vec<(f64, f64)> = (0..FRAMES)
+                    .map(|_| {
+                        let began = Instant::now();
+                        let (cost, ()) = timed(|| {
+                            motion.step(&forces);
+                        });
+                        (1e3 * cost, 1e3 * began.elapsed().as_secs_f64())
+                    })
+                    .collect();
+                costs.sort_by(|a, b| a.0.total_cmp(&b.0));
+                let frame = costs[FRAMES / 2].0;
+                costs.sort_by(|a, b| a.1.total_cmp(&b.1));
+                let (median, late) = (costs[FRAMES / 2].1, costs[FRAMES * 95 / 100].1);
+                if kind == SpringKind::Isotropic {
+                    isotropic[number] = frame;
+                }
+                let (kind, megabytes) = (format!("{kind:?}"), object.factor.bytes() as f64 * 1e-6);
+                let ratio = frame / isotropic[number];
+                println!(
+                    "{nodes:7}  {kind:9}  {name:12}  {built:9.2}  {set_up:10.2}  {megabytes:11.1}  {frame:10.2}  {median:14.1}, {late:9.1}  {ratio:14.1}"
+                );
+            }
+        }
+    }
+}
