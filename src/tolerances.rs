@@ -199,6 +199,10 @@ pub const LEAST_INTERVAL: f64 = 1e-6;
 /// says nothing about the velocity.
 pub const GREATEST_INTERVAL: f64 = 0.1;
 
+/// Time over which the mean time between ticks is taken [s]: two of [`GREATEST_INTERVAL`], so that one such pause lengthens the
+/// mean by half only, while persistent overruns are found within a second.
+pub const PACE_WINDOW: f64 = 2.0 * GREATEST_INTERVAL;
+
 /// Energy that the loop may give the device from nowhere before its torque is brought to zero [J]: what 0.1 kg at the hand
 /// has at 1.4 m/s, which a hand stops within a centimetre with 10 N.
 pub const GREATEST_GIVEN_ENERGY: f64 = 0.1;

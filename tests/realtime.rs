@@ -15,10 +15,11 @@ use haptize::{
     device::{Device, HandError, Motion, Pointer, SimulatedHand},
     render::{
         field::TorqueField,
+        flags::Fault,
         haptic::{Haptics, Inputs},
         realtime::{self, Ends, HapticLoop},
         recording::Recording,
-        session::Plan,
+        session::{Driver, Plan},
         setup::labels,
     },
     scene::Waypoint,
@@ -40,10 +41,15 @@ fn build(data: &Dataset) -> Haptics {
     Haptics::new(field, proxy(joints), &spec).unwrap()
 }
 
+/// A hand that leads all joints alike through (time, place).
+fn along<const N: usize>(joints: usize, places: [(f64, f64); N]) -> SimulatedHand {
+    let way = places.map(|(time, x)| Waypoint { time, q: JointVector::from_slice(&vec![x; joints]) });
+    SimulatedHand::new(&haptics(joints), Motion::through(&way, joints).unwrap()).unwrap()
+}
+
+/// In and out of the object.
 fn hand(joints: usize) -> SimulatedHand {
-    let waypoint = |time, x| Waypoint { time, q: JointVector::from_slice(&vec![x; joints]) };
-    let motion = Motion::through(&[waypoint(0.0, -0.2), waypoint(0.1, 0.3), waypoint(0.3, -0.2)], joints).unwrap();
-    SimulatedHand::new(&haptics(joints), motion).unwrap()
+    along(joints, [(0.0, -0.2), (0.1, 0.3), (0.3, -0.2)])
 }
 
 #[test]
@@ -145,4 +151,38 @@ fn a_place_that_is_none_is_refused_and_the_hand_keeps_its_goal() {
     assert_eq!(pointer.move_to(&other), Err(HandError::Joints { told: 3, device: 2 }));
     assert!(Pointer::new(&haptics(2), &other).is_err());
     assert_eq!(device.read(1e-3).hand, start);
+}
+
+#[test]
+fn a_loop_that_keeps_missing_its_deadlines_lets_go_without_a_jump_and_says_why() {
+    let data = object(3);
+    let haptics = build(&data);
+    // Time is told, not waited for: pressed for a second on time, then as the machine allows.
+    let run = |late: f64| {
+        let mut hand = along(3, [(0.0, -0.2), (0.5, 0.3)]);
+        let mut driver = Driver::new(&haptics, &mut hand).unwrap();
+        let (mut before, mut greatest) = (JointVector::zeros(3), 0.0);
+        for k in 0..2000 {
+            let interval = if k < 1000 { 1e-3 } else { late };
+            let (tick, _) = driver.tick(interval, interval);
+            let change = |a: usize| (tick.device_torque[a] - before[a]).abs() / (1e-3_f64).max(interval);
+            greatest = (0..3).map(change).fold(greatest, f64::max);
+            if k == 999 {
+                assert!(tick.fault.is_none() && tick.device_torque.norm() > 0.1, "{tick:?}");
+            }
+            if tick.fault.is_some() && tick.device_torque.norm() == 0.0 {
+                return (tick.fault, tick.time, greatest);
+            }
+            before = tick.device_torque;
+        }
+        (None, f64::INFINITY, greatest)
+    };
+    for late in [0.012, 0.05, 0.1] {
+        let (fault, when, greatest) = run(late);
+        assert_eq!(fault, Some(Fault::Overrun), "{late} s");
+        assert!(when < 2.0, "{late} s: without torque only after {when} s");
+        // No faster than the device's greatest rate, 500 N m/s.
+        assert!(greatest <= 500.0 * (1.0 + 1e-12), "{late} s: {greatest} N m/s");
+    }
+    assert_eq!(run(0.008).0, None);
 }

@@ -31,12 +31,14 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let setting = Setting { effort, gpu };
     let bar = bar(cases.len() as u64, "{wide_bar} {pos}/{len} cases, {msg}, {elapsed}");
     let started = Instant::now();
-    let mut outcomes = Vec::new();
+    let (mut outcomes, mut spent) = (Vec::new(), Vec::new());
     for case in &cases {
+        let began = Instant::now();
         bar.set_message(format!("{}: {}", case.room, case.name));
         // A case that cannot be run has not passed.
         let found = (case.run)(&setting).unwrap_or_else(|error| vec![not_run(case, &error)]);
         outcomes.extend(found.into_iter().map(|outcome| (case.room, outcome)));
+        spent.push((case, began.elapsed().as_secs_f64()));
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -55,8 +57,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         Some(folder) => write_all(folder, &outcomes, &adapter)?,
         None => Vec::new(),
     };
+    spent.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let row = |(case, seconds): &(&Case, f64)| serde_json::json!({ "room": case.room, "case": case.name, "seconds": seconds });
     let json = serde_json::json!({
         "outcomes": rows, "failed": failed, "adapter": adapter, "seconds": seconds,
+        "spent": spent.iter().map(row).collect::<Vec<_>>(),
         "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
     });
     let mut text = String::new();
@@ -69,6 +74,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     let count = outcomes.len();
     text += &format!("{} of {count} figures keep their bounds; {seconds:.1} s, {adapter}\n", count - failed);
+    let longest: Vec<String> =
+        spent.iter().take(3).map(|(case, seconds)| format!("{} {seconds:.1} s", case.name)).collect();
+    text += &format!("longest: {}\n", longest.join(", "));
     if let Some(folder) = &arguments.output {
         text += &format!("{} files in {}\n", files.len(), folder.display());
     }

@@ -80,6 +80,33 @@ pub(super) struct Extra {
 }
 
 impl Accounts {
+    /// Every account by its name, in the order of their balance, and what it leaves; none where it is not known [J].
+    #[must_use]
+    pub fn named(&self) -> [(&'static str, Option<f64>); 20] {
+        [
+            ("initial", Some(self.initial)),
+            ("kinetic", Some(self.kinetic)),
+            ("spring", Some(self.spring)),
+            ("bristles", Some(self.bristles)),
+            ("coupling work", Some(self.coupling_work)),
+            ("channel work", Some(self.channel_work)),
+            ("field work", Some(self.field_work)),
+            ("stop work", Some(self.stop_work)),
+            ("proxy dissipation", Some(self.proxy_dissipation)),
+            ("coupling dissipation", Some(self.coupling_dissipation)),
+            ("friction dissipation", Some(self.friction_dissipation)),
+            ("contact dissipation", Some(self.contact_dissipation)),
+            ("control dissipation", Some(self.control_dissipation)),
+            ("residual", Some(self.residual())),
+            ("turnover", Some(self.turnover)),
+            ("stored", Some(self.stored)),
+            ("first stored", self.first_stored),
+            ("leak", Some(self.leak)),
+            ("port work", Some(self.port_work)),
+            ("device dissipation", Some(self.device_dissipation)),
+        ]
+    }
+
     /// What the balance of proxy and coupling leaves unexplained: rounding, and nothing else [J].
     #[must_use]
     pub fn residual(&self) -> f64 {

@@ -41,6 +41,9 @@ pub enum Fault {
         "the time between two ticks was too long or not a positive number: give the loop real-time priority or a core"
     )]
     Late,
+    /// The loop has missed most of its deadlines for a while.
+    #[error("the loop keeps missing its deadlines: give it real-time priority or a core or lower its rate")]
+    Overrun,
     /// The device moved faster than its `speed_limit`.
     #[error("the device leapt: look for lost encoder counts or raise speed_limit")]
     Leap,

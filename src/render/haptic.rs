@@ -15,12 +15,12 @@ use super::{
     channels::{ChannelState, Channels},
     control::PassivityControl,
     coupling::Coupling,
-    effects::{ContactEffects, EffectState},
+    effects::{ContactEffects, EffectState, Pending},
     field::{Sample, TorqueField},
     flags::{Fault, Flags},
     held::Held,
     npmi::{Motion, Npmi},
-    watchdog::{self, Watchdog},
+    watchdog::{self, Pace, Watchdog},
 };
 use crate::{JointVector, scene::HapticsSpec, tolerances::GREATEST_GIVEN_ENERGY};
 
@@ -50,6 +50,8 @@ pub struct State {
     device: JointVector,
     /// Torques on the device.
     held: Held,
+    /// How the ticks have come lately.
+    pace: Pace,
     /// The first fault since the loop began.
     fault: Option<Fault>,
     accounts: Accounts,
@@ -184,6 +186,7 @@ impl Haptics {
             proxy_velocity: JointVector::zeros(joints),
             device: *position,
             held: Held::new(joints, self.period),
+            pace: self.watchdog.start(),
             fault: None,
             accounts: Accounts::default(),
             channels: None,
@@ -209,6 +212,7 @@ impl Haptics {
         state.motion = Motion::at_rest(&self.npmi.within_limits(position));
         state.proxy_velocity = JointVector::zeros(self.joints());
         state.device = *position;
+        state.pace = self.watchdog.start();
         state.fault = None;
         let initial = self.coupling.spring_energy(&state.motion.position, position);
         state.accounts = Accounts { initial, ..Accounts::default() };
@@ -220,7 +224,11 @@ impl Haptics {
 
     /// One tick.
     pub fn tick(&self, state: &mut State, inputs: &Inputs) -> Output {
-        let mut fault = state.fault.or_else(|| self.watchdog.check(inputs, &state.device).err());
+        let checked = self
+            .watchdog
+            .check(inputs, &state.device)
+            .and_then(|()| self.watchdog.follow(&mut state.pace, inputs.elapsed));
+        let mut fault = state.fault.or(checked.err());
         let mut velocity = JointVector::zeros(self.joints());
         let proxy = state.motion.position;
         if fault.is_none() {
@@ -314,7 +322,8 @@ impl Haptics {
         let step = match (&self.effects, &mut state.effects) {
             (Some(effects), Some(memory)) => {
                 let share = if sample.contact { sample.share } else { 0.0 };
-                effects.step(&self.npmi, &stage, memory, &mut state.motion, interval, &load, share, &mut extra)
+                let pending = Pending { npmi: &self.npmi, stage: &stage, interval, load };
+                effects.step(pending, memory, &mut state.motion, share, &mut extra)
             }
             _ => self.npmi.advance(&stage, &mut state.motion, interval, &load),
         };

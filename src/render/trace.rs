@@ -167,8 +167,8 @@ impl Trace {
         s
     }
 
-    /// Writes all ticks as CSV: one header line with units, then one row a tick. Numbers are printed so that reading
-    /// them gives the same bits.
+    /// Writes all ticks as CSV: one header line with units, then one row a tick, with every energy account
+    /// ([`Accounts::named`]); a field is empty where nothing is known. Numbers are printed so that reading them gives the same bits.
     ///
     /// # Errors
     /// Those of `out`.
@@ -187,19 +187,7 @@ impl Trace {
             }
         }
         write!(out, ",contact index,contact,contact nodes,flags,fault")?;
-        for name in [
-            "kinetic",
-            "spring",
-            "coupling work",
-            "field work",
-            "stop work",
-            "proxy dissipation",
-            "coupling dissipation",
-            "stored",
-            "leak",
-            "port work",
-            "residual",
-        ] {
+        for (name, _) in Accounts::default().named() {
             write!(out, ",{name} [J]")?;
         }
         writeln!(out)?;
@@ -213,21 +201,9 @@ impl Trace {
             let fault = tick.fault.map(|fault| fault.to_string()).unwrap_or_default();
             let (index, contact, nodes) = (tick.index, u8::from(tick.contact), tick.contact_nodes);
             write!(out, ",{index},{contact},{nodes},{},{fault}", tick.flags.bits())?;
-            let a = &tick.accounts;
-            for value in [
-                a.kinetic,
-                a.spring,
-                a.coupling_work,
-                a.field_work,
-                a.stop_work,
-                a.proxy_dissipation,
-                a.coupling_dissipation,
-                a.stored,
-                a.leak,
-                a.port_work,
-                a.residual(),
-            ] {
-                write!(out, ",{value}")?;
+            for (_, account) in tick.accounts.named() {
+                write!(out, ",")?;
+                account.map_or(Ok(()), |joules| write!(out, "{joules}"))?;
             }
             writeln!(out)?;
         }

@@ -4,11 +4,19 @@
 //! comes in time, and can have been reached: `|y_k - y_{k-1}| <= speed_limit max(T_{k-1}, T)` at each joint. The nominal T
 //! in there keeps an encoder's step from looking like a leap when two ticks follow closely. The first failure is a fault
 //! that stays, whatever comes after it, until somebody restarts the loop: a device that comes and goes must not kick.
+//!
+//! *Overruns.* A deadline that is missed once costs nothing but a longer step: the proxy is passive at any T_k, and what the
+//! longer hold gives the hand is seen at the device's port ([`Fault::Energy`]). When deadlines are missed persistently the torque
+//! rests on positions which, by the end of each hold, are as old as the time between ticks. So its mean over [`PACE_WINDOW`] may
+//! not exceed what the age of a position may not, [`GREATEST_POSITION_AGE`], or, where the loop is slow by design, 2 T: every
+//! other deadline missed. With W the window, ticks are counted by `n_k = n_{k-1} / (1 + T_{k-1}/W) + 1`, each weighing less
+//! the longer ago it was; ticks evenly T apart tend to `n = W/T + 1`, so that the mean is taken to be `W / (n_k - 1)`. One pause
+//! alone, however long it may be ([`GREATEST_INTERVAL`]), lengthens it by half and is never enough.
 
 use super::{flags::Fault, haptic::Inputs};
 use crate::{
     JointVector,
-    tolerances::{GREATEST_INPUT, GREATEST_INTERVAL, GREATEST_POSITION_AGE, LEAST_INTERVAL},
+    tolerances::{GREATEST_INPUT, GREATEST_INTERVAL, GREATEST_POSITION_AGE, LEAST_INTERVAL, PACE_WINDOW},
 };
 
 /// What the inputs are held against.
@@ -18,6 +26,18 @@ pub struct Watchdog {
     period: f64,
     /// Greatest speed of each joint that is taken for motion [rad/s or m/s].
     speed_limit: JointVector,
+}
+
+/// How the ticks have come lately: their number n, older ones weighing less [1].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace(f64);
+
+impl Pace {
+    /// Mean time between ticks [s].
+    #[must_use]
+    pub fn mean(self) -> f64 {
+        PACE_WINDOW / (self.0 - 1.0)
+    }
 }
 
 impl Watchdog {
@@ -44,6 +64,27 @@ impl Watchdog {
         if (0..before.len()).all(reached) { Ok(()) } else { Err(Fault::Leap) }
     }
 
+    /// The pace before the first tick: the nominal one.
+    #[must_use]
+    pub fn start(&self) -> Pace {
+        Pace(PACE_WINDOW / self.period + 1.0)
+    }
+
+    /// Takes in that `elapsed` [s], which can lie between two ticks, lay before this one.
+    ///
+    /// # Errors
+    /// When deadlines are missed persistently.
+    pub fn follow(&self, pace: &mut Pace, elapsed: f64) -> Result<(), Fault> {
+        pace.0 = pace.0 / (1.0 + elapsed / PACE_WINDOW) + 1.0;
+        if pace.mean() > self.greatest_mean() { Err(Fault::Overrun) } else { Ok(()) }
+    }
+
+    /// Longest mean time between ticks that may persist [s].
+    #[must_use]
+    pub fn greatest_mean(&self) -> f64 {
+        GREATEST_POSITION_AGE.max(2.0 * self.period)
+    }
+
     /// Whether `position` can be one of the device.
     ///
     /// # Errors
@@ -61,4 +102,55 @@ impl Watchdog {
 #[must_use]
 pub fn is_interval(seconds: f64) -> bool {
     (LEAST_INTERVAL..=GREATEST_INTERVAL).contains(&seconds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Time until persistent overruns are found, and the mean then [s]; none within a minute.
+    fn found(period: f64, time: impl Fn(usize) -> f64) -> Option<(f64, f64)> {
+        let watchdog = Watchdog::new(period, JointVector::zeros(1));
+        let (mut pace, mut passed, mut k) = (watchdog.start(), 0.0, 0);
+        while passed < 60.0 {
+            let elapsed = time(k);
+            (passed, k) = (passed + elapsed, k + 1);
+            if let Err(fault) = watchdog.follow(&mut pace, elapsed) {
+                assert_eq!(fault, Fault::Overrun);
+                return Some((passed, pace.mean()));
+            }
+        }
+        None
+    }
+
+    #[test]
+    fn what_the_rule_allows_may_last_and_what_it_does_not_ends_soon() {
+        for period in [1e-4, 1e-3, 2e-2] {
+            let greatest = f64::max(1e-2, 2.0 * period);
+            assert_eq!(found(period, |_| period), None, "{period} s, on time");
+            assert_eq!(found(period, |_| 0.99 * greatest), None, "{period} s, just within");
+            // Unevenly, half as long and half as long again.
+            assert_eq!(
+                found(period, |k| if k % 2 == 0 { 0.45 * greatest } else { 1.35 * greatest }),
+                None,
+                "{period} s"
+            );
+            let (when, mean) = found(period, |_| 1.2 * greatest).unwrap();
+            assert!(when < 8.0 * PACE_WINDOW && mean > greatest, "{period} s: {when} s, {mean} s");
+            let (when, _) = found(period, |_| GREATEST_INTERVAL).unwrap();
+            assert!(when < 6.0 * PACE_WINDOW, "{period} s: {when} s");
+        }
+    }
+
+    #[test]
+    fn a_pause_alone_is_no_overrun() {
+        for period in [1e-3, 2e-2, 4.9e-2] {
+            let once = (1.0 / period) as usize;
+            assert_eq!(
+                found(period, |k| if k % once == once - 1 { GREATEST_INTERVAL } else { period }),
+                None,
+                "{period} s"
+            );
+        }
+    }
 }

@@ -15,13 +15,13 @@
 //! turns at least one node from stick to slip or from slip to held, so that there are at most twice as many as contacts,
 //! and one; in practice one or two.
 
-use super::{Bristle, EffectState, Patch, add};
+use super::{Bristle, EffectState, Patch, Pending, add};
 use crate::{
     MAX_JOINTS,
     proxy::JointMatrix,
     render::{
         accounts::Extra,
-        npmi::{Load, Motion, Npmi, Stage, Step},
+        npmi::{Load, Motion, Step},
     },
     scene::FrictionSpec,
 };
@@ -62,18 +62,16 @@ impl Friction {
         }
     }
 
-    /// One step of the proxy under `load` and the friction at the patches of `state`.
-    #[expect(clippy::too_many_arguments)] // One step of everything that moves.
+    /// The `pending` step of the proxy with friction at the patches of `state`.
     pub(super) fn step(
         &self,
-        npmi: &Npmi,
-        stage: &Stage,
+        pending: &Pending<'_>,
         state: &mut EffectState,
         motion: &mut Motion,
-        interval: f64,
-        load: &Load,
         extra: &mut Extra,
     ) -> Step {
+        let Pending { npmi, stage, interval, load } = pending;
+        let interval = *interval;
         for patch in &mut state.patches {
             patch.bristle = patch.bristle.clamp_length_max(self.sticking_cone(patch) / self.stiffness);
         }

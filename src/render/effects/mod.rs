@@ -32,6 +32,18 @@ pub struct ContactEffects {
     damping: f64,
 }
 
+/// A step of the proxy that is about to be made.
+pub(super) struct Pending<'a> {
+    /// Who makes it.
+    pub npmi: &'a Npmi,
+    /// Inertia in its middle.
+    pub stage: &'a Stage,
+    /// T [s].
+    pub interval: f64,
+    /// What acts beside the effects.
+    pub load: Load,
+}
+
 /// What the effects remember, and their work space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectState {
@@ -122,29 +134,24 @@ impl ContactEffects {
         }
     }
 
-    /// One step of the proxy under `load` and the effects, where the field puts `share` on the dataset's torque; zero out
-    /// of contact. Books into `extra`. Never allocates.
-    #[expect(clippy::too_many_arguments)] // One step of everything that moves.
+    /// The `pending` step of the proxy with the effects, where the field puts `share` on the dataset's torque; zero out of
+    /// contact. Books into `extra`. Never allocates.
     pub(super) fn step(
         &self,
-        npmi: &Npmi,
-        stage: &Stage,
+        mut pending: Pending<'_>,
         state: &mut EffectState,
         motion: &mut Motion,
-        interval: f64,
-        load: &Load,
         share: f64,
         extra: &mut Extra,
     ) -> Step {
-        let mut load = *load;
         self.touch(state, &motion.position, share);
         let damping = self.contact_damping(&state.patches);
-        add(&mut load.damping, 1.0, &damping);
+        add(&mut pending.load.damping, 1.0, &damping);
         let step = match &self.friction {
-            Some(friction) => friction.step(npmi, stage, state, motion, interval, &load, extra),
-            None => npmi.advance(stage, motion, interval, &load),
+            Some(friction) => friction.step(&pending, state, motion, extra),
+            None => pending.npmi.advance(pending.stage, motion, pending.interval, &pending.load),
         };
-        extra.contact_dissipation = interval * quadratic(&damping, &step.velocity);
+        extra.contact_dissipation = pending.interval * quadratic(&damping, &step.velocity);
         step
     }
 

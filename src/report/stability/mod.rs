@@ -137,6 +137,8 @@ pub fn table(outcomes: &[Outcome]) -> String {
 
 /// Three significant digits, without an exponent where that is short.
 fn figure(value: f64) -> String {
+    // Neither zero has a sign.
+    let value = value + 0.0;
     if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
         let decimals = if value == 0.0 { 0 } else { (2 - value.abs().log10().floor() as i32).clamp(0, 5) as usize };
         let text = format!("{value:.decimals$}");
@@ -176,6 +178,6 @@ mod tests {
         assert!(lines[2].contains("3.00e-7") && lines[2].contains("<= 1.00e-8"));
         let column = lines[0].find("bound").unwrap();
         assert!(lines[1][column..].starts_with(">=") && lines[2][column..].starts_with("<="), "{table}");
-        assert_eq!([0.0, 1.0, 12.345, 99_999.0, 0.5].map(figure), ["0", "1", "12.3", "99999", "0.5"]);
+        assert_eq!([0.0, -0.0, 1.0, 12.345, 99_999.0, 0.5].map(figure), ["0", "0", "1", "12.3", "99999", "0.5"]);
     }
 }
