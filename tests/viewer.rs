@@ -341,7 +341,7 @@ fn effects_of_tick_and_frame_have_prices_and_are_left_out_and_taken_back() {
     std::fs::write(&scene, text).unwrap();
     let mut window = Window::open(&Start::File(scene), [1200.0, 900.0], Theme::Light);
     assert_eq!(window.harness.state().error(), None);
-    for effect in ["Inertia of each configuration", "Gravity", "Smoothing"] {
+    for effect in ["Varying inertia", "Gravity", "Smoothing"] {
         assert!(window.shows(effect), "{effect} is missing");
     }
     for absent in ["Contact friction", "Strain stiffening", "Quasi-static object"] {
@@ -360,7 +360,7 @@ fn effects_of_tick_and_frame_have_prices_and_are_left_out_and_taken_back() {
     window.wait();
     window.pass(0.5);
     assert!(sagging == window.picture_of("3-D scene"), "gravity taken back is another");
-    window.reach("Inertia of each configuration");
+    window.reach("Varying inertia");
     assert_eq!(window.harness.state().error(), None);
 }
 
@@ -497,6 +497,27 @@ fn without_a_display_the_file_is_looked_at_first_and_the_remedy_is_told_in_a_sen
     let message = view("datasets/sphere.toml");
     assert!(message.starts_with("haptize: there is no display") && message.contains("--screenshot"), "{message}");
     assert!(message.lines().count() == 1 && !message.contains(".rs:"), "{message}");
+}
+
+#[test]
+fn a_lost_device_is_told_with_what_to_do_and_the_loop_goes_on() {
+    let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
+    let render = viewer::render_state(&context).unwrap();
+    let mut viewer = Viewer::new(Arc::clone(&context), render, Pace::Steps, ".".into()).unwrap();
+    let egui = eframe::egui::Context::default();
+    viewer.start(&Start::File(SPHERE.1.clone()), &egui);
+    viewer.wait(&egui);
+    viewer.advance(0.1, &egui);
+    assert_eq!(viewer.error(), None);
+    let (.., device, _) = context.shared();
+    device.destroy();
+    assert!(viewer.play("press"));
+    for _ in 0..22 {
+        viewer.advance(0.1, &egui);
+    }
+    let told = viewer.error().unwrap();
+    assert!(told.contains("lost") && told.contains("start haptize view again"), "{told}");
+    assert!(viewer.contact_torque().unwrap() > 0.1, "the loop stands still");
 }
 
 #[test]

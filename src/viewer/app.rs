@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     JointVector,
-    gpu::Context,
+    gpu::{Context, GpuError},
     render::{passivity::Bound, timing::Timing, trace::Tick},
     scene::Scene,
 };
@@ -286,7 +286,7 @@ impl Viewer {
         session.history.collect(&mut session.feel);
         let latest = session.feel.latest();
         if let Err(error) = self.scene.advance(&session.loaded, &latest, elapsed) {
-            self.error = Some(error.to_string());
+            self.error = Some(not_drawn(error));
         }
     }
 
@@ -417,7 +417,7 @@ impl Viewer {
         CentralPanel::no_frame().show(ui, |ui| {
             let mut guide = session.feel.guide();
             if let Err(error) = self.scene.show(ui, &session.loaded, &mut guide) {
-                self.error = Some(error.to_string());
+                self.error = Some(not_drawn(error));
             }
         });
         self.solver = session.controls.solver.clone();
@@ -559,6 +559,17 @@ fn progress(ui: &mut Ui, job: &Job, width: f32) {
 
 fn bar(ui: &Ui) -> Frame {
     Frame::new().fill(ui.visuals().panel_fill).inner_margin(BAR_MARGIN)
+}
+
+/// Why nothing is drawn any more, and what to do in a window: its device cannot be opened again under it.
+fn not_drawn(error: ViewError) -> String {
+    match error {
+        ViewError::Gpu(GpuError::Lost(why)) => format!(
+            "the GPU that draws this window was lost: {why}. The loop goes on; start haptize view again to see it, and update \
+             the driver if this comes back"
+        ),
+        other => other.to_string(),
+    }
 }
 
 /// What is touched, in words; `known`: whether the dataset tells which nodes of the object are.

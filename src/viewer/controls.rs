@@ -49,6 +49,9 @@ pub struct Controls {
     prices: Prices,
 }
 
+/// Price from which on it is told without decimals [us].
+const WHOLE: f64 = 10.0;
+
 /// Greatest stiffness of contact that can be typed [N/m], and the change for each point of the pointer's way [N/m/point].
 const CONTACT_STIFFNESS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 const CONTACT_STIFFNESS_DRAG: f64 = 5.0;
@@ -173,24 +176,26 @@ impl Controls {
         }
         for number in named {
             let effect = &EFFECTS[number];
-            let mut on = (effect.is_on)(&self.tuning);
-            if ui.checkbox(&mut on, effect.name).on_hover_text(effect.what).changed() {
-                if on {
-                    (effect.take_back)(&mut self.tuning, &self.original);
-                } else {
-                    (effect.leave_out)(&mut self.tuning);
-                }
-            }
             let of = match effect.part {
                 Part::Tick => "tick",
                 Part::Frame => "frame",
             };
             let price = match self.prices.of(Item::Effect(number)) {
-                Price::Known(price) => format!("{price:+.2} µs a {of}"),
-                Price::Coming => "its price is being measured".into(),
-                Price::Unknown => "its price is not known".into(),
+                Price::Known(price) if price.abs() < WHOLE => format!("{price:+.2} µs a {of}"),
+                Price::Known(price) => format!("{price:+.0} µs a {of}"),
+                Price::Coming => "measuring …".into(),
+                Price::Unknown => "price unknown".into(),
             };
-            ui.indent(effect.name, |ui| note(ui, price));
+            let mut on = (effect.is_on)(&self.tuning);
+            ui.horizontal(|ui| {
+                let changed = ui.checkbox(&mut on, effect.name).on_hover_text(effect.what).changed();
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| note(ui, price));
+                if changed && on {
+                    (effect.take_back)(&mut self.tuning, &self.original);
+                } else if changed {
+                    (effect.leave_out)(&mut self.tuning);
+                }
+            });
         }
     }
 

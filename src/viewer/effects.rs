@@ -41,7 +41,7 @@ pub struct Effect {
 /// All effects; a scene shows those that it names.
 pub const EFFECTS: [Effect; 9] = [
     Effect {
-        name: "Inertia of each configuration",
+        name: "Varying inertia",
         what: "The proxy moves with the chain's inertia where it is, instead of that in the middle of the grid",
         part: Part::Tick,
         is_on: |tuning| tuning.haptics.proxy_inertia == ProxyInertia::Configuration,
