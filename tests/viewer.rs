@@ -500,27 +500,6 @@ fn without_a_display_the_file_is_looked_at_first_and_the_remedy_is_told_in_a_sen
 }
 
 #[test]
-fn a_lost_device_is_told_with_what_to_do_and_the_loop_goes_on() {
-    let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-    let render = viewer::render_state(&context).unwrap();
-    let mut viewer = Viewer::new(Arc::clone(&context), render, Pace::Steps, ".".into()).unwrap();
-    let egui = eframe::egui::Context::default();
-    viewer.start(&Start::File(SPHERE.1.clone()), &egui);
-    viewer.wait(&egui);
-    viewer.advance(0.1, &egui);
-    assert_eq!(viewer.error(), None);
-    let (.., device, _) = context.shared();
-    device.destroy();
-    assert!(viewer.play("press"));
-    for _ in 0..22 {
-        viewer.advance(0.1, &egui);
-    }
-    let told = viewer.error().unwrap();
-    assert!(told.contains("lost") && told.contains("start haptize view again"), "{told}");
-    assert!(viewer.contact_torque().unwrap() > 0.1, "the loop stands still");
-}
-
-#[test]
 fn a_bake_can_be_cancelled_and_leaves_what_was_open() {
     let mut window = Window::sphere();
     window.reach("Bake again");

@@ -1,38 +1,21 @@
-//! The viewer: its state, what happens in a frame, and where its panels lie. It knows neither window nor clock: `window.rs`
-//! and `offscreen.rs` call [`Viewer::ui`] with the time that went by.
+//! The viewer: its state, and what happens in a frame. It knows neither window nor clock: `window.rs` and `offscreen.rs` tell
+//! [`Viewer::advance`] the time that went by, and call [`Viewer::ui`], which is in `panels.rs`.
 
 use super::{
     ViewError,
-    cloud::Cloud,
-    controls::Controls,
-    feel::{Feel, Pace},
+    feel::Pace,
     files::Files,
-    guide::Guide,
-    history::History,
-    job::{Job, Outcome, Solver, Task, short},
-    loaded::Loaded,
-    number,
+    job::{Job, Outcome, Solver, Task},
     plots::Plots,
     scene::SceneView,
-    slices::Slices,
-    theme::{
-        BAR_MARGIN, CONTROLS_RANGE, CONTROLS_WIDTH, FINE_GAP, GAP, GROUP_GAP, LONE_BUTTON, MESSAGE_WIDTH, MOTION_WIDTH,
-        NARROW, PANEL_MARGIN, PAUSE_WIDTH, PLANE_WIDGETS, PLOTS_RANGE, PROGRESS, PROGRESS_HEIGHT, ROOM_FOR_BOTH,
-        SIDE_SHARE, SPACE_RANGE, WIDE_PROGRESS,
-    },
+    session::Session,
 };
 use crate::{
-    JointVector,
     gpu::{Context, GpuError},
-    render::{passivity::Bound, timing::Timing, trace::Tick},
+    render::timing::Timing,
     scene::Scene,
 };
-use eframe::{
-    egui::{
-        self, Align, Button, CentralPanel, Frame, Layout, Panel, ProgressBar, RichText, ScrollArea, Slider, Ui, vec2,
-    },
-    egui_wgpu::RenderState,
-};
+use eframe::{egui, egui_wgpu::RenderState};
 use std::{
     fs::File,
     path::{Path, PathBuf},
@@ -71,81 +54,18 @@ const SPHERE: &str = include_str!("../../datasets/sphere.toml");
 
 /// The viewer.
 pub struct Viewer {
-    context: Arc<Context>,
-    pace: Pace,
-    session: Option<Session>,
-    scene: SceneView,
-    plots: Plots,
-    files: Files,
-    job: Option<Job>,
+    pub(super) context: Arc<Context>,
+    pub(super) pace: Pace,
+    pub(super) session: Option<Session>,
+    pub(super) scene: SceneView,
+    pub(super) plots: Plots,
+    pub(super) files: Files,
+    pub(super) job: Option<Job>,
     /// What this machine bakes with, and what is chosen of it.
-    solvers: Vec<Solver>,
-    solver: Solver,
+    pub(super) solvers: Vec<Solver>,
+    pub(super) solver: Solver,
     /// What went wrong, until it is dismissed.
-    error: Option<String>,
-}
-
-/// A dataset being felt.
-struct Session {
-    loaded: Loaded,
-    feel: Feel,
-    history: History,
-    slices: Slices,
-    cloud: Cloud,
-    controls: Controls,
-    exceeded: Vec<Bound>,
-    /// Whether the cloud is shown where there is no height for plane and cloud.
-    cloud_first: bool,
-}
-
-impl Session {
-    fn new(
-        loaded: Loaded,
-        context: &Arc<Context>,
-        pace: Pace,
-        wake: impl Fn() + Send + 'static,
-    ) -> Result<Self, String> {
-        let controls = Controls::new(&loaded, context, wake);
-        let gains = &controls.tuning.haptics;
-        let (haptics, exceeded) = loaded.tuned(gains).map_err(|error| error.to_string())?;
-        let history = History::new(haptics.period()).ok_or("no memory for histograms; close other programs")?;
-        let feel = Feel::start(haptics, gains, Guide::new(&loaded), pace)?;
-        let (slices, cloud) = (Slices::new(&loaded.dataset), Cloud::new(&loaded.dataset));
-        Ok(Self { loaded, feel, history, slices, cloud, controls, exceeded, cloud_first: false })
-    }
-
-    /// Plane and cloud of C-space, one below the other, or one of them where there is no height for both.
-    fn configuration_space(&mut self, ui: &mut Ui, q: &JointVector) {
-        let both = ui.available_height() > ROOM_FOR_BOTH;
-        ui.horizontal(|ui| {
-            ui.heading("C-space");
-            if !both {
-                ui.selectable_value(&mut self.cloud_first, false, "Plane");
-                ui.selectable_value(&mut self.cloud_first, true, "Cloud");
-            }
-        });
-        if both || !self.cloud_first {
-            let room = ui.available_height() - PLANE_WIDGETS;
-            let height = if both { 0.5 * room } else { room };
-            self.slices.show(ui, &self.loaded, q, &self.history, height);
-            ui.add_space(GAP);
-        }
-        if both || self.cloud_first {
-            let height = ui.available_height() - FINE_GAP;
-            self.cloud.show(ui, &self.loaded, q, height);
-        }
-    }
-
-    /// Goes on with gains and effects of the controls, the hand where it is.
-    fn retune(&mut self, pace: Pace) -> Result<(), String> {
-        let gains = &self.controls.tuning.haptics;
-        let (haptics, exceeded) = self.loaded.tuned(gains).map_err(|error| error.to_string())?;
-        let guide = self.feel.guide().clone();
-        let history = History::new(haptics.period()).ok_or("no memory for histograms; close other programs")?;
-        self.feel = Feel::start(haptics, gains, guide, pace)?;
-        (self.history, self.exceeded) = (history, exceeded);
-        Ok(())
-    }
+    pub(super) error: Option<String>,
 }
 
 impl Viewer {
@@ -181,12 +101,12 @@ impl Viewer {
     }
 
     /// Begins to open a scene or a dataset.
-    fn open_file(&mut self, path: &Path, egui: &egui::Context) {
+    pub(super) fn open_file(&mut self, path: &Path, egui: &egui::Context) {
         self.files.remember(path);
         self.begin(Task::Open(path.to_owned()), egui);
     }
 
-    fn begin(&mut self, task: Task, egui: &egui::Context) {
+    pub(super) fn begin(&mut self, task: Task, egui: &egui::Context) {
         self.error = None;
         let egui = egui.clone();
         match Job::begin(task, self.solver.clone(), Arc::clone(&self.context), move || egui.request_repaint()) {
@@ -289,294 +209,15 @@ impl Viewer {
             self.error = Some(not_drawn(error));
         }
     }
-
-    /// The whole window.
-    pub fn ui(&mut self, ui: &mut Ui) {
-        let dropped = ui.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
-        if let Some(path) = dropped {
-            self.open_file(&path, &ui.ctx().clone());
-        }
-        Panel::top("bar").frame(bar(ui)).show(ui, |ui| self.bar(ui));
-        Panel::bottom("status").frame(bar(ui)).show(ui, |ui| self.status(ui));
-        if self.session.is_some() {
-            self.panels(ui);
-        } else {
-            CentralPanel::default().show(ui, |ui| self.welcome(ui));
-        }
-        if let Some(path) = self.files.show(ui) {
-            self.open_file(&path, &ui.ctx().clone());
-        }
-        self.complaint(ui);
-    }
-
-    /// Title, opening, motions, theme.
-    fn bar(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| {
-            ui.heading("haptize");
-            if let Some(session) = &self.session {
-                let name = ui.label(RichText::new(&session.loaded.name).weak());
-                if let Some(file) = &session.loaded.file {
-                    name.on_hover_text(file.display().to_string());
-                }
-            }
-            ui.add_space(GAP);
-            if ui.button("Open…").clicked() {
-                self.files.toggle();
-            }
-            let computed = self.session.as_ref().is_some_and(|session| session.loaded.report.is_some());
-            if computed && ui.button("Save dataset").on_hover_text("Into the folder that Open… shows").clicked() {
-                self.save();
-            }
-            ui.separator();
-            if let Some(session) = &self.session {
-                motions(ui, &mut session.feel.guide());
-            }
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                let dark = ui.visuals().dark_mode;
-                if ui.button(if dark { "Light" } else { "Dark" }).on_hover_text("Colours of the window").clicked() {
-                    ui.ctx().set_theme(if dark { egui::Theme::Light } else { egui::Theme::Dark });
-                }
-                if ui.button("Reset view").on_hover_text("Or double-click the scene").clicked() {
-                    self.scene.reset_view();
-                }
-            });
-        });
-    }
-
-    /// What computes, and how the loop fares.
-    fn status(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| {
-            let adapter = self.context.adapter();
-            ui.label(RichText::new(format!("drawn by {} ({})", short(&adapter.name), adapter.kind)).weak().small());
-            let Some(session) = &self.session else { return };
-            if let Some(tick) = session.history.last() {
-                ui.separator();
-                let contact = contact(tick, session.loaded.knows_nodes());
-                ui.label(RichText::new(contact).small());
-                ui.separator();
-                ui.label(RichText::new(format!("torque {} N m", number(tick.contact_torque.norm()))).small());
-                if let Some(fault) = tick.fault {
-                    ui.separator();
-                    ui.colored_label(ui.visuals().error_fg_color, RichText::new(fault.to_string()).small());
-                    if ui.small_button("Clear fault").clicked() {
-                        session.feel.clear_fault();
-                    }
-                }
-            }
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                if let Some(job) = &self.job {
-                    progress(ui, job, PROGRESS);
-                    ui.label(RichText::new(&job.title).small());
-                    return;
-                }
-                let jitter = session.history.jitter().percentiles();
-                let cost = session.history.cost().percentiles();
-                if cost.count > 0 && self.pace == Pace::Clock {
-                    let words = format!("tick {} µs, jitter {} µs at 99 %", number(cost.p50), number(jitter.p99));
-                    let refused = session.history.refused();
-                    let label = ui.label(RichText::new(words).small());
-                    if !refused.is_empty() {
-                        label.on_hover_text(refused.join("\n"));
-                    }
-                }
-            });
-        });
-    }
-
-    fn panels(&mut self, ui: &mut Ui) {
-        let Some(session) = &mut self.session else { return };
-        let size = ui.available_size();
-        let side = Frame::new().fill(ui.visuals().panel_fill).inner_margin(PANEL_MARGIN);
-        let mut asked = Default::default();
-        let share = |length: f32, [least, greatest]: [f32; 2]| (SIDE_SHARE * length).clamp(least, greatest);
-        let below = share(size.y, PLOTS_RANGE);
-        // In a narrow window the plots get its whole width, in a wide one C-space gets its whole height.
-        let narrow = size.x < NARROW;
-        if narrow {
-            plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
-        }
-        Panel::left("controls")
-            .frame(side)
-            .resizable(true)
-            .default_size(CONTROLS_WIDTH)
-            .size_range(CONTROLS_RANGE)
-            .show(ui, |ui| {
-                ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                    let (controls, loaded) = (&mut session.controls, &session.loaded);
-                    asked = controls.show(ui, loaded, &session.exceeded, &mut self.scene.shown, &self.solvers);
-                });
-            });
-        let right = share(size.x, SPACE_RANGE);
-        Panel::right("C-space").frame(side).resizable(true).default_size(right).show(ui, |ui| {
-            let q = session.history.last().map_or_else(|| session.loaded.start(), |tick| tick.proxy);
-            session.configuration_space(ui, &q);
-        });
-        if !narrow {
-            plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
-        }
-        CentralPanel::no_frame().show(ui, |ui| {
-            let mut guide = session.feel.guide();
-            if let Err(error) = self.scene.show(ui, &session.loaded, &mut guide) {
-                self.error = Some(not_drawn(error));
-            }
-        });
-        self.solver = session.controls.solver.clone();
-        if asked.retune
-            && let Err(error) = session.retune(self.pace)
-        {
-            self.error = Some(error);
-        }
-        if asked.redraw {
-            let egui = ui.ctx().clone();
-            let effects = session.controls.tuning.graphics;
-            if let Err(error) = self.scene.redraw(&session.loaded, effects, move || egui.request_repaint()) {
-                self.error = Some(error);
-            }
-        }
-        if let (true, Some(scene)) = (asked.bake, session.controls.scene.clone()) {
-            self.begin(Task::Bake(scene), &ui.ctx().clone());
-        }
-    }
-
-    /// What is shown before there is anything to feel.
-    fn welcome(&mut self, ui: &mut Ui) {
-        ui.vertical_centered(|ui| {
-            // Somewhat above the middle, where one looks first.
-            ui.add_space(ui.available_height() / 3.0);
-            match &self.job {
-                Some(job) => {
-                    ui.heading(&job.title);
-                    ui.label(RichText::new("Contact is solved at every point of the grid over the joints, once; then it is felt at 1 kHz.").weak());
-                    ui.add_space(GROUP_GAP);
-                    let size = vec2(WIDE_PROGRESS + LONE_BUTTON.x, LONE_BUTTON.y);
-                    ui.allocate_ui(size, |ui| ui.horizontal(|ui| progress(ui, job, WIDE_PROGRESS)));
-                }
-                None => {
-                    ui.heading("Nothing is open");
-                    ui.label(RichText::new("Open a scene or a dataset, or drop one on this window.").weak());
-                    ui.add_space(GROUP_GAP);
-                    if ui.button("Open…").clicked() {
-                        self.files.toggle();
-                    }
-                }
-            }
-        });
-    }
-
-    fn complaint(&mut self, ui: &Ui) {
-        let Some(error) = &self.error else { return };
-        let mut dismissed = false;
-        egui::Window::new("This did not work")
-            .collapsible(false)
-            .resizable(false)
-            .anchor(egui::Align2::CENTER_CENTER, vec2(0.0, 0.0))
-            .show(ui.ctx(), |ui| {
-                ui.set_max_width(MESSAGE_WIDTH);
-                // Messages point at a line with a caret: that needs letters of one width.
-                let text = RichText::new(error).color(ui.visuals().error_fg_color);
-                ui.label(if error.contains('\n') { text.monospace() } else { text });
-                ui.add_space(GROUP_GAP);
-                dismissed = ui.add(Button::new("Dismiss").min_size(LONE_BUTTON)).clicked();
-            });
-        if dismissed {
-            self.error = None;
-        }
-    }
-
-    fn save(&mut self) {
-        let Some(session) = &self.session else { return };
-        let file = self.files.folder().join(format!("{}.haptize", session.loaded.name.replace([' ', '/'], "-")));
-        match session.loaded.dataset.save(&file) {
-            Ok(()) => self.files.remember(&file),
-            Err(error) => self.error = Some(error.to_string()),
-        }
-    }
-}
-
-fn plots_panel(ui: &mut Ui, frame: Frame, height: f32, plots: &mut Plots, session: &mut Session, folder: &Path) {
-    Panel::bottom("plots").frame(frame).resizable(true).default_size(height).show(ui, |ui| {
-        if plots.show(ui, &session.loaded, &mut session.history, folder) {
-            session.history.hold_still(&mut session.feel);
-        }
-    });
-}
-
-/// Motions of the scene: choose, play, pause, scrub.
-fn motions(ui: &mut Ui, guide: &mut Guide) {
-    let names = guide.names();
-    if names.is_empty() {
-        ui.label(RichText::new("drag the proxy by one of its nodes").weak());
-        return;
-    }
-    let mut chosen = guide.playing();
-    if ui.selectable_label(chosen.is_none(), "Pointer").on_hover_text("Drag the proxy by one of its nodes").clicked() {
-        let goal = guide.goal();
-        guide.point(goal);
-    }
-    for (number, name) in names.iter().enumerate() {
-        let title = format!("{}{}", name[..1].to_uppercase(), &name[1..]);
-        if ui.selectable_label(chosen == Some(number), title).clicked() {
-            guide.play(number);
-            chosen = Some(number);
-        }
-    }
-    if let (Some((mut time, duration)), true) = (guide.time(), chosen.is_some()) {
-        let text = if guide.is_running() { "Pause" } else { "Play" };
-        if ui.add(Button::new(text).min_size(vec2(PAUSE_WIDTH, 0.0))).clicked() {
-            guide.toggle();
-        }
-        ui.spacing_mut().slider_width = MOTION_WIDTH;
-        let slider = Slider::new(&mut time, 0.0..=duration).show_value(false);
-        let response = ui.add(slider);
-        response.widget_info(|| egui::WidgetInfo::slider(true, time, "Time in the motion"));
-        if response.changed() {
-            guide.scrub(time);
-        }
-        ui.label(RichText::new(format!("{time:.1} of {duration:.1} s")).weak());
-    }
-}
-
-fn progress(ui: &mut Ui, job: &Job, width: f32) {
-    let done = job.progress();
-    let share = if done.points > 0 { done.done as f32 / done.points as f32 } else { 0.0 };
-    let text = if done.points == 0 {
-        "preparing".to_owned()
-    } else if done.rate > 0.0 {
-        format!("{} of {}, {:.0} s left", done.done, done.points, (done.points - done.done) as f64 / done.rate)
-    } else {
-        format!("{} of {}", done.done, done.points)
-    };
-    let cancel = |ui: &mut Ui| {
-        if ui.button("Cancel").clicked() {
-            job.cancel();
-        }
-    };
-    let bar =
-        ProgressBar::new(share).desired_width(width).desired_height(PROGRESS_HEIGHT).text(RichText::new(text).small());
-    ui.add(bar);
-    cancel(ui);
-}
-
-fn bar(ui: &Ui) -> Frame {
-    Frame::new().fill(ui.visuals().panel_fill).inner_margin(BAR_MARGIN)
 }
 
 /// Why nothing is drawn any more, and what to do in a window: its device cannot be opened again under it.
-fn not_drawn(error: ViewError) -> String {
+pub fn not_drawn(error: ViewError) -> String {
     match error {
         ViewError::Gpu(GpuError::Lost(why)) => format!(
             "the GPU that draws this window was lost: {why}. The loop goes on; start haptize view again to see it, and update \
              the driver if this comes back"
         ),
         other => other.to_string(),
-    }
-}
-
-/// What is touched, in words; `known`: whether the dataset tells which nodes of the object are.
-fn contact(tick: &Tick, known: bool) -> String {
-    match tick.contact {
-        false => "free".into(),
-        true if known => format!("{} nodes in contact", tick.contact_nodes),
-        true => "in contact, nodes not stored".into(),
     }
 }

@@ -67,8 +67,8 @@ pub const EFFECTS: [Effect; 9] = [
         },
     },
     Effect {
-        name: "Four-channel coupling",
-        what: "Forces and accelerations of hand and proxy are exchanged beside the coupling's spring and damper",
+        name: "Four channels",
+        what: "Four-channel coupling: forces and accelerations of hand and proxy are exchanged beside the coupling's spring and damper",
         part: Part::Tick,
         is_on: |tuning| tuning.haptics.effects.four_channel.is_some(),
         leave_out: |tuning| tuning.haptics.effects.four_channel = None,

@@ -2,7 +2,8 @@
 //!
 //! | file | subject |
 //! |---|---|
-//! | `app` | the window's state, what happens in a frame, and where panels lie |
+//! | `app`, `panels` | the window's state and what happens in a frame; where panels lie |
+//! | `session` | a dataset being felt |
 //! | `window`, `offscreen` | the two places where it is drawn: a window, a picture |
 //! | `theme`, `palette` | sizes and type, colours |
 //! | `loaded`, `job` | what is open, and how it is baked or read in the background |
@@ -31,11 +32,13 @@ mod job;
 mod loaded;
 mod offscreen;
 mod palette;
+mod panels;
 mod pipelines;
 mod pixels;
 mod plots;
 mod prices;
 mod scene;
+mod session;
 mod shapes;
 mod slices;
 mod stage;

@@ -57,8 +57,10 @@ const ROUNDS: usize = 12;
 const BLOCKS: usize = 40;
 const TICKS: usize = 50;
 
-/// Frames of a block: the wait at its end, some tens of microseconds, is shared by this many.
-const FRAMES: usize = 10;
+/// Frames of a block, which share the wait at its end, some tens of microseconds; and times that it is timed. A software
+/// device has several threads that all have to come through alone.
+const FRAMES: usize = 4;
+const FRAME_ROUNDS: usize = 36;
 
 impl Prices {
     /// Begins to measure interpolations, and the effects that the scene of `loaded` names. `wake` is called whenever there
@@ -178,7 +180,7 @@ fn frame_costs<const N: usize>(
     let start = loaded.start();
     let latest = Latest { time: 0.0, proxy: start, device: start, share: 1.0 };
     let mut least = [f64::INFINITY; N];
-    for _ in 0..ROUNDS {
+    for _ in 0..FRAME_ROUNDS {
         for (nodes, least) in objects.iter_mut().zip(&mut least) {
             let begin = Instant::now();
             for _ in 0..FRAMES {

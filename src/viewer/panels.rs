@@ -1,0 +1,301 @@
+//! Where panels lie, and the bars about them.
+
+use super::{
+    app::{Viewer, not_drawn},
+    feel::Pace,
+    guide::Guide,
+    job::{Job, Task, short},
+    number,
+    plots::Plots,
+    session::Session,
+    theme::{
+        BAR_MARGIN, CONTROLS_RANGE, CONTROLS_WIDTH, GAP, GROUP_GAP, LONE_BUTTON, MESSAGE_WIDTH, MOTION_WIDTH, NARROW,
+        PANEL_MARGIN, PAUSE_WIDTH, PLOTS_RANGE, PROGRESS, PROGRESS_HEIGHT, SIDE_SHARE, SPACE_RANGE, WIDE_PROGRESS,
+    },
+};
+use crate::render::trace::Tick;
+use eframe::egui::{
+    self, Align, Button, CentralPanel, Frame, Layout, Panel, ProgressBar, RichText, ScrollArea, Slider, Ui, vec2,
+};
+use std::path::Path;
+
+impl Viewer {
+    /// The whole window.
+    pub fn ui(&mut self, ui: &mut Ui) {
+        let dropped = ui.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
+        if let Some(path) = dropped {
+            self.open_file(&path, &ui.ctx().clone());
+        }
+        Panel::top("bar").frame(bar(ui)).show(ui, |ui| self.bar(ui));
+        Panel::bottom("status").frame(bar(ui)).show(ui, |ui| self.status(ui));
+        if self.session.is_some() {
+            self.panels(ui);
+        } else {
+            CentralPanel::default().show(ui, |ui| self.welcome(ui));
+        }
+        if let Some(path) = self.files.show(ui) {
+            self.open_file(&path, &ui.ctx().clone());
+        }
+        self.complaint(ui);
+    }
+
+    /// Title, opening, motions, theme.
+    fn bar(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            ui.heading("haptize");
+            if let Some(session) = &self.session {
+                let name = ui.label(RichText::new(&session.loaded.name).weak());
+                if let Some(file) = &session.loaded.file {
+                    name.on_hover_text(file.display().to_string());
+                }
+            }
+            ui.add_space(GAP);
+            if ui.button("Open…").clicked() {
+                self.files.toggle();
+            }
+            let computed = self.session.as_ref().is_some_and(|session| session.loaded.report.is_some());
+            if computed && ui.button("Save dataset").on_hover_text("Into the folder that Open… shows").clicked() {
+                self.save();
+            }
+            ui.separator();
+            if let Some(session) = &self.session {
+                motions(ui, &mut session.feel.guide());
+            }
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                let dark = ui.visuals().dark_mode;
+                if ui.button(if dark { "Light" } else { "Dark" }).on_hover_text("Colours of the window").clicked() {
+                    ui.ctx().set_theme(if dark { egui::Theme::Light } else { egui::Theme::Dark });
+                }
+                if ui.button("Reset view").on_hover_text("Or double-click the scene").clicked() {
+                    self.scene.reset_view();
+                }
+            });
+        });
+    }
+
+    /// What computes, and how the loop fares.
+    fn status(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            let adapter = self.context.adapter();
+            ui.label(RichText::new(format!("drawn by {} ({})", short(&adapter.name), adapter.kind)).weak().small());
+            let Some(session) = &self.session else { return };
+            if let Some(tick) = session.history.last() {
+                ui.separator();
+                let contact = contact(tick, session.loaded.knows_nodes());
+                ui.label(RichText::new(contact).small());
+                ui.separator();
+                ui.label(RichText::new(format!("torque {} N m", number(tick.contact_torque.norm()))).small());
+                if let Some(fault) = tick.fault {
+                    ui.separator();
+                    ui.colored_label(ui.visuals().error_fg_color, RichText::new(fault.to_string()).small());
+                    if ui.small_button("Clear fault").clicked() {
+                        session.feel.clear_fault();
+                    }
+                }
+            }
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                if let Some(job) = &self.job {
+                    progress(ui, job, PROGRESS);
+                    ui.label(RichText::new(&job.title).small());
+                    return;
+                }
+                let jitter = session.history.jitter().percentiles();
+                let cost = session.history.cost().percentiles();
+                if cost.count > 0 && self.pace == Pace::Clock {
+                    let words = format!("tick {} µs, jitter {} µs at 99 %", number(cost.p50), number(jitter.p99));
+                    let refused = session.history.refused();
+                    let label = ui.label(RichText::new(words).small());
+                    if !refused.is_empty() {
+                        label.on_hover_text(refused.join("\n"));
+                    }
+                }
+            });
+        });
+    }
+
+    fn panels(&mut self, ui: &mut Ui) {
+        let Some(session) = &mut self.session else { return };
+        let size = ui.available_size();
+        let side = Frame::new().fill(ui.visuals().panel_fill).inner_margin(PANEL_MARGIN);
+        let mut asked = Default::default();
+        let share = |length: f32, [least, greatest]: [f32; 2]| (SIDE_SHARE * length).clamp(least, greatest);
+        let below = share(size.y, PLOTS_RANGE);
+        // In a narrow window the plots get its whole width, in a wide one C-space gets its whole height.
+        let narrow = size.x < NARROW;
+        if narrow {
+            plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
+        }
+        Panel::left("controls")
+            .frame(side)
+            .resizable(true)
+            .default_size(CONTROLS_WIDTH)
+            .size_range(CONTROLS_RANGE)
+            .show(ui, |ui| {
+                ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+                    let (controls, loaded) = (&mut session.controls, &session.loaded);
+                    asked = controls.show(ui, loaded, &session.exceeded, &mut self.scene.shown, &self.solvers);
+                });
+            });
+        let right = share(size.x, SPACE_RANGE);
+        Panel::right("C-space").frame(side).resizable(true).default_size(right).show(ui, |ui| {
+            let q = session.history.last().map_or_else(|| session.loaded.start(), |tick| tick.proxy);
+            session.configuration_space(ui, &q);
+        });
+        if !narrow {
+            plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
+        }
+        CentralPanel::no_frame().show(ui, |ui| {
+            let mut guide = session.feel.guide();
+            if let Err(error) = self.scene.show(ui, &session.loaded, &mut guide) {
+                self.error = Some(not_drawn(error));
+            }
+        });
+        self.solver = session.controls.solver.clone();
+        if asked.retune
+            && let Err(error) = session.retune(self.pace)
+        {
+            self.error = Some(error);
+        }
+        if asked.redraw {
+            let egui = ui.ctx().clone();
+            let effects = session.controls.tuning.graphics;
+            if let Err(error) = self.scene.redraw(&session.loaded, effects, move || egui.request_repaint()) {
+                self.error = Some(error);
+            }
+        }
+        if let (true, Some(scene)) = (asked.bake, session.controls.scene.clone()) {
+            self.begin(Task::Bake(scene), &ui.ctx().clone());
+        }
+    }
+
+    /// What is shown before there is anything to feel.
+    fn welcome(&mut self, ui: &mut Ui) {
+        ui.vertical_centered(|ui| {
+            // Somewhat above the middle, where one looks first.
+            ui.add_space(ui.available_height() / 3.0);
+            match &self.job {
+                Some(job) => {
+                    ui.heading(&job.title);
+                    ui.label(RichText::new("Contact is solved at every point of the grid over the joints, once; then it is felt at 1 kHz.").weak());
+                    ui.add_space(GROUP_GAP);
+                    let size = vec2(WIDE_PROGRESS + LONE_BUTTON.x, LONE_BUTTON.y);
+                    ui.allocate_ui(size, |ui| ui.horizontal(|ui| progress(ui, job, WIDE_PROGRESS)));
+                }
+                None => {
+                    ui.heading("Nothing is open");
+                    ui.label(RichText::new("Open a scene or a dataset, or drop one on this window.").weak());
+                    ui.add_space(GROUP_GAP);
+                    if ui.button("Open…").clicked() {
+                        self.files.toggle();
+                    }
+                }
+            }
+        });
+    }
+
+    fn complaint(&mut self, ui: &Ui) {
+        let Some(error) = &self.error else { return };
+        let mut dismissed = false;
+        egui::Window::new("This did not work")
+            .collapsible(false)
+            .resizable(false)
+            .anchor(egui::Align2::CENTER_CENTER, vec2(0.0, 0.0))
+            .show(ui.ctx(), |ui| {
+                ui.set_max_width(MESSAGE_WIDTH);
+                // Messages point at a line with a caret: that needs letters of one width.
+                let text = RichText::new(error).color(ui.visuals().error_fg_color);
+                ui.label(if error.contains('\n') { text.monospace() } else { text });
+                ui.add_space(GROUP_GAP);
+                dismissed = ui.add(Button::new("Dismiss").min_size(LONE_BUTTON)).clicked();
+            });
+        if dismissed {
+            self.error = None;
+        }
+    }
+
+    fn save(&mut self) {
+        let Some(session) = &self.session else { return };
+        let file = self.files.folder().join(format!("{}.haptize", session.loaded.name.replace([' ', '/'], "-")));
+        match session.loaded.dataset.save(&file) {
+            Ok(()) => self.files.remember(&file),
+            Err(error) => self.error = Some(error.to_string()),
+        }
+    }
+}
+
+fn plots_panel(ui: &mut Ui, frame: Frame, height: f32, plots: &mut Plots, session: &mut Session, folder: &Path) {
+    Panel::bottom("plots").frame(frame).resizable(true).default_size(height).show(ui, |ui| {
+        if plots.show(ui, &session.loaded, &mut session.history, folder) {
+            session.history.hold_still(&mut session.feel);
+        }
+    });
+}
+
+/// Motions of the scene: choose, play, pause, scrub.
+fn motions(ui: &mut Ui, guide: &mut Guide) {
+    let names = guide.names();
+    if names.is_empty() {
+        ui.label(RichText::new("drag the proxy by one of its nodes").weak());
+        return;
+    }
+    let mut chosen = guide.playing();
+    if ui.selectable_label(chosen.is_none(), "Pointer").on_hover_text("Drag the proxy by one of its nodes").clicked() {
+        let goal = guide.goal();
+        guide.point(goal);
+    }
+    for (number, name) in names.iter().enumerate() {
+        let title = format!("{}{}", name[..1].to_uppercase(), &name[1..]);
+        if ui.selectable_label(chosen == Some(number), title).clicked() {
+            guide.play(number);
+            chosen = Some(number);
+        }
+    }
+    if let (Some((mut time, duration)), true) = (guide.time(), chosen.is_some()) {
+        let text = if guide.is_running() { "Pause" } else { "Play" };
+        if ui.add(Button::new(text).min_size(vec2(PAUSE_WIDTH, 0.0))).clicked() {
+            guide.toggle();
+        }
+        ui.spacing_mut().slider_width = MOTION_WIDTH;
+        let slider = Slider::new(&mut time, 0.0..=duration).show_value(false);
+        let response = ui.add(slider);
+        response.widget_info(|| egui::WidgetInfo::slider(true, time, "Time in the motion"));
+        if response.changed() {
+            guide.scrub(time);
+        }
+        ui.label(RichText::new(format!("{time:.1} of {duration:.1} s")).weak());
+    }
+}
+
+fn progress(ui: &mut Ui, job: &Job, width: f32) {
+    let done = job.progress();
+    let share = if done.points > 0 { done.done as f32 / done.points as f32 } else { 0.0 };
+    let text = if done.points == 0 {
+        "preparing".to_owned()
+    } else if done.rate > 0.0 {
+        format!("{} of {}, {:.0} s left", done.done, done.points, (done.points - done.done) as f64 / done.rate)
+    } else {
+        format!("{} of {}", done.done, done.points)
+    };
+    let cancel = |ui: &mut Ui| {
+        if ui.button("Cancel").clicked() {
+            job.cancel();
+        }
+    };
+    let bar =
+        ProgressBar::new(share).desired_width(width).desired_height(PROGRESS_HEIGHT).text(RichText::new(text).small());
+    ui.add(bar);
+    cancel(ui);
+}
+
+fn bar(ui: &Ui) -> Frame {
+    Frame::new().fill(ui.visuals().panel_fill).inner_margin(BAR_MARGIN)
+}
+
+/// What is touched, in words; `known`: whether the dataset tells which nodes of the object are.
+fn contact(tick: &Tick, known: bool) -> String {
+    match tick.contact {
+        false => "free".into(),
+        true if known => format!("{} nodes in contact", tick.contact_nodes),
+        true => "in contact, nodes not stored".into(),
+    }
+}
