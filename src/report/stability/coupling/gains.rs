@@ -55,7 +55,7 @@ pub(super) fn control_over_a_potential(setting: &Setting) -> Result<Vec<Outcome>
     let mut judge = |watch: &Watch, varied: &str| {
         outcomes.extend(watch.outcomes("control over a potential", varied));
         outcomes.push(Outcome {
-            measure: "energy created at the object's port [J]".into(),
+            measure: "energy created at the object's port and not taken by the controller [J]".into(),
             worst: watch.created,
             bound: Bound::AtMost(GREATEST_GIVEN_ENERGY),
             ..outcomes[outcomes.len() - 1].clone()

@@ -58,6 +58,7 @@ struct Watch {
     /// Of the present run: greatest residual, and its turnover so far [J].
     run: [f64; 2],
     given: f64,
+    /// At the object's port, beyond what the controller took there [J].
     created: f64,
     /// Most that the torque held over one tick could have given: the greatest torque along the way of the device [J].
     hold: f64,
@@ -97,7 +98,7 @@ impl Watch {
         }
         self.run = [self.run[0].max(accounts.residual().abs()), accounts.turnover];
         self.given = self.given.max(-accounts.device_port().unwrap_or(0.0));
-        self.created = self.created.max(accounts.created());
+        self.created = self.created.max(accounts.created() - accounts.control_dissipation);
         if let Some(before) = self.device.replace(output.device) {
             let way = output.device.iter().zip(before.iter()).map(|(to, from)| (to - from).abs());
             self.hold = self.hold.max(way.zip(self.limit.iter()).map(|(way, limit)| way * limit).sum());
