@@ -338,15 +338,20 @@ fn without_forces_the_objects_energy_never_rises_however_few_the_iterations() {
     }
 }
 
-/// The kernels know facets as they are: a scene that blends them is refused, and left to the CPU where the choice is free.
+/// The kernels know facets as they are and freeze them once: a scene that asks for more is refused, and left to the CPU where
+/// the choice is free.
 #[test]
-fn blended_facets_are_refused() {
+fn blended_facets_and_updates_are_refused() {
     let (scene, object, chain) = load("sphere.toml");
     let mut model = Model::new(&object, &chain, scene.contact);
     assert!(GpuSolver::new(context(), &model).is_ok());
     model.set_blending(Blending::Mesh);
     let refusal = GpuSolver::new(context(), &model).err().unwrap();
-    assert!(matches!(refusal, GpuError::Blending) && refusal.to_string().contains("--backend cpu"), "{refusal}");
+    assert!(matches!(refusal, GpuError::Unsupported("blending")), "{refusal}");
+    model.set_blending(Blending::Width(0.0));
+    model.contact.updates = 1;
+    let refusal = GpuSolver::new(context(), &model).err().unwrap();
+    assert!(matches!(refusal, GpuError::Unsupported("updates")), "{refusal}");
 }
 
 #[test]

@@ -170,6 +170,7 @@ const BROKEN: &[Broken] = &[
     ("stiffness = 1000", "stiffness = 1000\ntolerance = 0", "tolerance = 0", &["between 0 and 1"]),
     ("stiffness = 1000", "stiffness = 1000\nmax_iterations = 0", "max_iterations", &["at least 1"]),
     ("stiffness = 1000", "stiffness = 1000\nalgorithm = \"magic\"", "magic", &["`energy`", "`paper`", "`linearised`"]),
+    ("stiffness = 1000", "stiffness = 1000\nupdates = 2", "updates = 2", &["linearised"]),
     ("stiffness = 1000", "stiffness = 1000\nblending = -0.1", "blending = -0.1", &["zero or positive"]),
     ("stiffness = 1000", "stiffness = 1000\nblending = \"auto\"", "blending", &["auto", "a number or \"mesh\""]),
     (

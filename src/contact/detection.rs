@@ -519,6 +519,7 @@ mod tests {
                 algorithm: Algorithm::Energy,
                 tolerance: 1e-8,
                 max_iterations: 1,
+                updates: 0,
                 blending: Blending::Width(0.0),
             };
             let model = Model::new(&object, &chain, contact);

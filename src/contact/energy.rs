@@ -10,9 +10,10 @@
 //! state in E at the final kc: E_s(u_s) <= E_s(0) bounds both its elastic energy and its depths by those at rest.
 //!
 //! With the geometry frozen at rest (`linearised`) the same steps minimise the convex
-//! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`.
+//! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`; each of its updates freezes the geometry anew at the
+//! displacement found and solves again.
 
-use super::blend::{strength, together};
+use super::blend::{self, strength, together};
 use super::depth::Contact;
 use super::detection::{Detection, Walls};
 use super::model::Model;
@@ -30,7 +31,7 @@ use glam::DVec3;
 pub enum Geometry {
     /// The closest point of the deformed surface, found anew at every displacement.
     Deformed,
-    /// The closest points at rest.
+    /// The closest points at rest, or at the last update.
     Frozen,
 }
 
@@ -117,14 +118,28 @@ impl EnergySearch {
         };
         self.start(model, detection, geometry);
         let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
-        let mut first_radius = self.begin_stage(model, &mut outcome);
+        self.descend(model, detection, geometry, &mut outcome);
+        let updates = if geometry == Geometry::Frozen { model.contact.updates } else { 0 };
+        for _ in 0..updates {
+            if !outcome.converged {
+                break;
+            }
+            self.freeze_here(model, detection);
+            self.descend(model, detection, geometry, &mut outcome);
+        }
+        outcome
+    }
+
+    /// Descends from the current state until it is balanced or there is no going on.
+    fn descend(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry, outcome: &mut Outcome) {
+        let mut first_radius = self.begin_stage(model, outcome);
         let mut radius = first_radius;
         while outcome.residual.is_finite() {
             let stuck = radius < GIVE_UP_RADIUS * first_radius;
             let stalled = radius < STALLED_RADIUS * first_radius;
             if self.kc < model.kc && (outcome.residual <= STAGE_TOLERANCE || stalled) {
                 self.kc = model.kc.min(CONTINUATION_FACTOR * self.kc);
-                first_radius = self.begin_stage(model, &mut outcome);
+                first_radius = self.begin_stage(model, outcome);
                 radius = first_radius;
                 continue;
             }
@@ -158,7 +173,28 @@ impl EnergySearch {
                 outcome.residual = self.balance(model);
             }
         }
-        outcome
+    }
+
+    /// Freezes the geometry anew, as it is at the current displacement: an update of linearised contact.
+    fn freeze_here(&mut self, model: &Model, detection: &mut Detection) {
+        let Self { state, frozen, .. } = self;
+        for (node, position) in state.positions.iter_mut().enumerate() {
+            *position = model.rest[node] + DVec3::from_slice(&state.displacement[3 * node..]);
+        }
+        detection.deformed(model, &state.displacement, &state.positions, Walls::All, frozen);
+        blend::freeze(frozen);
+        // Depths at rest, by the slopes here.
+        let here: Vec<f64> = frozen
+            .chunk_by(together)
+            .flat_map(|rows| {
+                let change = linear_change(rows, &state.displacement);
+                rows.iter().map(move |row| row.depth - change)
+            })
+            .collect();
+        for (row, depth) in frozen.iter_mut().zip(here) {
+            row.depth = depth;
+        }
+        frozen_contacts(frozen, &state.displacement, &mut state.contacts);
     }
 
     /// Takes up a new contact stiffness at the current state; returns the first radius: 1/2 |u|^2 in the energy norm
@@ -299,13 +335,16 @@ pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
 fn frozen_contacts(rows: &[Contact], displacement: &[f64], contacts: &mut Vec<Contact>) {
     contacts.clear();
     for rows in rows.chunk_by(together) {
-        let moves = |row: &Contact| row.nodes.map(|node| DVec3::from_slice(&displacement[3 * node as usize..]));
-        let change = |row: &Contact| row.deepening(moves(row));
-        let depth = rows[0].depth
-            + match rows {
-                [row] if row.part.is_none() => change(row),
-                _ => rows.iter().map(|row| row.share * change(row)).sum(),
-            };
+        let depth = rows[0].depth + linear_change(rows, displacement);
         contacts.extend(rows.iter().map(|row| Contact { depth, ..*row }));
+    }
+}
+
+/// By how much `displacement` deepens the frozen rows of one depth [m].
+fn linear_change(rows: &[Contact], displacement: &[f64]) -> f64 {
+    let moves = |row: &Contact| row.nodes.map(|node| DVec3::from_slice(&displacement[3 * node as usize..]));
+    match rows {
+        [row] if row.part.is_none() => row.deepening(moves(row)),
+        _ => rows.iter().map(|row| row.share * row.deepening(moves(row))).sum(),
     }
 }

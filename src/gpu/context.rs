@@ -76,9 +76,9 @@ pub enum GpuError {
         /// Nodes that are taken.
         limit: usize,
     },
-    /// The kernels take facets as they are.
-    #[error("the GPU does not solve contact with blending. Use --backend cpu, or leave `blending` out of [contact]")]
-    Blending,
+    /// What the kernels do not do.
+    #[error("the GPU does not solve contact with {0}. Use --backend cpu, or leave `{0}` out of [contact]")]
+    Unsupported(&'static str),
     /// Outputs that no invocation wrote: a dispatch was cut short.
     #[error(
         "the GPU left {count} of {total} results unwritten. Use --backend cpu, and report this with `haptize doctor`"

@@ -119,6 +119,7 @@ pub(super) struct ContactTable {
     pub algorithm: Option<Algorithm>,
     pub tolerance: Option<Number>,
     pub max_iterations: Option<Spanned<u32>>,
+    pub updates: Option<Spanned<u32>>,
     pub blending: Option<Spanned<NumberOr<Mesh>>>,
 }
 

@@ -182,6 +182,8 @@ pub struct ContactSpec {
     pub tolerance: f64,
     /// After as many a configuration that has not converged is flagged.
     pub max_iterations: u32,
+    /// How often linearised contact takes its geometry anew, at the displacement found.
+    pub updates: u32,
     /// Over what width facets pass into each other for nodes without a radius.
     pub blending: Blending,
 }
@@ -204,7 +206,7 @@ pub enum Algorithm {
     Energy,
     /// The paper's four-step iteration (section 2.1).
     Paper,
-    /// Minimum of the stored energy with the geometry frozen at rest.
+    /// Minimum of the stored energy with the geometry frozen, at rest or at the last of its updates.
     Linearised,
 }
 

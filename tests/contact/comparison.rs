@@ -135,3 +135,41 @@ fn a_node_at_the_centre_ends() {
         assert!(equilibrium.energy.is_finite() && equilibrium.torque.is_finite());
     }
 }
+
+/// Each update of linearised contact comes nearer to the energy form, whose fixed point it shares; with many, half of the
+/// configurations at least have reached it.
+#[test]
+fn updates_lead_from_linearised_contact_to_the_energy_form() {
+    let object = sphere(SpringKind::Isotropic);
+    let chain = Chain::new(&arm(0.0));
+    let mut model = Model::new(&object, &chain, contact(Algorithm::Energy, 300.0));
+    let places: Vec<Vec<f64>> = {
+        let mut solver = Solver::new(&model);
+        let shallow = |q: &Vec<f64>| (-0.005..0.0).contains(&solver.gap(q));
+        random_configurations(9, 600).into_iter().filter(shallow).collect()
+    };
+    let exact: Vec<Equilibrium> = {
+        let mut solver = Solver::new(&model);
+        places.iter().map(|q| solver.solve(q)).collect()
+    };
+    model.contact.algorithm = Algorithm::Linearised;
+    let mut errors = Vec::new();
+    for updates in [0, 1, 2, 4, 60] {
+        model.contact.updates = updates;
+        let mut solver = Solver::new(&model);
+        let mut found: Vec<f64> = places
+            .iter()
+            .zip(&exact)
+            .map(|(q, exact)| {
+                let torque = solver.solve(q).torque;
+                let off = torque.iter().zip(exact.torque.iter()).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+                off / exact.torque.norm()
+            })
+            .collect();
+        found.sort_by(f64::total_cmp);
+        errors.push(found[found.len() / 2]);
+    }
+    assert!(places.len() > 20, "{}", places.len());
+    assert!(errors[0] > 1e-3 && errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
+    assert!(errors[4] < 1e-6, "{errors:?}");
+}

@@ -171,12 +171,12 @@ pub(super) fn loops(accuracy: &Accuracy) -> Canvas {
 pub(super) fn solver(accuracy: &Accuracy) -> Canvas {
     let mut canvas = sheet(
         "Error of a solved configuration against its time",
-        "left: tolerance of the residual, algorithm, arithmetic, time relative to the scene's own; right: nodes of the object",
+        "left: tolerance, updates, algorithm, arithmetic, time relative to the scene's own; right: nodes of the object",
     );
     let place = |row: &Row| (row.cost.least, row.rms);
     let mut curves = series(accuracy, Study::Tolerance, place);
     curves.iter_mut().for_each(|curve| curve.name = "tolerance".to_owned());
-    for study in [Study::Algorithm, Study::Arithmetic] {
+    for study in [Study::Updates, Study::Algorithm, Study::Arithmetic] {
         for mut curve in series(accuracy, study, place) {
             curve.colour = curves.len();
             curves.push(curve);

@@ -45,6 +45,8 @@ pub enum Study {
     Spacing,
     /// Tolerance of the contact solver; cost is a configuration.
     Tolerance,
+    /// Updates of linearised contact's geometry; cost is a configuration.
+    Updates,
     /// How contact is solved; cost is a configuration.
     Algorithm,
     /// f64 on the CPU against f32 on the GPU; cost is a configuration.

@@ -41,8 +41,8 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
         (
             "accuracy-solver",
             figures::solver(accuracy),
-            "A tolerance below the knee buys nothing that interpolation does not throw away. Linearised contact keeps the \
-             geometry at rest; the paper's iteration has its own fixed point, or none: the table counts what did not converge. \
+            "A tolerance below the knee buys nothing that interpolation does not throw away. Linearised contact freezes the \
+             geometry, at rest and again at each update (0 to 8 along its curve); the paper's iteration has its own fixed point, or none: the table counts what did not converge. \
              Objects of other nodes are other facets for a point to touch: where the right curve does not fall, the \
              finest object is no better than the others.",
         ),
@@ -101,6 +101,7 @@ fn study_name(study: Study) -> &'static str {
     match study {
         Study::Spacing => "spacing",
         Study::Tolerance => "tolerance",
+        Study::Updates => "updates",
         Study::Algorithm => "algorithm",
         Study::Arithmetic => "arithmetic",
         Study::Nodes => "nodes",

@@ -77,6 +77,15 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
     })
 }
 
+fn updates(checker: &Checker<'_>, table: &ContactTable) -> Result<u32, SceneError> {
+    let Some(value) = &table.updates else { return Ok(0) };
+    if table.algorithm != Some(Algorithm::Linearised) {
+        let reason = "updates acts on linearised contact, whose geometry is frozen: add algorithm = \"linearised\", or leave it out";
+        return Err(checker.error(value.span(), reason));
+    }
+    Ok(*value.get_ref())
+}
+
 fn blending(checker: &Checker<'_>, table: &ContactTable) -> Result<Blending, SceneError> {
     let Some(value) = &table.blending else { return Ok(Blending::Width(0.0)) };
     if table.algorithm == Some(Algorithm::Paper) {
@@ -109,6 +118,7 @@ fn contact(checker: &Checker<'_>, table: &ContactTable) -> Result<ContactSpec, S
         algorithm: table.algorithm.unwrap_or(Algorithm::Energy),
         tolerance: tolerance.unwrap_or(Ok(CONTACT_TOLERANCE))?,
         max_iterations,
+        updates: updates(checker, table)?,
         blending: blending(checker, table)?,
     })
 }

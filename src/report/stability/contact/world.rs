@@ -192,6 +192,7 @@ pub fn contact(stiffness: f64) -> ContactSpec {
         algorithm: Algorithm::Energy,
         tolerance: 1e-8,
         max_iterations: ITERATIONS,
+        updates: 0,
         blending: Blending::Width(0.0),
     }
 }
