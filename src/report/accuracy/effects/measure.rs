@@ -11,7 +11,7 @@ use crate::{
     gpu::{AdapterChoice, Context, FrameCost, FrameError, FrameMethod, FrameUpdate},
     render::{
         graphics::{ContactForces, Graphics, Smoothing},
-        session,
+        session::{self, Driver, SessionError},
         setup::Setup,
     },
     scene::{EFFECTS, Effect, Scene, Waypoint},
@@ -43,24 +43,31 @@ pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, A
         let dataset = baked(&variants[k].scene)?;
         let seconds = begun.elapsed().as_secs_f64();
         datasets[k] = Some(dataset);
-        Ok(Some(seconds))
+        Ok(Some(vec![seconds]))
     })?;
     let datasets: Vec<Dataset> = datasets.into_iter().flatten().collect();
     let setups: Vec<Setup> = datasets.iter().map(Setup::new).collect::<Result<_, _>>()?;
     progress("effects: ticks");
     let motion = motion(scene, &datasets[0])?;
-    let feel = |k: usize| {
-        let (setup, data): (&Setup, &Dataset) = (&setups[k], &datasets[k]);
-        let plan = setup.plan(data, motion.duration(), 0);
-        let begun = Instant::now();
-        let trace = session::run(&setup.haptics, &mut Recorded::new(motion.clone()), None, &plan)?;
-        Ok::<_, AccuracyError>((begun.elapsed().as_secs_f64() / plan.ticks.max(1) as f64, trace))
-    };
-    let felt = feel(0)?.1;
+    let plain = &setups[PLAIN];
+    let plan = plain.plan(&datasets[PLAIN], motion.duration(), 0);
+    let felt = session::run(&plain.haptics, &mut Recorded::new(motion.clone()), None, &plan)?;
+    let blocks = plan.ticks / BLOCK + 1;
     let mut faults = Vec::new();
     let ticks = rounds(variants.len(), TRIES, |k| {
-        let (seconds, trace) = feel(k)?;
-        if trace.ticks.iter().any(|tick| tick.fault.is_some()) && !faults.contains(&variants[k].name) {
+        let haptics = &setups[k].haptics;
+        let mut device = Recorded::new(motion.clone());
+        let mut driver = Driver::new(haptics, &mut device).map_err(SessionError::from)?;
+        let mut fault = false;
+        let block = |_| {
+            let begun = Instant::now();
+            for _ in 0..BLOCK {
+                fault |= driver.tick(haptics.period(), haptics.period()).0.fault.is_some();
+            }
+            begun.elapsed().as_secs_f64() / (blocks * BLOCK) as f64
+        };
+        let seconds = (0..blocks).map(block).collect();
+        if fault && !faults.contains(&variants[k].name) {
             faults.push(variants[k].name.clone());
         }
         Ok(Some(seconds))
@@ -81,9 +88,12 @@ pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, A
         setups.iter().zip(&datasets).map(|(setup, data)| setup.graphics(data)).collect::<Result<_, _>>()?;
     let frames = rounds(variants.len(), TRIES, |k| {
         let Some(graphics) = &mut drawn[k] else { return Ok(None) };
-        let begun = Instant::now();
-        places.iter().for_each(|(q, share)| graphics.frame(q, *share));
-        Ok(Some(begun.elapsed().as_secs_f64() / places.len() as f64))
+        let frame = |(q, share): &(JointVector, f64)| {
+            let begun = Instant::now();
+            graphics.frame(q, *share);
+            begun.elapsed().as_secs_f64() / places.len() as f64
+        };
+        Ok(Some(places.iter().map(frame).collect()))
     })?;
     let mut device = match on_the_device(&setups, &datasets) {
         Ok(device) => device,
@@ -92,11 +102,11 @@ pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, A
             Device { adapter: None, bodies: variants.iter().map(|_| None).collect() }
         }
     };
-    let gpu_frames = rounds(variants.len(), 1, |k| {
+    let gpu_frames = rounds(variants.len(), TRIES, |k| {
         let Some(body) = &mut device.bodies[k] else { return Ok(None) };
         let begun = Instant::now();
         body.play(&places)?;
-        Ok(Some(begun.elapsed().as_secs_f64() / places.len() as f64))
+        Ok(Some(vec![begun.elapsed().as_secs_f64() / places.len() as f64]))
     })?;
     let takes = |k: usize| match (&device.bodies[k], &device.adapter) {
         (Some(body), _) => Some(body.update.takes()),
@@ -162,27 +172,33 @@ fn variants(scene: &Scene, notes: &mut Vec<String>) -> Result<Vec<Variant>, Accu
     Ok(variants)
 }
 
-/// Runs of a loop in one round, of which the fastest counts: they take milliseconds, and whatever else a machine does adds to
-/// them.
+/// Runs of a loop in one round. Of each of its blocks the fastest counts: the work of a block is the same in every run, and
+/// whatever else a machine does only adds to it.
 const TRIES: usize = 3;
 
-/// Seconds that `work` takes of each of `count` variants, round by round, the least of `tries`.
+/// Ticks of a block: a tenth of a millisecond, which is mostly not interrupted, and long enough for any clock.
+const BLOCK: usize = 100;
+
+/// Seconds that `work` takes of each of `count` variants, round by round: the sum of its blocks, each the least of `tries`.
 fn rounds(
     count: usize,
     tries: usize,
-    mut work: impl FnMut(usize) -> Result<Option<f64>, AccuracyError>,
+    mut work: impl FnMut(usize) -> Result<Option<Vec<f64>>, AccuracyError>,
 ) -> Result<Times, AccuracyError> {
     let mut times: Times = vec![Some([0.0; REPEATS]); count];
     for round in 0..REPEATS {
         for step in 0..count {
             let k = if round % 2 == 0 { step } else { count - 1 - step };
-            for attempt in 0..tries {
-                let seconds = work(k)?;
-                times[k] = times[k].zip(seconds).map(|(mut times, seconds)| {
-                    times[round] = if attempt == 0 { seconds } else { seconds.min(times[round]) };
-                    times
-                });
+            let mut blocks = work(k)?;
+            for _ in 1..tries {
+                if let (Some(blocks), Some(again)) = (&mut blocks, work(k)?) {
+                    blocks.iter_mut().zip(again).for_each(|(least, seconds)| *least = least.min(seconds));
+                }
             }
+            times[k] = times[k].zip(blocks).map(|(mut times, blocks)| {
+                times[round] = blocks.iter().sum();
+                times
+            });
         }
     }
     Ok(times)
