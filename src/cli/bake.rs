@@ -116,10 +116,10 @@ fn announce(progress: &Progress) {
     let Progress { points, done, footprint: Footprint { memory, disk }, .. } = progress;
     let disk = match disk.most {
         0 => String::new(),
-        _ => format!(" and {} of disk, twice that for a moment at the end", range(*disk)),
+        _ => format!(" and {} of disk (twice that for a moment at the end)", range(*disk)),
     };
     eprintln!(
-        "haptize: {points} points, {done} of them done; results take {} of memory{disk}, by how much is in contact",
+        "haptize: {points} points, {done} of them done; results take {} of memory{disk}, depending on how much touches",
         range(*memory)
     );
 }
