@@ -36,10 +36,14 @@ pub fn write_all(folder: &Path, outcomes: &[(&str, Outcome)], adapter: &str) -> 
     Ok(files)
 }
 
-/// Of its bound, how much a figure takes: above one it is broken, and so it is where it is no number.
+/// Of its bound, how much a figure takes: above one it is broken, and so it is where it is no number. Of a share that must reach
+/// some part of one, what it lacks over what it may lack.
 fn share(outcome: &Outcome) -> f64 {
     let share = match outcome.bound {
         Bound::AtMost(bound) => outcome.worst / bound,
+        Bound::AtLeast(bound) if 0.0 < bound && bound < 1.0 && outcome.worst <= 1.0 => {
+            (1.0 - outcome.worst) / (1.0 - bound)
+        }
         Bound::AtLeast(bound) => bound / outcome.worst,
     };
     match (outcome.passed(), share.is_nan()) {
@@ -57,10 +61,33 @@ fn share(outcome: &Outcome) -> f64 {
     }
 }
 
-/// One row a figure, room by room.
+/// What the picture shows in one row: the figures of one measure of one case.
+struct Row<'a> {
+    case: &'a str,
+    measure: &'a str,
+    figures: usize,
+    /// The greatest of them.
+    share: f64,
+}
+
+/// The rows of one room, in the order of their first figures.
+fn rows<'a>(room: &'a [(&str, Outcome)]) -> Vec<Row<'a>> {
+    let mut rows: Vec<Row<'a>> = Vec::new();
+    for (_, outcome) in room {
+        let share = share(outcome);
+        match rows.iter_mut().find(|row| row.case == outcome.case && row.measure == outcome.measure) {
+            Some(row) => (row.figures, row.share) = (row.figures + 1, row.share.max(share)),
+            None => rows.push(Row { case: &outcome.case, measure: &outcome.measure, figures: 1, share }),
+        }
+    }
+    rows
+}
+
+/// One row a measure of a case, room by room.
 fn figure(outcomes: &[(&str, Outcome)], adapter: &str) -> Canvas {
-    let rooms: Vec<&[(&str, Outcome)]> = outcomes.chunk_by(|a, b| a.0 == b.0).collect();
-    let height = (outcomes.len() + 2 * rooms.len()) as f64 * ROW;
+    let rooms: Vec<(&str, Vec<Row<'_>>)> =
+        outcomes.chunk_by(|a, b| a.0 == b.0).map(|room| (room[0].0, rows(room))).collect();
+    let height = rooms.iter().map(|(_, rows)| (rows.len() + 2) as f64 * ROW).sum();
     let mut canvas = Canvas::new(WIDTH, TOP + height + 52.0);
     headline(&mut canvas, "How much of its bound each hard case takes");
     let failed = outcomes.iter().filter(|(_, outcome)| !outcome.passed()).count();
@@ -83,21 +110,22 @@ fn figure(outcomes: &[(&str, Outcome)], adapter: &str) -> Canvas {
         TITLE.anchored(Anchor::Middle),
     );
     let mut y = TOP;
-    for room in rooms {
+    for (room, rows) in rooms {
         y += 2.0 * ROW;
-        canvas.text((MARGIN, y - 6.0), room[0].0, TITLE);
+        canvas.text((MARGIN, y - 6.0), room, TITLE);
         let mut before = "";
-        for (_, outcome) in room {
+        for Row { case, measure, figures, share } in rows {
             let line = y + 0.5 * ROW + 0.36 * NOTE.size;
-            if outcome.case != before {
+            if case != before {
                 canvas.polyline(&[(MARGIN, y), (WIDTH - MARGIN, y)], colour::GRID, 0.8, None);
-                canvas.text((MARGIN, line), &outcome.case, NOTE);
-                before = &outcome.case;
+                canvas.text((MARGIN, line), case, NOTE);
+                before = case;
             }
             let style = TICK.anchored(Anchor::Start);
-            canvas.text((MEASURES, line), &shortened(&outcome.measure, |text| style.width(text)), style);
-            let (share, middle) = (share(outcome), y + 0.5 * ROW);
-            let ink = colour::series(if outcome.passed() { 2 } else { 1 });
+            let count = if figures > 1 { format!(", {figures} times") } else { String::new() };
+            canvas.text((MEASURES, line), &shortened(&format!("{measure}{count}"), |text| style.width(text)), style);
+            let middle = y + 0.5 * ROW;
+            let ink = colour::series(if share <= 1.0 { 2 } else { 1 });
             canvas.polyline(&[(area.x, middle), (place(share), middle)], ink.with_opacity(0.35), 5.0, None);
             canvas.disc((place(share), middle), 4.0, ink);
             y += ROW;
@@ -157,6 +185,9 @@ mod tests {
             (4.0, Bound::AtLeast(1.0), 0.25),
             (2.0, Bound::AtMost(1.0), 2.0),
             (0.5, Bound::AtLeast(1.0), 2.0),
+            (0.75, Bound::AtLeast(0.5), 0.5),
+            (0.0, Bound::AtLeast(0.5), 2.0),
+            (1.0, Bound::AtLeast(0.5), 0.0),
             (0.0, Bound::AtMost(0.0), 0.0),
             (1.0, Bound::AtMost(0.0), f64::INFINITY),
             (-1.0, Bound::AtLeast(1.0), f64::INFINITY),
@@ -168,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_and_the_picture_have_a_row_each() {
+    fn the_table_has_a_row_for_each_figure_and_the_picture_for_each_measure() {
         let outcomes = [
             ("loop", outcome(0.5, Bound::AtMost(1.0))),
             ("loop", outcome(2.0, Bound::AtMost(1.0))),
@@ -181,7 +212,9 @@ mod tests {
         assert_eq!(table.lines().filter(|line| line.starts_with("| case | a \\| b")).count(), 3, "{table}");
         assert_eq!((table.matches("### ").count(), table.matches("**fail**").count()), (2, 1));
         let svg = std::fs::read_to_string(folder.path().join("stability.svg")).unwrap();
-        assert_eq!(svg.matches("<circle").count(), 3);
+        assert_eq!(svg.matches("<circle").count(), 2);
+        let worst = rows(&outcomes[..2]);
+        assert_eq!((worst.len(), worst[0].figures, worst[0].share), (1, 2, 2.0));
         assert_eq!(shortened("four", |text| 100.0 * text.chars().count() as f64), "fo…");
     }
 }
