@@ -57,10 +57,9 @@ have_rust() {
     cargo fmt --version && cargo clippy --version || rustup component add rustfmt clippy
 }
 
-# The demo as on a fresh machine: no Vulkan driver, no display, an empty folder. It is built as the tests are, which saves
-# compiling every dependency once more.
+# The demo as on a fresh machine: no Vulkan driver, no display, an empty folder. It is the program that the tests have built,
+# which saves compiling every dependency once more.
 demo() {
-    cargo build --locked --quiet || return 1
     local binary=${CARGO_TARGET_DIR:-$PWD/target}/debug/haptize place
     place=$(mktemp -d) || return 1
     (cd "$place" && env -u DISPLAY -u WAYLAND_DISPLAY VK_DRIVER_FILES=/none VK_ICD_FILENAMES=/none \

@@ -26,7 +26,7 @@ pub struct Model<'a> {
     /// normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
     /// [`RIGID_STIFFNESS`] [N/m].
     pub kc: f64,
-    /// Width w over which facets pass into each other for point nodes, zero where they are sharp; see [`super::blend`] [m].
+    /// Width w over which facets pass into each other for point nodes, zero where they are sharp [m].
     pub blending: f64,
     /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
     /// loses no digits.
