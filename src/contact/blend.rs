@@ -80,9 +80,10 @@ impl Blend {
         let corners = surface::corners(positions, model.object.triangles[t as usize]);
         let point = closest_point(x, corners);
         let square = x.distance_squared(point_at(corners, point.weights));
-        if square < reach * reach {
+        let area = model.rest_areas[t as usize];
+        // A triangle without area has no plane, and no say.
+        if square < reach * reach && area > 0.0 {
             let w = model.blending * model.blending;
-            let area = model.rest_areas[t as usize];
             self.near.push(Near { triangle: t, point, square: square / w, area: area / (area + w) });
         }
     }

@@ -31,8 +31,8 @@ pub struct Felt {
     pub outer: bool,
     /// Distance of the node [m].
     pub distance: f64,
-    /// Face, edge or vertex of the whole surface.
-    key: (u8, u32),
+    /// Face, edge or vertex of the whole surface: which of them, and its triangle, its two nodes or its node.
+    key: (u8, u32, u32),
 }
 
 /// Gathers the features that one node feels; its lists are reused from node to node.
@@ -68,21 +68,21 @@ impl Features {
         felt.clear();
         let reach = radius * radius;
         for &(t, point) in near.iter() {
-            add(felt, triangles, topology, t, point, 1);
+            add(felt, triangles, t, point, 1);
             let nodes = triangles[t as usize];
             let corners = surface::corners(positions, nodes);
             for k in 0..3 {
                 if t < topology.across[t as usize][k] {
                     let point = closest_on_edge(x, corners, k);
                     if x.distance_squared(point_at(corners, point.weights)) < reach {
-                        add(felt, triangles, topology, t, point, -1);
+                        add(felt, triangles, t, point, -1);
                     }
                 }
                 let first = topology.around[topology.around_offsets[nodes[k] as usize] as usize];
                 if t == first && x.distance_squared(corners[k]) < reach {
                     let mut weights = [0.0; 3];
                     weights[k] = 1.0;
-                    add(felt, triangles, topology, t, ClosestPoint { weights, feature: Feature::Vertex(k) }, 1);
+                    add(felt, triangles, t, ClosestPoint { weights, feature: Feature::Vertex(k) }, 1);
                 }
             }
         }
@@ -99,24 +99,15 @@ impl Features {
 }
 
 /// Counts a cell's closest point for the feature that it lies on.
-fn add(felt: &mut Vec<Felt>, triangles: &[[u32; 3]], topology: &Topology, t: u32, point: ClosestPoint, share: i32) {
+fn add(felt: &mut Vec<Felt>, triangles: &[[u32; 3]], t: u32, point: ClosestPoint, share: i32) {
+    let nodes = triangles[t as usize];
     let key = match point.feature {
-        Feature::Face => (0, t),
+        Feature::Face => (0, t, t),
         Feature::Edge(k) => {
-            let other = topology.across[t as usize][k];
-            let (low, k) = if t < other {
-                (t, k)
-            } else {
-                let across = &topology.across[other as usize];
-                // The edge of `other` that starts where this one ends.
-                let end = triangles[t as usize][(k + 1) % 3];
-                let start = triangles[other as usize].iter().position(|&node| node == end).unwrap_or(0);
-                debug_assert_eq!(across[start], t);
-                (other, start)
-            };
-            (1, 3 * low + k as u32)
+            let (a, b) = (nodes[k], nodes[(k + 1) % 3]);
+            (1, a.min(b), a.max(b))
         }
-        Feature::Vertex(k) => (2, triangles[t as usize][k]),
+        Feature::Vertex(k) => (2, nodes[k], nodes[k]),
     };
     match felt.iter_mut().find(|felt| felt.key == key) {
         Some(felt) => felt.share += share,

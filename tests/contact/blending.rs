@@ -1,6 +1,6 @@
 //! Facets that pass into each other: continuous torque, exact depth below a plane, one smooth surface from inside and outside.
 
-use crate::fixture::{arm, contact, octahedron, probe, random_configurations, sphere};
+use crate::fixture::{arm, contact, object, octahedron, probe, random_configurations, sphere};
 use glam::DVec3;
 use haptize::JointVector;
 use haptize::contact::{Model, Solver, Status};
@@ -151,4 +151,30 @@ fn an_inspection_tells_all_features_of_a_blended_depth() {
     for (found, expected) in inspection.torque_of_contacts().iter().zip(&inspection.torque) {
         assert!((found - expected).abs() < 1e-12, "{found} {expected}");
     }
+}
+
+/// Beside a right-angled edge the blended surface stands out by a quarter of the width, and no farther.
+#[test]
+fn a_right_angled_edge_bulges_by_a_quarter_of_the_width() {
+    let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 0.1;
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let cube = object((0..8).map(corner).collect(), triangles);
+    let width = 0.01;
+    let mut greatest = 0.0f64;
+    for from_edge in 0..=60 {
+        // Over the top face, near its edge at x = 0 and far from the others, also that between its two triangles.
+        let place = DVec3::new(2e-4 * f64::from(from_edge), 0.05, 0.1);
+        let chain = probe(place, DVec3::Z);
+        let model = Model::new(&cube, &chain, blended(Algorithm::Energy, 500.0, Blending::Width(width)));
+        let mut solver = Solver::new(&model);
+        let (mut low, mut high) = (-0.5 * width, width);
+        assert!(solver.gap(&[low]) < 0.0 && solver.gap(&[high]) > 0.0);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            *(if solver.gap(&[middle]) < 0.0 { &mut low } else { &mut high }) = middle;
+        }
+        greatest = greatest.max(low / width);
+    }
+    assert!((greatest - 0.25).abs() < 0.01, "{greatest} of the width");
 }

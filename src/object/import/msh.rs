@@ -107,12 +107,12 @@ impl<R: BufRead> Lines<'_, R> {
     }
 
     /// Goes on to a line that must be there.
-    fn expect(&mut self) -> Result<(), String> {
+    fn require(&mut self) -> Result<(), String> {
         if self.next()? { Ok(()) } else { Err(self.error("the file ends within a section")) }
     }
 
     fn end(&mut self, section: &str) -> Result<(), String> {
-        self.expect()?;
+        self.require()?;
         if self.text == section { Ok(()) } else { Err(self.error(&format!("{section} is expected here"))) }
     }
 
@@ -142,7 +142,7 @@ impl<R: BufRead> Lines<'_, R> {
 }
 
 fn format(lines: &mut Lines<'_, impl BufRead>) -> Result<Version, String> {
-    lines.expect()?;
+    lines.require()?;
     let ([version, kind], _) = lines.numbers::<f64, 2>()?;
     let version = match (version, kind) {
         (2.2, 0.0) => Version::Two,
@@ -158,7 +158,7 @@ fn format(lines: &mut Lines<'_, impl BufRead>) -> Result<Version, String> {
 fn skip(lines: &mut Lines<'_, impl BufRead>) -> Result<(), String> {
     let end = format!("$End{}", &lines.text[1..]);
     loop {
-        lines.expect()?;
+        lines.require()?;
         if lines.text == end {
             return Ok(());
         }
@@ -166,10 +166,10 @@ fn skip(lines: &mut Lines<'_, impl BufRead>) -> Result<(), String> {
 }
 
 fn nodes_2(lines: &mut Lines<'_, impl BufRead>, nodes: &mut Nodes) -> Result<(), String> {
-    lines.expect()?;
+    lines.require()?;
     let ([count], _) = lines.numbers::<u64, 1>()?;
     for _ in 0..count {
-        lines.expect()?;
+        lines.require()?;
         let tag = lines.number_at(0)?;
         let position = [lines.number_at(1)?, lines.number_at(2)?, lines.number_at(3)?];
         nodes.add(lines, tag, position)?;
@@ -179,18 +179,18 @@ fn nodes_2(lines: &mut Lines<'_, impl BufRead>, nodes: &mut Nodes) -> Result<(),
 
 /// `blocks nodes least greatest`, then blocks: `dimension entity parametric nodes`, their tags, their positions.
 fn nodes_4(lines: &mut Lines<'_, impl BufRead>, nodes: &mut Nodes) -> Result<(), String> {
-    lines.expect()?;
+    lines.require()?;
     let ([blocks], _) = lines.numbers::<u64, 1>()?;
     for _ in 0..blocks {
-        lines.expect()?;
+        lines.require()?;
         let ([_, _, _, count], _) = lines.numbers::<i64, 4>()?;
         let mut tags = Vec::new();
         for _ in 0..count {
-            lines.expect()?;
+            lines.require()?;
             tags.push(lines.numbers::<u64, 1>()?.0[0]);
         }
         for tag in tags {
-            lines.expect()?;
+            lines.require()?;
             let (position, _) = lines.numbers::<f64, 3>()?;
             nodes.add(lines, tag, position)?;
         }
@@ -203,10 +203,10 @@ fn elements_2(
     nodes: &Nodes,
     tetrahedra: &mut Vec<[u32; 4]>,
 ) -> Result<(), String> {
-    lines.expect()?;
+    lines.require()?;
     let ([count], _) = lines.numbers::<u64, 1>()?;
     for _ in 0..count {
-        lines.expect()?;
+        lines.require()?;
         // Number, type, count of labels, labels, nodes.
         let ([_, kind, labels], all) = lines.numbers::<u64, 3>()?;
         if kind == TETRAHEDRON {
@@ -230,13 +230,13 @@ fn elements_4(
     nodes: &Nodes,
     tetrahedra: &mut Vec<[u32; 4]>,
 ) -> Result<(), String> {
-    lines.expect()?;
+    lines.require()?;
     let ([blocks], _) = lines.numbers::<u64, 1>()?;
     for _ in 0..blocks {
-        lines.expect()?;
+        lines.require()?;
         let ([_, _, kind, count], _) = lines.numbers::<i64, 4>()?;
         for _ in 0..count {
-            lines.expect()?;
+            lines.require()?;
             if kind == TETRAHEDRON as i64 {
                 let ([_, tags @ ..], all) = lines.numbers::<u64, 5>()?;
                 if all != 5 {
