@@ -21,7 +21,7 @@ fn sphere(coarser: usize) -> Scene {
 #[test]
 fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
     let scene = sphere(2);
-    let extent = Extent { configurations: 60, points: 4000 };
+    let extent = Extent { configurations: 60, points: 4000, rounds: 1 };
     let mut found = accuracy::measure(&scene, extent, &mut |_| ()).unwrap();
     assert!(found.in_contact > 20 && found.left_out == 0);
     // The reference is far better than anything that is compared with it.
@@ -70,7 +70,7 @@ fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
     assert!(
         prices
             .lines()
-            .all(|line| line.split('"').step_by(2).map(|part| part.matches(',').count()).sum::<usize>() == 18)
+            .all(|line| line.split('"').step_by(2).map(|part| part.matches(',').count()).sum::<usize>() == 42)
     );
     assert!(files.iter().all(|file| std::fs::metadata(file).unwrap().len() > 1000), "{files:?}");
     let page = std::fs::read_to_string(folder.path().join("accuracy.html")).unwrap();
@@ -79,28 +79,36 @@ fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
     assert_eq!(table.lines().count(), found.rows.len() + 1);
 }
 
-/// Each effect alone and all together: what is counted is exact, what is timed is relative to the same run.
+/// Each effect alone and within the whole scene: what is counted is exact, what is timed is relative to the same run.
 fn effects_are_priced_side_by_side(scene: &Scene) -> accuracy::effects::Effects {
-    let priced = accuracy::effects::price(scene, &mut |_| ()).unwrap();
+    let priced = accuracy::effects::price(scene, 2, &mut |_| ()).unwrap();
     assert_eq!(priced.prices.len(), EFFECTS.len() + 3);
     assert!(priced.in_contact > 0.2 && priced.nodes == 102, "{priced:?}");
     let [plain, graphics] = ["plain", "graphics"].map(|name| priced.of(name).unwrap());
-    assert_eq!((plain.bake.least, plain.tick.least, graphics.frame.unwrap().least), (1.0, 1.0, 1.0));
+    assert_eq!((plain.alone.bake.least, plain.alone.tick.least, graphics.alone.frame.unwrap().least), (1.0, 1.0, 1.0));
     for effect in EFFECTS {
         let price = priced.of(effect.key).unwrap();
         let like = if effect.needs_forces() { graphics } else { plain };
         assert_eq!(price.dataset_bytes, like.dataset_bytes, "{}", effect.key);
-        assert_eq!((price.frame.is_some(), price.gpu_frame.is_some()), (effect.is_drawn(), effect.is_drawn()));
-        assert!(price.bake.least > 0.0 && price.tick.least <= price.tick.median && !price.setting.is_empty());
+        let costs = price.alone;
+        assert_eq!((costs.frame.is_some(), costs.gpu_frame.is_some()), (effect.is_drawn(), effect.is_drawn()));
+        assert!(costs.bake.least > 0.0 && costs.tick.least <= costs.tick.median && !price.setting.is_empty());
+        // Within the whole scene all is drawn and all forces are stored, with it or without.
+        assert_eq!(price.within.is_none(), effect.key == "quasi_static");
+        if let Some(within) = price.within {
+            assert!(within.frame.is_some() && within.dataset == 1.0, "{}", effect.key);
+            assert_eq!(within.device.unwrap() > 1.0, effect.key == "stiffening", "{}", effect.key);
+        }
     }
-    let together = priced.of("all together").unwrap();
+    let together = priced.of("whole").unwrap();
     assert!(graphics.dataset_bytes > plain.dataset_bytes && together.dataset_bytes == graphics.dataset_bytes);
-    assert_eq!(together.setting, "without quasi_static");
+    let all = EFFECTS.map(|effect| effect.key).into_iter().filter(|key| *key != "quasi_static");
+    assert_eq!(together.setting, all.collect::<Vec<_>>().join(", "));
     // Nothing on the device without graphics; with stiffening more than without.
     let bytes = |name: &str| priced.of(name).unwrap().device.unwrap().bytes;
     assert!(bytes("friction") == 0 && bytes("graphics") > 0 && bytes("smoothing") == bytes("graphics"));
     assert!(bytes("stiffening") > bytes("gravity") && bytes("gravity") > bytes("graphics"));
-    assert!(bytes("quasi_static") < bytes("graphics") && bytes("all together") == bytes("stiffening"));
+    assert!(bytes("quasi_static") < bytes("graphics") && bytes("whole") == bytes("stiffening"));
     assert!(priced.notes.is_empty(), "{:?}", priced.notes);
     priced
 }

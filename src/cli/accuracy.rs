@@ -22,6 +22,9 @@ pub struct Arguments {
     /// Grids with more points than this are left out.
     #[arg(long, default_value_t = 100_000)]
     points: usize,
+    /// Runs of each work that is timed; the least counts.
+    #[arg(long, default_value_t = 5)]
+    rounds: usize,
     /// Price every effect, too: the scene with it and without it, haptized, felt and drawn.
     #[arg(long)]
     effects: bool,
@@ -30,11 +33,15 @@ pub struct Arguments {
 /// Measures the scene and writes what was found.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let scene = Scene::load(&arguments.scene)?;
-    let extent = Extent { configurations: arguments.configurations.max(1), points: arguments.points };
+    let extent = Extent {
+        configurations: arguments.configurations.max(1),
+        points: arguments.points,
+        rounds: arguments.rounds.max(1),
+    };
     let mut progress = |what: &str| eprintln!("haptize: {what} ...");
     let mut found = accuracy::measure(&scene, extent, &mut progress)?;
     if arguments.effects {
-        found.effects = Some(accuracy::effects::price(&scene, &mut progress)?);
+        found.effects = Some(accuracy::effects::price(&scene, extent.rounds, &mut progress)?);
     }
     let files = accuracy::write_all(&arguments.output, &found)?;
     let mut json = serde_json::to_value(&found)?;

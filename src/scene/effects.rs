@@ -41,13 +41,23 @@ impl Effect {
         self.is_drawn() || matches!(self.key, "friction" | "contact_damping")
     }
 
-    /// Its value in `scene`; the usual one where the scene does not name it, or says that it is off.
+    /// Its value in `scene`; none where the scene does not name it, or says that it is off.
+    fn given(&self, scene: &Scene) -> Option<Value> {
+        let given = table_of(scene).get(self.table)?.get(self.key).cloned();
+        given.filter(|value| *value != Value::Boolean(false) && value.as_str() != Some("constant"))
+    }
+
+    /// Whether `scene` asks for it.
+    #[must_use]
+    pub fn is_named(&self, scene: &Scene) -> bool {
+        self.given(scene).is_some()
+    }
+
+    /// Its value in `scene`; the usual one where the scene does not ask for it.
     #[must_use]
     pub fn value(&self, scene: &Scene) -> Value {
-        let given = table_of(scene).get(self.table).and_then(|table| table.get(self.key)).cloned();
-        let is_on = |value: &Value| *value != Value::Boolean(false) && value.as_str() != Some("constant");
         let usual = || format!("usual = {}", self.usual).parse::<Table>().ok()?.remove("usual");
-        given.filter(is_on).or_else(usual).unwrap_or(Value::Boolean(true))
+        self.given(scene).or_else(usual).unwrap_or(Value::Boolean(true))
     }
 }
 
@@ -118,6 +128,9 @@ mod tests {
         let scene = Scene::parse(&text, "s.toml").unwrap();
         let value = |key: &str| EFFECTS.iter().find(|effect| effect.key == key).unwrap().value(&scene);
         assert_eq!((value("contact_damping"), value("passivity_control")), (Value::Float(7.5), Value::Boolean(true)));
+        let named: Vec<&str> =
+            EFFECTS.iter().filter(|effect| effect.is_named(&scene)).map(|effect| effect.key).collect();
+        assert_eq!(named, ["contact_damping"]);
     }
 
     #[test]

@@ -88,7 +88,7 @@ fn frames(push: &Push<'_>, study: &mut Accuracy) -> Result<(), AccuracyError> {
     let exact = run(REFERENCE_RATE)?;
     let mut found = Vec::new();
     for rate in RATES {
-        found.push((rate, timed(|| run(rate))?));
+        found.push((rate, timed(study.rounds, || run(rate))?));
     }
     let nearest = |rate: &u32| (f64::from(*rate) - push.rate).abs();
     let baseline = found.iter().min_by(|a, b| nearest(&a.0).total_cmp(&nearest(&b.0))).map_or(0.0, |f| f.1.0.least);
@@ -123,7 +123,7 @@ fn iterations(push: &Push<'_>, study: &mut Accuracy) -> Result<(), AccuracyError
     };
     let mut found = Vec::new();
     for count in ITERATIONS {
-        found.push((count, timed(|| run(FrameMethod::Iterations(count)))?));
+        found.push((count, timed(study.rounds, || run(FrameMethod::Iterations(count)))?));
     }
     let usual = found.iter().find(|(count, _)| *count == FrameMethod::USUAL_ITERATIONS);
     let baseline = usual.map_or(0.0, |(_, (cost, _))| cost.least);

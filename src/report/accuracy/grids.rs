@@ -63,7 +63,7 @@ pub(super) fn spacing(
     limit: usize,
     study: &mut Accuracy,
 ) -> Result<Dataset, AccuracyError> {
-    let (own_cost, own) = timed(|| baked(scene))?;
+    let (own_cost, own) = timed(study.rounds, || baked(scene))?;
     let mut before = 0;
     for coarser in COARSER {
         let spaced = spaced(scene, coarser);
@@ -79,7 +79,7 @@ pub(super) fn spacing(
                 .push(format!("the grid of {count} points is left out: more than {limit} (raise --points to have it)"));
             continue;
         }
-        let (cost, dataset) = timed(|| baked(&spaced))?;
+        let (cost, dataset) = timed(study.rounds, || baked(&spaced))?;
         for interpolation in Interpolation::ALL {
             let field = field(&spaced, &dataset, interpolation)?;
             let (rms, worst) = reference.errors(|q| field.sample(q).torque);
@@ -111,7 +111,7 @@ pub(super) fn look_up(scene: &Scene, own: &Dataset, study: &mut Accuracy) -> Res
     for interpolation in Interpolation::ALL {
         let field = field(scene, own, interpolation)?;
         let places: Vec<JointVector> = (0..256).map(|k| own.grid.configuration(k * own.grid.points() / 256)).collect();
-        let (cost, ()) = timed(|| {
+        let (cost, ()) = timed(study.rounds, || {
             for k in 0..LOOK_UPS {
                 black_box(field.sample(black_box(&places[k % places.len()])));
             }

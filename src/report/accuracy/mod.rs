@@ -5,7 +5,7 @@
 //! moves when it is asked for a hundredth of that. Errors are Euclidean norms over the joints; a prismatic joint counts with
 //! the lever arm of 0.1 m, so that all are N m. `rms` is over all configurations, in contact or not, and is set beside the
 //! rms of the reference torque itself. Accuracy is deterministic. Time is told as the ratio to one row of the same study:
-//! the least of [`REPEATS`] runs, because the work is the same in each and a busy machine only adds to it; median and
+//! the least of some runs, because the work is the same in each and a busy machine only adds to it; median and
 //! greatest show by how much.
 
 mod choice;
@@ -33,9 +33,6 @@ use crate::{
 use reference::Reference;
 use serde::Serialize;
 use std::time::Instant;
-
-/// Runs that are timed: of five, one is hardly ever without interruption, and the median tells how usual that is.
-pub const REPEATS: usize = 5;
 
 /// What is varied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -115,6 +112,8 @@ pub struct Loops {
 pub struct Accuracy {
     /// Name of the scene.
     pub scene: String,
+    /// Runs that were timed.
+    pub rounds: usize,
     /// Configurations of the reference.
     pub configurations: usize,
     /// Of which in contact.
@@ -148,6 +147,8 @@ pub struct Extent {
     pub configurations: usize,
     /// Grids with more points than this are left out.
     pub points: usize,
+    /// Runs that are timed, at least 1: of five, one is hardly ever without interruption, and the median tells how usual that is.
+    pub rounds: usize,
 }
 
 /// The study failed.
@@ -203,6 +204,7 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
     let reference = Reference::solve(scene, &model, extent.configurations)?;
     let mut study = Accuracy {
         scene: scene.name.clone(),
+        rounds: extent.rounds,
         configurations: reference.exact.len(),
         in_contact: reference.in_contact,
         left_out: reference.left_out,
@@ -241,27 +243,32 @@ fn unit(scene: &Scene) -> &'static str {
     }
 }
 
-/// Median time of [`REPEATS`] runs of `work`, with least and greatest [s], and the last result.
-fn timed<T, E>(mut work: impl FnMut() -> Result<T, E>) -> Result<(Cost, T), E> {
-    let mut seconds = [0.0; REPEATS];
-    let mut run = |slot: &mut f64| {
+/// Median time of `rounds` runs of `work`, with least and greatest [s], and the last result.
+fn timed<T, E>(rounds: usize, mut work: impl FnMut() -> Result<T, E>) -> Result<(Cost, T), E> {
+    let mut run = || {
         let start = Instant::now();
-        let result = work();
-        *slot = start.elapsed().as_secs_f64();
-        result
+        work().map(|result| (start.elapsed().as_secs_f64(), result))
     };
-    for slot in &mut seconds[1..] {
-        run(slot)?;
+    let (first, mut result) = run()?;
+    let mut seconds = vec![first];
+    for _ in 1..rounds {
+        let (again, same) = run()?;
+        seconds.push(again);
+        result = same;
     }
-    let result = run(&mut seconds[0])?;
-    Ok((Cost::of(seconds), result))
+    Ok((Cost::of(&seconds), result))
 }
 
 impl Cost {
     /// Median and spread of `runs`.
-    fn of(mut runs: [f64; REPEATS]) -> Self {
+    fn of(runs: &[f64]) -> Self {
+        let mut runs = runs.to_vec();
         runs.sort_unstable_by(f64::total_cmp);
-        Self { median: runs[REPEATS / 2], least: runs[0], greatest: runs[REPEATS - 1] }
+        match runs[..] {
+            [least, .., greatest] => Self { median: runs[runs.len() / 2], least, greatest },
+            [only] => Self { median: only, least: only, greatest: only },
+            [] => Self::default(),
+        }
     }
 
     /// Relative to `baseline` [s].

@@ -195,7 +195,7 @@ fn page(
         accuracy.left_out,
         accuracy.torque,
         accuracy.reference_error,
-        super::REPEATS
+        accuracy.rounds
     )?;
     html.push_str(
         "<h2>For which error take what</h2>\n<table><tr><th>error<th>interpolation<th>spacing<th>points<th>bake time",

@@ -74,9 +74,9 @@ pub(super) fn settings(
         let contact = ContactSpec { algorithm: Algorithm::Linearised, updates, ..scene.contact };
         (Study::Updates, "linearised", format!("{updates} updates"), updates.into(), contact)
     });
-    let (baseline, _) = timed(|| equilibria(model, scene.contact, &reference.places))?;
+    let (baseline, _) = timed(study.rounds, || equilibria(model, scene.contact, &reference.places))?;
     for (varied, series, mut setting, value, contact) in tolerances.into_iter().chain(updates).chain(algorithms) {
-        let (cost, found) = timed(|| equilibria(model, contact, &reference.places))?;
+        let (cost, found) = timed(study.rounds, || equilibria(model, contact, &reference.places))?;
         let lost = found.iter().filter(|e| e.status == Status::Unconverged).count();
         if lost > 0 {
             setting += &format!(", {lost} of {} not converged", reference.in_contact);
@@ -89,7 +89,7 @@ pub(super) fn settings(
 /// f32 on a GPU, where there is one, against f64.
 pub(super) fn arithmetic(model: &Model<'_>, reference: &Reference, study: &mut Accuracy) -> Result<(), AccuracyError> {
     let places = &reference.places[..reference.places.len().min(GPU_CONFIGURATIONS)];
-    let (baseline, found) = timed(|| equilibria(model, model.contact, places))?;
+    let (baseline, found) = timed(study.rounds, || equilibria(model, model.contact, places))?;
     let part = reference.first(places.len());
     let cost = baseline.over(baseline.least);
     study.rows.push(row(Study::Arithmetic, "cpu", "cpu, f64".to_owned(), 64.0, cost, &part, &found));
@@ -100,7 +100,7 @@ pub(super) fn arithmetic(model: &Model<'_>, reference: &Reference, study: &mut A
             return Ok(());
         }
     };
-    match timed(|| gpu.solve(places)) {
+    match timed(study.rounds, || gpu.solve(places)) {
         Ok((cost, found)) => {
             let setting = format!("{}, f32", gpu.adapter());
             let cost = cost.over(baseline.least);
@@ -135,7 +135,7 @@ pub(super) fn nodes(
     for finer in FINER {
         let object = Object::build(&of(finer))?;
         let model = Model::new(&object, chain, scene.contact);
-        let (cost, equilibria) = timed(|| equilibria(&model, scene.contact, &reference.places))?;
+        let (cost, equilibria) = timed(study.rounds, || equilibria(&model, scene.contact, &reference.places))?;
         found.push((finer, object.rest.len(), cost, equilibria));
     }
     let Some((_, _, _, finest)) = found.last() else { return Ok(()) };

@@ -1,4 +1,5 @@
-//! One row a variant, one column a cost: a dot at the least of the rounds, a line from there to the greatest.
+//! One row a variant, one column a cost: a dot at the least of the rounds, a line from there to the greatest, and a ring
+//! at what the effect costs within the whole scene.
 
 use super::{super::Cost, Effects};
 use crate::report::{
@@ -10,7 +11,7 @@ use crate::report::{
 };
 
 /// Width of the sheet, in points.
-const WIDTH: f64 = 980.0;
+const WIDTH: f64 = 1220.0;
 /// Room for the names of the effects.
 const NAMES: f64 = 132.0;
 /// Height of a row.
@@ -19,7 +20,7 @@ const ROW: f64 = 24.0;
 const TOP: f64 = 126.0;
 /// Room between two columns.
 const BETWEEN: f64 = 22.0;
-/// Room for a number beside its dot.
+/// Room for a number beside the dots.
 const NUMBER: f64 = 34.0;
 
 /// What each effect costs.
@@ -29,8 +30,8 @@ pub(in super::super) fn figure(effects: &Effects) -> Canvas {
     let mut canvas = Canvas::new(WIDTH, TOP + rows * ROW + 52.0);
     headline(&mut canvas, "What each effect costs, relative to the scene without it");
     let note = format!(
-        "dots: the least of {} rounds, lines: up to the greatest; {:.0} % of the ticks are in contact; {} nodes are drawn; frames on the GPU: {}",
-        super::super::REPEATS,
+        "dots, left numbers: alone, the least of {} rounds, lines up to the greatest; rings, right numbers: within the whole scene; {:.0} % of the ticks are in contact; {} nodes are drawn; frames on the GPU: {}",
+        effects.rounds,
         100.0 * effects.in_contact,
         effects.nodes,
         effects.adapter.as_deref().unwrap_or("no adapter")
@@ -50,7 +51,7 @@ pub(in super::super) fn figure(effects: &Effects) -> Canvas {
         let area = Area { x, width: width - BETWEEN, ..area };
         canvas.text((area.x, TOP - 28.0), title, TITLE);
         canvas.text((area.x, TOP - 11.0), &takes, TICK.anchored(Anchor::Start));
-        let costs: Vec<Option<Cost>> = effects.prices.iter().map(|price| effects.columns(price)[column]).collect();
+        let costs: Vec<[Option<Cost>; 2]> = effects.prices.iter().map(|price| price.columns()[column]).collect();
         draw(&mut canvas, area, &costs);
     }
     canvas
@@ -62,17 +63,20 @@ fn base_line(top: f64) -> f64 {
 
 /// One column: an axis of ratios that holds one, and all of `costs`. What costs more than its baseline usually does has the
 /// other colour.
-fn draw(canvas: &mut Canvas, area: Area, costs: &[Option<Cost>]) {
+fn draw(canvas: &mut Canvas, area: Area, costs: &[[Option<Cost>; 2]]) {
     // One round that was interrupted does not set the scale: its line is cut.
-    let ends = costs.iter().flatten().flat_map(|cost| [cost.least, cost.median]).chain([0.95, 1.05]);
-    let [low, high] = ticks::range(ends, 0.0);
+    let alone = costs.iter().filter_map(|[alone, _]| *alone);
+    let within = costs.iter().filter_map(|[_, within]| *within);
+    let ends = alone.clone().flat_map(|cost| [cost.least, cost.median]).chain(within.map(|cost| cost.least));
+    let [low, high] = ticks::range(ends.chain([0.95, 1.05]), 0.0);
     // Equal lengths are equal ratios where there are large ones.
     let wide = low > 0.0 && high > 5.0 * low;
     let along = |ratio: f64| if wide { ratio.log10() } else { ratio };
     let spare = 0.05 * (along(high) - along(low));
     let [left, right] = [along(low) - spare, along(high) + spare];
     // Numbers stand at the right end, clear of all dots.
-    let place = |ratio: f64| area.x + (along(ratio) - left) / (right - left) * (area.width - NUMBER);
+    let [first, second] = [area.right() - NUMBER, area.right()];
+    let place = |ratio: f64| area.x + (along(ratio) - left) / (right - left) * (first - NUMBER - area.x);
     let marks = if wide { ticks::decades([low, high], 2) } else { ticks::ticks([left, right], 2) };
     for (value, label) in &marks.marks {
         let x = place(*value);
@@ -80,19 +84,29 @@ fn draw(canvas: &mut Canvas, area: Area, costs: &[Option<Cost>]) {
         canvas.text((x, area.bottom() + 17.0), label, TICK);
     }
     canvas.polyline(&[(place(1.0), area.y), (place(1.0), area.bottom())], colour::FRAME, 1.2, None);
-    let usual = costs.iter().flatten().find(|cost| cost.least == 1.0).map_or(1.0, |baseline| baseline.median);
-    for (row, cost) in costs.iter().enumerate() {
+    let usual = alone.clone().find(|cost| cost.least == 1.0).map_or(1.0, |baseline| baseline.median);
+    for (row, [alone, within]) in costs.iter().enumerate() {
         let top = area.y + row as f64 * ROW;
         let middle = top + 0.5 * ROW;
-        let Some(cost) = cost else {
-            canvas.text((area.right(), base_line(top)), "–", TICK.anchored(Anchor::End));
-            continue;
+        let mut number = |x: f64, cost: &Option<Cost>| {
+            let text = cost.map_or_else(|| "–".to_owned(), |cost| format!("{:.2}", cost.least));
+            canvas.text((x, base_line(top)), &text, TICK.anchored(Anchor::End));
         };
-        let ink = colour::series(usize::from(cost.least > usual));
-        let end = place(cost.greatest).min(area.right() - NUMBER);
-        let ends = [(place(cost.least), middle), (end, middle)];
-        canvas.polyline(&ends, ink.with_opacity(0.6), 2.2, None);
-        canvas.disc(ends[0], 3.6, ink);
-        canvas.text((area.right(), base_line(top)), &format!("{:.2}", cost.least), TICK.anchored(Anchor::End));
+        number(first, alone);
+        if within.is_some() {
+            number(second, within);
+        }
+        let ink = |cost: &Cost| colour::series(usize::from(cost.least > usual));
+        if let Some(cost) = within {
+            let centre = (place(cost.least), middle);
+            canvas.disc(centre, 5.6, ink(cost));
+            canvas.disc(centre, 4.2, if row % 2 == 0 { colour::SHADE } else { colour::WHITE });
+        }
+        if let Some(cost) = alone {
+            let end = place(cost.greatest).min(first - NUMBER);
+            let ends = [(place(cost.least), middle), (end, middle)];
+            canvas.polyline(&ends, ink(cost).with_opacity(0.6), 2.2, None);
+            canvas.disc(ends[0], 3.6, ink(cost));
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! The rounds in which the variants of a scene are haptized, felt and drawn.
 
 use super::{
-    super::{AccuracyError, Cost, REPEATS, dynamics::deepest, grids::baked},
-    Baseline, Effects, Price,
+    super::{AccuracyError, Cost, dynamics::deepest, grids::baked},
+    Baseline, Costs, Effects, Price,
 };
 use crate::{
     JointVector,
@@ -24,21 +24,24 @@ struct Variant {
     name: String,
     setting: String,
     scene: Scene,
+    /// Of an effect: numbers of the whole scene with it and without it.
+    within: Option<[usize; 2]>,
 }
 
 /// Seconds of each variant in each round; none where the variant does not do the work.
-type Times = Vec<Option<[f64; REPEATS]>>;
+type Times = Vec<Option<Vec<f64>>>;
 
-/// Prices the effects of `scene`. `progress` is told what comes next.
+/// Prices the effects of `scene` in so many rounds. `progress` is told what comes next.
 ///
 /// # Errors
 /// When a variant cannot be haptized, felt or drawn. A machine without a GPU is none: a note says so.
-pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, AccuracyError> {
+pub fn price(scene: &Scene, rounds: usize, progress: &mut dyn FnMut(&str)) -> Result<Effects, AccuracyError> {
     let mut notes = Vec::new();
-    let variants = variants(scene, &mut notes)?;
+    let (variants, priced) = variants(scene, &mut notes)?;
     progress("effects: bake");
     let mut datasets: Vec<Option<Dataset>> = variants.iter().map(|_| None).collect();
-    let bakes = rounds(variants.len(), 1, |k| {
+    let timed = (rounds, variants.len());
+    let bakes = by_rounds(timed, 1, |k| {
         let begun = Instant::now();
         let dataset = baked(&variants[k].scene)?;
         let seconds = begun.elapsed().as_secs_f64();
@@ -54,7 +57,7 @@ pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, A
     let felt = session::run(&plain.haptics, &mut Recorded::new(motion.clone()), None, &plan)?;
     let blocks = plan.ticks / BLOCK + 1;
     let mut faults = Vec::new();
-    let ticks = rounds(variants.len(), TRIES, |k| {
+    let ticks = by_rounds(timed, TRIES, |k| {
         let haptics = &setups[k].haptics;
         let mut device = Recorded::new(motion.clone());
         let mut driver = Driver::new(haptics, &mut device).map_err(SessionError::from)?;
@@ -86,7 +89,7 @@ pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, A
         .collect();
     let mut drawn: Vec<Option<Graphics<'_>>> =
         setups.iter().zip(&datasets).map(|(setup, data)| setup.graphics(data)).collect::<Result<_, _>>()?;
-    let frames = rounds(variants.len(), TRIES, |k| {
+    let frames = by_rounds(timed, TRIES, |k| {
         let Some(graphics) = &mut drawn[k] else { return Ok(None) };
         let frame = |(q, share): &(JointVector, f64)| {
             let begun = Instant::now();
@@ -102,7 +105,7 @@ pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, A
             Device { adapter: None, bodies: variants.iter().map(|_| None).collect() }
         }
     };
-    let gpu_frames = rounds(variants.len(), TRIES, |k| {
+    let gpu_frames = by_rounds(timed, TRIES, |k| {
         let Some(body) = &mut device.bodies[k] else { return Ok(None) };
         let begun = Instant::now();
         body.play(&places)?;
@@ -112,7 +115,19 @@ pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, A
         (Some(body), _) => Some(body.update.takes()),
         (None, adapter) => adapter.as_ref().map(|_| FrameCost::default()),
     };
-    let least = |times: &Times, k: usize| times[k].map(|times| Cost::of(times).least);
+    // Costs of variant k over those of `plain`, and of `drawn` for what is drawn.
+    let costs = |k: usize, plain: usize, drawn: usize| {
+        let bytes = |k: usize| takes(k).map_or(0.0, |takes| takes.bytes as f64);
+        Costs {
+            bake: cost(&bakes, k, plain).unwrap_or_default(),
+            tick: cost(&ticks, k, plain).unwrap_or_default(),
+            frame: cost(&frames, k, drawn),
+            gpu_frame: cost(&gpu_frames, k, drawn),
+            device: (bytes(drawn) > 0.0).then(|| bytes(k) / bytes(drawn)),
+            dataset: datasets[k].summary().bytes as f64 / datasets[plain].summary().bytes as f64,
+        }
+    };
+    let least = |times: &Times, k: usize| times[k].as_ref().map(|times| Cost::of(times).least);
     let contacts = felt.ticks.iter().filter(|tick| tick.contact).count();
     Ok(Effects {
         baseline: Baseline {
@@ -121,14 +136,12 @@ pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, A
             frame: least(&frames, GRAPHICS).unwrap_or(0.0),
             gpu_frame: least(&gpu_frames, GRAPHICS),
         },
-        prices: (0..variants.len())
+        prices: (0..priced)
             .map(|k| Price {
                 name: variants[k].name.clone(),
                 setting: variants[k].setting.clone(),
-                bake: cost(&bakes, k, PLAIN).unwrap_or_default(),
-                tick: cost(&ticks, k, PLAIN).unwrap_or_default(),
-                frame: cost(&frames, k, GRAPHICS),
-                gpu_frame: cost(&gpu_frames, k, GRAPHICS),
+                alone: costs(k, PLAIN, GRAPHICS),
+                within: variants[k].within.map(|[with, without]| costs(with, without, without)),
                 device: takes(k),
                 dataset_bytes: datasets[k].summary().bytes,
             })
@@ -137,6 +150,7 @@ pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, A
         nodes: setups.iter().find_map(|setup| setup.object.as_ref()).map_or(0, |object| object.rest.len()),
         adapter: device.adapter,
         notes,
+        rounds,
     })
 }
 
@@ -144,15 +158,15 @@ pub fn price(scene: &Scene, progress: &mut dyn FnMut(&str)) -> Result<Effects, A
 const PLAIN: usize = 0;
 const GRAPHICS: usize = 1;
 
-/// Plain, graphics, each effect that can act, and all that can act together.
-fn variants(scene: &Scene, notes: &mut Vec<String>) -> Result<Vec<Variant>, AccuracyError> {
-    let variant = |name: &str, setting: String, scene| Variant { name: name.to_owned(), setting, scene };
+/// Plain, graphics, each effect that can act, and the whole; and how many of them are priced. After them the whole with each
+/// effect that it lacks, or without one that it has.
+fn variants(scene: &Scene, notes: &mut Vec<String>) -> Result<(Vec<Variant>, usize), AccuracyError> {
+    let variant = |name: &str, setting: String, scene| Variant { name: name.to_owned(), setting, scene, within: None };
     let mut variants = vec![
         variant("plain", String::new(), scene.with_effects(false, &[])?),
         variant("graphics", String::new(), scene.with_effects(true, &[])?),
     ];
-    let mut together: Vec<Effect> = Vec::new();
-    let mut left_out = Vec::new();
+    let mut can_act: Vec<Effect> = Vec::new();
     for effect in EFFECTS {
         match scene.with_effects(false, &[effect]) {
             Ok(with) => variants.push(variant(effect.key, effect.value(scene).to_string(), with)),
@@ -161,15 +175,42 @@ fn variants(scene: &Scene, notes: &mut Vec<String>) -> Result<Vec<Variant>, Accu
                 continue;
             }
         }
-        together.push(effect);
+        can_act.push(effect);
+    }
+    let (graphics, whole) = whole(scene, &can_act);
+    let setting = whole.iter().map(|effect| effect.key).collect::<Vec<_>>().join(", ");
+    variants.push(variant("whole", setting, scene.with_effects(graphics, &whole)?));
+    let priced = variants.len();
+    for (k, effect) in (GRAPHICS + 1..).zip(can_act) {
+        let is_in = whole.contains(&effect);
+        let mut others: Vec<Effect> = whole.iter().copied().filter(|other| *other != effect).collect();
+        if !is_in {
+            others.push(effect);
+        }
+        let Ok(other) = scene.with_effects(graphics, &others) else { continue };
+        let (same, changed) = (priced - 1, variants.len());
+        variants[k].within = Some(if is_in { [same, changed] } else { [changed, same] });
+        let how = if is_in { "without" } else { "with" };
+        variants.push(variant(&format!("whole {how} {}", effect.key), String::new(), other));
+    }
+    Ok((variants, priced))
+}
+
+/// Whether the whole scene is drawn, and its effects: those that it names; where it names none, all of `can_act` that can act
+/// together.
+fn whole(scene: &Scene, can_act: &[Effect]) -> (bool, Vec<Effect>) {
+    let named: Vec<Effect> = EFFECTS.into_iter().filter(|effect| effect.is_named(scene)).collect();
+    if !named.is_empty() {
+        return (scene.graphics.is_some(), named);
+    }
+    let mut together = Vec::new();
+    for effect in can_act {
+        together.push(*effect);
         if scene.with_effects(true, &together).is_err() {
             together.pop();
-            left_out.push(effect.key);
         }
     }
-    let setting = if left_out.is_empty() { String::new() } else { format!("without {}", left_out.join(", ")) };
-    variants.push(variant("all together", setting, scene.with_effects(true, &together)?));
-    Ok(variants)
+    (true, together)
 }
 
 /// Runs of a loop in one round. Of each of its blocks the fastest counts: the work of a block is the same in every run, and
@@ -179,14 +220,14 @@ const TRIES: usize = 3;
 /// Ticks of a block: a tenth of a millisecond, which is mostly not interrupted, and long enough for any clock.
 const BLOCK: usize = 100;
 
-/// Seconds that `work` takes of each of `count` variants, round by round: the sum of its blocks, each the least of `tries`.
-fn rounds(
-    count: usize,
+/// Seconds that `work` takes of each variant, round by round: the sum of its blocks, each the least of `tries`.
+fn by_rounds(
+    (rounds, count): (usize, usize),
     tries: usize,
     mut work: impl FnMut(usize) -> Result<Option<Vec<f64>>, AccuracyError>,
 ) -> Result<Times, AccuracyError> {
-    let mut times: Times = vec![Some([0.0; REPEATS]); count];
-    for round in 0..REPEATS {
+    let mut times: Times = vec![Some(Vec::new()); count];
+    for round in 0..rounds.max(1) {
         for step in 0..count {
             let k = if round % 2 == 0 { step } else { count - 1 - step };
             let mut blocks = work(k)?;
@@ -195,8 +236,8 @@ fn rounds(
                     blocks.iter_mut().zip(again).for_each(|(least, seconds)| *least = least.min(seconds));
                 }
             }
-            times[k] = times[k].zip(blocks).map(|(mut times, blocks)| {
-                times[round] = blocks.iter().sum();
+            times[k] = times[k].take().zip(blocks).map(|(mut times, blocks)| {
+                times.push(blocks.iter().sum());
                 times
             });
         }
@@ -206,7 +247,7 @@ fn rounds(
 
 /// Times of variant `k` over the least of `baseline`.
 fn cost(times: &Times, k: usize, baseline: usize) -> Option<Cost> {
-    let (times, whole) = times[k].zip(times[baseline])?;
+    let (times, whole) = times[k].as_ref().zip(times[baseline].as_ref())?;
     Some(Cost::of(times).over(Cost::of(whole).least))
 }
 

@@ -1,10 +1,12 @@
-//! What each effect of a scene costs, alone and all together, beside the plain scene of the same run.
+//! What each effect of a scene costs, alone and in the scene, beside the same scene without it in the same run.
 //!
 //! *Plain* is the scene without effects and without graphics: no contact force is stored, no frame drawn. `graphics` adds the
 //! graphics loop, each of the others one effect with the scene's own value, or a usual one where the scene does not name
-//! it. All of them are haptized, felt along the same motion, and drawn under the same forces, in rounds: what a busy machine
+//! it. The *whole* scene has all effects that it names, or, where it names none, all that can act together; what an effect costs
+//! within it is the whole with the effect over the whole without. All of them are haptized, felt along the same motion, and drawn under
+//! the same forces, in rounds: what a busy machine
 //! does in between falls on all alike, and every second round goes backwards, so that what drifts does, too. A cost is the
-//! least time of the [`REPEATS`](super::REPEATS) rounds over the least of the baseline; median and greatest show the spread. The
+//! least time of the rounds over the least of the baseline; median and greatest show the spread. The
 //! baseline of bakes, ticks and size is the plain scene, that of frames and of device memory is `graphics`.
 
 mod figure;
@@ -19,25 +21,55 @@ use super::Cost;
 use crate::gpu::FrameCost;
 use serde::Serialize;
 
-/// What one variant of the scene costs.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Price {
-    /// `plain`, `graphics`, the key of an effect, or `all together`.
-    pub name: String,
-    /// Its value in the scene's text; empty where there is none.
-    pub setting: String,
+/// What a variant of the scene costs, relative to another.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Costs {
     /// Haptization on the CPU.
     pub bake: Cost,
     /// A tick of the haptic loop.
     pub tick: Cost,
-    /// A frame on the CPU; none without graphics.
+    /// A frame on the CPU; none where either has no graphics.
     pub frame: Option<Cost>,
     /// A frame on the GPU; none without graphics or without an adapter.
     pub gpu_frame: Option<Cost>,
+    /// GPU memory; none where the baseline takes nothing [1].
+    pub device: Option<f64>,
+    /// Size of the dataset without the scene's text [1].
+    pub dataset: f64,
+}
+
+impl Costs {
+    /// Column by column, as the figure, the page and the table show them.
+    fn columns(&self) -> [Option<Cost>; 6] {
+        let exact = |ratio: f64| Cost { median: ratio, least: ratio, greatest: ratio };
+        let Self { bake, tick, frame, gpu_frame, device, dataset } = *self;
+        [Some(bake), Some(tick), frame, gpu_frame, device.map(exact), Some(exact(dataset))]
+    }
+}
+
+/// What one variant of the scene costs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Price {
+    /// `plain`, `graphics`, the key of an effect, or `whole`.
+    pub name: String,
+    /// Its value in the scene's text; empty where there is none.
+    pub setting: String,
+    /// Over the baseline.
+    pub alone: Costs,
+    /// Of an effect: the whole scene with it over the whole without it; none where they cannot act together.
+    pub within: Option<Costs>,
     /// What the graphics takes of the GPU: nothing without graphics; unknown without an adapter.
     pub device: Option<FrameCost>,
     /// Size of the dataset without the scene's text [B].
     pub dataset_bytes: usize,
+}
+
+impl Price {
+    /// Both costs, column by column.
+    fn columns(&self) -> [[Option<Cost>; 2]; 6] {
+        let (alone, within) = (self.alone.columns(), self.within.map_or([None; 6], |within| within.columns()));
+        std::array::from_fn(|column| [alone[column], within[column]])
+    }
 }
 
 /// What the baselines themselves take, least of the rounds.
@@ -56,8 +88,10 @@ pub struct Baseline {
 /// All that was priced.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Effects {
-    /// Plain first, then graphics, each effect alone, and all together.
+    /// Plain first, then graphics, each effect, and the whole.
     pub prices: Vec<Price>,
+    /// Rounds that were timed.
+    pub rounds: usize,
     /// What costs are relative to.
     pub baseline: Baseline,
     /// Share of the ticks in contact, in the plain scene [1].
@@ -75,19 +109,6 @@ impl Effects {
     #[must_use]
     pub fn of(&self, name: &str) -> Option<&Price> {
         self.prices.iter().find(|price| price.name == name)
-    }
-
-    /// Ratios of one price, column by column, as the figure, the page and the table show them.
-    fn columns(&self, price: &Price) -> [Option<Cost>; 6] {
-        let ratio = |part: f64, whole: f64| {
-            let ratio = part / whole;
-            (whole > 0.0).then_some(Cost { median: ratio, least: ratio, greatest: ratio })
-        };
-        let drawn = self.of("graphics").and_then(|graphics| graphics.device).map_or(0.0, |device| device.bytes as f64);
-        let plain = self.prices.first().map_or(0.0, |plain| plain.dataset_bytes as f64);
-        let device = price.device.and_then(|device| ratio(device.bytes as f64, drawn));
-        let size = ratio(price.dataset_bytes as f64, plain);
-        [Some(price.bake), Some(price.tick), price.frame, price.gpu_frame, device, size]
     }
 
     /// Title of each column, and what its baseline takes.

@@ -14,17 +14,20 @@ use std::fmt::{self, Write as _};
 pub(in super::super) fn describe(text: &mut String, effects: &Effects) -> fmt::Result {
     writeln!(
         text,
-        "  effects, times relative to the plain scene (frames and GPU memory: to graphics alone), least of the rounds"
+        "  effects: the plain scene with each over it without (frames and GPU memory: graphics alone), and so within the whole \
+         scene; least of the rounds"
     )?;
     write!(text, "    {:<18}", "")?;
     for (title, _) in effects.heads() {
-        write!(text, "{title:>12}")?;
+        write!(text, "{title:>14}")?;
     }
     writeln!(text)?;
     for price in &effects.prices {
         write!(text, "    {:<18}", price.name)?;
-        for cost in effects.columns(price) {
-            write!(text, "{:>12}", cost.map_or_else(|| "-".to_owned(), |cost| format!("{:.2}", cost.least)))?;
+        for costs in price.columns() {
+            let [alone, within] =
+                costs.map(|cost| cost.map_or_else(|| "-".to_owned(), |cost| format!("{:.2}", cost.least)));
+            write!(text, "{alone:>8} {within:>5}")?;
         }
         writeln!(text)?;
     }
@@ -34,14 +37,17 @@ pub(in super::super) fn describe(text: &mut String, effects: &Effects) -> fmt::R
 /// All prices, a row each.
 pub(in super::super) fn csv(effects: &Effects) -> String {
     let mut text = "name,setting".to_owned();
-    for what in ["bake", "tick", "frame", "gpu_frame"] {
-        // A String takes everything, here and below.
-        let _ = write!(text, ",{what}_median,{what}_least,{what}_greatest");
+    for place in ["", "within_"] {
+        for what in ["bake", "tick", "frame", "gpu_frame", "device", "dataset"] {
+            // A String takes everything, here and below.
+            let _ = write!(text, ",{place}{what}_median,{place}{what}_least,{place}{what}_greatest");
+        }
     }
     text.push_str(",device_bytes,device_buffers,dispatches,pipelines,dataset_bytes\n");
     for price in &effects.prices {
         let _ = write!(text, "{},\"{}\"", price.name, price.setting.replace('"', "'"));
-        for cost in [Some(price.bake), Some(price.tick), price.frame, price.gpu_frame] {
+        let columns = price.columns();
+        for cost in [0, 1].into_iter().flat_map(|place| columns.map(|costs| costs[place])) {
             let _ = match cost {
                 Some(Cost { median, least, greatest }) => write!(text, ",{median},{least},{greatest}"),
                 None => write!(text, ",,,"),
@@ -64,9 +70,11 @@ pub(in super::super) fn csv(effects: &Effects) -> String {
 /// None in a `String`.
 pub(in super::super) fn html(html: &mut String, effects: &Effects, figure: &Canvas) -> fmt::Result {
     writeln!(html, "<h2>What each effect costs</h2>")?;
-    let caption = "Dots are the least of the rounds over the least of the baseline, lines reach up to the greatest. An effect \
+    let caption = "Dots are the least of the rounds over the least of the baseline, lines reach up to the greatest; rings are what \
+                   the effect costs within the whole scene. An effect \
                    of the tick costs no frame, one of the graphics no tick; friction and contact damping have contact \
-                   forces stored, which the size of the dataset shows. In the table: least (median, greatest).";
+                   forces stored, which the size of the dataset shows. In the table: least (median, greatest), alone, and below it \
+                   within the whole scene.";
     writeln!(html, "<figure>{}<figcaption>{caption}</figcaption></figure>", figure.svg())?;
     write!(html, "<table><tr><th>effect<th>value")?;
     for (title, takes) in effects.heads() {
@@ -75,13 +83,10 @@ pub(in super::super) fn html(html: &mut String, effects: &Effects, figure: &Canv
     writeln!(html, "<th>GPU dispatches<th>pipelines</tr>")?;
     for price in &effects.prices {
         write!(html, "<tr><td>{}<td>{}", escaped(&price.name), escaped(&price.setting))?;
-        for cost in effects.columns(price) {
-            match cost {
-                Some(Cost { median, least, greatest }) if least < greatest => {
-                    write!(html, "<td>{least:.2} ({median:.2}, {greatest:.2})")?;
-                }
-                Some(Cost { least, .. }) => write!(html, "<td>{least:.2}")?,
-                None => write!(html, "<td>–")?,
+        for [alone, within] in price.columns() {
+            write!(html, "<td>{}", told(alone))?;
+            if price.within.is_some() {
+                write!(html, "<br>{}", told(within))?;
             }
         }
         match price.device {
@@ -91,4 +96,15 @@ pub(in super::super) fn html(html: &mut String, effects: &Effects, figure: &Canv
     }
     writeln!(html, "</table>")?;
     effects.notes.iter().try_for_each(|note| writeln!(html, "<p>Note: {}</p>", escaped(note)))
+}
+
+/// Least, median and greatest.
+fn told(cost: Option<Cost>) -> String {
+    match cost {
+        Some(Cost { median, least, greatest }) if least < greatest => {
+            format!("{least:.2} ({median:.2}, {greatest:.2})")
+        }
+        Some(Cost { least, .. }) => format!("{least:.2}"),
+        None => "–".to_owned(),
+    }
 }
