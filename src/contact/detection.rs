@@ -158,30 +158,51 @@ impl Detection {
     /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns the smallest signed distance of a
     /// proxy node to the surface at rest, less its radius [m]. The gap ([`Detection::gap`]) is at least that.
     pub fn take_up(&mut self, model: &Model, nodes: &[DVec3]) -> f64 {
-        self.candidates.clear();
+        // The node that is most likely the nearest rules out most others.
+        let first = self.place(model, nodes);
         let mut gap = f64::MAX;
-        for (i, &node) in nodes.iter().enumerate() {
-            let x = node - model.centre;
-            self.nodes[i] = x;
-            let radius = model.chain.nodes[i].radius;
+        for i in std::iter::once(first).chain(0..nodes.len()) {
             let standing = &mut self.standings[i];
-            standing.margin = -1.0;
-            standing.spread = BLEND_SPREAD;
-            standing.watched = false;
-            // Outside the surface's box the node is outside the surface, and the box bounds its distance.
-            let to_box = model.bounds.distance_squared(x);
-            standing.distance = to_box.sqrt();
-            standing.exact = false;
-            standing.inside = false;
-            if to_box > model.bounds.slack(x) && standing.distance - radius > gap {
+            let radius = model.chain.nodes[i].radius;
+            if standing.exact || (standing.distance > 0.0 && standing.distance - radius > gap) {
                 continue;
             }
-            find_standing(model, x, standing);
+            find_standing(model, self.nodes[i], standing);
             let signed = if standing.inside { -standing.distance } else { standing.distance };
             gap = gap.min(signed - radius);
         }
         self.expected = (-gap).max(0.0);
         gap
+    }
+
+    /// Places the proxy nodes at `nodes` [m] in the world, with lower bounds for distances that may be negative, and returns the
+    /// one whose bound, less its radius, is least.
+    pub fn place(&mut self, model: &Model, nodes: &[DVec3]) -> usize {
+        self.candidates.clear();
+        let (mut first, mut least) = (0, f64::INFINITY);
+        for (i, &node) in nodes.iter().enumerate() {
+            let x = node - model.centre;
+            self.nodes[i] = x;
+            let standing = &mut self.standings[i];
+            standing.margin = -1.0;
+            standing.spread = BLEND_SPREAD;
+            standing.watched = false;
+            standing.exact = false;
+            standing.inside = false;
+            // Beyond the lattice of bounds the surface's box bounds the distance.
+            standing.distance = match model.distance_bounds.at(x) {
+                Some((bound, triangle)) => {
+                    standing.last = triangle;
+                    bound
+                }
+                None => model.bounds.distance_squared(x).sqrt(),
+            };
+            let clearance = standing.distance - model.chain.nodes[i].radius;
+            if clearance < least {
+                (first, least) = (i, clearance);
+            }
+        }
+        first
     }
 
     /// The gap of the configuration taken up: the smallest signed distance of a proxy node to the surface at rest, less its
@@ -335,16 +356,25 @@ impl Detection {
     }
 }
 
+/// Signed distance of `x` to the surface at rest [m], and the closest triangle.
+pub(super) fn signed_distance(model: &Model, x: DVec3) -> (f64, u32) {
+    let mut standing = Standing { last: u32::MAX, ..Standing::default() };
+    let triangle = find_standing(model, x, &mut standing).triangle;
+    (if standing.inside { -standing.distance } else { standing.distance }, triangle)
+}
+
 /// Closest feature at rest; notes distance and side.
 fn find_standing(model: &Model, x: DVec3, standing: &mut Standing) -> Closest {
     let triangles = &model.object.triangles;
     let mut closest = Closest::none();
-    if (standing.last as usize) < triangles.len() {
-        closest.consider(x, &model.rest, triangles, standing.last);
-    }
-    model.bounds.search(x, closest.distance_squared, |t, _| {
-        closest.consider(x, &model.rest, triangles, t);
-        closest.distance_squared
+    let slack = model.bounds.slack(x);
+    let mut least = model.facets.get(standing.last as usize).map_or(f64::MAX, |facet| facet.distance_squared(x));
+    model.bounds.search(x, least, |t, _| {
+        if model.facets[t as usize].distance_squared(x) <= least + slack {
+            closest.consider(x, &model.rest, triangles, t);
+            least = least.min(closest.distance_squared);
+        }
+        least
     });
     standing.exact = true;
     standing.distance = closest.distance_squared.sqrt();

@@ -3,6 +3,8 @@
 use super::blend;
 use super::bounding_volumes::BoundingVolumes;
 use super::closest_point::Feature;
+use super::distance_bounds::DistanceBounds;
+use super::facet::Facet;
 use super::reach;
 use super::surface;
 use crate::JointVector;
@@ -39,6 +41,10 @@ pub struct Model<'a> {
     pub softest: f64,
     /// The triangles at rest, for closest-point queries.
     pub bounds: BoundingVolumes,
+    /// The triangles at rest, for distances.
+    pub facets: Vec<Facet>,
+    /// What is known of distances to the surface at rest without such a query.
+    pub distance_bounds: DistanceBounds,
     /// Areas of the triangles at rest [m^2].
     pub rest_areas: Vec<f64>,
     /// Unit normals of the triangles at rest.
@@ -101,6 +107,7 @@ impl<'a> Model<'a> {
         let softest =
             (0..compliance.nodes.len()).map(|j| (3 * j..3 * j + 3).map(diagonal).sum::<f64>()).fold(0.0, f64::max);
         let bounds = BoundingVolumes::new(&rest, triangles);
+        let facets = triangles.iter().map(|nodes| Facet::new(surface::corners(&rest, *nodes))).collect();
         let mut model = Self {
             object,
             chain,
@@ -113,10 +120,13 @@ impl<'a> Model<'a> {
             rest,
             softest,
             bounds,
+            facets,
+            distance_bounds: DistanceBounds::none(),
             rest_areas,
             rest_normals,
             rest_pseudonormals,
         };
+        model.distance_bounds = DistanceBounds::new(&model);
         model.set_blending(contact.blending);
         model.set_stiffness(contact.stiffness);
         model

@@ -22,8 +22,9 @@ pub struct Solver<'a> {
     detection: Detection,
     energy: EnergySearch,
     paper: PaperIteration,
-    /// Of the last configuration [m].
+    /// Of the last configuration [m], and whether any of it is not zero.
     displacement: Vec<f64>,
+    displaced: bool,
     /// Sum of the forces on each surface node [N], and whether it is among `touched`.
     node_forces: Vec<DVec3>,
     marked: Vec<bool>,
@@ -42,6 +43,7 @@ impl<'a> Solver<'a> {
             energy: EnergySearch::new(model),
             paper: PaperIteration::new(model),
             displacement: vec![0.0; 3 * surface_nodes],
+            displaced: false,
             node_forces: vec![DVec3::ZERO; surface_nodes],
             marked: vec![false; surface_nodes],
             touched: Vec::new(),
@@ -55,7 +57,9 @@ impl<'a> Solver<'a> {
     #[must_use]
     pub fn solve(&mut self, q: &[f64]) -> Equilibrium {
         let model = self.model;
-        self.displacement.fill(0.0);
+        if std::mem::take(&mut self.displaced) {
+            self.displacement.fill(0.0);
+        }
         let joints = model.chain.joints.len();
         if q.len() != joints || !q.iter().all(|x| x.is_finite()) {
             return unknown(joints);
@@ -75,6 +79,7 @@ impl<'a> Solver<'a> {
             Algorithm::Linearised => self.minimise(Geometry::Frozen, &mut equilibrium),
             Algorithm::Paper => self.iterate(&mut equilibrium),
         };
+        self.displaced = true;
         equilibrium.iterations = outcome.iterations;
         equilibrium.residual = outcome.residual;
         equilibrium.status = if outcome.converged { Status::Contact } else { Status::Unconverged };

@@ -238,30 +238,40 @@ impl FreeSpace<'_> {
             half[j] = steps * axis.step;
             wide[j] = (steps + FreeSpace::MARGIN as f64) * axis.step;
         }
-        let gap = proximity.gap(&centre);
-        let (mut least, mut farthest) = (f64::INFINITY, 0.0_f64);
-        let mut slopes = JointVector::zeros(joints);
-        for (node, clearance) in proximity.clearances().enumerate() {
-            let mut motion = 0.0;
-            let mut inner = 0.0;
-            for j in 0..=self.model.chain.nodes[node].link {
-                let slope = self.slope(proximity, node, j, &wide);
-                slopes[j] = slopes[j].max(slope);
-                motion += slope * wide[j];
-                inner += slope * half[j];
-            }
-            least = least.min(clearance.max(gap) - motion);
-            farthest = farthest.max(inner);
-        }
+        let nearest = proximity.place(&centre);
         let rounding = FREE_SPACE_ROUNDING * (self.reach.length + self.model.extent);
-        if least > rounding {
-            self.skip(block, &centre, gap - rounding, &slopes, gaps);
-        } else if gap + farthest >= 0.0 {
+        let stays = |(i, clearance): (usize, f64)| clearance - self.motion(proximity, i, &wide, &wide) > rounding;
+        let least = proximity.clearances().nth(nearest).unwrap_or(f64::INFINITY);
+        if stays((nearest, least)) && proximity.clearances().enumerate().all(stays) {
+            self.skip(block, &centre, least - rounding, &self.slopes(proximity, &wide), gaps);
+            return;
+        }
+        // Halving it is of no use where something touches all over it.
+        let gap = if least < 0.0 { proximity.gap(&centre) } else { least };
+        if (0..self.model.chain.nodes.len()).any(|i| gap + self.motion(proximity, i, &wide, &half) >= 0.0) {
             block.halves(self.grid, &self.reach).into_iter().for_each(|half| self.search(proximity, half, gaps));
         }
     }
 
-    /// m_ij over the block of half-widths `wide` around the configuration measured last.
+    /// How far a node moves at most, within the block of half-widths `wide` around the configuration placed last, where joints
+    /// move by up to `by`.
+    fn motion(&self, proximity: &Proximity<'_>, node: usize, wide: &JointVector, by: &JointVector) -> f64 {
+        let link = self.model.chain.nodes[node].link;
+        (0..=link).map(|j| self.slope(proximity, node, j, wide) * by[j]).sum()
+    }
+
+    /// Greatest slope of any node in each joint.
+    fn slopes(&self, proximity: &Proximity<'_>, wide: &JointVector) -> JointVector {
+        let mut slopes = JointVector::zeros(wide.len());
+        for (node, at) in self.model.chain.nodes.iter().enumerate() {
+            for j in 0..=at.link {
+                slopes[j] = slopes[j].max(self.slope(proximity, node, j, wide));
+            }
+        }
+        slopes
+    }
+
+    /// m_ij over the block of half-widths `wide` around the configuration placed last.
     fn slope(&self, proximity: &Proximity<'_>, node: usize, joint: usize, wide: &JointVector) -> f64 {
         let bounds = &self.reach.bounds[node];
         let here = self.model.chain.jacobian_column(proximity.pose(), node, joint).length();

@@ -108,8 +108,13 @@ impl Chain {
         pose.origins.iter_mut().zip(links.origins).for_each(|(slot, origin)| *slot = origin);
         pose.rotations.iter_mut().zip(links.rotations).for_each(|(slot, rotation)| *slot = rotation);
         pose.axes.iter_mut().zip(links.axes).for_each(|(slot, axis)| *slot = axis);
-        for (position, node) in pose.nodes.iter_mut().zip(&self.nodes) {
-            *position = pose.origins[node.link] + pose.rotations[node.link] * node.position;
+        let mut positions = &mut pose.nodes[..];
+        for nodes in self.nodes.chunk_by(|a, b| a.link == b.link) {
+            let (origin, rotation) = (pose.origins[nodes[0].link], pose.rotations[nodes[0].link]);
+            for (position, node) in positions.iter_mut().zip(nodes) {
+                *position = origin + rotation * node.position;
+            }
+            positions = &mut std::mem::take(&mut positions)[nodes.len()..];
         }
     }
 }

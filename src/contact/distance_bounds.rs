@@ -1,0 +1,179 @@
+//! Lower bounds of the signed distance to the surface at rest, looked up in a lattice of cubes around it.
+//!
+//! The distance d_t to a triangle is a convex function: nowhere below its tangent plane at a cube's middle c, and in the cube
+//! nowhere above what it is at the corners, less any linear function. With s the signed distance, h half a cube's side and g
+//! the direction from the closest triangle to c,
+//! - in a cube outside, `s = min_t d_t >= e + g . (x - c)` with `e = min_t ( d_t(c) - h |g - g_t|_1 )`, g_t = grad d_t(c),
+//!   |.|_1 the sum of a vector's sizes along the axes;
+//! - in a cube inside, `s >= -d_t >= e - g . (x - c)` for the closest triangle t, with `e = -max ( d_t(v) - g . (v - c) )`
+//!   over the corners v;
+//! - in a cube that the surface may pass through, `s >= s(c) - sqrt(3) h`, as s changes by no more than x moves.
+//!
+//! So away from the surface bounds are sharp to second order in h.
+
+use super::closest_point::{closest_point, point_at};
+use super::detection::signed_distance;
+use super::model::Model;
+use super::surface;
+use crate::tolerances::DEPTH_ROUNDING;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Cubes for each triangle, about: their sides are a fraction of a triangle's where the lattice is twice as wide as the object.
+const CUBES_PER_TRIANGLE: usize = 64;
+
+/// Most cubes: five megabytes.
+const MOST_CUBES: usize = 1 << 18;
+
+/// The bound within one cube, in single precision to stay in cache, and rounded down.
+#[derive(Clone, Copy)]
+struct Cube {
+    /// The bound at the model's centre [m], and its gradient.
+    constant: f32,
+    gradient: Vec3,
+    /// Triangle closest to the middle.
+    triangle: u32,
+}
+
+/// The lattice.
+pub struct DistanceBounds {
+    /// Its low corner [m].
+    low: DVec3,
+    /// One over a cube's side [1/m].
+    inverse_side: f64,
+    /// Cubes along each axis.
+    counts: [usize; 3],
+    /// Last axis fastest.
+    cubes: Vec<Cube>,
+}
+
+impl DistanceBounds {
+    /// No cubes.
+    #[must_use]
+    pub fn none() -> Self {
+        Self { low: DVec3::ZERO, inverse_side: 1.0, counts: [0; 3], cubes: Vec::new() }
+    }
+
+    /// The lattice for the surface at rest of `model`, which has none yet: the surface's box, widened all round by half
+    /// of its longest side.
+    #[must_use]
+    pub fn new(model: &Model) -> Self {
+        let low = model.rest.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+        let high = model.rest.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let margin = 0.5 * (high - low).max_element();
+        let (low, size) = (low - margin, high - low + 2.0 * margin);
+        let wanted = MOST_CUBES.min(CUBES_PER_TRIANGLE * model.object.triangles.len());
+        let side = (size.element_product() / wanted as f64).cbrt();
+        if !(side > 0.0 && side.is_finite()) {
+            return Self::none();
+        }
+        let counts = (size / side).to_array().map(|count| count.ceil() as usize);
+        let slack = DEPTH_ROUNDING * (low.abs() + size).length();
+        let cubes = (0..counts.iter().product()).into_par_iter().map(|k| {
+            let index = [k / counts[2] / counts[1], k / counts[2] % counts[1], k % counts[2]];
+            let middle = low + (DVec3::from_array(index.map(|place| place as f64)) + 0.5) * side;
+            cube(model, middle, 0.5 * side, slack)
+        });
+        Self { low, inverse_side: side.recip(), counts, cubes: cubes.collect() }
+    }
+
+    /// A lower bound of the signed distance of `x` to the surface [m], and a triangle near by; `None` where there are no cubes.
+    #[inline]
+    #[must_use]
+    pub fn at(&self, x: DVec3) -> Option<(f64, u32)> {
+        let place = (x - self.low) * self.inverse_side;
+        let [m, n, o] = self.counts;
+        let (i, j, k) = (place.x as u32 as usize, place.y as u32 as usize, place.z as u32 as usize);
+        if !(place.x >= 0.0 && place.y >= 0.0 && place.z >= 0.0 && i < m && j < n && k < o) {
+            return None;
+        }
+        let cube = &self.cubes[(i * n + j) * o + k];
+        Some((f64::from(cube.constant) + cube.gradient.as_dvec3().dot(x), cube.triangle))
+    }
+}
+
+/// The bound around `c`, `half` of a side to either side of it.
+fn cube(model: &Model, c: DVec3, half: f64, slack: f64) -> Cube {
+    let corners = |t: u32| surface::corners(&model.rest, model.object.triangles[t as usize]);
+    let offset = |t: u32, x: DVec3| x - point_at(corners(t), closest_point(x, corners(t)).weights);
+    let (s, triangle) = signed_distance(model, c);
+    let reach = 3.0_f64.sqrt() * half;
+    let nearest = offset(triangle, c);
+    // The direction as it is stored.
+    let gradient = (nearest / nearest.length()).as_vec3();
+    let g = gradient.as_dvec3();
+    let (least, gradient) = if s > reach + slack {
+        let mut least = s;
+        // |g - g_t|_1 is at most 2 sqrt(3).
+        let radius = s + 2.0 * reach;
+        model.bounds.search(c, radius * radius, |t, _| {
+            let offset = offset(t, c);
+            let distance = offset.length();
+            least = least.min(distance - half * (g - offset / distance).abs().element_sum());
+            radius * radius
+        });
+        (least, gradient)
+    } else if s < -reach - slack {
+        let excess = (0..8).map(|k| {
+            let v = DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0 - 1.0;
+            offset(triangle, c + v * half).length() - g.dot(v * half)
+        });
+        (-excess.fold(0.0, f64::max), -gradient)
+    } else {
+        (s - reach, Vec3::ZERO)
+    };
+    let constant = least - gradient.as_dvec3().dot(c) - slack;
+    Cube { constant: (constant as f32).next_down(), gradient, triangle }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{object::Object, proxy::Chain, scene::Scene};
+    use std::path::Path;
+
+    /// Distances by trial of every triangle, sides by solid angles: on a convex surface and on one with a hollow. Bounds hold,
+    /// and are idle only near the surface.
+    #[test]
+    fn bounds_hold_and_are_sharp_away_from_the_surface() {
+        for name in ["sphere.toml", "mesh.toml"] {
+            let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets").join(name)).unwrap();
+            let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+            let model = Model::new(&object, &chain, scene.contact);
+            let bounds = &model.distance_bounds;
+            let side = bounds.inverse_side.recip();
+            let size = DVec3::from_array(bounds.counts.map(|count| count as f64)) * side;
+            let mut state = 1_u64;
+            let mut next = || {
+                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                (state >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            let (mut slack, mut count, mut inside) = (0.0, 0.0, 0);
+            for _ in 0..4000 {
+                let x = bounds.low + size * DVec3::new(next(), next(), next());
+                let distance = |nodes: &[u32; 3]| {
+                    let corners = surface::corners(&model.rest, *nodes);
+                    x.distance(point_at(corners, closest_point(x, corners).weights))
+                };
+                let distance = object.triangles.iter().map(distance).fold(f64::INFINITY, f64::min);
+                let is_inside = surface::winding_number(&model.rest, &object.triangles, x) > 0.5;
+                let signed = if is_inside { -distance } else { distance };
+                let (bound, _) = bounds.at(x).unwrap();
+                assert!(bound <= signed, "{name}: {bound} {signed} at {x}");
+                inside += usize::from(is_inside);
+                if signed > 2.0 * side {
+                    slack += (signed - bound) / side;
+                    count += 1.0;
+                }
+            }
+            assert!(
+                slack < 0.1 * count && count > 1000.0 && inside > 100,
+                "{name}: {} {count} {inside}",
+                slack / count
+            );
+            let outside = bounds.low - 0.01 * side;
+            assert!(bounds.at(outside).is_none() && bounds.at(outside + size + 0.02 * side).is_none());
+            assert!(bounds.at(DVec3::NAN).is_none() && bounds.at(DVec3::INFINITY).is_none());
+        }
+    }
+}
