@@ -111,6 +111,7 @@ pub fn face_gradients(corners: [DVec3; 3]) -> [DVec3; 3] {
 
 /// Second variation of the depth along node displacements `v` [m]: one vector per node, so that d2s(v, v') is the sum of
 /// their inner products with v'_j.
+#[inline]
 #[must_use]
 pub fn second_variation(contact: &Contact, v: [DVec3; 3]) -> [DVec3; 3] {
     let Contact { weights, normal, curvature, .. } = contact;
@@ -130,6 +131,18 @@ pub fn second_variation(contact: &Contact, v: [DVec3; 3]) -> [DVec3; 3] {
     product
 }
 
+/// Product of the Hessian of the energy of a spring of stiffness `kc`, bent by the contact's multiplier, with node displacements
+/// `v` [m]: one force per node [N].
+#[inline]
+#[must_use]
+pub fn stiffness_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3] {
+    let Contact { weights, normal, share, multiplier, .. } = contact;
+    let push = *normal * (kc * share * contact.deepening(v));
+    let bend = share * multiplier;
+    let product = if bend == 0.0 { [DVec3::ZERO; 3] } else { second_variation(contact, v) };
+    [0, 1, 2].map(|j| push * weights[j] + product[j] * bend)
+}
+
 impl Contact {
     /// A spring of its own on the feature that [`measure`] found.
     #[must_use]
@@ -139,6 +152,7 @@ impl Contact {
     }
 
     /// What displacements `v` of its nodes bring the feature nearer by, to first order [m].
+    #[inline]
     #[must_use]
     pub fn deepening(&self, v: [DVec3; 3]) -> f64 {
         self.weights[0] * self.normal.dot(v[0])
@@ -147,6 +161,7 @@ impl Contact {
     }
 
     /// What a force `push` along the depth gives to the feature's nodes: push p w_j N [N].
+    #[inline]
     #[must_use]
     pub fn spread(&self, push: f64) -> [DVec3; 3] {
         self.weights.map(|weight| self.normal * (push * self.share * weight))

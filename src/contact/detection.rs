@@ -1,15 +1,16 @@
 //! Which proxy nodes touch the object, at rest and deformed.
 //!
 //! The closest feature is found exactly; culling only skips what cannot be closest, so results equal those of a search
-//! over all triangles. Two facts carry it, with |u| <= m everywhere on the surface:
+//! over all triangles. Three facts carry it, with |u| <= m everywhere on the surface:
 //! - a node outside at rest, farther than m from the surface, is outside still;
-//! - a triangle whose corners move by at most m_t has a distance within m_t of its distance at rest. With D the node's
-//!   distance at rest, a triangle farther than D + 2 m at rest is not the closest one.
+//! - where some triangle is at a distance d, one that was farther than d + m at rest is not the closest one;
+//! - a triangle that was at a distance d cannot come to the node before the surface has travelled by d.
 //!
-//! Triangles within D + 2 margin at rest are listed once per configuration and node, and again only when m outgrows the
-//! margin. Ties go to the lower triangle number.
+//! Triangles somewhat farther than d + m at rest are listed once per configuration and node, and again only when d + m
+//! outgrows that. Ties go to the lower triangle number.
 
 use super::blend::{self, Blend};
+use super::candidates::{Candidates, Listed};
 use super::closest_point::{ClosestPoint, Feature, closest_point, point_at};
 use super::depth::{Contact, measure};
 use super::features::{Features, Felt};
@@ -17,21 +18,6 @@ use super::model::Model;
 use super::surface;
 use crate::tolerances::BLEND_SPREAD;
 use glam::DVec3;
-
-/// A triangle that may be closest, with the squared distance to its box at rest [m^2].
-#[derive(Clone, Copy)]
-struct Candidate {
-    triangle: u32,
-    rest_distance: f64,
-}
-
-impl Candidate {
-    /// A lower bound of its distance once the surface nodes have moved by `moved` [m].
-    fn at_least(&self, model: &Model, moved: &[f64]) -> f64 {
-        let [a, b, c] = model.object.triangles[self.triangle as usize].map(|node| moved[node as usize]);
-        (self.rest_distance - a.max(b).max(c)).max(0.0)
-    }
-}
 
 /// Where a proxy node stands at rest, and its candidates.
 #[derive(Clone, Copy, Default)]
@@ -42,13 +28,10 @@ struct Standing {
     exact: bool,
     /// Inside at rest.
     inside: bool,
-    /// Largest displacement for which the candidates hold [m]; negative when there are none yet.
-    margin: f64,
-    /// Greatest R - min e_t / w^2 (see [`super::blend`]) for which they hold [1].
+    /// Greatest R - min e_t / w^2 (see [`super::blend`]) so far [1].
     spread: f64,
-    /// Candidates: from, to.
-    from: usize,
-    to: usize,
+    /// Candidates.
+    listed: Listed,
     /// Has touched since the configuration was taken up, and is reported as a near miss from then on.
     watched: bool,
     /// Triangle that was closest last: tried first, which makes the search short.
@@ -103,16 +86,12 @@ pub struct Detection {
     /// Proxy nodes relative to the model's centre [m].
     nodes: Vec<DVec3>,
     standings: Vec<Standing>,
-    candidates: Vec<Candidate>,
-    /// |u_j| of each surface node [m].
-    moved: Vec<f64>,
+    candidates: Candidates,
     /// Of the node at hand.
     features: Features,
     blend: Blend,
     /// Of a point at rest.
     rows: Vec<Contact>,
-    /// Depth of the deepest node at rest, which the surface is expected to move by [m].
-    expected: f64,
 }
 
 impl Detection {
@@ -123,12 +102,10 @@ impl Detection {
         Self {
             nodes: vec![DVec3::ZERO; count],
             standings: vec![Standing::default(); count],
-            candidates: Vec::new(),
-            moved: vec![0.0; model.rest.len()],
+            candidates: Candidates::new(model),
             features: Features::default(),
             blend: Blend::default(),
             rows: Vec::new(),
-            expected: 0.0,
         }
     }
 
@@ -171,20 +148,18 @@ impl Detection {
             let signed = if standing.inside { -standing.distance } else { standing.distance };
             gap = gap.min(signed - radius);
         }
-        self.expected = (-gap).max(0.0);
         gap
     }
 
     /// Places the proxy nodes at `nodes` [m] in the world, with lower bounds for distances that may be negative, and returns the
     /// one whose bound, less its radius, is least.
     pub fn place(&mut self, model: &Model, nodes: &[DVec3]) -> usize {
-        self.candidates.clear();
+        self.candidates.restart();
         let (mut first, mut least) = (0, f64::INFINITY);
         for (i, &node) in nodes.iter().enumerate() {
             let x = node - model.centre;
             self.nodes[i] = x;
             let standing = &mut self.standings[i];
-            standing.margin = -1.0;
             standing.spread = BLEND_SPREAD;
             standing.watched = false;
             standing.exact = false;
@@ -248,11 +223,8 @@ impl Detection {
         contacts: &mut Vec<Contact>,
     ) {
         contacts.clear();
-        let mut moved = 0.0f64;
-        for (node, length) in self.moved.iter_mut().enumerate() {
-            *length = DVec3::from_slice(&displacement[3 * node..]).length();
-            moved = moved.max(*length);
-        }
+        self.candidates.travel.go_on(model, displacement, positions);
+        let moved = self.candidates.travel.moved;
         for i in 0..self.nodes.len() {
             let x = self.nodes[i];
             let radius = model.chain.nodes[i].radius;
@@ -268,30 +240,34 @@ impl Detection {
                     continue;
                 }
             }
-            if standing.margin < moved {
-                standing.margin = (2.0 * moved).max(self.expected);
-                list(model, x, radius, standing, &mut self.candidates);
-            }
+            let mut closest = Closest::none();
+            closest.consider(x, positions, &model.object.triangles, standing.last);
+            let distance = closest.distance_squared.sqrt();
+            let feels = walls == Walls::All && radius > 0.0;
+            let wanted = |spread: f64| match () {
+                () if smooth => blend::reach(model, distance, spread),
+                () if feels => distance.max(radius),
+                () => distance,
+            };
+            self.candidates.list(model, x, wanted(standing.spread), &mut standing.listed);
             self.features.clear();
-            let felt = (walls == Walls::All && radius > 0.0).then_some((radius, &mut self.features));
-            let closest = closest_deformed(model, x, standing, &self.candidates, &self.moved, positions, felt);
+            let felt = feels.then_some((radius, &mut self.features));
+            self.candidates.find_closest(model, x, standing.listed, positions, felt, &mut closest);
             standing.last = closest.triangle;
             if smooth {
                 let distance = closest.distance_squared.sqrt();
                 let spread = loop {
                     let reach = blend::reach(model, distance, standing.spread);
                     self.blend.clear();
-                    for candidate in &self.candidates[standing.from..standing.to] {
-                        if candidate.at_least(model, &self.moved) <= reach {
-                            self.blend.consider(model, x, reach, positions, candidate.triangle);
-                        }
+                    for triangle in self.candidates.within(standing.listed, reach) {
+                        self.blend.consider(model, x, reach, positions, triangle);
                     }
                     let spread = self.blend.spread();
                     if spread <= standing.spread || !spread.is_finite() {
                         break spread;
                     }
                     standing.spread = spread;
-                    list(model, x, radius, standing, &mut self.candidates);
+                    self.candidates.list(model, x, wanted(spread), &mut standing.listed);
                 };
                 let first = contacts.len();
                 self.blend.rows(model, i, x, positions, spread, contacts);
@@ -379,6 +355,7 @@ fn find_standing(model: &Model, x: DVec3, standing: &mut Standing) -> Closest {
     standing.exact = true;
     standing.distance = closest.distance_squared.sqrt();
     standing.last = closest.triangle;
+    standing.listed = Listed::none(standing.distance);
     standing.inside = false;
     if closest.triangle != u32::MAX {
         let t = closest.triangle as usize;
@@ -386,52 +363,6 @@ fn find_standing(model: &Model, x: DVec3, standing: &mut Standing) -> Closest {
         standing.inside = offset.dot(model.rest_pseudonormal(t, closest.point.feature)) > 0.0;
     }
     closest
-}
-
-/// Closest feature of the deformed surface among the candidates.
-fn closest_deformed(
-    model: &Model,
-    x: DVec3,
-    standing: &Standing,
-    candidates: &[Candidate],
-    moved: &[f64],
-    positions: &[DVec3],
-    mut felt: Option<(f64, &mut Features)>,
-) -> Closest {
-    let triangles = &model.object.triangles;
-    let slack = model.bounds.slack(x);
-    let mut closest = Closest::none();
-    if (standing.last as usize) < triangles.len() {
-        closest.consider(x, positions, triangles, standing.last);
-    }
-    for candidate in &candidates[standing.from..standing.to] {
-        let nearest = candidate.at_least(model, moved);
-        let nearest = nearest * nearest - slack;
-        if let Some((radius, features)) = &mut felt
-            && nearest < *radius * *radius
-        {
-            let (point, distance_squared) = closest.consider(x, positions, triangles, candidate.triangle);
-            if distance_squared < *radius * *radius {
-                features.push(candidate.triangle, point);
-            }
-        } else if nearest <= closest.distance_squared {
-            closest.consider(x, positions, triangles, candidate.triangle);
-        }
-    }
-    closest
-}
-
-/// Lists the triangles that may matter to the node at `x` while the surface moves by no more than its standing's margin.
-fn list(model: &Model, x: DVec3, radius: f64, standing: &mut Standing, candidates: &mut Vec<Candidate>) {
-    standing.from = candidates.len();
-    let closest = standing.distance + 2.0 * standing.margin;
-    let smooth = if model.bulge(radius) > 0.0 { model.blending * standing.spread.sqrt() } else { 0.0 };
-    let reach = (closest + smooth).max(radius + standing.margin);
-    model.bounds.search(x, reach * reach, |triangle, square| {
-        candidates.push(Candidate { triangle, rest_distance: square.sqrt() });
-        reach * reach
-    });
-    standing.to = candidates.len();
 }
 
 /// Adds the rows of the smooth depth at rest of point node `i` at `x`, whose closest triangle is at `distance`.

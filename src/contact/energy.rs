@@ -74,6 +74,7 @@ pub struct EnergySearch {
     kc: f64,
     slots: Vec<[usize; 3]>,
     contact_forces: Vec<f64>,
+    /// r = c - f [N], and C r [m].
     residual: Vec<f64>,
     product: Vec<f64>,
     trust_region: TrustRegion,
@@ -151,7 +152,7 @@ impl EnergySearch {
             let step = self.trust_region.step(
                 &self.support,
                 Springs { contacts: &self.state.contacts, slots: &self.slots, kc: self.kc },
-                &self.residual,
+                (&self.residual, &self.product),
                 radius,
                 outcome.residual.clamp(INNER_TOLERANCE_FLOOR, INNER_TOLERANCE),
             );
@@ -255,10 +256,10 @@ impl EnergySearch {
         residual.clear();
         residual.extend(contact_forces.iter().zip(&state.forces).map(|(c, f)| c - f));
         product.resize(order, 0.0);
-        support.multiply(residual, product);
-        let out_of_balance = dot(residual, product);
         support.multiply(contact_forces, product);
         let scale = dot(contact_forces, product);
+        support.multiply(residual, product);
+        let out_of_balance = dot(residual, product);
         // Forces of depths too small to be known to the tolerance are measured against the smallest that is.
         let resolved_depth = DEPTH_ROUNDING * model.extent / model.contact.tolerance;
         let floor = *kc * resolved_depth * model.softest.sqrt();

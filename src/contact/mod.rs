@@ -7,6 +7,7 @@ use glam::DVec3;
 
 mod blend;
 mod bounding_volumes;
+mod candidates;
 pub(crate) mod closest_point;
 pub(crate) mod depth;
 pub(crate) mod detection;
@@ -18,9 +19,11 @@ mod model;
 mod paper;
 mod proximity;
 mod reach;
+mod rows;
 mod solver;
 pub(crate) mod support;
 pub(crate) mod surface;
+mod travel;
 mod trust_region;
 
 pub use model::Model;

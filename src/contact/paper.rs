@@ -275,6 +275,9 @@ pub fn three_closest(x: DVec3, positions: &[DVec3]) -> [u32; 3] {
     let mut squares = [f64::MAX; 3];
     for (node, position) in positions.iter().enumerate() {
         let mut entry = (position.distance_squared(x), node as u32);
+        if entry.0 >= squares[2] {
+            continue;
+        }
         for (square, node) in squares.iter_mut().zip(&mut nodes) {
             if entry.0 < *square {
                 std::mem::swap(square, &mut entry.0);

@@ -3,6 +3,7 @@
 //! Forces live on A only (3 |A| numbers) and displacement is u = C f, so the stiffness itself is never touched and the
 //! size of a problem is the size of its contact, not of its object.
 
+use super::rows::add_rows;
 use crate::object::Compliance;
 
 /// Nodes in contact, each with a slot; C restricted to them.
@@ -85,48 +86,52 @@ impl Support {
     /// `product = C_AA vector`.
     pub fn multiply(&self, vector: &[f64], product: &mut [f64]) {
         let order = self.order();
-        product[..order].fill(0.0);
-        // C is symmetric: adding rows, scaled, runs through memory in order and lets the compiler use wide registers.
-        for (row, &scale) in self.compliance.chunks_exact(order.max(1)).zip(vector) {
-            for (entry, &c) in product.iter_mut().zip(row) {
-                *entry += scale * c;
-            }
-        }
+        let product = &mut product[..order];
+        product.fill(0.0);
+        // C is symmetric: adding rows, scaled, runs through memory in order.
+        let scales = vector.as_chunks().0.iter().copied();
+        add_rows(self.compliance.chunks_exact((3 * order).max(1)).zip(scales), product);
     }
 
     /// `displacement = C forces` on all surface nodes that the compliance covers, zero on others; `forces` are on A.
     pub fn displace(&self, compliance: &Compliance, forces: &[f64], displacement: &mut [f64]) {
-        displacement.fill(0.0);
-        for (slot, &node) in self.nodes.iter().enumerate() {
-            let Some(place) = compliance.place(node) else { continue };
-            for a in 0..3 {
-                let row = compliance.row(3 * place + a);
-                let scale = forces[3 * slot + a];
-                if compliance.is_whole() {
-                    for (entry, &c) in displacement.iter_mut().zip(row) {
-                        *entry += scale * c;
-                    }
-                } else {
-                    for (&node, c) in compliance.nodes.iter().zip(row.chunks_exact(3)) {
-                        let at = 3 * node as usize;
-                        for (entry, c) in displacement[at..at + 3].iter_mut().zip(c) {
-                            *entry += scale * c;
-                        }
-                    }
-                }
-            }
+        let blocks = self.nodes.iter().zip(forces.as_chunks().0).filter_map(|(&node, &force)| {
+            let rows = 3 * compliance.place(node)? * compliance.order;
+            Some((&compliance.entries[rows..rows + 3 * compliance.order], force))
+        });
+        let covered = &mut displacement[..compliance.order];
+        covered.fill(0.0);
+        add_rows(blocks, covered);
+        if compliance.is_whole() {
+            return;
         }
+        // From the covered nodes' places, which are no higher, to the nodes' own.
+        let mut end = displacement.len();
+        for (place, &node) in compliance.nodes.iter().enumerate().rev() {
+            let at = 3 * node as usize;
+            displacement.copy_within(3 * place..3 * place + 3, at);
+            displacement[at + 3..end].fill(0.0);
+            end = at;
+        }
+        displacement[..end].fill(0.0);
     }
 }
 
 /// Inner product.
 #[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sum = 0.0;
-    for (a, b) in a.iter().zip(b) {
-        sum += a * b;
+    // Four sums, none of which waits for another.
+    let ((fours, rest), (other_fours, other_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for (a, b) in fours.iter().zip(other_fours) {
+        for k in 0..4 {
+            sums[k] += a[k] * b[k];
+        }
     }
-    sum
+    for ((sum, a), b) in sums.iter_mut().zip(rest).zip(other_rest) {
+        *sum += a * b;
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
 /// Length whose square is `square`; rounding below zero counts as zero, what is not a number stays so.

@@ -11,9 +11,10 @@ use crate::tolerances::MINIMUM_SQUARE;
 use glam::DVec3;
 
 /// Corner positions of triangle `t`.
+#[inline]
 #[must_use]
-pub fn corners(positions: &[DVec3], triangle: [u32; 3]) -> [DVec3; 3] {
-    triangle.map(|node| positions[node as usize])
+pub fn corners(positions: &[DVec3], [a, b, c]: [u32; 3]) -> [DVec3; 3] {
+    [positions[a as usize], positions[b as usize], positions[c as usize]]
 }
 
 /// Twice the area times the outward unit normal of a triangle [m^2].

@@ -20,7 +20,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::blend::{deepening, strength, together, vary};
-use super::depth::Contact;
+use super::depth::{Contact, stiffness_product};
 use super::support::{Support, dot, root};
 use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES};
 use glam::DVec3;
@@ -71,11 +71,19 @@ pub struct TrustRegion {
 }
 
 impl TrustRegion {
-    /// Step for the residual force `residual`, r = c(u) - f, within `radius`, solved to `tolerance` relative to it in the
+    /// Step for the residual force r = c(u) - f, given with C r, within `radius`, solved to `tolerance` relative to it in the
     /// energy norm. The step is left in `self.force`, its effect on the contacts in `self.deepening`.
-    pub fn step(&mut self, support: &Support, springs: Springs, residual: &[f64], radius: f64, tolerance: f64) -> Step {
-        self.reset(support.order(), springs.contacts, residual);
-        support.multiply(&self.residual, &mut self.preconditioned);
+    pub fn step(
+        &mut self,
+        support: &Support,
+        springs: Springs,
+        (residual, preconditioned): (&[f64], &[f64]),
+        radius: f64,
+        tolerance: f64,
+    ) -> Step {
+        self.reset(support.order(), springs.contacts);
+        self.residual.copy_from_slice(residual);
+        self.preconditioned.copy_from_slice(preconditioned);
         let stop = tolerance * tolerance * dot(&self.residual, &self.preconditioned);
         let mut predicted = 0.0;
         let mut at_boundary = false;
@@ -105,12 +113,13 @@ impl TrustRegion {
     }
 
     /// The zero step.
-    fn reset(&mut self, order: usize, contacts: &[Contact], residual: &[f64]) {
+    fn reset(&mut self, order: usize, contacts: &[Contact]) {
         for vector in [
             &mut self.force,
             &mut self.displacement,
             &mut self.previous_force,
             &mut self.previous_displacement,
+            &mut self.residual,
             &mut self.preconditioned,
             &mut self.direction_force,
             &mut self.direction,
@@ -119,8 +128,6 @@ impl TrustRegion {
             vector.clear();
             vector.resize(order, 0.0);
         }
-        self.residual.clear();
-        self.residual.extend_from_slice(residual);
         self.deepening.clear();
         self.deepening.resize(contacts.len(), 0.0);
         self.touching.clear();
@@ -145,11 +152,9 @@ impl TrustRegion {
             let share = square / curvature;
             let inside = curvature > 0.0 && share < to_boundary;
             let share = if inside { share } else { to_boundary };
-            for k in 0..order {
-                self.force[k] += share * self.direction_force[k];
-                self.displacement[k] += share * self.direction[k];
-                self.residual[k] -= share * self.image[k];
-            }
+            add_scaled(share, &self.direction_force, &mut self.force);
+            add_scaled(share, &self.direction, &mut self.displacement);
+            add_scaled(-share, &self.image, &mut self.residual);
             if !inside {
                 return true;
             }
@@ -157,10 +162,8 @@ impl TrustRegion {
             let next = dot(&self.residual, &self.preconditioned);
             let ratio = next / square;
             square = next;
-            for k in 0..order {
-                self.direction_force[k] = self.residual[k] + ratio * self.direction_force[k];
-                self.direction[k] = self.preconditioned[k] + ratio * self.direction[k];
-            }
+            turn(ratio, &self.residual, &mut self.direction_force);
+            turn(ratio, &self.preconditioned, &mut self.direction);
         }
         false
     }
@@ -261,9 +264,15 @@ fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], own: &mut
         if !touching[first] && multiplier == 0.0 {
             return;
         }
+        let kc = if touching[first] { springs.kc } else { 0.0 };
+        if let [contact] = rows
+            && contact.part.is_none()
+        {
+            let slots = springs.slots[first];
+            return add_on_nodes(stiffness_product(contact, kc, nodes_of(p, slots)), slots, product);
+        }
         let v = |k: usize| nodes_of(p, springs.slots[first + k]);
-        let deepening = deepening(rows, v, own);
-        let push = if touching[first] { springs.kc * deepening } else { 0.0 };
+        let push = kc * deepening(rows, v, own);
         vary(rows, v, own, |k, bend| {
             let spread = rows[k].spread(push);
             add_on_nodes([0, 1, 2].map(|j| spread[j] + bend[j] * multiplier), springs.slots[first + k], product);
@@ -279,8 +288,24 @@ pub fn add_contact_forces(springs: Springs, forces: &mut [f64]) {
 }
 
 /// The three nodes' parts of a vector on the support.
-fn nodes_of(vector: &[f64], slots: [usize; 3]) -> [DVec3; 3] {
-    slots.map(|slot| DVec3::from_slice(&vector[3 * slot..]))
+#[inline]
+fn nodes_of(vector: &[f64], [a, b, c]: [usize; 3]) -> [DVec3; 3] {
+    let (nodes, _) = vector.as_chunks();
+    [DVec3::from_array(nodes[a]), DVec3::from_array(nodes[b]), DVec3::from_array(nodes[c])]
+}
+
+/// sum += share * direction.
+fn add_scaled(share: f64, direction: &[f64], sum: &mut [f64]) {
+    for (sum, direction) in sum.iter_mut().zip(direction) {
+        *sum += share * direction;
+    }
+}
+
+/// direction = residual + ratio * direction.
+fn turn(ratio: f64, residual: &[f64], direction: &mut [f64]) {
+    for (direction, residual) in direction.iter_mut().zip(residual) {
+        *direction = residual + ratio * *direction;
+    }
 }
 
 fn inner(a: [DVec3; 3], b: [DVec3; 3]) -> f64 {
@@ -288,10 +313,11 @@ fn inner(a: [DVec3; 3], b: [DVec3; 3]) -> f64 {
 }
 
 /// Adds one vector for each of three nodes to a vector on the support.
+#[inline]
 fn add_on_nodes(parts: [DVec3; 3], slots: [usize; 3], vector: &mut [f64]) {
+    let (nodes, _) = vector.as_chunks_mut();
     for (part, slot) in parts.into_iter().zip(slots) {
-        vector[3 * slot] += part.x;
-        vector[3 * slot + 1] += part.y;
-        vector[3 * slot + 2] += part.z;
+        let node: &mut [f64; 3] = &mut nodes[slot];
+        *node = (DVec3::from_array(*node) + part).to_array();
     }
 }
