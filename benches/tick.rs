@@ -13,10 +13,8 @@ mod synthetic;
 use haptize as engine;
 use haptize::{
     JointVector, MAX_JOINTS,
-    render::{
-        field::TorqueField,
-        haptic::{Haptics, Inputs},
-    },
+    field::TorqueField,
+    render::haptic::{Haptics, Inputs},
     scene::Interpolation,
 };
 use std::{hint::black_box, time::Instant};

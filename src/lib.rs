@@ -16,10 +16,10 @@
 //! ```
 //! use haptize::{
 //!     contact::Model,
+//!     field::TorqueField,
 //!     haptize::{BackendChoice, ChosenBackend, Run, Sweep},
 //!     object::Object,
 //!     proxy::Chain,
-//!     render::field::TorqueField,
 //!     scene::Scene,
 //! };
 //! use std::sync::atomic::AtomicBool;
@@ -72,6 +72,7 @@ pub mod contact;
 pub mod gpu;
 
 pub mod dataset;
+pub mod field;
 pub mod haptize;
 
 pub mod device;

@@ -10,10 +10,10 @@ use haptize::{
     JointVector,
     contact::{Model, Solver, Status},
     dataset::{Dataset, Grid},
+    field::TorqueField,
     haptize::{BackendChoice, Bake},
     object::Object,
     proxy::Chain,
-    render::field::TorqueField,
     scene::{Interpolation, Scene},
 };
 use std::{path::Path, sync::atomic::AtomicBool};

@@ -13,8 +13,8 @@ use haptize::{
     JointVector, MAX_JOINTS,
     dataset::Dataset,
     device::{Device, HandError, Motion, Pointer, SimulatedHand},
+    field::TorqueField,
     render::{
-        field::TorqueField,
         flags::Fault,
         haptic::{Haptics, Inputs},
         realtime::{self, Ends, HapticLoop},

@@ -13,10 +13,10 @@ use haptize::{
     contact::Status,
     dataset::{Contacts, Dataset},
     device::{Device, Motion, Reading, Recorded, SimulatedHand},
+    field::TorqueField,
     haptize::{BackendChoice, Bake},
     object::Object,
     render::{
-        field::TorqueField,
         flags::{Fault, Flags},
         graphics::{ContactForces, Graphics, GraphicsError, ObjectMotion},
         haptic::{Haptics, Inputs, JointsError},

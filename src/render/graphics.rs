@@ -10,9 +10,9 @@
 //! *Motion*: see [`ObjectMotion`].
 
 pub use super::object_motion::ObjectMotion;
-use super::stencil::{Lattice, LatticeError};
 use crate::{
     dataset::Dataset,
+    field::stencil::{Lattice, LatticeError},
     object::{FactorError, Object},
     scene::GraphicsSpec,
 };

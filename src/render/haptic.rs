@@ -16,13 +16,17 @@ use super::{
     control::PassivityControl,
     coupling::Coupling,
     effects::{ContactEffects, EffectState, Pending},
-    field::{Sample, TorqueField},
     flags::{Fault, Flags},
     held::Held,
     npmi::{Motion, Npmi},
     watchdog::{self, Pace, Watchdog},
 };
-use crate::{JointVector, scene::HapticsSpec, tolerances::GREATEST_GIVEN_ENERGY};
+use crate::{
+    JointVector,
+    field::{Sample, TorqueField},
+    scene::HapticsSpec,
+    tolerances::GREATEST_GIVEN_ENERGY,
+};
 
 /// Everything of the haptic loop that does not change from tick to tick.
 pub struct Haptics {

@@ -1,13 +1,11 @@
 //! Rendering: from a dataset to the torque of the haptic device at 1 kHz and the moving object at 60 Hz (section 3).
 
 pub mod accounts;
-pub mod boundary;
 pub mod channels;
 pub(crate) mod clock;
 pub mod control;
 pub mod coupling;
 pub mod effects;
-pub mod field;
 pub mod flags;
 pub mod graphics;
 pub mod haptic;
@@ -19,14 +17,6 @@ pub mod realtime;
 pub mod recording;
 pub mod session;
 pub mod setup;
-pub mod stencil;
 pub mod timing;
 pub mod trace;
 pub mod watchdog;
-
-#[cfg(test)]
-use crate as engine;
-
-#[cfg(test)]
-#[path = "../../tests/synthetic/mod.rs"]
-mod synthetic;

@@ -9,8 +9,8 @@
 //! - Encoder, per joint, where its step Delta is told: `K <= 2 fc / Delta`, fc the device's dry friction (Diolaiti,
 //!   Niemeyer, Barbagli and Salisbury 2006; Abbott and Okamura 2005).
 
-use super::{field::TorqueField, trace::JointLabel};
-use crate::scene::HapticsSpec;
+use super::trace::JointLabel;
+use crate::{field::TorqueField, scene::HapticsSpec};
 use serde::Serialize;
 
 /// A gain and its passivity bound. Beyond it the loop runs, and may create energy.

@@ -3,7 +3,6 @@
 
 use super::{
     effects::{ContactEffects, EffectError},
-    field::{FieldError, TorqueField},
     graphics::{Graphics, GraphicsError},
     haptic::{Haptics, JointsError},
     npmi::{InertiaError, Npmi},
@@ -15,6 +14,7 @@ use crate::{
     JointVector,
     dataset::{Dataset, Grid},
     device::{HandError, Motion, SimulatedHand},
+    field::{FieldError, TorqueField},
     object::{Object, ObjectError},
     proxy::Chain,
     scene::{HapticsSpec, ProxyInertia, Rendering, SceneError},

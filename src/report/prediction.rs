@@ -8,8 +8,8 @@
 use crate::{
     contact::Status,
     dataset::Dataset,
+    field::stencil::{Lattice, LatticeError},
     haptize::gridize::{GridizeError, GridizeOptions, Samples, gridize},
-    render::stencil::{Lattice, LatticeError},
 };
 
 /// Predicted beside measured torque.

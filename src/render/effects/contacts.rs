@@ -10,8 +10,13 @@
 //! Between grid points `F_i(q) = share sum_c w_c F_i(q_c)`, with the weights of the torque and the factor of boundary
 //! layer and fade; likewise the share of the corners at which node i is touched. Both are continuous in q.
 
-use super::super::stencil::{Lattice, LatticeError};
-use crate::{JointVector, dataset::Dataset, proxy::Chain, tolerances::LEAST_CONTACT_FORCE};
+use crate::{
+    JointVector,
+    dataset::Dataset,
+    field::stencil::{Lattice, LatticeError},
+    proxy::Chain,
+    tolerances::LEAST_CONTACT_FORCE,
+};
 use glam::DVec3;
 
 /// Contact forces on the proxy's nodes, compressed rows over the grid points.

@@ -11,11 +11,11 @@ pub use friction::Friction;
 use super::{
     accounts::Extra,
     npmi::{Load, Motion, Npmi, Stage, Step},
-    stencil::LatticeError,
 };
 use crate::{
     JointVector, MAX_JOINTS,
     dataset::Dataset,
+    field::stencil::LatticeError,
     proxy::{Chain, JointMatrix},
     scene::{Diagnostic, HapticEffects},
 };

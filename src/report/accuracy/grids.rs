@@ -4,8 +4,8 @@ use super::{Accuracy, AccuracyError, BACKEND, Cost, Loops, Row, Study, reference
 use crate::{
     JointVector,
     dataset::Dataset,
+    field::{FieldError, TorqueField},
     haptize::Bake,
-    render::field::{FieldError, TorqueField},
     scene::{Interpolation, Scene},
 };
 use std::{hint::black_box, sync::atomic::AtomicBool};

@@ -23,11 +23,12 @@ pub use page::{describe, write_all};
 use crate::{
     contact::Model,
     device::MotionError,
+    field::FieldError,
     gpu::FrameError,
     haptize::{BackendChoice, BackendError, BakeError},
     object::{Object, ObjectError},
     proxy::Chain,
-    render::{field::FieldError, graphics::GraphicsError, session::SessionError, setup::SetupError},
+    render::{graphics::GraphicsError, session::SessionError, setup::SetupError},
     scene::{JointKind, Scene, SceneError},
 };
 use reference::Reference;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::contact::Status;
-use crate::render::synthetic::{grid, half_space};
+use crate::field::synthetic::{grid, half_space};
 
 /// So steep a layer that it holds nothing back.
 const SOFT: f64 = 1e6;

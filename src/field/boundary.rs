@@ -206,7 +206,7 @@ fn beside(lattice: &Lattice, set: &[bool]) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::synthetic::grid;
+    use crate::field::synthetic::grid;
 
     fn slope(values: &[f64]) -> JointVector {
         JointVector::from_slice(values)

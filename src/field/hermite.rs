@@ -10,10 +10,8 @@
 //! gradient entry an axis joins the contraction where its axis is the one contracted: about 4^d sums of four products in all.
 //! Nothing allocates, nothing branches.
 
-use crate::{
-    JointVector,
-    render::stencil::{Lattice, Stencil},
-};
+use super::stencil::{Lattice, Stencil};
+use crate::JointVector;
 
 /// An interpolated function.
 pub(super) struct Hermite {

@@ -26,12 +26,9 @@ use super::{
     FieldError,
     hermite::{self, Hermite},
     points::{Checked, Generations},
+    stencil::{Lattice, Stencil},
 };
-use crate::{
-    JointVector,
-    render::stencil::{Lattice, Stencil},
-    tolerances::LEAST_ENERGY,
-};
+use crate::{JointVector, tolerances::LEAST_ENERGY};
 
 /// The potential of one dataset.
 pub(super) struct Potential {

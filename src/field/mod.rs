@@ -9,20 +9,24 @@
 //! A field owns a copy of what it needs, interleaved point by point. The real-time thread thus never touches a mapped file,
 //! which would end the process when somebody else truncates it.
 
+pub mod boundary;
 mod error;
+mod flags;
 mod hermite;
 mod layered;
 mod points;
 mod potential;
+pub mod stencil;
 mod work;
 
 pub use error::FieldError;
+pub use flags::Flags;
 
-use super::{flags::Flags, stencil::Lattice};
 use crate::{JointVector, MAX_JOINTS, dataset::Dataset, scene::Interpolation};
 use layered::Layered;
 use points::{Checked, Point};
 use potential::Potential;
+use stencil::Lattice;
 
 /// The contact torque around one object.
 pub struct TorqueField {
@@ -201,6 +205,13 @@ impl TorqueField {
         }
     }
 }
+
+#[cfg(test)]
+use crate as engine;
+
+#[cfg(test)]
+#[path = "../../tests/synthetic/mod.rs"]
+pub(crate) mod synthetic;
 
 #[cfg(test)]
 mod tests;

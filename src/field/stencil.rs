@@ -168,7 +168,7 @@ impl Stencil {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::synthetic::grid;
+    use crate::field::synthetic::grid;
 
     #[test]
     fn weights_reproduce_the_configuration_in_one_to_six_joints() {

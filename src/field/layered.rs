@@ -17,16 +17,11 @@
 
 use super::{
     FieldError,
+    boundary::BoundaryLayer,
     points::{Checked, Generations, plausible},
+    stencil::{Lattice, Stencil},
 };
-use crate::{
-    JointVector,
-    render::{
-        boundary::BoundaryLayer,
-        stencil::{Lattice, Stencil},
-    },
-    tolerances::LEAST_GAP,
-};
+use crate::{JointVector, tolerances::LEAST_GAP};
 
 /// Interleaved point by point, so that a corner is one stretch of memory.
 pub(super) struct Layered {

@@ -1,12 +1,7 @@
 //! What a field knows of each grid point beside numbers that are interpolated, and what is known where nothing was computed.
 
-use super::FieldError;
-use crate::{
-    contact::Status,
-    dataset::Dataset,
-    render::{flags::Flags, stencil::Lattice},
-    tolerances::GREATEST_INPUT,
-};
+use super::{FieldError, Flags, stencil::Lattice};
+use crate::{contact::Status, dataset::Dataset, tolerances::GREATEST_INPUT};
 use std::collections::VecDeque;
 
 /// What is not interpolated.

@@ -1,6 +1,7 @@
 //! Why a dataset cannot be rendered, and what to do.
 
-use crate::{JointVector, render::stencil::LatticeError};
+use super::stencil::LatticeError;
+use crate::JointVector;
 
 /// A dataset cannot be rendered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
