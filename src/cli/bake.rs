@@ -1,8 +1,8 @@
 //! `haptize bake`: a scene haptized into a dataset.
 
-use super::{Failure, Report, bar::bar};
+use super::{Failure, Report, bar::bar, max_error};
 use haptize::{
-    haptize::{BackendChoice, Bake, BakeError, Bounds, Footprint, Iterations, Progress, SweepReport},
+    haptize::{Aim, BackendChoice, Bake, Bounds, Footprint, Iterations, Progress, SweepReport},
     scene::{Algorithm, Scene},
 };
 use indicatif::ProgressBar;
@@ -33,6 +33,13 @@ pub struct Arguments {
     /// Continue a bake that was interrupted.
     #[arg(long)]
     resume: bool,
+    /// Choose grid spacing, interpolation and the solver's tolerance for this rms error of the torque, and verify it: a share of
+    /// the torque's own rms over the grid's region (0.01), or a torque ("0.002 N m").
+    #[arg(long, value_name = "ERROR")]
+    max_error: Option<Aim>,
+    /// Most grid points that --max-error may choose.
+    #[arg(long, default_value_t = 2_000_000, value_name = "POINTS")]
+    max_points: usize,
 }
 
 /// Haptizes the scene. Ctrl-C leaves a part that `--resume` continues.
@@ -46,6 +53,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file")?)
             .with_extension("haptize"),
     };
+    if let Some(aim) = arguments.max_error {
+        let wanted = max_error::Wanted { aim, points: arguments.max_points, output: &output, resume: arguments.resume };
+        return max_error::run(&scene, &wanted, arguments.backend);
+    }
     let bake = |bake: Bake<'_>| bake.to_file(&output, arguments.resume);
     let report = watched(&scene, arguments.backend, bake)?;
     warn(&report);
@@ -59,10 +70,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
 
 /// Runs `bake`, dated now, with a progress bar. Ctrl-C stops it after the configurations at hand; afterwards, or again,
 /// Ctrl-C ends the program at once.
-pub fn watched<T>(
+pub fn watched<T, E: Into<Failure>>(
     scene: &Scene,
     backend: BackendChoice,
-    bake: impl FnOnce(Bake<'_>) -> Result<T, BakeError>,
+    bake: impl FnOnce(Bake<'_>) -> Result<T, E>,
 ) -> Result<T, Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = stop.clone();
@@ -83,7 +94,7 @@ pub fn watched<T>(
     let result = bake(Bake { scene, backend, date: &date, stop: &stop, progress: &mut progress });
     bar.finish_and_clear();
     stop.store(true, Ordering::Relaxed);
-    Ok(result?)
+    result.map_err(Into::into)
 }
 
 /// Tells on standard error what was noticed on the way.
@@ -93,11 +104,15 @@ pub fn warn(report: &SweepReport) {
 
 /// What was baked into `file`, for people.
 pub fn describe(text: &mut String, file: &Path, report: &SweepReport) -> fmt::Result {
-    let SweepReport { points, contact_points, unconverged, overflowed, .. } = report;
+    let SweepReport { points, contact_points, filled_points, unconverged, overflowed, .. } = report;
     let SweepReport { seconds, configurations_per_second, algorithm, backend, adapter, .. } = report;
     let Iterations { mean, max } = report.iterations;
     let lost = unconverged + overflowed;
     writeln!(text, "{}: {points} points, {contact_points} in contact, {lost} not converged", file.display())?;
+    if *filled_points > 0 {
+        let solved = contact_points - filled_points;
+        writeln!(text, "  filled       {filled_points} of those in contact, between {solved} that were solved")?;
+    }
     writeln!(
         text,
         "  solved       in {seconds:.2} s, {configurations_per_second:.0} configurations a second, {algorithm} on \
@@ -125,7 +140,7 @@ fn announce(progress: &Progress) {
 }
 
 /// Rounded up, with unit.
-fn megabytes(bytes: usize) -> String {
+pub fn megabytes(bytes: usize) -> String {
     format!("{} MB", (bytes as f64 / 1e6).ceil())
 }
 

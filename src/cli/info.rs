@@ -1,7 +1,7 @@
 //! `haptize info`: what a dataset holds. The whole file is checked first.
 
 use super::{Failure, Report};
-use haptize::dataset::{Axis, Dataset, Summary};
+use haptize::dataset::{Achieved, Axis, Dataset, Summary};
 use std::{
     fmt::{self, Write},
     path::PathBuf,
@@ -40,9 +40,12 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
     }
     let counts = &summary.statuses;
     write!(text, "  status       {} free, {} in contact", counts.free, counts.contact)?;
-    for (count, word) in
-        [(counts.unconverged, "unconverged"), (counts.overflow, "overflowed"), (counts.outside, "outside")]
-    {
+    for (count, word) in [
+        (counts.unconverged, "unconverged"),
+        (counts.overflow, "overflowed"),
+        (counts.outside, "outside"),
+        (counts.filled, "filled between those that were solved"),
+    ] {
         if count > 0 {
             write!(text, ", {count} {word}")?;
         }
@@ -67,10 +70,28 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
         writeln!(text, "  not there    {}", absent.join(", "))?;
     }
     let from = &summary.provenance;
+    from.achieved.as_ref().map_or(Ok(()), |found| achieved(text, found))?;
     write!(text, "  made         {} by haptize {}: {}", from.date, from.version, from.algorithm)?;
     // Measured torques were not solved for: they have no residual.
     if from.tolerance > 0.0 {
         write!(text, " to {:.0e}", from.tolerance)?;
     }
     writeln!(text, " on {} ({})", from.backend, from.adapter)
+}
+
+/// The error that was aimed at, and the one that was found.
+pub fn achieved(text: &mut String, found: &Achieved) -> fmt::Result {
+    let Achieved { aim, rms, worst, torque, interpolation, configurations, in_contact, fill } = found;
+    writeln!(
+        text,
+        "  accuracy     {rms:.2e} N m rms, {:.2} % of the torque's, where {aim:.2e} was to be kept: {}; `{interpolation}`, filled to \
+         {fill:.1e} N m",
+        100.0 * rms / torque,
+        if found.is_kept() { "kept" } else { "missed" }
+    )?;
+    writeln!(
+        text,
+        "  {:<12} at worst {worst:.2e} N m, at {configurations} random configurations, {in_contact} of them in contact",
+        ""
+    )
 }

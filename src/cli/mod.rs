@@ -20,6 +20,7 @@ mod felt;
 mod gridize;
 mod info;
 mod inspect;
+mod max_error;
 mod play;
 mod scan;
 mod stability;

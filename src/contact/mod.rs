@@ -44,13 +44,16 @@ pub enum Status {
     Overflow = 3,
     /// Not computed, or outside the measured region.
     Outside = 4,
+    /// In contact, not solved: torque, energy and forces are interpolated between configurations around it.
+    Filled = 5,
 }
 
 impl Status {
     /// The status whose number is `number`, if there is one.
     #[must_use]
     pub fn from_number(number: u8) -> Option<Self> {
-        [Self::Free, Self::Contact, Self::Unconverged, Self::Overflow, Self::Outside].into_iter().nth(number.into())
+        let all = [Self::Free, Self::Contact, Self::Unconverged, Self::Overflow, Self::Outside, Self::Filled];
+        all.into_iter().nth(number.into())
     }
 }
 

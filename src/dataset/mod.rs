@@ -92,6 +92,38 @@ pub struct Provenance {
     /// What happened on the way, such as a GPU that was lost and from which grid point on the CPU solved instead.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notices: Vec<String>,
+    /// Where the grid was chosen for an error, that error and the one that was found afterwards.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub achieved: Option<Achieved>,
+}
+
+/// The error that a dataset was made for, and the one that it has at random configurations.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Achieved {
+    /// Rms error of the torque that was to be kept [N m].
+    pub aim: f64,
+    /// Rms error that was found [N m].
+    pub rms: f64,
+    /// Greatest error that was found [N m].
+    pub worst: f64,
+    /// Rms of the torque itself [N m].
+    pub torque: f64,
+    /// Interpolation that it was found with, as the scene names it.
+    pub interpolation: String,
+    /// How far filled points may be from what coarser grids foretell [N m].
+    pub fill: f64,
+    /// Random configurations, solved directly.
+    pub configurations: usize,
+    /// Of these, in contact.
+    pub in_contact: usize,
+}
+
+impl Achieved {
+    /// Whether the aim was kept.
+    #[must_use]
+    pub fn is_kept(&self) -> bool {
+        self.rms <= self.aim
+    }
 }
 
 impl Dataset {

@@ -49,6 +49,8 @@ pub struct StatusCounts {
     pub overflow: usize,
     /// [`Status::Outside`].
     pub outside: usize,
+    /// [`Status::Filled`].
+    pub filled: usize,
 }
 
 impl StatusCounts {
@@ -60,13 +62,14 @@ impl StatusCounts {
             Status::Unconverged => &mut self.unconverged,
             Status::Overflow => &mut self.overflow,
             Status::Outside => &mut self.outside,
+            Status::Filled => &mut self.filled,
         } += 1;
     }
 
-    /// Points at which something touches, converged or not.
+    /// Points at which something touches, converged or not, or filled.
     #[must_use]
     pub fn in_contact(&self) -> usize {
-        self.contact + self.unconverged + self.overflow
+        self.contact + self.unconverged + self.overflow + self.filled
     }
 }
 

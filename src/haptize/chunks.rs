@@ -45,6 +45,19 @@ impl Store for Columns {
     }
 }
 
+/// Nowhere: a grid that is filled keeps its results itself.
+impl Store for () {
+    fn append(&mut self, _first: usize, _chunk: &Columns) -> Result<(), SweepError> {
+        Ok(())
+    }
+    fn note(&mut self, _notice: &str) -> Result<(), SweepError> {
+        Ok(())
+    }
+    fn path(&self) -> Option<&Path> {
+        None
+    }
+}
+
 /// What there is of a sweep before a run.
 pub(super) struct Begun {
     pub tally: Tally,
@@ -94,7 +107,7 @@ impl Sweep<'_> {
                     return Err(SweepError::Stopped { done: first, points, part: store.path().map(Into::into) });
                 }
                 let chunk = self.cut(first..slab.end, most, free_gap);
-                let equilibria = solved(backend, &chunk)?;
+                let equilibria = solved(backend, &chunk.configurations, chunk.points.clone())?;
                 for notice in backend.notices() {
                     let notice = format!("from grid point {first} on: {notice}");
                     store.note(&notice)?;
@@ -114,11 +127,17 @@ impl Sweep<'_> {
                 tell(&tally, (tally.points - resumed) as f64 / start.elapsed().as_secs_f64().max(f64::MIN_POSITIVE));
             }
         }
-        let facts = RunFacts { footprint, skipped_points: skipped, resumed_points: resumed, time: start.elapsed() };
+        let facts = RunFacts {
+            footprint,
+            skipped_points: skipped,
+            resumed_points: resumed,
+            solved_points: tally.points - resumed,
+            time: start.elapsed(),
+        };
         Ok((SweepReport::of(&tally, facts, &provenance, &self.warnings), provenance))
     }
 
-    fn gaps(&self, free_space: &FreeSpace<'_>, slab: Range<usize>) -> Result<FreeGaps, SweepError> {
+    pub(super) fn gaps(&self, free_space: &FreeSpace<'_>, slab: Range<usize>) -> Result<FreeGaps, SweepError> {
         let (points, bytes) = (slab.len(), 4 * slab.len());
         free_space.find(slab).map_err(|source| SweepError::Memory { points, bytes, source })
     }
@@ -139,14 +158,19 @@ impl Sweep<'_> {
     }
 }
 
-fn solved<B: Backend>(backend: &mut B, chunk: &Chunk) -> Result<Vec<Equilibrium>, SweepError> {
-    let equilibria = backend.solve(&chunk.configurations).map_err(|source| SweepError::Backend {
-        first: chunk.points.start,
-        last: chunk.points.end - 1,
+/// `configurations`, which lie among `points`, solved by `backend`.
+pub(super) fn solved<B: Backend>(
+    backend: &mut B,
+    configurations: &[JointVector],
+    points: Range<usize>,
+) -> Result<Vec<Equilibrium>, SweepError> {
+    let equilibria = backend.solve(configurations).map_err(|source| SweepError::Backend {
+        first: points.start,
+        last: points.end - 1,
         source: Box::new(source),
     })?;
-    if equilibria.len() != chunk.configurations.len() {
-        return Err(SweepError::Miscount { asked: chunk.configurations.len(), found: equilibria.len() });
+    if equilibria.len() != configurations.len() {
+        return Err(SweepError::Miscount { asked: configurations.len(), found: equilibria.len() });
     }
     Ok(equilibria)
 }

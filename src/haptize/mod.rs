@@ -14,8 +14,12 @@ pub mod gridize;
 pub mod import;
 mod inspection;
 mod part;
+mod pilot;
+pub(crate) mod reference;
+mod refinement;
 mod report;
 pub mod scan;
+pub(crate) mod spacing;
 mod sweep;
 mod tally;
 
@@ -27,6 +31,8 @@ pub use fallback::WithFallback;
 pub use footprint::{Bounds, Footprint};
 pub use free_space::{FreeGaps, FreeSpace};
 pub use inspection::{Contact, Inspection, ObjectNode, ProxyNode};
+pub use pilot::{Aim, Choice, Pilot, PilotError, Prospect, Trial, verify};
+pub use reference::ReferenceError;
 pub use report::{Iterations, SweepReport};
 pub use sweep::{Progress, Run, Sweep};
 

@@ -10,8 +10,10 @@ use std::time::Duration;
 pub struct SweepReport {
     /// Grid points.
     pub points: usize,
-    /// Points in contact, converged or not.
+    /// Points in contact, converged or not, or filled.
     pub contact_points: usize,
+    /// Of these, not solved but filled between those that were.
+    pub filled_points: usize,
     /// Of these, not converged.
     pub unconverged: usize,
     /// Of these, with more contacts than the solver has room for.
@@ -20,7 +22,7 @@ pub struct SweepReport {
     pub max_residual: f64,
     /// Iterations of the points in contact.
     pub iterations: Iterations,
-    /// Points that this run proved free of contact without solving them.
+    /// Points that this run found free of contact without solving them.
     pub skipped_points: usize,
     /// Points that were taken over from an interrupted sweep.
     pub resumed_points: usize,
@@ -40,7 +42,7 @@ pub struct SweepReport {
     pub warnings: Vec<String>,
 }
 
-/// Iterations of the points in contact.
+/// Iterations of the points in contact that were solved.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Iterations {
     /// Mean; 0 where nothing touches.
@@ -51,25 +53,25 @@ pub struct Iterations {
 
 impl SweepReport {
     pub(super) fn of(tally: &Tally, run: RunFacts, provenance: &Provenance, object_warnings: &[String]) -> Self {
-        let RunFacts { footprint, skipped_points, resumed_points, time } = run;
+        let RunFacts { footprint, skipped_points, resumed_points, solved_points, time } = run;
         let contact_points = tally.statuses.in_contact();
         let seconds = time.as_secs_f64();
         Self {
             points: tally.points,
             contact_points,
+            filled_points: tally.statuses.filled,
             unconverged: tally.statuses.unconverged,
             overflowed: tally.statuses.overflow,
             max_residual: tally.max_residual.into(),
             iterations: Iterations {
-                mean: tally.iterations as f64 / contact_points.max(1) as f64,
+                mean: tally.iterations as f64 / (contact_points - tally.statuses.filled).max(1) as f64,
                 max: tally.max_iterations,
             },
             skipped_points,
             resumed_points,
             seconds,
             // A clock that did not move is taken for its own resolution.
-            configurations_per_second: (tally.points - resumed_points) as f64
-                / time.max(Duration::from_nanos(1)).as_secs_f64(),
+            configurations_per_second: solved_points as f64 / time.max(Duration::from_nanos(1)).as_secs_f64(),
             backend: provenance.backend.clone(),
             adapter: provenance.adapter.clone(),
             algorithm: provenance.algorithm.clone(),
@@ -84,5 +86,7 @@ pub(super) struct RunFacts {
     pub footprint: Footprint,
     pub skipped_points: usize,
     pub resumed_points: usize,
+    /// By this run, with those that it skipped where it goes through the grid point by point.
+    pub solved_points: usize,
     pub time: Duration,
 }

@@ -1,4 +1,5 @@
-//! A sweep: equation (2) solved at every point of a grid in C-space, in chunks, by any [`Backend`].
+//! A sweep: equation (2) solved at every point of a grid in C-space, in chunks, by any [`Backend`]; or where it is needed
+//! ([`Sweep::fill`]).
 //!
 //! Each configuration is solved on its own, so the dataset depends neither on the number of threads nor on how the grid
 //! is cut into chunks, and an interrupted sweep continues where it stopped (see [`Sweep::bake`]).
@@ -10,6 +11,7 @@ use super::{
     columns::{Columns, Shape},
     footprint::{self, Bounds},
     part::{Binding, Part},
+    refinement::{self, Filling, Kept},
     tally::Tally,
 };
 use crate::{
@@ -61,8 +63,10 @@ pub struct Sweep<'a> {
     pub(super) warnings: Vec<String>,
     /// By which free space is found; `None` where all points are solved.
     model: Option<&'a Model<'a>>,
+    /// Where points are filled.
+    filling: Option<Filling<'a>>,
     /// Number of nodes of the proxy.
-    proxy_nodes: usize,
+    pub(super) proxy_nodes: usize,
 }
 
 impl<'a> Sweep<'a> {
@@ -114,9 +118,11 @@ impl<'a> Sweep<'a> {
                 adapter: adapter.into(),
                 date: date.into(),
                 notices: Vec::new(),
+                achieved: None,
             },
             warnings: object.warnings.clone(),
             model: None,
+            filling: None,
             proxy_nodes: scene.proxy.joints.iter().map(|joint| joint.nodes.len()).sum(),
         })
     }
@@ -127,11 +133,31 @@ impl<'a> Sweep<'a> {
     /// # Errors
     /// [`SweepError::Grid`] when the model's proxy has other joints.
     pub fn skip_free_space(&mut self, model: &'a Model<'a>) -> Result<(), SweepError> {
+        self.fits(model)?;
+        self.model = Some(model);
+        Ok(())
+    }
+
+    /// Solves every fourth grid line along each axis, and between them what those do not foretell to `tolerance`; all other
+    /// points in contact are filled, [`Status::Filled`](crate::contact::Status::Filled). `model` is that of the scene. Memory
+    /// then grows with the grid, also where the results go to a file.
+    ///
+    /// Distances of torques are Euclidean over the joints; a prismatic one counts with [`LEVER_ARM`](crate::tolerances::LEVER_ARM) [N m].
+    ///
+    /// # Errors
+    /// [`SweepError::Grid`] when the model's proxy has other joints, or the grid's steps along an axis are no multiple of four.
+    pub fn fill(&mut self, model: &'a Model<'a>, tolerance: f64) -> Result<(), SweepError> {
+        self.fits(model)?;
+        refinement::check(&self.grid).map_err(SweepError::Grid)?;
+        self.filling = Some(Filling { model, tolerance });
+        Ok(())
+    }
+
+    fn fits(&self, model: &Model<'_>) -> Result<(), SweepError> {
         let joints = model.chain.joints.len();
         if joints != self.grid.joints() {
             return Err(SweepError::Grid(format!("{} axes for {joints} joints", self.grid.joints())));
         }
-        self.model = Some(model);
         Ok(())
     }
 
@@ -144,6 +170,9 @@ impl<'a> Sweep<'a> {
     /// What a sweep in memory, or else into a file, takes up with chunks of `chunk` configurations.
     #[must_use]
     pub fn footprint(&self, chunk: usize, in_memory: bool) -> Footprint {
+        if self.filling.is_some() {
+            return refinement::footprint(self, chunk, in_memory);
+        }
         let points = self.grid.points();
         let solved = chunk.clamp(1, points);
         let free_space = self.free_space();
@@ -169,8 +198,14 @@ impl<'a> Sweep<'a> {
     /// Sweeps in memory.
     ///
     /// # Errors
-    /// [`SweepError::Memory`], [`SweepError::Backend`], [`SweepError::Stopped`].
+    /// [`SweepError::Memory`], [`SweepError::Backend`], [`SweepError::Stopped`], [`SweepError::Field`].
     pub fn run<B: Backend>(&self, backend: &mut B, run: Run<'_>) -> Result<(Dataset, SweepReport), SweepError> {
+        if let Some(filling) = self.filling {
+            let begun = Begun { tally: Tally::default(), provenance: self.provenance.clone() };
+            let kept = Kept { store: &mut (), resumed: Columns::default() };
+            let (columns, report, provenance) = refinement::fill(self, filling, backend, run, begun, kept)?;
+            return Ok((self.dataset(columns, provenance), report));
+        }
         let footprint = self.footprint(run.chunk, true);
         let (points, bytes) = (self.grid.points(), footprint.memory.least);
         let mut columns = Columns::with_room(points, self.shape.joints).map_err(|source| SweepError::Memory {
@@ -208,30 +243,43 @@ impl<'a> Sweep<'a> {
             grid: self.grid.clone(),
             scene: self.scene.clone(),
             surface: surface.finalize(),
+            fill: self.filling.map(|filling| filling.tolerance),
             provenance: self.provenance.clone(),
         };
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
         let mut provenance = binding.provenance;
         if !provenance.notices.is_empty() {
             let Provenance { backend, adapter, .. } = &self.provenance;
-            let notice = format!("from grid point {} on: resumed on {backend} ({adapter})", tally.points);
+            let point = if self.filling.is_some() { "solved point" } else { "grid point" };
+            let notice = format!("from {point} {} on: resumed on {backend} ({adapter})", tally.points);
             part.note(&notice)?;
             provenance.notices.push(notice);
         }
         let footprint = self.footprint(run.chunk, false);
         let begun = Begun { tally, provenance };
         let stop = run.stop;
+        let kept_in = part.path().to_path_buf();
+        let unwritten = |source, points| {
+            if stop.load(Ordering::Relaxed) {
+                SweepError::Stopped { done: points, points, part: Some(kept_in.clone()) }
+            } else {
+                SweepError::Dataset { part: kept_in.clone(), source }
+            }
+        };
+        if let Some(filling) = self.filling {
+            let resumed =
+                part.all(self.shape.joints).map_err(|source| SweepError::Part { path: kept_in.clone(), source })?;
+            let kept = Kept { store: &mut part, resumed };
+            let (columns, report, provenance) = refinement::fill(self, filling, backend, run, begun, kept)?;
+            let dataset = self.dataset(columns, provenance);
+            dataset.save(output).map_err(|source| unwritten(source, report.points))?;
+            part.remove()?;
+            return Ok(report);
+        }
         let (report, provenance) = self.solve(backend, run, begun, footprint, &mut part)?;
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
         let results = Results { part: &part, shape: self.shape, stop };
-        results.assemble(output, heading, &self.surface).map_err(|source| {
-            let (part, points) = (part.path().to_path_buf(), report.points);
-            if stop.load(Ordering::Relaxed) {
-                SweepError::Stopped { done: points, points, part: Some(part) }
-            } else {
-                SweepError::Dataset { part, source }
-            }
-        })?;
+        results.assemble(output, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
         part.remove()?;
         Ok(report)
     }

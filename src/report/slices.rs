@@ -149,10 +149,13 @@ impl Slice {
                 if value.is_finite() {
                     canvas.rectangle(cell, if status == Status::Free { colour::WHITE } else { map.colour(value) });
                 }
-                if status == Status::Unconverged {
-                    let radius = (0.18 * (right - left).min(bottom - top)).min(2.2);
-                    canvas.disc(((left + right) / 2.0, (top + bottom) / 2.0), radius, colour::INK);
-                }
+                let (size, ink) = match status {
+                    Status::Unconverged => (0.18, colour::INK),
+                    Status::Filled => (0.1, colour::SOFT_INK),
+                    _ => continue,
+                };
+                let radius = (size * (right - left).min(bottom - top)).min(2.2);
+                canvas.disc(((left + right) / 2.0, (top + bottom) / 2.0), radius, ink);
             }
             for segment in self.boundary(dataset, cells) {
                 let ends = segment.map(|(x, y)| corner(x, y));
@@ -234,6 +237,9 @@ impl Slice {
         if statuses().any(|status| status == Status::Unconverged) {
             entries.push(entry("not converged", colour::INK, Mark::Dot));
         }
+        if statuses().any(|status| status == Status::Filled) {
+            entries.push(entry("not solved: filled between neighbours", colour::SOFT_INK, Mark::Dot));
+        }
         if statuses().any(|status| status == Status::Outside) {
             entries.push(entry("no data", colour::ABSENT, Mark::Box));
         }
@@ -248,7 +254,7 @@ fn pitch(dataset: &Dataset, axis: usize) -> usize {
 
 /// Whether the proxy touches the object, solved for or not.
 pub(super) fn touching(status: Status) -> bool {
-    matches!(status, Status::Contact | Status::Unconverged | Status::Overflow)
+    matches!(status, Status::Contact | Status::Unconverged | Status::Overflow | Status::Filled)
 }
 
 /// Whether the chain has revolute and prismatic joints.

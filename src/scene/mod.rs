@@ -8,6 +8,7 @@ mod convert;
 mod effects;
 mod error;
 mod file;
+mod own_text;
 mod scan;
 mod spec;
 

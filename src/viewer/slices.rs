@@ -305,7 +305,14 @@ impl Slices {
         let palette = palette::of(ui.visuals());
         if self.column == Column::Status {
             ui.horizontal_wrapped(|ui| {
-                for status in [Status::Free, Status::Contact, Status::Unconverged, Status::Overflow, Status::Outside] {
+                for status in [
+                    Status::Free,
+                    Status::Contact,
+                    Status::Filled,
+                    Status::Unconverged,
+                    Status::Overflow,
+                    Status::Outside,
+                ] {
                     let (rect, _) = ui.allocate_exact_size(vec2(SWATCH, SWATCH), egui::Sense::hover());
                     ui.painter().rect_filled(rect, FINE_GAP, status_colour(status, &palette));
                     ui.label(RichText::new(format!("{status:?}").to_lowercase()).small());
@@ -379,6 +386,7 @@ fn status_colour(status: Status, palette: &Palette) -> Color32 {
     match status {
         Status::Free => palette.free,
         Status::Contact => palette.ghost,
+        Status::Filled => palette.ghost.gamma_multiply(0.5),
         Status::Unconverged => palette.flagged,
         Status::Overflow => palette.force,
         Status::Outside => palette.absent,

@@ -4,8 +4,10 @@
 
 mod equilibria;
 mod failure;
+mod filled;
 mod fixture;
 mod inspection;
+mod max_error;
 mod memory;
 #[cfg(unix)]
 mod program;

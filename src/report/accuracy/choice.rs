@@ -1,7 +1,7 @@
 //! For a given error: which spacing and interpolation, and what it costs.
 
 use super::{Accuracy, Row, Study};
-use crate::{scene::Interpolation, tolerances::FARTHEST_EXTRAPOLATION};
+use crate::{haptize::spacing::order, scene::Interpolation, tolerances::FARTHEST_EXTRAPOLATION};
 use serde::Serialize;
 
 /// Errors that are asked for, relative to the rms of the torque [1].
@@ -32,34 +32,23 @@ impl Accuracy {
         self.rows.iter().filter(move |row| row.study == study)
     }
 
-    /// Rows of the spacing study that no other beats in both points and error, coarsest first.
+    /// Rows of the spacing study that no other beats in both points solved and error, coarsest first.
     #[must_use]
     pub fn front(&self) -> Vec<&Row> {
         let beaten = |row: &&Row| {
             self.of(Study::Spacing).any(|other| {
-                other.points <= row.points && other.rms <= row.rms && (other.points < row.points || other.rms < row.rms)
+                other.solved <= row.solved && other.rms <= row.rms && (other.solved < row.solved || other.rms < row.rms)
             })
         };
         let mut front: Vec<&Row> = self.of(Study::Spacing).filter(|row| !beaten(row)).collect();
-        front.sort_by_key(|row| row.points);
+        front.sort_by_key(|row| row.solved);
         front
     }
 
-    /// Measured order p of `series`, error ~ h^p: the slope of a line through the logarithms. `None` for less than two
-    /// spacings.
+    /// Measured order p of `series`, error ~ h^p. `None` for less than two spacings.
     #[must_use]
     pub fn order(&self, series: &str) -> Option<f64> {
-        let points: Vec<(f64, f64)> = self
-            .of(Study::Spacing)
-            .filter(|row| row.series == series && row.rms > 0.0)
-            .map(|row| (row.value.ln(), row.rms.ln()))
-            .collect();
-        let count = points.len() as f64;
-        let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
-        let (across, along) = points
-            .iter()
-            .fold((0.0, 0.0), |sum, p| (sum.0 + (p.0 - mean.0) * (p.1 - mean.1), sum.1 + (p.0 - mean.0).powi(2)));
-        (points.len() > 1 && along > 0.0).then(|| across / along)
+        order(self.of(Study::Spacing).filter(|row| row.series == series).map(|row| (row.value, row.rms)))
     }
 }
 
@@ -70,7 +59,7 @@ pub fn offers(accuracy: &Accuracy) -> Vec<Offer> {
     let size = accuracy.torque.max(f64::MIN_POSITIVE);
     let measured = |target: f64| {
         let reaching = accuracy.of(Study::Spacing).filter(|row| row.rms <= target * size);
-        reaching.min_by(|a, b| (a.points, a.rms).partial_cmp(&(b.points, b.rms)).unwrap_or(std::cmp::Ordering::Equal))
+        reaching.min_by(|a, b| (a.solved, a.rms).partial_cmp(&(b.solved, b.rms)).unwrap_or(std::cmp::Ordering::Equal))
     };
     let predicted = |target: f64| {
         let from = |interpolation: Interpolation| {

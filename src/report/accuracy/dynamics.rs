@@ -149,6 +149,7 @@ fn rows(study: Study, setting: &str, value: f64, cost: Cost, seen: &[Seen], exac
             setting: setting.to_owned(),
             value,
             points: nodes,
+            solved: 0,
             bytes: 0,
             cost,
             unit,

@@ -125,9 +125,9 @@ pub(super) fn spacing(accuracy: &Accuracy) -> Canvas {
     let by = |place: fn(&Row) -> (f64, f64)| series(accuracy, Study::Spacing, place);
     let across = worst_too(by(|row| (row.value, row.rms)), by(|row| (row.value, row.worst)));
     panel(&mut canvas, 0, &format!("Grid spacing [{}]", accuracy.unit), "Error [N m]", &across, &[]);
-    let costs = by(|row| (row.points as f64, row.rms));
-    let front: Vec<(f64, f64)> = accuracy.front().iter().map(|row| (row.points as f64, row.rms)).collect();
-    panel(&mut canvas, 1, "Grid points [1]", "Rms error [N m]", &costs, &front);
+    let costs = worst_too(by(|row| (row.solved as f64, row.rms)), by(|row| (row.solved as f64, row.worst)));
+    let front: Vec<(f64, f64)> = accuracy.front().iter().map(|row| (row.solved as f64, row.rms)).collect();
+    panel(&mut canvas, 1, "Points solved [1]", "Error [N m]", &costs, &front);
     let dashes = Entry { name: "worst".into(), colour: colour::SOFT_INK, mark: Mark::Dashes };
     let best = Entry { name: "Pareto front".into(), colour: colour::series(5), mark: Mark::Dot };
     legend(&mut canvas, &costs, vec![dashes, best]);

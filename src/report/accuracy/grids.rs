@@ -1,17 +1,21 @@
 //! Grids of other spacings over the scene's region, looked up by each interpolation: error, bake time, size, loops.
 
-use super::{Accuracy, AccuracyError, BACKEND, Cost, Loops, Row, Study, reference::Reference, timed};
+use super::{Accuracy, AccuracyError, BACKEND, Cost, Loops, Row, Study, filled, timed};
 use crate::{
     JointVector,
     dataset::Dataset,
     field::{FieldError, TorqueField},
-    haptize::Bake,
+    haptize::{
+        Bake, SweepReport,
+        reference::Reference,
+        spacing::{points, spaced, spacing_of},
+    },
     scene::{Interpolation, Scene},
 };
 use std::{hint::black_box, sync::atomic::AtomicBool};
 
-/// Spacings, relative to the scene's own: half an octave apart, from four times as coarse to half.
-const COARSER: [f64; 7] = [4.0, 2.828, 2.0, 1.414, 1.0, std::f64::consts::FRAC_1_SQRT_2, 0.5];
+/// Spacings, relative to the scene's own: half an octave apart, from four times as coarse to a quarter.
+const COARSER: [f64; 9] = [4.0, 2.828, 2.0, 1.414, 1.0, std::f64::consts::FRAC_1_SQRT_2, 0.5, 0.354, 0.25];
 
 /// Look-ups that are timed at once.
 const LOOK_UPS: usize = 20_000;
@@ -22,36 +26,14 @@ const SIDES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 /// Loops of each size.
 const LOOPS: usize = 24;
 
-/// `scene` with its grid `coarser` times as coarse over the same region.
-#[must_use]
-pub(super) fn spaced(scene: &Scene, coarser: f64) -> Scene {
-    let mut scene = scene.clone();
-    for axis in &mut scene.grid.axes {
-        let cells = (axis.count - 1) as f64;
-        let new = (cells / coarser).round().max(1.0);
-        (axis.count, axis.step) = (new as usize + 1, axis.step * cells / new);
-    }
-    scene
-}
-
-fn points(scene: &Scene) -> usize {
-    scene.grid.axes.iter().map(|axis| axis.count).fold(1, usize::saturating_mul)
-}
-
-/// Geometric mean of the spacings [rad or m].
-fn spacing_of(scene: &Scene) -> f64 {
-    let axes = &scene.grid.axes;
-    (axes.iter().map(|axis| axis.step.ln()).sum::<f64>() / axes.len().max(1) as f64).exp()
-}
-
-/// The dataset of `scene`.
-pub(super) fn baked(scene: &Scene) -> Result<Dataset, AccuracyError> {
+/// The dataset of `scene`, and what became of its points.
+pub(super) fn baked(scene: &Scene) -> Result<(Dataset, SweepReport), AccuracyError> {
     let stop = AtomicBool::new(false);
     let bake = Bake { scene, backend: BACKEND, date: "", stop: &stop, progress: &mut |_| () };
-    Ok(bake.in_memory()?.0)
+    Ok(bake.in_memory()?)
 }
 
-fn field(scene: &Scene, dataset: &Dataset, interpolation: Interpolation) -> Result<TorqueField, FieldError> {
+pub(super) fn field(scene: &Scene, dataset: &Dataset, interpolation: Interpolation) -> Result<TorqueField, FieldError> {
     let spec = &scene.haptics;
     TorqueField::interpolated(dataset, interpolation, spec.threshold, &spec.boundary_slope)
 }
@@ -63,10 +45,10 @@ pub(super) fn spacing(
     limit: usize,
     study: &mut Accuracy,
 ) -> Result<Dataset, AccuracyError> {
-    let (own_cost, own) = timed(study.rounds, || baked(scene))?;
+    let (own_cost, (own, _)) = timed(study.rounds, || baked(scene))?;
     let mut before = 0;
     for coarser in COARSER {
-        let spaced = spaced(scene, coarser);
+        let spaced = spaced(scene, |steps| (steps / coarser).round());
         let count = points(&spaced);
         // Small grids cannot be cut much coarser.
         if count == before {
@@ -79,7 +61,7 @@ pub(super) fn spacing(
                 .push(format!("the grid of {count} points is left out: more than {limit} (raise --points to have it)"));
             continue;
         }
-        let (cost, dataset) = timed(study.rounds, || baked(&spaced))?;
+        let (cost, (dataset, report)) = timed(study.rounds, || baked(&spaced))?;
         for interpolation in Interpolation::ALL {
             let field = field(&spaced, &dataset, interpolation)?;
             let (rms, worst) = reference.errors(|q| field.sample(q).torque);
@@ -89,6 +71,7 @@ pub(super) fn spacing(
                 setting: format!("{:.4} {}", spacing_of(&spaced), study.unit),
                 value: spacing_of(&spaced),
                 points: count,
+                solved: report.contact_points - report.filled_points,
                 bytes: dataset.summary().bytes,
                 cost: cost.over(own_cost.least),
                 unit: "N m",
@@ -98,6 +81,7 @@ pub(super) fn spacing(
             });
         }
     }
+    filled::rows(scene, reference, limit, own_cost.least, study)?;
     Ok(own)
 }
 
@@ -127,6 +111,7 @@ pub(super) fn look_up(scene: &Scene, own: &Dataset, study: &mut Accuracy) -> Res
             setting: interpolation.name().to_owned(),
             value: f64::from(u8::from(interpolation == Interpolation::Potential)) * 2.0 + 1.0,
             points: own.grid.points(),
+            solved: 0,
             bytes: 0,
             cost: Cost::over(cost, baseline),
             unit: "N m",

@@ -12,12 +12,13 @@ mod choice;
 mod dynamics;
 pub mod effects;
 mod figures;
+mod filled;
 mod grids;
 mod page;
-mod reference;
 mod solver;
 
 pub use choice::{Offer, offers};
+pub use filled::Saving;
 pub use page::{describe, write_all};
 
 use crate::{
@@ -25,15 +26,17 @@ use crate::{
     device::MotionError,
     field::FieldError,
     gpu::FrameError,
-    haptize::{BackendChoice, BackendError, BakeError},
+    haptize::{BackendChoice, BackendError, BakeError, ReferenceError, reference::Reference},
     object::{Object, ObjectError},
     proxy::Chain,
     render::{graphics::GraphicsError, session::SessionError, setup::SetupError},
     scene::{JointKind, Scene, SceneError},
 };
-use reference::Reference;
 use serde::Serialize;
 use std::time::Instant;
+
+/// What draws the configurations of the reference.
+const SEED: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// What is varied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -83,6 +86,9 @@ pub struct Row {
     pub value: f64,
     /// Grid points (spacing), nodes or iterations on average; 0 where there are none.
     pub points: usize,
+    /// Of the grid's points, those in contact that were solved: a free one costs a distance, however the grid is made. 0 in other
+    /// studies.
+    pub solved: usize,
     /// Size of the dataset; 0 where there is none [bytes].
     pub bytes: usize,
     /// Time, relative to the least of the study's baseline.
@@ -186,11 +192,8 @@ pub enum AccuracyError {
     #[error(transparent)]
     Frame(#[from] FrameError),
     /// Nothing to compare with.
-    #[error(
-        "the proxy touches nothing, or contact converges nowhere, at {0} random configurations: give the scene's \
-             grid a region where the proxy touches the object"
-    )]
-    NoContact(usize),
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
 }
 
 /// Measures `scene`. `progress` is told what comes next.
@@ -202,7 +205,7 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
     let chain = Chain::new(&scene.proxy);
     let model = Model::new(&object, &chain, scene.contact);
     progress("reference");
-    let reference = Reference::solve(scene, &model, extent.configurations)?;
+    let reference = Reference::solve(scene, &model, SEED, extent.configurations)?;
     let mut study = Accuracy {
         scene: scene.name.clone(),
         rounds: extent.rounds,

@@ -1,7 +1,7 @@
 //! The files of a study: figures, one table of all rows as CSV, and one page that holds them all.
 
 use super::{
-    Accuracy, Study,
+    Accuracy, Saving, Study,
     choice::{TARGETS, offers},
     effects::{self, Effects},
     figures,
@@ -72,18 +72,19 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
 
 fn csv(accuracy: &Accuracy) -> String {
     let mut text =
-        "study,series,setting,value,points,bytes,cost_median,cost_least,cost_greatest,unit,rms,worst,rms_relative\n"
+        "study,series,setting,value,points,solved,bytes,cost_median,cost_least,cost_greatest,unit,rms,worst,rms_relative\n"
             .to_owned();
     for row in &accuracy.rows {
         // A String takes everything.
         let _ = writeln!(
             text,
-            "{},{},\"{}\",{},{},{},{},{},{},{},{},{},{}",
+            "{},{},\"{}\",{},{},{},{},{},{},{},{},{},{},{}",
             study_name(row.study),
             row.series,
             row.setting.replace('"', "'"),
             row.value,
             row.points,
+            row.solved,
             row.bytes,
             row.cost.median,
             row.cost.least,
@@ -153,6 +154,14 @@ pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
             text,
             "  below {:2.0} %   out of reach: no grid up to four times as fine as the finest here",
             100.0 * least
+        )?;
+    }
+    if let Some(Saving { filled, uniform, times }) = accuracy.saving() {
+        writeln!(
+            text,
+            "  filled       {} solved for a worst error of {:.4} N m ({}), {times:.1} times fewer than {} of a grid solved \
+             throughout; rms {:.4} and {:.4} N m",
+            filled.solved, filled.worst, filled.setting, uniform.solved, filled.rms, uniform.rms
         )?;
     }
     accuracy.notes.iter().try_for_each(|note| writeln!(text, "  note         {note}"))?;
@@ -228,17 +237,18 @@ fn page(
         effects::html(&mut html, effects, figure)?;
     }
     html.push_str(
-        "<h2>All rows</h2>\n<table><tr><th>study<th>series<th>setting<th>points or iterations<th>bytes<th>time",
+        "<h2>All rows</h2>\n<table><tr><th>study<th>series<th>setting<th>points or iterations<th>solved<th>bytes<th>time",
     );
     html.push_str("<th>median<th>most<th>rms<th>worst<th><th>relative</tr>\n");
     for row in &accuracy.rows {
         writeln!(
             html,
-            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{:.3}<td>{:.3}<td>{:.3}<td>{:.3e}<td>{:.3e}<td>{}<td>{:.2} %</tr>",
+            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{:.3}<td>{:.3}<td>{:.3}<td>{:.3e}<td>{:.3e}<td>{}<td>{:.2} %</tr>",
             study_name(row.study),
             escaped(&row.series),
             escaped(&row.setting),
             row.points,
+            row.solved,
             row.bytes,
             row.cost.least,
             row.cost.median,

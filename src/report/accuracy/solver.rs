@@ -1,14 +1,13 @@
 //! How contact is solved, away from any grid: tolerance, algorithm, arithmetic, nodes of the object.
 
-use super::{
-    Accuracy, AccuracyError, Cost, Row, Study,
-    reference::{Reference, equilibria},
-    timed,
-};
+use super::{Accuracy, AccuracyError, Cost, Row, Study, timed};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},
-    haptize::{Backend, BackendChoice, ChosenBackend},
+    haptize::{
+        Backend, BackendChoice, ChosenBackend,
+        reference::{Reference, equilibria},
+    },
     object::Object,
     proxy::Chain,
     scene::{Algorithm, ContactSpec, Scene, Shape},
@@ -46,6 +45,7 @@ fn row(
         setting,
         value,
         points: iterations.round() as usize,
+        solved: 0,
         bytes: 0,
         cost,
         unit: "N m",

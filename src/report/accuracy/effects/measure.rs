@@ -43,7 +43,7 @@ pub fn price(scene: &Scene, rounds: usize, progress: &mut dyn FnMut(&str)) -> Re
     let timed = (rounds, variants.len());
     let bakes = by_rounds(timed, 1, |k| {
         let begun = Instant::now();
-        let dataset = baked(&variants[k].scene)?;
+        let (dataset, _) = baked(&variants[k].scene)?;
         let seconds = begun.elapsed().as_secs_f64();
         datasets[k] = Some(dataset);
         Ok(Some(vec![seconds]))

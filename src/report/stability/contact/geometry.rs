@@ -130,7 +130,7 @@ fn tally(results: impl Iterator<Item = Equilibrium>) -> (usize, usize, usize) {
             Status::Free => result.gap >= 0.0 && result.energy == 0.0,
             Status::Contact => result.gap < 0.0 && result.residual <= 1e-6,
             Status::Unconverged => true,
-            Status::Overflow | Status::Outside => false,
+            Status::Overflow | Status::Outside | Status::Filled => false,
         };
         flagged += usize::from(result.status == Status::Unconverged);
         wrong += usize::from(!(finite && honest));

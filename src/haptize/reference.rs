@@ -1,16 +1,18 @@
 //! Directly solved random configurations, and the distance of other answers from them.
 
-use super::AccuracyError;
+use super::{Backend, BackendError, CpuBackend};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},
-    haptize::{Backend, CpuBackend},
     scene::{Algorithm, ContactSpec, JointKind, Scene},
     tolerances::{LEVER_ARM, REFERENCE_TOLERANCE},
 };
 
+/// Most configurations that are drawn to find some in contact: a region in contact at a few in a thousand is still seen.
+const MOST_DRAWN: usize = 1 << 16;
+
 /// Random configurations and their torques.
-pub(super) struct Reference {
+pub(crate) struct Reference {
     /// Configurations [rad or m].
     pub places: Vec<JointVector>,
     /// Torques there, converged.
@@ -24,10 +26,24 @@ pub(super) struct Reference {
     levers: JointVector,
 }
 
+/// There is nothing to compare with.
+#[derive(Debug, thiserror::Error)]
+pub enum ReferenceError {
+    /// No backend.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
+    /// Nothing touches, or nothing converges.
+    #[error(
+        "the proxy touches nothing, or contact converges nowhere, at {0} random configurations: give the scene's \
+             grid a region where the proxy touches the object"
+    )]
+    NoContact(usize),
+}
+
 impl Reference {
-    /// Solves `count` random configurations within the grid of `scene`, the same ones every time.
-    pub fn solve(scene: &Scene, model: &Model<'_>, count: usize) -> Result<Self, AccuracyError> {
-        let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    /// Solves `count` random configurations within the grid of `scene`, the same ones every time for the same `seed`.
+    pub fn solve(scene: &Scene, model: &Model<'_>, seed: u64, count: usize) -> Result<Self, ReferenceError> {
+        let mut random = Random(seed);
         let place = |_| {
             let mut q = JointVector::zeros(scene.grid.axes.len());
             for (q, axis) in q.iter_mut().zip(&scene.grid.axes) {
@@ -63,13 +79,27 @@ impl Reference {
             }
         }
         if reference.in_contact == 0 {
-            return Err(AccuracyError::NoContact(count));
+            return Err(ReferenceError::NoContact(count));
         }
         let zero = JointVector::zeros(reference.levers.len());
         reference.torque = reference.errors(|_| zero).0;
         let mut rough = rough.into_iter();
         reference.error = reference.errors(|_| rough.next().unwrap_or(zero)).0;
         Ok(reference)
+    }
+
+    /// As [`Reference::solve`], with twice as many configurations again and again until `contacts` of them are in contact, or no
+    /// more are drawn.
+    pub fn in_contact(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, ReferenceError> {
+        let mut count = contacts;
+        loop {
+            count *= 2;
+            match Self::solve(scene, model, seed, count) {
+                Ok(reference) if reference.in_contact >= contacts || count >= MOST_DRAWN => return Ok(reference),
+                Err(ReferenceError::NoContact(_)) | Ok(_) if count < MOST_DRAWN => (),
+                otherwise => return otherwise,
+            }
+        }
     }
 
     /// The first `count` configurations.
@@ -98,21 +128,21 @@ impl Reference {
 }
 
 /// `places` solved as `contact` says, on all cores.
-pub(super) fn equilibria(
+pub(crate) fn equilibria(
     model: &Model<'_>,
     contact: ContactSpec,
     places: &[JointVector],
-) -> Result<Vec<Equilibrium>, AccuracyError> {
+) -> Result<Vec<Equilibrium>, BackendError> {
     let model = Model::new(model.object, model.chain, contact);
-    let mut backend = CpuBackend::new(&model, 0).map_err(crate::haptize::BackendError::from)?;
+    let mut backend = CpuBackend::new(&model, 0)?;
     Ok(backend.solve(places).unwrap_or_else(|never| match never {}))
 }
 
 /// Numbers in 0..1, the same every time (a 64-bit linear congruence, upper bits; Knuth 1998, section 3.3.4).
-pub(super) struct Random(pub u64);
+struct Random(u64);
 
 impl Random {
-    pub fn next(&mut self) -> f64 {
+    fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }

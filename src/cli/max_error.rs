@@ -1,0 +1,74 @@
+//! `haptize bake --max-error`: a grid chosen for an error, baked and verified.
+
+use super::{Failure, Report, bake, info};
+use haptize::{
+    haptize::{Aim, BackendChoice, Bake, Choice, Pilot, PilotError, verify},
+    scene::Scene,
+};
+use std::{fmt::Write, path::Path};
+
+/// What is asked for.
+pub struct Wanted<'a> {
+    /// The error to stay below.
+    pub aim: Aim,
+    /// Most grid points.
+    pub points: usize,
+    /// The dataset to write.
+    pub output: &'a Path,
+    /// Whether to continue a bake that was interrupted: its pilot finds the same again.
+    pub resume: bool,
+}
+
+/// Chooses, states, bakes and verifies. Nothing is baked where no grid keeps the error; exit code 1 where one should and did not.
+pub fn run(scene: &Scene, wanted: &Wanted<'_>, backend: BackendChoice) -> Result<Report, Failure> {
+    let (pilot, choice, report, achieved) = bake::watched(scene, backend, |bake| {
+        eprintln!("haptize: pilot: coarse grids against random configurations ...");
+        let pilot = Pilot::run(scene, wanted.aim, bake.backend, bake.stop)?;
+        let choice = pilot.choose(scene, wanted.points, bake.backend)?;
+        state(&pilot, &choice);
+        let bake = Bake { scene: &choice.scene, progress: &mut *bake.progress, ..bake };
+        let report = bake.to_file(wanted.output, wanted.resume)?;
+        eprintln!("haptize: verifying against other random configurations ...");
+        let achieved = verify(wanted.output, &pilot, &choice)?;
+        Ok::<_, PilotError>((pilot, choice, report, achieved))
+    })?;
+    bake::warn(&report);
+    let mut json = serde_json::to_value(&report)?;
+    json["file"] = wanted.output.display().to_string().into();
+    json["pilot"] = serde_json::to_value(&pilot)?;
+    json["choice"] = serde_json::to_value(&choice)?;
+    json["achieved"] = serde_json::to_value(&achieved)?;
+    let mut text = String::new();
+    bake::describe(&mut text, wanted.output, &report)?;
+    info::achieved(&mut text, &achieved)?;
+    if !achieved.is_kept() {
+        writeln!(text, "  the aim was missed: the dataset is whole, and errs by more; ask for a smaller error")?;
+    }
+    Ok(Report { text, json, whole: achieved.is_kept() })
+}
+
+/// What was chosen, and what it is going to take, before it begins.
+fn state(pilot: &Pilot, choice: &Choice) {
+    let best = pilot.prospects.first().map_or(0.0, |best| best.order);
+    eprintln!(
+        "haptize: for an rms error of {:.2e} N m ({:.2} % of {:.4} N m): {} grid points, {:.4} apart, `{}`, solved to {:.0e}; the \
+         pilot's errors fell with the spacing to the power {best:.2}",
+        pilot.aim,
+        100.0 * pilot.relative,
+        pilot.torque,
+        choice.points,
+        choice.spacing,
+        choice.interpolation,
+        choice.tolerance,
+    );
+    let disk = choice.footprint.disk;
+    eprintln!(
+        "haptize: predicted: at most {} points solved, what coarser grids foretell to {:.1e} N m is filled; at most {:.0} s, {} to {} on \
+         the disk",
+        choice.points,
+        choice.fill,
+        choice.seconds.ceil(),
+        bake::megabytes(disk.least),
+        bake::megabytes(disk.most),
+    );
+}

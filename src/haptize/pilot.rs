@@ -1,0 +1,376 @@
+//! What to bake for a given error: spacing, interpolation and tolerance of the solver, from a pilot.
+//!
+//! The pilot bakes some coarse grids over the scene's region, holds them against directly solved random configurations, and
+//! measures how the error falls with the spacing: `error ~ h^p`. The spacing that is needed follows, for each interpolation; the
+//! one with the fewest grid points is taken. Its grid is filled where coarser ones foretell it (`refinement/mod.rs`).
+//!
+//! *The error* is the rms of the torque's over the region, in contact or not, as in `haptize accuracy`; relative ones are relative to
+//! the rms of the torque itself. Where torque jumps, the worst error is as large as the jump on any grid: it is reported, and
+//! not promised.
+
+use super::{
+    BackendChoice, Bake, BakeError, ChosenBackend, Footprint, Sweep,
+    reference::{Reference, ReferenceError, equilibria},
+    refinement::COARSEST,
+    sample, spacing,
+};
+use crate::{
+    contact::Model,
+    dataset::{Achieved, Dataset},
+    field::{FieldError, TorqueField},
+    object::{Object, ObjectError},
+    proxy::Chain,
+    scene::{ContactSpec, Interpolation, Scene, SceneError},
+    tolerances::{FARTHEST_EXTRAPOLATION, FILL_SHARE, SOLVER_SHARE, SPACING_SHARE},
+};
+use serde::Serialize;
+use std::{fmt, path::Path, str::FromStr, sync::atomic::AtomicBool, time::Instant};
+
+/// Grid points of the pilot's finest grid, at most: some seconds of solving.
+const PILOT_POINTS: f64 = 10_000.0;
+
+/// The pilot's grids, finest first, over its finest spacing: half an octave apart, as in `haptize accuracy`.
+const COARSER: [f64; 4] = [1.0, std::f64::consts::SQRT_2, 2.0, 2.0 * std::f64::consts::SQRT_2];
+
+/// Configurations in contact that the pilot, and that verification asks for: an rms over so many is good to a tenth.
+const CONTACTS: usize = 200;
+
+/// What draws the configurations of pilot and verification: neither sees the other's.
+const SEEDS: [u64; 2] = [0xbf58_476d_1ce4_e5b9, 0x94d0_49bb_1331_11eb];
+
+/// Tolerances of the solver that are tried, roughest first [1].
+const TOLERANCES: [f64; 6] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
+
+/// An error to stay below.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Aim {
+    /// Relative to the rms of the torque over the grid's region [1].
+    Relative(f64),
+    /// [N m]
+    Absolute(f64),
+}
+
+impl FromStr for Aim {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |digits: &str| digits.trim().parse::<f64>().ok().filter(|aim| aim.is_finite() && *aim > 0.0);
+        let absolute = ["N m", "Nm", "N*m"].iter().find_map(|unit| text.trim().strip_suffix(unit));
+        let aim = match absolute {
+            Some(digits) => number(digits).map(Self::Absolute),
+            None => number(text).filter(|aim| *aim < 1.0).map(Self::Relative),
+        };
+        aim.ok_or_else(|| {
+            "give a share of the rms torque between 0 and 1, such as 0.01, or a torque, such as \"0.002 N m\"".into()
+        })
+    }
+}
+
+/// A grid that the pilot tried.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Trial {
+    /// How it was interpolated.
+    pub interpolation: &'static str,
+    /// Geometric mean of its spacings [rad or m].
+    pub spacing: f64,
+    /// Grid points.
+    pub points: usize,
+    /// Rms error [N m].
+    pub rms: f64,
+    /// Worst error [N m].
+    pub worst: f64,
+}
+
+/// What the pilot says of one interpolation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Prospect {
+    /// As the scene names it.
+    pub interpolation: &'static str,
+    /// Measured order p of the error in the spacing [1].
+    pub order: f64,
+    /// How many times as fine as the pilot's finest grid it must be; less than one where a coarser one does [1].
+    pub finer: f64,
+    /// Grid points that it then has.
+    pub points: f64,
+}
+
+/// What a pilot found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Pilot {
+    /// Rms error to stay below [N m].
+    pub aim: f64,
+    /// The same over the rms torque [1].
+    pub relative: f64,
+    /// Rms of the torque [N m].
+    pub torque: f64,
+    /// Random configurations, and those in contact.
+    pub configurations: usize,
+    /// See `configurations`.
+    pub in_contact: usize,
+    /// What was tried.
+    pub trials: Vec<Trial>,
+    /// What follows, fewest points first; without interpolations whose error does not fall.
+    pub prospects: Vec<Prospect>,
+    /// Tolerance of the solver that is good enough [1].
+    pub tolerance: f64,
+    /// Time of the finest trial's points [s].
+    pub seconds_per_point: f64,
+}
+
+/// What is going to be baked.
+#[derive(Clone, Debug, Serialize)]
+pub struct Choice {
+    /// The scene, whose text says the same.
+    #[serde(skip)]
+    pub scene: Scene,
+    /// How it is interpolated.
+    pub interpolation: &'static str,
+    /// Geometric mean of the spacings [rad or m].
+    pub spacing: f64,
+    /// Grid points; of which at most as many are solved.
+    pub points: usize,
+    /// Tolerance of the solver [1].
+    pub tolerance: f64,
+    /// Tolerance of filling [N m].
+    pub fill: f64,
+    /// Time that solving all points would take: filling takes less [s].
+    pub seconds: f64,
+    /// Memory and disk.
+    pub footprint: Footprint,
+}
+
+/// No grid was chosen, or what was baked cannot be verified.
+#[derive(Debug, thiserror::Error)]
+pub enum PilotError {
+    /// The object cannot be built.
+    #[error(transparent)]
+    Object(#[from] ObjectError),
+    /// Nothing to compare with.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// A coarse grid cannot be baked.
+    #[error(transparent)]
+    Bake(#[from] BakeError),
+    /// A grid cannot be interpolated.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// The scene cannot be changed as it should be.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The dataset cannot be read, or written again.
+    #[error(transparent)]
+    Dataset(#[from] crate::dataset::Error),
+    /// No grid within reach has so small an error.
+    #[error("{0}")]
+    OutOfReach(String),
+}
+
+/// Where scene and object are.
+struct Ground {
+    object: Object,
+    chain: Chain,
+}
+
+impl Ground {
+    fn new(scene: &Scene) -> Result<Self, ObjectError> {
+        Ok(Self { object: Object::build(&scene.object)?, chain: Chain::new(&scene.proxy) })
+    }
+
+    fn model(&self, scene: &Scene) -> Model<'_> {
+        Model::new(&self.object, &self.chain, scene.contact)
+    }
+}
+
+impl Pilot {
+    /// Tries `scene` for `aim`.
+    ///
+    /// # Errors
+    /// Any [`PilotError`] but [`PilotError::OutOfReach`].
+    pub fn run(scene: &Scene, aim: Aim, backend: BackendChoice, stop: &AtomicBool) -> Result<Self, PilotError> {
+        let ground = Ground::new(scene)?;
+        let model = ground.model(scene);
+        let reference = Reference::in_contact(scene, &model, SEEDS[0], CONTACTS)?;
+        let joints = scene.grid.axes.len();
+        let finest = (spacing::points(scene) as f64 / PILOT_POINTS).powf(1.0 / joints as f64).max(1.0);
+        let (mut trials, mut seconds_per_point) = (Vec::new(), 0.0);
+        for coarser in COARSER {
+            let mut spaced = spacing::spaced(scene, |steps| (steps / (finest * coarser)).round());
+            spaced.grid.fill = None;
+            let points = spacing::points(&spaced);
+            if trials.last().is_some_and(|trial: &Trial| trial.points == points) {
+                continue;
+            }
+            let start = Instant::now();
+            let (dataset, _) = Bake { scene: &spaced, backend, date: "", stop, progress: &mut |_| () }.in_memory()?;
+            if trials.is_empty() {
+                seconds_per_point = start.elapsed().as_secs_f64() / points as f64;
+            }
+            for interpolation in Interpolation::ALL {
+                let (rms, worst) = errors(scene, &reference, &dataset, interpolation)?;
+                let (interpolation, spacing) = (interpolation.name(), spacing::spacing_of(&spaced));
+                trials.push(Trial { interpolation, spacing, points, rms, worst });
+            }
+        }
+        let torque = reference.torque;
+        let aim = match aim {
+            Aim::Relative(share) => share * torque,
+            Aim::Absolute(aim) => aim,
+        };
+        Ok(Self {
+            aim,
+            relative: aim / torque,
+            torque,
+            configurations: reference.exact.len(),
+            in_contact: reference.in_contact,
+            prospects: prospects(&trials, SPACING_SHARE * aim, joints),
+            tolerance: tolerance(scene, &model, &reference, SOLVER_SHARE * aim)?,
+            trials,
+            seconds_per_point,
+        })
+    }
+
+    /// What to bake: the fewest points with which the measured order keeps the aim, of at most `limit`.
+    ///
+    /// # Errors
+    /// [`PilotError::OutOfReach`] where there are none; it says what the pilot measured, and what would help.
+    pub fn choose(&self, scene: &Scene, limit: usize, backend: BackendChoice) -> Result<Choice, PilotError> {
+        let best = self.prospects.first();
+        let Some(best) = best.filter(|best| best.points <= limit as f64 && best.finer <= FARTHEST_EXTRAPOLATION) else {
+            return Err(PilotError::OutOfReach(self.refusal(limit)));
+        };
+        let finest = self.trials.first().map_or(1.0, |trial| trial.spacing);
+        let fill = FILL_SHARE * self.aim;
+        let coarser = finest / best.finer / spacing::spacing_of(scene);
+        let multiples = |steps: f64| (steps / (coarser * COARSEST as f64)).ceil();
+        let mut chosen = spacing::spaced(scene, |steps| COARSEST as f64 * multiples(steps).max(1.0));
+        chosen.grid.fill = Some(fill);
+        chosen.contact.tolerance = self.tolerance;
+        let interpolation = Interpolation::ALL.into_iter().find(|i| i.name() == best.interpolation);
+        chosen.haptics.interpolation = interpolation.unwrap_or(scene.haptics.interpolation);
+        let chosen = chosen.with_own_text()?;
+        let points = spacing::points(&chosen);
+        Ok(Choice {
+            interpolation: best.interpolation,
+            spacing: spacing::spacing_of(&chosen),
+            points,
+            tolerance: self.tolerance,
+            fill,
+            seconds: self.seconds_per_point * points as f64,
+            footprint: footprint(&chosen, backend)?,
+            scene: chosen,
+        })
+    }
+
+    /// Why nothing was chosen, and what to do.
+    fn refusal(&self, limit: usize) -> String {
+        let aim = format!("an rms error of {:.2e} N m, {} % of the rms torque", self.aim, percent(self.relative));
+        let Some(finest) = self.trials.first() else { return format!("{aim}, is out of reach: no grid was tried") };
+        let tried = self.trials.iter().filter(|trial| trial.points == finest.points);
+        let tried = tried.min_by(|a, b| a.rms.total_cmp(&b.rms)).unwrap_or(finest);
+        let reached = format!(
+            "at {} points `{}` errs by {} %",
+            tried.points,
+            tried.interpolation,
+            percent(tried.rms / self.torque)
+        );
+        let falls = match self.prospects.first() {
+            None => "and finer grids do not help".to_owned(),
+            Some(best) => format!(
+                "and errors fall only with the spacing to the power {:.2} (`{}`): it would take {:.1e} points, {:.1} times as \
+                 fine a grid, where at most {limit} points (--max-points) and {FARTHEST_EXTRAPOLATION} times are tried",
+                best.order, best.interpolation, best.points, best.finer
+            ),
+        };
+        format!(
+            "{aim}, is out of reach: {reached}, {falls}. What would help: a larger error, a grid over a smaller or shallower range \
+             (deep contact has several equilibria, between which torque jumps on any grid), or [contact] blending = \"mesh\" where \
+             the object is a mesh that points touch. Nothing was baked"
+        )
+    }
+}
+
+/// `share` in percent, to two digits.
+fn percent(share: f64) -> impl fmt::Display {
+    let percent = 100.0 * share;
+    if percent < 1.0 { format!("{percent:.2}") } else { format!("{percent:.1}") }
+}
+
+/// What each interpolation needs for the error `aim`, fewest points first; no coarser grid than the coarsest that was tried.
+fn prospects(trials: &[Trial], aim: f64, joints: usize) -> Vec<Prospect> {
+    let of = |interpolation: Interpolation| {
+        let rows = || trials.iter().filter(move |trial| trial.interpolation == interpolation.name());
+        let order = spacing::order(rows().map(|trial| (trial.spacing, trial.rms))).filter(|order| *order > 0.0)?;
+        let finest = rows().next()?;
+        let coarsest = rows().next_back()?;
+        let finer = (finest.rms / aim).powf(1.0 / order).max(finest.spacing / coarsest.spacing);
+        let points = finest.points as f64 * finer.powi(joints as i32);
+        Some((Prospect { interpolation: interpolation.name(), order, finer, points }, finest.rms))
+    };
+    let mut prospects: Vec<(Prospect, f64)> = Interpolation::ALL.into_iter().filter_map(of).collect();
+    prospects.sort_by(|(a, a_rms), (b, b_rms)| a.points.total_cmp(&b.points).then(a_rms.total_cmp(b_rms)));
+    prospects.into_iter().map(|(prospect, _)| prospect).collect()
+}
+
+/// The roughest tolerance of the solver that adds no more than `error` to the error; the scene's own where none does.
+fn tolerance(scene: &Scene, model: &Model<'_>, reference: &Reference, error: f64) -> Result<f64, PilotError> {
+    for tolerance in TOLERANCES {
+        let contact = ContactSpec { tolerance, ..scene.contact };
+        let found = equilibria(model, contact, &reference.places).map_err(ReferenceError::from)?;
+        let mut torques = found.iter().map(|equilibrium| equilibrium.torque);
+        if reference.errors(|q| torques.next().unwrap_or(*q)).0 <= error {
+            return Ok(tolerance);
+        }
+    }
+    Ok(scene.contact.tolerance)
+}
+
+fn errors(
+    scene: &Scene,
+    reference: &Reference,
+    dataset: &Dataset,
+    interpolation: Interpolation,
+) -> Result<(f64, f64), FieldError> {
+    let spec = &scene.haptics;
+    let field = TorqueField::interpolated(dataset, interpolation, spec.threshold, &spec.boundary_slope)?;
+    Ok(reference.errors(|q| field.sample(q).torque))
+}
+
+/// What baking `scene` into a file takes up.
+fn footprint(scene: &Scene, backend: BackendChoice) -> Result<Footprint, PilotError> {
+    let ground = Ground::new(scene)?;
+    let model =
+        Model::reaching(&ground.object, &ground.chain, scene.contact, &sample(scene)).map_err(BakeError::from)?;
+    let backend = ChosenBackend::open(backend, &model).map_err(BakeError::from)?;
+    let mut sweep = Sweep::new(scene, &ground.object, "", "", "").map_err(BakeError::from)?;
+    if let Some(fill) = scene.grid.fill {
+        sweep.fill(&model, fill).map_err(BakeError::from)?;
+    }
+    Ok(sweep.footprint(backend.chunk(), false))
+}
+
+/// Holds the dataset `file`, baked from `choice`, against random configurations that the pilot has not seen, and writes into its
+/// provenance what was aimed at and achieved.
+///
+/// # Errors
+/// Any [`PilotError`] but [`PilotError::OutOfReach`]; the dataset is then as it was.
+pub fn verify(file: &Path, pilot: &Pilot, choice: &Choice) -> Result<Achieved, PilotError> {
+    let scene = &choice.scene;
+    let ground = Ground::new(scene)?;
+    let reference = Reference::in_contact(scene, &ground.model(scene), SEEDS[1], CONTACTS)?;
+    // Read, not mapped: it is about to be replaced.
+    let mut dataset = Dataset::load(file)?;
+    let (rms, worst) = errors(scene, &reference, &dataset, scene.haptics.interpolation)?;
+    let achieved = Achieved {
+        aim: pilot.aim,
+        rms,
+        worst,
+        torque: reference.torque,
+        interpolation: choice.interpolation.to_owned(),
+        fill: choice.fill,
+        configurations: reference.exact.len(),
+        in_contact: reference.in_contact,
+    };
+    dataset.provenance.achieved = Some(achieved.clone());
+    dataset.save(file)?;
+    Ok(achieved)
+}

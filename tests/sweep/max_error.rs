@@ -1,0 +1,137 @@
+//! `bake --max-error`: chosen by a pilot, stated, baked, verified; and refused where no grid can keep the error.
+
+use crate::fixture::{Folder, SCENE};
+use haptize::{
+    contact::Status,
+    dataset::Dataset,
+    field::TorqueField,
+    haptize::{Aim, Backend, BackendChoice, CpuBackend, Pilot, PilotError, verify},
+    object::Object,
+    proxy::Chain,
+    scene::Scene,
+};
+use serde_json::Value;
+use std::{path::Path, process::Output, sync::atomic::AtomicBool};
+
+/// The small sphere on 25 x 33 grid points, touched by balls: torque has kinks, and hardly a jump.
+fn text() -> String {
+    SCENE
+        .replace("step = 0.1, count = 7", "step = 0.025, count = 25")
+        .replace("step = 0.004, count = 9", "step = 0.001, count = 33")
+        .replace("count = 3 }]", "count = 3, radius = 0.01 }]")
+}
+
+fn haptize(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
+    command.current_dir(folder).args(arguments).output().unwrap()
+}
+
+#[test]
+fn a_grid_is_chosen_stated_baked_and_verified() {
+    let folder = Folder::new();
+    std::fs::write(folder.0.path().join("a.toml"), text()).unwrap();
+    let arguments = ["bake", "a.toml", "--backend", "cpu", "--max-error", "0.005", "--json"];
+    let output = haptize(folder.0.path(), &arguments);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert!(told.contains("predicted: at most") && told.contains("on the disk"), "{told}");
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let dataset = Dataset::open(&folder.output()).unwrap();
+    let achieved = dataset.provenance.achieved.clone().unwrap();
+    assert_eq!(json["achieved"], serde_json::to_value(&achieved).unwrap());
+    assert!(achieved.is_kept() && achieved.rms <= 0.005 * json["pilot"]["torque"].as_f64().unwrap());
+    assert!(achieved.worst >= achieved.rms && achieved.in_contact >= 200);
+
+    // The scene in the dataset says what was baked.
+    let scene = Scene::parse(&dataset.scene, "a.toml").unwrap();
+    let counts: Vec<usize> = scene.grid.axes.iter().map(|axis| axis.count).collect();
+    assert_eq!(counts, dataset.grid.counts());
+    assert_eq!(scene.haptics.interpolation.name(), achieved.interpolation);
+    assert_eq!((scene.grid.fill, scene.contact.tolerance), (Some(achieved.fill), dataset.provenance.tolerance));
+    let ends = |scene: &Scene| -> Vec<f64> {
+        scene.grid.axes.iter().map(|axis| axis.start + axis.step * (axis.count - 1) as f64).collect()
+    };
+    let own = ends(&Scene::parse(&text(), "a.toml").unwrap());
+    assert!(ends(&scene).iter().zip(own).all(|(a, b)| (a - b).abs() < 1e-12), "the region is the scene's");
+
+    // Independent of what was verified: points of a grid in between.
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = haptize::contact::Model::new(&object, &chain, scene.contact);
+    let mut between = dataset.grid.clone();
+    for axis in &mut between.axes {
+        (axis.start, axis.count) = (axis.start + 0.41 * axis.step, axis.count - 1);
+    }
+    let places: Vec<_> = (0..between.points()).map(|point| between.configuration(point)).collect();
+    let Ok(exact) = CpuBackend::new(&model, 0).unwrap().solve(&places);
+    let spec = &scene.haptics;
+    let field = TorqueField::interpolated(&dataset, spec.interpolation, spec.threshold, &spec.boundary_slope).unwrap();
+    let square = |q: &haptize::JointVector, tau: &[f64]| {
+        let found = field.sample(q).torque;
+        // A force counts with an arm of 0.1 m.
+        (found[0] - tau[0]).powi(2) + (0.1 * (found[1] - tau[1])).powi(2)
+    };
+    let sum: f64 = places.iter().zip(&exact).map(|(q, e)| square(q, &e.torque)).sum();
+    let rms = (sum / places.len() as f64).sqrt();
+    assert!((0.5..2.0).contains(&(rms / achieved.rms)), "{rms} and {}", achieved.rms);
+
+    let told = haptize(folder.0.path(), &["info", "a.haptize"]);
+    let told = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert!(told.contains("accuracy") && told.contains(": kept"), "{told}");
+    assert!(dataset.status_counts().filled == 0 || told.contains("filled between"), "{told}");
+}
+
+#[test]
+fn an_error_that_no_grid_keeps_is_refused_before_anything_is_written() {
+    let folder = Folder::new();
+    std::fs::write(folder.0.path().join("a.toml"), text()).unwrap();
+    std::fs::write(folder.output(), "earlier").unwrap();
+    for (error, points) in [("1e-7", "2000000"), ("0.02", "50")] {
+        let arguments = ["bake", "a.toml", "--backend", "cpu", "--max-error", error, "--max-points", points];
+        let output = haptize(folder.0.path(), &arguments);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{told}");
+        for part in ["out of reach", "to the power", "points", "shallower", "Nothing was baked"] {
+            assert!(told.contains(part), "{part}: {told}");
+        }
+        assert_eq!(std::fs::read(folder.output()).unwrap(), b"earlier");
+        assert_eq!(folder.names(), ["a.haptize", "a.toml"]);
+    }
+    for wrong in ["0", "-0.1", "1.5", "N m", "0.1 N", "nan"] {
+        let output = haptize(folder.0.path(), &["bake", "a.toml", &format!("--max-error={wrong}")]);
+        assert_eq!(output.status.code(), Some(2), "{wrong}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("0.002 N m"), "{wrong}");
+    }
+    assert_eq!("0.01".parse(), Ok(Aim::Relative(0.01)));
+    assert_eq!("0.002 N m".parse(), Ok(Aim::Absolute(0.002)));
+}
+
+#[test]
+fn an_aim_that_was_missed_is_told_and_kept_in_the_file() {
+    let folder = Folder::new();
+    let scene = Scene::parse(&text(), "a.toml").unwrap();
+    let stop = AtomicBool::new(false);
+    let mut pilot = Pilot::run(&scene, Aim::Relative(0.05), BackendChoice::Cpu, &stop).unwrap();
+    let choice = pilot.choose(&scene, usize::MAX, BackendChoice::Cpu).unwrap();
+    assert!(pilot.prospects.iter().all(|prospect| prospect.points >= pilot.prospects[0].points));
+    assert!(matches!(pilot.choose(&scene, 10, BackendChoice::Cpu), Err(PilotError::OutOfReach(_))));
+    let bake = haptize::haptize::Bake {
+        scene: &choice.scene,
+        backend: BackendChoice::Cpu,
+        date: "",
+        stop: &stop,
+        progress: &mut |_| (),
+    };
+    let report = bake.to_file(&folder.output(), false).unwrap();
+    assert!(report.points == choice.points && report.contact_points - report.filled_points <= choice.points);
+    let before = Dataset::load(&folder.output()).unwrap();
+    pilot.aim /= 100.0;
+    let achieved = verify(&folder.output(), &pilot, &choice).unwrap();
+    assert!(!achieved.is_kept() && achieved.rms > 0.0);
+    let after = Dataset::open(&folder.output()).unwrap();
+    assert_eq!(after.provenance.achieved, Some(achieved));
+    assert!(after.torque[..] == before.torque[..] && after.status[..] == before.status[..]);
+    assert_eq!(after.status_counts().unconverged, 0);
+    assert!((0..after.grid.points()).any(|point| after.status(point) == Status::Contact));
+    let told = haptize(folder.0.path(), &["info", "a.haptize"]);
+    assert!(String::from_utf8_lossy(&told.stdout).contains(": missed"));
+}
