@@ -18,6 +18,7 @@ const INTERRUPTED: i32 = 130;
 
 /// What to haptize, and how.
 #[derive(clap::Args)]
+#[command(after_help = super::ADAPTER_HELP)]
 pub struct Arguments {
     /// The scene's file.
     scene: PathBuf,

@@ -4,7 +4,7 @@
 //! the 1 kHz loop punctual (`play --realtime`).
 
 use super::{Failure, Report};
-use haptize::gpu::{AdapterSummary, adapters};
+use haptize::gpu::{ADAPTER_VARIABLE, AdapterSummary, adapters};
 use serde::Serialize;
 use std::{fmt::Write, thread};
 
@@ -47,6 +47,11 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
             for (rank, adapter) in found.iter().enumerate() {
                 writeln!(text, "{:<22} {adapter}", if rank == 0 { "graphics adapters" } else { "" })?;
             }
+            writeln!(
+                text,
+                "{:<22} (the first is taken; {ADAPTER_VARIABLE}, set to a part of a name, allows only that)",
+                ""
+            )?;
         }
     }
     writeln!(text, "{:<22} {automatic} (a hardware GPU, else all CPU threads)", "`--backend auto` takes")?;

@@ -33,6 +33,10 @@ use std::{
     process::ExitCode,
 };
 
+/// Which adapter draws and computes, for the commands that use one.
+const ADAPTER_HELP: &str = "Of several graphics adapters the best is taken. The environment variable WGPU_ADAPTER_NAME, set to \
+                            a part of its name, takes another; `haptize doctor` lists them.";
+
 /// Haptize: contact solved beforehand for every joint configuration, felt at 1 kHz.
 #[derive(Parser)]
 #[command(version, after_help = "Without a command: a demo. A soft sphere is haptized, pressed and drawn, into ./out.")]

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 /// What to look at.
 #[derive(clap::Args)]
+#[command(after_help = super::ADAPTER_HELP)]
 pub struct Arguments {
     /// A scene, which is baked first, or a dataset; without one the paper's sphere.
     file: Option<PathBuf>,

@@ -4,6 +4,7 @@
 //! (callback; wgpu's default is to panic), and waits that never end. All three end up in [`GpuError`]: the callbacks
 //! store the first message, [`Context::check`] returns it, and every wait has a limit.
 
+use super::adapter::{AdapterChoice, AdapterSummary, asked_for, candidates, instance};
 use std::{
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
@@ -91,111 +92,6 @@ pub enum GpuError {
     },
 }
 
-/// Which adapters qualify.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum AdapterChoice {
-    /// A GPU made of silicon: what automatic choice takes; a software rasteriser is slower than the CPU backend.
-    Hardware,
-    /// Any adapter, software Vulkan included.
-    Any,
-    /// This one, of [`adapters`], and no other.
-    This(AdapterSummary),
-}
-
-impl AdapterChoice {
-    fn takes(&self, adapter: &AdapterSummary) -> bool {
-        match self {
-            Self::Hardware => adapter.hardware,
-            Self::Any => true,
-            Self::This(wanted) => adapter == wanted,
-        }
-    }
-
-    /// Why none of the adapters that were `found` qualifies.
-    fn refusal(&self, found: &[String]) -> GpuError {
-        let found = if found.is_empty() { "none".to_owned() } else { found.join("; ") };
-        match self {
-            Self::Hardware => GpuError::NoAdapter { wanted: "hardware", found },
-            Self::Any => GpuError::NoAdapter { wanted: "usable", found },
-            Self::This(wanted) => GpuError::NotThere { wanted: wanted.to_string(), found },
-        }
-    }
-}
-
-/// One adapter, in words for `doctor` and for a dataset's provenance.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct AdapterSummary {
-    /// Such as `llvmpipe (LLVM 15.0.6, 256 bits)`.
-    pub name: String,
-    /// Driver and its version.
-    pub driver: String,
-    /// `Vulkan`, `Metal` or `Dx12`.
-    pub interface: String,
-    /// `discrete GPU`, `integrated GPU`, `virtual GPU`, `software` or `unknown`.
-    pub kind: &'static str,
-    /// True for a GPU made of silicon.
-    pub hardware: bool,
-    /// Largest buffer that one binding reaches [B].
-    pub binding_limit: u64,
-}
-
-impl AdapterSummary {
-    fn of(adapter: &wgpu::Adapter) -> Self {
-        let info = adapter.get_info();
-        let kind = match info.device_type {
-            wgpu::DeviceType::DiscreteGpu => "discrete GPU",
-            wgpu::DeviceType::IntegratedGpu => "integrated GPU",
-            wgpu::DeviceType::VirtualGpu => "virtual GPU",
-            wgpu::DeviceType::Cpu => "software",
-            wgpu::DeviceType::Other => "unknown",
-        };
-        Self {
-            name: info.name,
-            driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
-            interface: format!("{:?}", info.backend),
-            kind,
-            hardware: preference(info.device_type) < preference(wgpu::DeviceType::Other),
-            binding_limit: adapter.limits().max_storage_buffer_binding_size,
-        }
-    }
-}
-
-impl std::fmt::Display for AdapterSummary {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} ({}, {}, {})", self.name, self.kind, self.interface, self.driver)
-    }
-}
-
-/// Lower is better.
-fn preference(kind: wgpu::DeviceType) -> u8 {
-    match kind {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    }
-}
-
-fn instance() -> wgpu::Instance {
-    wgpu::Instance::new(wgpu::InstanceDescriptor {
-        backends: wgpu::Backends::PRIMARY,
-        ..wgpu::InstanceDescriptor::new_without_display_handle()
-    })
-}
-
-/// All adapters of this machine, best first; empty where there is no driver. Never fails.
-#[must_use]
-pub fn adapters() -> Vec<AdapterSummary> {
-    candidates(&instance()).iter().map(AdapterSummary::of).collect()
-}
-
-fn candidates(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
-    let mut found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
-    found.sort_by_key(|adapter| preference(adapter.get_info().device_type));
-    found
-}
-
 /// First message of each kind of failure that arrives by callback.
 #[derive(Default)]
 struct Failures {
@@ -229,10 +125,11 @@ impl Context {
         let instance = instance();
         let found = candidates(&instance);
         let names: Vec<String> = found.iter().map(|adapter| AdapterSummary::of(adapter).to_string()).collect();
+        let part = asked_for();
         let mut refusal = None;
         for adapter in &found {
             let summary = AdapterSummary::of(adapter);
-            if !choice.takes(&summary) {
+            if !choice.takes(&summary, part.as_deref()) {
                 continue;
             }
             match Self::open_on(&instance, adapter, summary, choice.clone()) {
@@ -240,7 +137,7 @@ impl Context {
                 Err(error) => refusal = refusal.or(Some(error)),
             }
         }
-        Err(refusal.unwrap_or_else(|| choice.refusal(&names)))
+        Err(refusal.unwrap_or_else(|| choice.refusal(&names, part.as_deref())))
     }
 
     fn open_on(
@@ -312,6 +209,8 @@ impl Context {
     /// # Errors
     /// That failure.
     pub fn check(&self) -> Result<(), GpuError> {
+        // Some losses are told in a poll alone; it does not wait.
+        let _ = self.device.poll(wgpu::PollType::Poll);
         let mut failures = lock(&self.failures);
         if let Some(message) = &failures.lost {
             return Err(GpuError::Lost(message.clone()));

@@ -1,7 +1,8 @@
 //! Leaf functions of the kernels, each on its own, against their CPU twins in f64 on the same (f32) inputs.
 
 use super::{
-    context::{AdapterChoice, Context, GpuError},
+    adapter::AdapterChoice,
+    context::{Context, GpuError},
     kernel::{Access, Kernel, StorageBuffer},
     layout::{Joint, Parameters, ProxyNode},
     pipeline::Room,

@@ -2,7 +2,8 @@
 //!
 //! | file | subject |
 //! |---|---|
-//! | `context` | adapter, device, what can go wrong with them |
+//! | `adapter` | the adapters of this machine, and which is taken |
+//! | `context` | the device, and what can go wrong with it |
 //! | `layout` | structs shared with WGSL, checked against it |
 //! | `shaders` | shaders embedded, assembled from parts, with their override sets |
 //! | `model` | object, proxy and contact law as buffers |
@@ -17,6 +18,7 @@
 //! coordinates relative to the object's centroid; what is summed over few terms (torque, forces of a node) is summed on
 //! the host in f64.
 
+mod adapter;
 mod context;
 mod frame;
 mod kernel;
@@ -30,7 +32,8 @@ pub mod shaders;
 mod solver;
 mod unpack;
 
-pub use context::{AdapterChoice, AdapterSummary, Context, GpuError, adapters};
+pub use adapter::{ADAPTER_VARIABLE, AdapterChoice, AdapterSummary, adapters};
+pub use context::{Context, GpuError};
 pub use frame::{FrameCost, FrameError, FrameMethod, FrameUpdate};
 pub use pipeline::Room;
 pub use solver::GpuSolver;

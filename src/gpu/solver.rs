@@ -9,7 +9,8 @@
 //! residuals that rounding keeps above [`GPU_RESOLVED_RESIDUAL`], more contacts than the lists hold. Nothing is cut off.
 
 use super::{
-    context::{AdapterSummary, Context, GpuError},
+    adapter::AdapterSummary,
+    context::{Context, GpuError},
     pipeline::{Pipeline, Room},
     unpack::unpack,
 };

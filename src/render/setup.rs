@@ -20,6 +20,7 @@ use crate::{
     scene::{HapticsSpec, ProxyInertia, Rendering, SceneError},
 };
 use glam::DVec3;
+use std::sync::Arc;
 
 /// A dataset, ready to be felt and drawn.
 pub struct Setup {
@@ -27,8 +28,8 @@ pub struct Setup {
     pub scene: Rendering,
     /// The proxy.
     pub chain: Chain,
-    /// The haptic loop.
-    pub haptics: Haptics,
+    /// The haptic loop, which threads can share.
+    pub haptics: Arc<Haptics>,
     /// The object; absent where the scene has no graphics or the dataset no surface.
     pub object: Option<Object>,
     /// All passivity bounds of the scene's gains.
@@ -111,7 +112,7 @@ impl Setup {
                 None => None,
             },
         };
-        Ok(Self { scene, chain, haptics, object, bounds, exceeded })
+        Ok(Self { scene, chain, haptics: Arc::new(haptics), object, bounds, exceeded })
     }
 
     /// The haptic loop of `dataset`, from which this was made, with `gains` in the place of the scene's; and which of them

@@ -1,31 +1,118 @@
-//! The effects that a scene may name, and a scene with any of them put in or left out: for pricing them, and for proving that
-//! what is not named is not there.
+//! The effects that a scene may name: what they are called, what they do, and how to put them into a scene or leave them out,
+//! for pricing them, for turning them on and off while one feels, and for proving that what is not named is not there.
 
-use super::{Scene, SceneError};
+use super::{GraphicsEffects, HapticEffects, HapticsSpec, ProxyInertia, Scene, SceneError};
 use toml::{Table, Value};
 
 /// An effect of a loop: absent unless the scene names it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Effect {
     /// Table of the scene's file that it stands in, `haptics` or `graphics`.
     pub table: &'static str,
     /// Its key there.
     pub key: &'static str,
+    /// Its name, for people.
+    pub name: &'static str,
+    /// What it does.
+    pub what: &'static str,
     /// Its value where a scene does not give one: TOML, with figures that suit a desktop device and soft objects.
     usual: &'static str,
+    /// Gives the first this effect as the second has it, or has it not.
+    copy: fn(&mut Tuning, &Tuning),
+}
+
+/// No two have the same key.
+impl PartialEq for Effect {
+    fn eq(&self, other: &Self) -> bool {
+        self.key == other.key
+    }
+}
+
+impl Eq for Effect {}
+
+/// What loops can be given anew without haptizing again.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tuning {
+    /// Gains and effects of a tick.
+    pub haptics: HapticsSpec,
+    /// Effects of a frame; none where nothing is drawn.
+    pub graphics: GraphicsEffects,
 }
 
 /// All effects, those of the tick first.
 pub const EFFECTS: [Effect; 9] = [
-    Effect { table: "haptics", key: "friction", usual: "{ coefficient = 0.4 }" },
-    Effect { table: "haptics", key: "contact_damping", usual: "1.0" },
-    Effect { table: "haptics", key: "four_channel", usual: "{}" },
-    Effect { table: "haptics", key: "passivity_control", usual: "true" },
-    Effect { table: "haptics", key: "proxy_inertia", usual: "\"configuration\"" },
-    Effect { table: "graphics", key: "gravity", usual: "[0.0, 0.0, -9.81]" },
-    Effect { table: "graphics", key: "stiffening", usual: "{ factor = 4.0, strain = 0.1 }" },
-    Effect { table: "graphics", key: "smoothing", usual: "0.05" },
-    Effect { table: "graphics", key: "quasi_static", usual: "true" },
+    Effect {
+        table: "haptics",
+        key: "friction",
+        name: "Contact friction",
+        what: "Coulomb friction of elastic-plastic bristles at the proxy's nodes in contact: sticks, slips",
+        usual: "{ coefficient = 0.4 }",
+        copy: |to, from| to.haptics.effects.friction.clone_from(&from.haptics.effects.friction),
+    },
+    Effect {
+        table: "haptics",
+        key: "contact_damping",
+        name: "Contact damping",
+        what: "Dampers along the normals of the contacts",
+        usual: "1.0",
+        copy: |to, from| to.haptics.effects.contact_damping.clone_from(&from.haptics.effects.contact_damping),
+    },
+    Effect {
+        table: "haptics",
+        key: "four_channel",
+        name: "Four channels",
+        what: "Forces and accelerations of hand and proxy are exchanged beside the coupling's spring and damper",
+        usual: "{}",
+        copy: |to, from| to.haptics.effects.four_channel = from.haptics.effects.four_channel,
+    },
+    Effect {
+        table: "haptics",
+        key: "passivity_control",
+        name: "Passivity control",
+        what: "Damping wherever the passivity observer says that energy came from nowhere",
+        usual: "true",
+        copy: |to, from| to.haptics.effects.passivity_control = from.haptics.effects.passivity_control,
+    },
+    Effect {
+        table: "haptics",
+        key: "proxy_inertia",
+        name: "Varying inertia",
+        what: "The proxy moves with the chain's inertia where it is, instead of that in the middle of the grid",
+        usual: "\"configuration\"",
+        copy: |to, from| to.haptics.proxy_inertia = from.haptics.proxy_inertia,
+    },
+    Effect {
+        table: "graphics",
+        key: "gravity",
+        name: "Gravity",
+        what: "The object's nodes have weight",
+        usual: "[0.0, 0.0, -9.81]",
+        copy: |to, from| to.graphics.gravity = from.graphics.gravity,
+    },
+    Effect {
+        table: "graphics",
+        key: "stiffening",
+        name: "Strain stiffening",
+        what: "The object's springs stiffen the more they are stretched",
+        usual: "{ factor = 4.0, strain = 0.1 }",
+        copy: |to, from| to.graphics.stiffening = from.graphics.stiffening,
+    },
+    Effect {
+        table: "graphics",
+        key: "smoothing",
+        name: "Smoothing",
+        what: "Contact forces pass a low-pass filter before they move the object",
+        usual: "0.05",
+        copy: |to, from| to.graphics.smoothing = from.graphics.smoothing,
+    },
+    Effect {
+        table: "graphics",
+        key: "quasi_static",
+        name: "Quasi-static object",
+        what: "The object has no dynamics: it is drawn in equilibrium with the contact forces",
+        usual: "true",
+        copy: |to, from| to.graphics.quasi_static = from.graphics.quasi_static,
+    },
 ];
 
 impl Effect {
@@ -58,6 +145,29 @@ impl Effect {
     pub fn value(&self, scene: &Scene) -> Value {
         let usual = || format!("usual = {}", self.usual).parse::<Table>().ok()?.remove("usual");
         self.given(scene).or_else(usual).unwrap_or(Value::Boolean(true))
+    }
+
+    /// Whether `tuning` has it.
+    #[must_use]
+    pub fn is_in(&self, tuning: &Tuning) -> bool {
+        let mut without = tuning.clone();
+        self.leave_out(&mut without);
+        without != *tuning
+    }
+
+    /// Leaves it out of `tuning`.
+    pub fn leave_out(&self, tuning: &mut Tuning) {
+        let plain = HapticsSpec {
+            proxy_inertia: ProxyInertia::Constant,
+            effects: HapticEffects::default(),
+            ..tuning.haptics.clone()
+        };
+        self.take_back(tuning, &Tuning { haptics: plain, graphics: GraphicsEffects::default() });
+    }
+
+    /// Takes it back into `tuning` as `scene` has it.
+    pub fn take_back(&self, tuning: &mut Tuning, scene: &Tuning) {
+        (self.copy)(tuning, scene);
     }
 }
 
@@ -118,6 +228,27 @@ mod tests {
             // What is named is what is parsed.
             assert_eq!(scene.text.matches(effect.key).count(), 1, "{}", scene.text);
         }
+    }
+
+    #[test]
+    fn each_effect_is_left_out_of_a_tuning_alone_and_taken_back_as_it_was() {
+        let mut seen = [false; EFFECTS.len()];
+        for excluded in ["stiffening", "quasi_static"] {
+            let together: Vec<Effect> = EFFECTS.into_iter().filter(|effect| effect.key != excluded).collect();
+            let scene = sphere().with_effects(true, &together).unwrap();
+            let scene = Tuning { haptics: scene.haptics, graphics: scene.graphics.unwrap().effects };
+            let named = |tuning: &Tuning| EFFECTS.map(|effect| effect.is_in(tuning));
+            for (number, effect) in EFFECTS.into_iter().enumerate().filter(|(_, effect)| effect.is_in(&scene)) {
+                seen[number] = true;
+                let (mut tuning, mut left) = (scene.clone(), named(&scene));
+                effect.leave_out(&mut tuning);
+                left[number] = false;
+                assert_eq!(named(&tuning), left, "{}", effect.name);
+                effect.take_back(&mut tuning, &scene);
+                assert_eq!(tuning, scene, "{}", effect.name);
+            }
+        }
+        assert_eq!(seen, [true; EFFECTS.len()], "an effect is not tested");
     }
 
     #[test]

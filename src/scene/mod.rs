@@ -12,7 +12,7 @@ mod own_text;
 mod scan;
 mod spec;
 
-pub use effects::{EFFECTS, Effect};
+pub use effects::{EFFECTS, Effect, Tuning};
 pub use error::{Diagnostic, SceneError};
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
 pub use spec::{

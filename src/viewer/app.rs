@@ -6,12 +6,13 @@ use super::{
     feel::Pace,
     files::Files,
     job::{Job, Outcome, Solver, Task},
+    loaded::Loaded,
     plots::Plots,
     scene::SceneView,
     session::Session,
 };
 use crate::{
-    gpu::{Context, GpuError},
+    gpu::{ADAPTER_VARIABLE, Context, GpuError},
     render::timing::Timing,
     scene::Scene,
 };
@@ -66,7 +67,23 @@ pub struct Viewer {
     pub(super) solver: Solver,
     /// What went wrong, until it is dismissed.
     pub(super) error: Option<String>,
+    /// Frames of the window a second, over the last ones, where it goes by the clock.
+    pub(super) frame_rate: Option<f64>,
 }
+
+/// What is left of a window whose device was lost.
+pub struct Rescue {
+    /// Why it was lost.
+    pub why: String,
+    /// What was open.
+    loaded: Option<Loaded>,
+}
+
+/// Samples a pixel of the 3-D scene, for smooth edges.
+const SAMPLES: u32 = 4;
+
+/// Share of the latest frame in the frame rate that is shown [1].
+const LATEST: f64 = 0.1;
 
 impl Viewer {
     /// A viewer that draws through `render`, whose device is that of `context`; files go to `folder`. Its windows want to
@@ -75,8 +92,11 @@ impl Viewer {
     /// # Errors
     /// When the device refuses the drawing shaders.
     pub fn new(context: Arc<Context>, render: RenderState, pace: Pace, folder: PathBuf) -> Result<Self, ViewError> {
+        // A software rasteriser that has to keep up with the clock has no time for more.
+        let hasty = pace == Pace::Clock && !context.adapter().hardware;
+        let samples = if hasty { 1 } else { SAMPLES };
         Ok(Self {
-            scene: SceneView::new(Arc::clone(&context), render)?,
+            scene: SceneView::new(Arc::clone(&context), render, samples)?,
             context,
             pace,
             session: None,
@@ -86,7 +106,35 @@ impl Viewer {
             solvers: Solver::all(),
             solver: Solver::Auto,
             error: None,
+            frame_rate: None,
         })
+    }
+
+    /// What a window on another device can [`Viewer::resume`] from, once this one's is lost; none before.
+    pub fn rescue(&mut self) -> Option<Rescue> {
+        match self.context.check() {
+            Ok(()) => None,
+            Err(GpuError::Lost(why)) => {
+                Some(Rescue { why, loaded: self.session.as_ref().map(|session| session.loaded.clone()) })
+            }
+            Err(other) => {
+                self.error = Some(other.to_string());
+                None
+            }
+        }
+    }
+
+    /// Opens again what was open in a window whose device was lost, and says so.
+    pub fn resume(&mut self, rescue: Rescue, egui: &egui::Context) {
+        if let Some(loaded) = rescue.loaded {
+            self.begin(Task::Show(Box::new(loaded)), egui);
+        }
+        self.error = Some(format!(
+            "The GPU that drew this window was lost ({}). It was opened again, with what was open; gains and effects are \
+             those of the scene. Update its driver if this comes back, or draw on another adapter: set {ADAPTER_VARIABLE} to a \
+             part of its name",
+            rescue.why
+        ));
     }
 
     /// Begins to open `start`.
@@ -120,10 +168,9 @@ impl Viewer {
         if let Some(job) = self.job.take() {
             self.take(job.wait(), egui);
         }
-        if let Err(error) = self.scene.wait() {
-            self.error = Some(error.to_string());
-        }
         if let Some(session) = &mut self.session {
+            let redrawn = self.scene.wait(&session.loaded, &session.controls.tuning.graphics).map_err(not_drawn);
+            self.error = redrawn.and_then(|()| session.wait()).err().or(self.error.take());
             session.controls.wait();
         }
     }
@@ -197,11 +244,21 @@ impl Viewer {
 
     /// Lets `elapsed` [s] go by: the loop where it runs by steps, the object, and what is in the background.
     pub fn advance(&mut self, elapsed: f64, egui: &egui::Context) {
+        if self.pace == Pace::Clock && elapsed > 0.0 {
+            let rate = self.frame_rate.map_or(elapsed, |rate| (1.0 - LATEST) / rate + LATEST * elapsed).recip();
+            self.frame_rate = Some(rate);
+        }
         if let Some(outcome) = self.job.as_mut().and_then(Job::poll) {
             self.job = None;
             self.take(outcome, egui);
         }
         let Some(session) = &mut self.session else { return };
+        let wake = || {
+            let egui = egui.clone();
+            move || egui.request_repaint()
+        };
+        let redrawn = self.scene.follow(&session.loaded, &session.controls.tuning.graphics, wake()).map_err(not_drawn);
+        self.error = redrawn.and_then(|()| session.follow(wake())).err().or(self.error.take());
         session.feel.step((elapsed / session.loaded.setup.haptics.period()).round() as usize);
         session.history.collect(&mut session.feel);
         let latest = session.feel.latest();
@@ -211,12 +268,12 @@ impl Viewer {
     }
 }
 
-/// Why nothing is drawn any more, and what to do in a window: its device cannot be opened again under it.
+/// Why nothing is drawn any more, and what to do.
 pub fn not_drawn(error: ViewError) -> String {
     match error {
         ViewError::Gpu(GpuError::Lost(why)) => format!(
-            "the GPU that draws this window was lost: {why}. The loop goes on; start haptize view again to see it, and update \
-             the driver if this comes back"
+            "the GPU that draws this window was lost: {why}. The loop goes on; start haptize view again if the window does not \
+             open anew by itself, and update the driver if this comes back"
         ),
         other => other.to_string(),
     }

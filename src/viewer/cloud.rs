@@ -4,9 +4,10 @@
 
 use super::{
     camera::Camera,
+    column::untrusted,
     loaded::Loaded,
     number, palette,
-    slices::{gradient, untrusted},
+    slices::gradient,
     theme::{self, COLOUR_BAR, FINE_GAP, GAP, HAIRLINE, ROUNDING},
 };
 use crate::{JointVector, contact::Status, dataset::Dataset, report::colour::ColourMap};
@@ -29,6 +30,9 @@ const DOT: f32 = 0.4;
 const DOTS: [f32; 2] = [1.0, 6.0];
 const LEAST_SHARE: f64 = 0.45;
 
+/// Most dots that are shown: more overlap one another, and cost frames.
+const MOST: usize = 12_000;
+
 /// The colour bar, from the panel's upper right corner [points].
 const BAR_AT: egui::Vec2 = vec2(-104.0, 22.0);
 const BAR_WIDTH: f32 = 86.0;
@@ -38,6 +42,8 @@ pub struct Cloud {
     camera: Camera,
     /// Grid lines of the joints beyond the third, and the points on them.
     points: Option<(Vec<usize>, Vec<Point>)>,
+    /// Of the first three joints every such grid line is shown.
+    pitch: usize,
     high: f64,
 }
 
@@ -53,9 +59,11 @@ impl Cloud {
     /// The cloud of `dataset`.
     #[must_use]
     pub fn new(dataset: &Dataset) -> Self {
-        let contact = (0..dataset.grid.points()).filter(|&point| dataset.status(point) == Status::Contact);
-        let high = contact.map(|point| size(dataset, point)).fold(0.0, f64::max);
-        Self { camera: home(), points: None, high }
+        let contact = || (0..dataset.grid.points()).filter(|&point| dataset.status(point) == Status::Contact);
+        let high = contact().map(|point| size(dataset, point)).fold(0.0, f64::max);
+        let axes = &dataset.grid.axes;
+        let others: usize = axes.iter().skip(3).map(|axis| axis.count).product();
+        Self { camera: home(), points: None, pitch: pitch(contact().count() / others, axes.len().min(3)), high }
     }
 
     /// Shows it in a picture `height` points high.
@@ -72,7 +80,7 @@ impl Cloud {
         let others: Vec<usize> =
             grid.axes.iter().zip(q.iter()).skip(3).map(|(axis, q)| axis.nearest_line(*q)).collect();
         if self.points.as_ref().is_none_or(|(known, _)| *known != others) {
-            self.points = Some((others.clone(), points(dataset, &others)));
+            self.points = Some((others.clone(), points(dataset, &others, self.pitch)));
         }
         let Some((_, points)) = &self.points else { return };
         let palette = palette::of(ui.visuals());
@@ -103,6 +111,7 @@ impl Cloud {
         // Distance of neighbours in the box, the geometric mean over its sides.
         let shown = grid.axes.len().min(3) as f32;
         let cell = grid.axes.iter().take(3).map(|axis| 2.0 / axis.count as f32).product::<f32>().powf(1.0 / shown);
+        let cell = cell * self.pitch as f32;
         let radius = (DOT * cell / self.camera.height_at_target() * rect.height()).clamp(DOTS[0], DOTS[1]);
         for (at, _, point) in dots {
             let share = (point.torque / self.high.max(f64::MIN_POSITIVE)).cbrt().clamp(LEAST_SHARE, 1.0) as f32;
@@ -112,6 +121,11 @@ impl Cloud {
         let (here, _) = show(place(dataset, q));
         for (radius, colour) in palette::ring(&palette) {
             painter.circle_filled(here, radius, colour);
+        }
+        if self.pitch > 1 {
+            let note = format!("every {}th grid line", self.pitch);
+            let at = rect.left_top() + vec2(GAP, GAP);
+            painter.text(at, Align2::LEFT_TOP, note, theme::small(), ui.visuals().weak_text_color());
         }
         let unit = grid.axes.first().map_or("N m", |axis| axis.effort_unit());
         let bar = Rect::from_min_size(rect.right_top() + BAR_AT, vec2(BAR_WIDTH, COLOUR_BAR));
@@ -158,8 +172,12 @@ impl Cloud {
         for (joint, (axis, place)) in dataset.grid.axes.iter().zip(places.into_iter().chain([upright])).enumerate() {
             let align = if joint == 2 { Align2::RIGHT_CENTER } else { Align2::CENTER_CENTER };
             let offset = if joint == 2 { vec2(-GAP, 0.0) } else { vec2(0.0, GAP) };
-            let name = format!("{} [{}]", axis.name, axis.unit);
-            painter.text(show(place).0 + offset, align, name, small.clone(), text);
+            let name = painter.layout_no_wrap(format!("{} [{}]", axis.name, axis.unit), small.clone(), text);
+            // A narrow panel has no room beside the box.
+            let within = painter.clip_rect().shrink(FINE_GAP);
+            let at = align.anchor_size(show(place).0 + offset, name.size()).min;
+            let at = at.clamp(within.min, within.max - name.size());
+            painter.galley(at, name, text);
         }
     }
 }
@@ -183,11 +201,28 @@ fn place(dataset: &Dataset, q: &JointVector) -> Vec3 {
     place
 }
 
-fn points(dataset: &Dataset, others: &[usize]) -> Vec<Point> {
-    let pitch: usize = dataset.grid.axes.iter().skip(3).map(|axis| axis.count).product();
+/// Distance of the grid lines of which `count` configurations on `axes` joints leave no more than [`MOST`].
+fn pitch(count: usize, axes: usize) -> usize {
+    let share = count as f64 / MOST as f64;
+    share.powf(1.0 / axes.max(1) as f64).ceil().max(1.0) as usize
+}
+
+/// Configurations that are not free, on every `pitch`th grid line of the first three joints.
+fn points(dataset: &Dataset, others: &[usize], pitch: usize) -> Vec<Point> {
+    let axes = &dataset.grid.axes[..dataset.grid.axes.len().min(3)];
+    let is_on_a_line = |block: &usize| {
+        let mut rest = *block;
+        axes.iter().rev().all(|axis| {
+            let line = rest % axis.count;
+            rest /= axis.count;
+            line % pitch == 0
+        })
+    };
+    let block: usize = dataset.grid.axes.iter().skip(3).map(|axis| axis.count).product();
     let within = dataset.grid.axes.iter().skip(3).zip(others).fold(0, |point, (axis, line)| point * axis.count + line);
-    (0..dataset.grid.points() / pitch)
-        .map(|block| block * pitch + within)
+    (0..dataset.grid.points() / block)
+        .filter(is_on_a_line)
+        .map(|number| number * block + within)
         .filter(|&point| !matches!(dataset.status(point), Status::Free | Status::Outside))
         .map(|point| Point {
             place: place(dataset, &dataset.grid.configuration(point)),
@@ -195,4 +230,18 @@ fn points(dataset: &Dataset, others: &[usize]) -> Vec<Point> {
             trusted: !untrusted(dataset.status(point)),
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_large_grid_few_lines_are_shown_and_of_a_small_one_all() {
+        assert_eq!((pitch(0, 3), pitch(MOST, 3), pitch(MOST + 1, 3)), (1, 1, 2));
+        for count in [50_000, 500_000, 5_000_000] {
+            let shown = count as f64 / (pitch(count, 3) as f64).powi(3);
+            assert!(shown <= MOST as f64 && shown > MOST as f64 / 8.0, "{shown} of {count}");
+        }
+    }
 }

@@ -2,12 +2,11 @@
 //! baked.
 
 use super::{
-    effects::{EFFECTS, Part, Tuning},
     gains,
     job::Solver,
     loaded::Loaded,
     palette,
-    prices::{Item, Price, Prices},
+    prices::{Item, Prices},
     scene::Shown,
     stage::Quantity,
     theme::{CHOICE_WIDTH, GROUP_GAP},
@@ -16,21 +15,10 @@ use crate::{
     dataset::Dataset,
     gpu::Context,
     render::passivity::Bound,
-    scene::{Algorithm, Interpolation, Scene},
+    scene::{Algorithm, EFFECTS, Interpolation, Scene, Tuning},
 };
-use eframe::egui::{Align, Button, ComboBox, DragValue, Layout, RichText, Ui};
+use eframe::egui::{Align, Button, ComboBox, DragValue, Layout, Response, RichText, Ui};
 use std::sync::Arc;
-
-/// What the user asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Asked {
-    /// The loop has other gains or effects.
-    pub retune: bool,
-    /// The object has other effects.
-    pub redraw: bool,
-    /// The scene is to be baked again.
-    pub bake: bool,
-}
 
 /// The panel's state.
 pub struct Controls {
@@ -49,9 +37,6 @@ pub struct Controls {
     prices: Prices,
 }
 
-/// Price from which on it is told without decimals [us].
-const WHOLE: f64 = 10.0;
-
 /// Greatest stiffness of contact that can be typed [N/m], and the change for each point of the pointer's way [N/m/point].
 const CONTACT_STIFFNESS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 const CONTACT_STIFFNESS_DRAG: f64 = 5.0;
@@ -61,7 +46,7 @@ impl Controls {
     /// whenever there is news.
     #[must_use]
     pub fn new(loaded: &Loaded, context: &Arc<Context>, wake: impl Fn() + Send + 'static) -> Self {
-        let original = Tuning::of(loaded);
+        let original = loaded.tuning();
         let prices = Prices::measure(loaded, context, wake);
         let (tuning, scene) = (original.clone(), loaded.scene.clone());
         Self { tuning, original, joint: None, scene, solver: Solver::Auto, bake_on_change: false, prices }
@@ -77,7 +62,8 @@ impl Controls {
         self.prices.wait();
     }
 
-    /// The panel. `exceeded`: gains beyond their bound; `solvers`: what this machine bakes with.
+    /// The panel. `exceeded`: gains beyond their bound; `solvers`: what this machine bakes with. Answers whether the scene is to
+    /// be baked again.
     pub fn show(
         &mut self,
         ui: &mut Ui,
@@ -85,8 +71,7 @@ impl Controls {
         exceeded: &[Bound],
         shown: &mut Shown,
         solvers: &[Solver],
-    ) -> Asked {
-        let before = self.tuning.clone();
+    ) -> bool {
         ui.horizontal(|ui| {
             ui.heading("Feel");
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -109,8 +94,7 @@ impl Controls {
         }
         ui.add_space(GROUP_GAP);
         ui.heading("Haptization");
-        let bake = self.haptization(ui, loaded, solvers);
-        Asked { retune: before.haptics != self.tuning.haptics, redraw: before.graphics != self.tuning.graphics, bake }
+        self.haptization(ui, loaded, solvers)
     }
 
     fn feel(&mut self, ui: &mut Ui, loaded: &Loaded, exceeded: &[Bound]) {
@@ -152,12 +136,8 @@ impl Controls {
         });
         let chosen = self.tuning.haptics.interpolation;
         let mut cost = |interpolation: Interpolation| {
-            let number = match self.prices.of(Item::Tick(interpolation)) {
-                Price::Known(cost) => format!("{cost:.2}"),
-                Price::Coming => "…".into(),
-                Price::Unknown => return None,
-            };
-            Some(format!("{} {number}", interpolation.name()))
+            let cost = self.prices.of(Item::Tick(interpolation)).cost()?;
+            Some(format!("{} {cost}", interpolation.name()))
         };
         let own = cost(chosen).unwrap_or_else(|| format!("{} ?", chosen.name()));
         let others = Interpolation::ALL.into_iter().filter(|other| *other != chosen).filter_map(cost);
@@ -168,32 +148,27 @@ impl Controls {
     fn effects(&mut self, ui: &mut Ui) {
         ui.add_space(GROUP_GAP);
         ui.heading("Effects");
-        let named: Vec<usize> = self.original.named().collect();
+        let named: Vec<usize> = (0..EFFECTS.len()).filter(|&number| EFFECTS[number].is_in(&self.original)).collect();
         if named.is_empty() {
-            let names: Vec<&str> = EFFECTS.iter().map(|effect| effect.name).collect();
-            let there_are = format!("There are:\n{}", names.join("\n"));
-            ui.label(RichText::new("This scene names none.").weak().small()).on_hover_text(there_are);
+            let there_are: Vec<String> =
+                EFFECTS.iter().map(|effect| format!("{}: {} in [{}]", effect.name, effect.key, effect.table)).collect();
+            let why = RichText::new("This scene names none.").weak().small();
+            ui.label(why).on_hover_text(format!("There are:\n{}", there_are.join("\n")));
         }
         for number in named {
             let effect = &EFFECTS[number];
-            let of = match effect.part {
-                Part::Tick => "tick",
-                Part::Frame => "frame",
-            };
-            let price = match self.prices.of(Item::Effect(number)) {
-                Price::Known(price) if price.abs() < WHOLE => format!("{price:+.2} µs a {of}"),
-                Price::Known(price) => format!("{price:+.0} µs a {of}"),
-                Price::Coming => "measuring …".into(),
-                Price::Unknown => "price unknown".into(),
-            };
-            let mut on = (effect.is_on)(&self.tuning);
+            let price = self.prices.of(Item::Effect(number));
+            let mut on = effect.is_in(&self.tuning);
             ui.horizontal(|ui| {
                 let changed = ui.checkbox(&mut on, effect.name).on_hover_text(effect.what).changed();
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| note(ui, price));
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    note(ui, price.told(if effect.is_drawn() { "frame" } else { "tick" }))
+                        .on_hover_text(price.meaning());
+                });
                 if changed && on {
-                    (effect.take_back)(&mut self.tuning, &self.original);
+                    effect.take_back(&mut self.tuning, &self.original);
                 } else if changed {
-                    (effect.leave_out)(&mut self.tuning);
+                    effect.leave_out(&mut self.tuning);
                 }
             });
         }
@@ -270,8 +245,8 @@ fn look(ui: &mut Ui, shown: &mut Shown) {
     });
 }
 
-fn note(ui: &mut Ui, text: String) {
-    ui.label(RichText::new(text).weak().small());
+fn note(ui: &mut Ui, text: String) -> Response {
+    ui.label(RichText::new(text).weak().small())
 }
 
 /// The column that `interpolation` needs and `dataset` lacks.

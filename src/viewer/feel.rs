@@ -5,7 +5,7 @@
 //! A picture without a window has no time of its own: there the same loop runs by steps that are told
 //! ([`Pace::Steps`]), and gives the same numbers on every machine.
 
-use super::guide::Guide;
+use super::{background::spawn, guide::Guide};
 use crate::{
     JointVector,
     device::{Device, Pointer, PointerInput, Reading},
@@ -83,22 +83,17 @@ impl Feel {
         let (refuse, refused) = mpsc::channel();
         let (acknowledge, stepped) = mpsc::channel();
         let (steps, asked) = mpsc::channel();
-        let thread = |name: &str, work: Box<dyn FnOnce() + Send>| {
-            let started = std::thread::Builder::new().name(name.into()).spawn(work);
-            started.map_err(|error| format!("the system gives no thread: {error}; close other programs"))
-        };
         let mut threads = Vec::new();
         let steps = match pace {
             Pace::Clock => {
                 let (leader, over) = (Arc::clone(&guide), Arc::clone(&stop));
-                threads.push(thread("guide", Box::new(move || lead(&leader, input, &over)))?);
-                threads.push(thread("haptic", Box::new(move || body.by_the_clock(&report, &refuse)))?);
+                threads.push(spawn("guide", move || lead(&leader, input, &over))?);
+                threads.push(spawn("haptic", move || body.by_the_clock(&report, &refuse))?);
                 None
             }
             Pace::Steps => {
                 let leader = Arc::clone(&guide);
-                let work = move || body.by_steps(&leader, input, &report, &asked, &acknowledge);
-                threads.push(thread("haptic", Box::new(work))?);
+                threads.push(spawn("haptic", move || body.by_steps(&leader, input, &report, &asked, &acknowledge))?);
                 Some(steps)
             }
         };

@@ -10,9 +10,7 @@ use crate::{
     render::passivity,
     scene::{HapticsSpec, Interpolation},
 };
-use eframe::egui::{
-    self, ComboBox, DragValue, Response, Slider, SliderClamping, Stroke, Ui, lerp, pos2, style::HandleShape,
-};
+use eframe::egui::{self, ComboBox, DragValue, Response, Slider, SliderClamping, Stroke, Ui, lerp, pos2};
 use std::ops::RangeInclusive;
 
 /// One gain of the loop.
@@ -166,11 +164,7 @@ fn row(ui: &mut Ui, [spoken, shown]: [&str; 2], value: &mut f64, end: f64, typed
     let label = ui.label(shown);
     let row = ui.horizontal(|ui| {
         ui.spacing_mut().slider_width = ui.available_width() - NUMBER_WIDTH;
-        let slider = Slider::new(value, 0.0..=end)
-            .show_value(false)
-            .smart_aim(false)
-            .clamping(SliderClamping::Edits)
-            .handle_shape(HandleShape::Circle);
+        let slider = Slider::new(value, 0.0..=end).show_value(false).smart_aim(false).clamping(SliderClamping::Edits);
         let slider = ui.add(slider);
         slider.widget_info(|| egui::WidgetInfo::slider(true, *value, spoken));
         let number = DragValue::new(value).range(0.0..=typed.greatest).speed(typed.speed);

@@ -23,6 +23,10 @@ pub struct History {
     first: usize,
     /// Nominal time between ticks [s].
     period: f64,
+    /// When the loop began, since the first one did [s].
+    begun: f64,
+    /// Whether no tick of this loop was seen yet.
+    new: bool,
     cost: Durations,
     jitter: Durations,
     /// The same while the window held still.
@@ -35,7 +39,15 @@ impl History {
     #[must_use]
     pub fn new(period: f64) -> Option<Self> {
         let [cost, jitter, still] = [Durations::new()?, Durations::new()?, Durations::new()?];
-        Some(Self { ticks: VecDeque::with_capacity(KEPT), first: 0, period, cost, jitter, still, refused: Vec::new() })
+        let ticks = VecDeque::with_capacity(KEPT);
+        Some(Self { ticks, first: 0, period, begun: 0.0, new: true, cost, jitter, still, refused: Vec::new() })
+    }
+
+    /// Another loop begins, whose time goes on where that of the last one ended.
+    pub fn begin_anew(&mut self) {
+        self.begun = self.last().map_or(0.0, |tick| tick.time + self.period);
+        self.new = true;
+        self.reset_timing();
     }
 
     /// Takes what `feel` has to say.
@@ -58,7 +70,8 @@ impl History {
 
     fn take(&mut self, feel: &mut Feel, jitter: fn(&mut Self) -> &mut Durations) {
         while let Some(tick) = feel.next_tick() {
-            if let Some(last) = self.ticks.back() {
+            let tick = Tick { time: self.begun + tick.time, ..tick };
+            if let (false, Some(last)) = (std::mem::take(&mut self.new), self.ticks.back()) {
                 let late = (tick.time - last.time - self.period).abs();
                 jitter(self).record(Duration::from_secs_f64(late));
             }

@@ -1,7 +1,11 @@
 //! Work in the background, so that the window never freezes: opening a file, baking a scene. It reports progress, can be
 //! cancelled, and ends with something [`Loaded`] or with the reason in words.
 
-use super::{body::Body, effects::Tuning, loaded::Loaded};
+use super::{
+    background::{ENDED, spawn},
+    body::Body,
+    loaded::Loaded,
+};
 use crate::{
     contact::Model,
     dataset::Dataset,
@@ -31,6 +35,8 @@ pub enum Task {
     Open(PathBuf),
     /// Bake a scene.
     Bake(Arc<Scene>),
+    /// Set up what was open on another device.
+    Show(Box<Loaded>),
 }
 
 /// What bakes.
@@ -127,6 +133,7 @@ impl Job {
         let title = match &task {
             Task::Open(path) => format!("Opening {}", path.file_name().unwrap_or(path.as_os_str()).display()),
             Task::Bake(scene) => format!("Haptizing {}", scene.name),
+            Task::Show(loaded) => format!("Opening {}", loaded.name),
         };
         let stop = Arc::new(AtomicBool::new(false));
         let (sender, reports) = mpsc::channel();
@@ -145,8 +152,7 @@ impl Job {
             let _ = sender.send(Report::Over(outcome));
             wake();
         };
-        let spawned = thread::Builder::new().name("bake".into()).spawn(work);
-        spawned.map_err(|error| format!("the system gives no thread: {error}; close other programs"))?;
+        spawn("bake", work)?;
         let progress = Progress::default();
         Ok(Self { title, progress, stop, reports })
     }
@@ -159,7 +165,7 @@ impl Job {
                 Ok(Report::Over(outcome)) => return Some(outcome),
                 Err(mpsc::TryRecvError::Empty) => return None,
                 Err(mpsc::TryRecvError::Disconnected) => {
-                    return Some(Outcome::Failed("the work ended unexpectedly; please report this".into()));
+                    return Some(Outcome::Failed(ENDED.into()));
                 }
             }
         }
@@ -210,8 +216,9 @@ fn run(
             Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
         }
         Task::Bake(scene) => bake((*scene).clone(), solver, context, stop, progress)?,
+        Task::Show(loaded) => *loaded,
     };
-    let body = Body::new(context, &loaded, &Tuning::of(&loaded).graphics)?;
+    let body = Body::new(context, &loaded, &loaded.tuning().graphics)?;
     Ok((loaded, body))
 }
 

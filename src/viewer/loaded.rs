@@ -11,7 +11,7 @@ use crate::{
         passivity::Bound,
         setup::{Setup, SetupError},
     },
-    scene::{HapticsSpec, Scene},
+    scene::{HapticsSpec, Scene, Tuning},
 };
 use std::{path::PathBuf, sync::Arc};
 
@@ -56,6 +56,14 @@ impl Loaded {
             forces: forces.map(Arc::new),
             report: None,
         })
+    }
+
+    /// Gains and effects as its scene has them.
+    #[must_use]
+    pub fn tuning(&self) -> Tuning {
+        let scene = &self.setup.scene;
+        let drawn = self.setup.object.as_ref().and(scene.graphics.as_ref());
+        Tuning { haptics: scene.haptics.clone(), graphics: drawn.map(|graphics| graphics.effects).unwrap_or_default() }
     }
 
     /// The haptic loop with `gains`, and which of them are beyond their passivity bound.

@@ -6,22 +6,24 @@
 //! | `session` | a dataset being felt |
 //! | `window`, `offscreen` | the two places where it is drawn: a window, a picture |
 //! | `theme`, `palette` | sizes and type, colours |
-//! | `loaded`, `job` | what is open, and how it is baked or read in the background |
+//! | `loaded`, `job`, `background` | what is open, how it is baked or read, and all else that the window must not wait for |
 //! | `feel`, `guide`, `history` | the haptic loop beside the window, who leads the hand, what was felt lately |
-//! | `scene`, `body`, `grip` | the 3-D panel, the object on the GPU, the pointer's grip on the proxy |
-//! | `stage`, `pipelines`, `shapes`, `camera`, `pixels` | the renderer of that panel |
-//! | `slices`, `cloud`, `plots`, `controls`, `gains`, `files` | the other panels |
-//! | `effects`, `prices` | what is done beyond the least, and what it costs |
+//! | `scene`, `overlay`, `body` | the 3-D panel, what lies on top of its picture, the object on the GPU |
+//! | `steering`, `grip`, `camera` | whence it is seen, and the pointer's grip on the proxy |
+//! | `stage`, `pipelines`, `shapes`, `pixels` | the renderer of that panel |
+//! | `slices`, `column`, `cloud`, `plots`, `controls`, `gains`, `files` | the other panels |
+//! | `prices` | what effects and interpolations cost |
 //!
 //! One device computes and draws: the object's nodes go from the frame update to the screen without a read-back. The
 //! haptic thread waits for nothing here; see `feel`.
 
 mod app;
+mod background;
 mod body;
 mod camera;
 mod cloud;
+mod column;
 mod controls;
-mod effects;
 mod feel;
 mod files;
 mod gains;
@@ -31,6 +33,7 @@ mod history;
 mod job;
 mod loaded;
 mod offscreen;
+mod overlay;
 mod palette;
 mod panels;
 mod pipelines;
@@ -42,10 +45,11 @@ mod session;
 mod shapes;
 mod slices;
 mod stage;
+mod steering;
 mod theme;
 mod window;
 
-pub use app::{Start, Viewer};
+pub use app::{Rescue, Start, Viewer};
 pub use eframe::egui_wgpu::RenderState;
 pub use feel::Pace;
 pub use offscreen::{Picture, render_state, screenshot};

@@ -2,7 +2,7 @@
 
 use super::theme::{HAIRLINE, ROUNDING, SHADOW_BLUR, SHADOW_DROP};
 use crate::report::colour::{self, Colour};
-use eframe::egui::{Color32, CornerRadius, Shadow, Stroke, Visuals};
+use eframe::egui::{Color32, CornerRadius, Shadow, Stroke, Visuals, style::HandleShape};
 
 /// Strength of lines that only help to read others, over their colour's own [1].
 pub const FAINT: f32 = 0.45;
@@ -167,6 +167,7 @@ fn dress(visuals: &mut Visuals, ink: Color32, soft: Color32, ground: Color32, pa
     visuals.widgets.noninteractive.bg_fill = panel;
     visuals.widgets.noninteractive.weak_bg_fill = panel;
     visuals.slider_trailing_fill = true;
+    visuals.handle_shape = HandleShape::Circle;
     visuals.indent_has_left_vline = false;
     visuals.window_shadow = Shadow {
         offset: [0, SHADOW_DROP],
@@ -185,5 +186,63 @@ fn dress(visuals: &mut Visuals, ink: Color32, soft: Color32, ground: Color32, pa
     ] {
         widget.corner_radius = CornerRadius::same(ROUNDING);
         widget.expansion = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Contrast of two colours as WCAG 2.2 has it, from 1 to 21: its relative luminance is that of linear sRGB.
+    fn contrast(a: Color32, b: Color32) -> f32 {
+        let luminance = |colour: Color32| {
+            let linear = |channel: u8| {
+                let share = f32::from(channel) / 255.0;
+                if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }
+            };
+            0.2126 * linear(colour.r()) + 0.7152 * linear(colour.g()) + 0.0722 * linear(colour.b())
+        };
+        let [a, b] = [luminance(a) + 0.05, luminance(b) + 0.05];
+        a.max(b) / a.min(b)
+    }
+
+    /// Least contrast of text (WCAG 2.2, level AA, 1.4.3), and of what tells something without being text (1.4.11).
+    const TEXT: f32 = 4.5;
+    const GRAPHICS: f32 = 3.0;
+
+    #[test]
+    fn text_and_marks_stand_out_from_their_ground() {
+        assert_eq!(contrast(Color32::BLACK, Color32::WHITE), 21.0);
+        assert!((contrast(Color32::from_rgb(0x76, 0x76, 0x76), Color32::WHITE) - 4.54).abs() < 0.01);
+        for visuals in [light(), dark()] {
+            let palette = of(&visuals);
+            let texts = [
+                visuals.text_color(),
+                visuals.weak_text_color(),
+                visuals.error_fg_color,
+                visuals.warn_fg_color,
+                visuals.hyperlink_color,
+                palette.good,
+                palette.flagged,
+            ];
+            for (number, text) in texts.into_iter().enumerate() {
+                for ground in [visuals.panel_fill, visuals.extreme_bg_color, palette.stage] {
+                    let found = contrast(text, ground);
+                    assert!(found >= TEXT, "text {number} on {ground:?}, dark {}: {found}", visuals.dark_mode);
+                }
+            }
+            let widgets = &visuals.widgets;
+            for widget in [&widgets.inactive, &widgets.hovered, &widgets.active, &widgets.open] {
+                assert!(contrast(widget.text_color(), widget.weak_bg_fill) >= TEXT, "{widget:?}");
+            }
+            assert!(contrast(visuals.selection.stroke.color, visuals.selection.bg_fill) >= TEXT);
+            let marks = [palette.force, palette.ghost, palette.axis, palette.here, palette.bad, palette.good];
+            for (number, mark) in marks.into_iter().chain((0..6).map(|k| series(k, visuals.dark_mode))).enumerate() {
+                for ground in [visuals.panel_fill, palette.stage] {
+                    let found = contrast(mark, ground);
+                    assert!(found >= GRAPHICS, "mark {number} on {ground:?}, dark {}: {found}", visuals.dark_mode);
+                }
+            }
+        }
     }
 }

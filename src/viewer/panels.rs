@@ -6,16 +6,17 @@ use super::{
     guide::Guide,
     job::{Job, Task, short},
     number,
-    plots::Plots,
+    plots::{self, Plots},
     session::Session,
+    steering,
     theme::{
         BAR_MARGIN, CONTROLS_RANGE, CONTROLS_WIDTH, GAP, GROUP_GAP, LONE_BUTTON, MESSAGE_WIDTH, MOTION_WIDTH, NARROW,
         PANEL_MARGIN, PAUSE_WIDTH, PLOTS_RANGE, PROGRESS, PROGRESS_HEIGHT, SIDE_SHARE, SPACE_RANGE, WIDE_PROGRESS,
     },
 };
-use crate::render::trace::Tick;
+use crate::{gpu::ADAPTER_VARIABLE, render::trace::Tick};
 use eframe::egui::{
-    self, Align, Button, CentralPanel, Frame, Layout, Panel, ProgressBar, RichText, ScrollArea, Slider, Ui, vec2,
+    self, Align, Button, CentralPanel, Frame, Grid, Layout, Panel, ProgressBar, RichText, ScrollArea, Slider, Ui, vec2,
 };
 use std::path::Path;
 
@@ -69,6 +70,7 @@ impl Viewer {
                 if ui.button("Reset view").on_hover_text("Or double-click the scene").clicked() {
                     self.scene.reset_view();
                 }
+                ui.menu_button("Help", help).response.on_hover_text("What pointer and keys do");
             });
         });
     }
@@ -77,7 +79,12 @@ impl Viewer {
     fn status(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             let adapter = self.context.adapter();
-            ui.label(RichText::new(format!("drawn by {} ({})", short(&adapter.name), adapter.kind)).weak().small());
+            let rate = self.frame_rate.map_or_else(String::new, |rate| format!(", {rate:.0} frames/s"));
+            let drawn = format!("drawn by {} ({}){rate}", short(&adapter.name), adapter.kind);
+            ui.label(RichText::new(drawn).weak().small()).on_hover_text(format!(
+                "{adapter}\nAnother adapter draws and computes where {ADAPTER_VARIABLE} is set to a part of its name before \
+                 haptize starts; haptize doctor lists them"
+            ));
             let Some(session) = &self.session else { return };
             if let Some(tick) = session.history.last() {
                 ui.separator();
@@ -99,6 +106,15 @@ impl Viewer {
                     ui.label(RichText::new(&job.title).small());
                     return;
                 }
+                let coming = [
+                    (session.is_retuning(), "The loop is made anew …"),
+                    (self.scene.is_redrawing(), "The object is set up anew …"),
+                ];
+                if let Some((_, what)) = coming.into_iter().find(|(is_coming, _)| *is_coming) {
+                    ui.spinner();
+                    ui.label(RichText::new(what).small());
+                    return;
+                }
                 let jitter = session.history.jitter().percentiles();
                 let cost = session.history.cost().percentiles();
                 if cost.count > 0 && self.pace == Pace::Clock {
@@ -117,7 +133,7 @@ impl Viewer {
         let Some(session) = &mut self.session else { return };
         let size = ui.available_size();
         let side = Frame::new().fill(ui.visuals().panel_fill).inner_margin(PANEL_MARGIN);
-        let mut asked = Default::default();
+        let mut bake = false;
         let share = |length: f32, [least, greatest]: [f32; 2]| (SIDE_SHARE * length).clamp(least, greatest);
         let below = share(size.y, PLOTS_RANGE);
         // In a narrow window the plots get its whole width, in a wide one C-space gets its whole height.
@@ -133,7 +149,7 @@ impl Viewer {
             .show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
                     let (controls, loaded) = (&mut session.controls, &session.loaded);
-                    asked = controls.show(ui, loaded, &session.exceeded, &mut self.scene.shown, &self.solvers);
+                    bake = controls.show(ui, loaded, &session.exceeded, &mut self.scene.shown, &self.solvers);
                 });
             });
         let right = share(size.x, SPACE_RANGE);
@@ -151,19 +167,7 @@ impl Viewer {
             }
         });
         self.solver = session.controls.solver.clone();
-        if asked.retune
-            && let Err(error) = session.retune(self.pace)
-        {
-            self.error = Some(error);
-        }
-        if asked.redraw {
-            let egui = ui.ctx().clone();
-            let effects = session.controls.tuning.graphics;
-            if let Err(error) = self.scene.redraw(&session.loaded, effects, move || egui.request_repaint()) {
-                self.error = Some(error);
-            }
-        }
-        if let (true, Some(scene)) = (asked.bake, session.controls.scene.clone()) {
+        if let (true, Some(scene)) = (bake, session.controls.scene.clone()) {
             self.begin(Task::Bake(scene), &ui.ctx().clone());
         }
     }
@@ -221,6 +225,17 @@ impl Viewer {
             Err(error) => self.error = Some(error.to_string()),
         }
     }
+}
+
+/// What pointer and keys do.
+fn help(ui: &mut Ui) {
+    Grid::new("help").spacing(vec2(GROUP_GAP, GAP)).show(ui, |ui| {
+        for (how, what) in steering::HELP.into_iter().chain(plots::HELP) {
+            ui.strong(how);
+            ui.label(what);
+            ui.end_row();
+        }
+    });
 }
 
 fn plots_panel(ui: &mut Ui, frame: Frame, height: f32, plots: &mut Plots, session: &mut Session, folder: &Path) {

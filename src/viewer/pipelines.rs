@@ -1,5 +1,5 @@
 //! The two drawing pipelines: the object's surface, pulled from the frame update's buffers, and instances of one rounded
-//! cone. Both share view and light (`shaders/draw_common.wgsl`), four samples a pixel, and a depth buffer.
+//! cone. Both share view and light (`shaders/draw_common.wgsl`), samples a pixel, and a depth buffer.
 
 use super::shapes::Shape;
 use crate::tolerances::GPU_LEAST_DIVISOR;
@@ -9,9 +9,6 @@ use bytemuck::{Pod, Zeroable};
 pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Of the depth buffer.
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Samples a pixel.
-pub const SAMPLES: u32 = 4;
-
 const COMMON: &str = include_str!("../../shaders/draw_common.wgsl");
 const SURFACE: &str = include_str!("../../shaders/draw_surface.wgsl");
 const SHAPES: &str = include_str!("../../shaders/draw_shapes.wgsl");
@@ -33,13 +30,13 @@ pub struct View {
 }
 
 /// The pipeline of the surface; its buffers are rest positions, state, forces, mesh.
-pub fn surface(device: &wgpu::Device) -> wgpu::RenderPipeline {
-    pipeline(device, "draw_surface", SURFACE, 4, &[])
+pub fn surface(device: &wgpu::Device, samples: u32) -> wgpu::RenderPipeline {
+    pipeline(device, samples, "draw_surface", SURFACE, 4, &[])
 }
 
 /// The pipeline of the shapes; its buffer is the state. Instances lie in the first vertex buffer, the unit shape in the
 /// second.
-pub fn shapes(device: &wgpu::Device) -> wgpu::RenderPipeline {
+pub fn shapes(device: &wgpu::Device, samples: u32) -> wgpu::RenderPipeline {
     let instances = wgpu::VertexBufferLayout {
         array_stride: size_of::<Shape>() as u64,
         step_mode: wgpu::VertexStepMode::Instance,
@@ -50,7 +47,7 @@ pub fn shapes(device: &wgpu::Device) -> wgpu::RenderPipeline {
         step_mode: wgpu::VertexStepMode::Vertex,
         attributes: &wgpu::vertex_attr_array![3 => Float32x4],
     };
-    pipeline(device, "draw_shapes", SHAPES, 1, &[Some(instances), Some(unit)])
+    pipeline(device, samples, "draw_shapes", SHAPES, 1, &[Some(instances), Some(unit)])
 }
 
 /// Source of a drawing stage: generated constants, what is shared, and the stage itself.
@@ -58,9 +55,10 @@ fn source(stage: &str) -> String {
     format!("const LEAST_DIVISOR: f32 = {GPU_LEAST_DIVISOR:e};\n{COMMON}\n{stage}")
 }
 
-/// A pipeline whose group 0 is the view and then `storage` read-only buffers.
+/// A pipeline of `samples` a pixel whose group 0 is the view and then `storage` read-only buffers.
 fn pipeline(
     device: &wgpu::Device,
+    samples: u32,
     label: &str,
     stage: &str,
     storage: u32,
@@ -109,7 +107,7 @@ fn pipeline(
             stencil: Default::default(),
             bias: Default::default(),
         }),
-        multisample: wgpu::MultisampleState { count: SAMPLES, ..Default::default() },
+        multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
         fragment: Some(wgpu::FragmentState {
             module: &module,
             entry_point: Some("fragment"),

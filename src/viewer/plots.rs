@@ -50,6 +50,13 @@ pub struct Plots {
 /// Lengths of the time axis that can be chosen [s]: a touch, a motion of the scene, all that is kept.
 const SPANS: [f64; 3] = [2.0, 6.0, 18.0];
 
+/// What the pointer does over frozen plots and the plane of C-space, for the window's help.
+pub const HELP: [(&str, &str); 3] = [
+    ("Frozen plots: drag", "move along"),
+    ("Right-drag, Ctrl-wheel", "zoom into a plot"),
+    ("Double-click a plot", "see all of it"),
+];
+
 /// Opacity of the lines that others are compared with [1].
 const BEHIND: f32 = 0.6;
 

@@ -3,18 +3,15 @@
 //! A tick: the scene's first motion is played by a simulated hand as fast as it goes. A frame: the object is advanced on
 //! the window's device, and waited for after some frames. Both are timed in short blocks, again and again, in the background,
 //! and of each block the fastest time counts, because everything else that a machine does only adds to it. The price of an
-//! effect is the difference in cost with it and without it, which take turns.
+//! effect is the difference in cost with it and without it, which take turns. All of that is done [`REPEATS`] times: the
+//! median is told with its spread, and a difference that has not the same sign every time is told to be below the noise.
 
-use super::{
-    body::Nodes,
-    effects::{EFFECTS, Part, Tuning},
-    loaded::Loaded,
-};
+use super::{background::spawn, body::Nodes, loaded::Loaded};
 use crate::{
     device::{Motion, SimulatedHand},
     gpu::Context,
     render::session::{Driver, Latest},
-    scene::{GraphicsEffects, HapticsSpec, Interpolation, Waypoint},
+    scene::{EFFECTS, GraphicsEffects, HapticsSpec, Interpolation, Tuning, Waypoint},
 };
 use std::{
     hint::black_box,
@@ -27,10 +24,91 @@ use std::{
 pub enum Price {
     /// It is being measured.
     Coming,
-    /// [us] a tick or a frame.
-    Known(f64),
+    /// A tick or a frame.
+    Known(Estimate),
     /// It could not be measured: it does not work here.
     Unknown,
+}
+
+/// A time, or a difference of two, as it was found again and again [us].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    median: f64,
+    least: f64,
+    greatest: f64,
+}
+
+/// Times that everything is measured. What costs nothing has the same sign every time, and so is told to have a price, once in
+/// 64.
+const REPEATS: usize = 7;
+
+/// Time from which on it is told without decimals [us].
+const WHOLE: f64 = 10.0;
+
+impl Estimate {
+    fn of(mut found: [f64; REPEATS]) -> Self {
+        found.sort_unstable_by(f64::total_cmp);
+        Self { median: found[REPEATS / 2], least: found[0], greatest: found[REPEATS - 1] }
+    }
+
+    /// What cannot be told from nothing is smaller than this [us]; none where it can be.
+    fn noise(self) -> Option<f64> {
+        (self.least <= 0.0 && self.greatest >= 0.0).then(|| self.greatest.max(-self.least))
+    }
+
+    /// Half the spread [us].
+    fn spread(self) -> f64 {
+        0.5 * (self.greatest - self.least)
+    }
+}
+
+impl Price {
+    /// Of something whole [us]; none where it does not work.
+    #[must_use]
+    pub fn cost(self) -> Option<String> {
+        match self {
+            Self::Known(cost) => Some(microseconds(cost.median)),
+            Self::Coming => Some("…".into()),
+            Self::Unknown => None,
+        }
+    }
+
+    /// Of an effect that is part `of` a tick or a frame.
+    #[must_use]
+    pub fn told(self, of: &str) -> String {
+        match self {
+            Self::Known(price) => match price.noise() {
+                Some(noise) => format!("< {} µs a {of}", microseconds(noise)),
+                None => {
+                    let sign = if price.median < 0.0 { '−' } else { '+' };
+                    let [size, spread] = [price.median.abs(), price.spread()].map(microseconds);
+                    format!("{sign}{size} ± {spread} µs a {of}")
+                }
+            },
+            Self::Coming => "measuring …".into(),
+            Self::Unknown => "price unknown".into(),
+        }
+    }
+
+    /// What that says.
+    #[must_use]
+    pub fn meaning(self) -> String {
+        match self {
+            Self::Known(price) => {
+                let [least, greatest] = [price.least, price.greatest].map(|time| format!("{time:+.2}"));
+                let verdict =
+                    if price.noise().is_some() { "; with both signs, it cannot be told from nothing here" } else { "" };
+                format!("With it over without it, {REPEATS} times in turns: from {least} to {greatest} µs{verdict}")
+            }
+            Self::Coming => "With it and without it, in turns, in the background".into(),
+            Self::Unknown => "It does not work here without it, or the system gave no thread to measure it".into(),
+        }
+    }
+}
+
+/// With the digits that a measurement bears.
+fn microseconds(time: f64) -> String {
+    if time.abs() < WHOLE { format!("{time:.2}") } else { format!("{time:.0}") }
 }
 
 /// What has a price.
@@ -48,28 +126,27 @@ pub struct Prices {
     news: Option<mpsc::Receiver<(Item, Price)>>,
 }
 
-/// Times that each block is timed: on a machine that is busy three times over, where two of three are disturbed, less than a
-/// hundredth of the blocks never come through alone.
-const ROUNDS: usize = 12;
+/// Times that a block is timed in each measurement: on a machine that is busy twice over, where every second one is disturbed,
+/// one block in thirty never comes through alone.
+const ROUNDS: usize = 5;
 
 /// Blocks of the loop, and ticks of one: two seconds of the motion at 1 kHz, in pieces far shorter than the turn that a
 /// system gives to others in between.
 const BLOCKS: usize = 40;
 const TICKS: usize = 50;
 
-/// Frames of a block, which share the wait at its end, some tens of microseconds; and times that it is timed. A software
-/// device has several threads that all have to come through alone.
+/// Frames of a block, which share the wait at its end, some tens of microseconds.
 const FRAMES: usize = 4;
-const FRAME_ROUNDS: usize = 36;
 
 impl Prices {
     /// Begins to measure interpolations, and the effects that the scene of `loaded` names. `wake` is called whenever there
     /// is news.
     #[must_use]
     pub fn measure(loaded: &Loaded, context: &Arc<Context>, wake: impl Fn() + Send + 'static) -> Self {
-        let scene = Tuning::of(loaded);
+        let scene = loaded.tuning();
         let ticks = Interpolation::ALL.into_iter().map(Item::Tick);
-        let items: Vec<Item> = ticks.chain(scene.named().map(Item::Effect)).collect();
+        let named = (0..EFFECTS.len()).filter(|&number| EFFECTS[number].is_in(&scene)).map(Item::Effect);
+        let items: Vec<Item> = ticks.chain(named).collect();
         let known = items.iter().map(|item| (*item, Price::Coming)).collect();
         let (sender, news) = mpsc::channel();
         let (loaded, context) = (loaded.clone(), Arc::clone(context));
@@ -84,7 +161,7 @@ impl Prices {
             }
         };
         // Without a thread prices stay unknown, which is what the window says.
-        let news = std::thread::Builder::new().name("prices".into()).spawn(work).ok().map(|_| news);
+        let news = spawn("prices", work).ok().map(|_| news);
         Self { known, news }
     }
 
@@ -116,28 +193,29 @@ impl Prices {
     }
 }
 
-/// Price of `item` [us]; none where it does not work.
-fn price(item: Item, loaded: &Loaded, context: &Arc<Context>, scene: &Tuning) -> Option<f64> {
+/// Price of `item`; none where it does not work.
+fn price(item: Item, loaded: &Loaded, context: &Arc<Context>, scene: &Tuning) -> Option<Estimate> {
     let [with, without] = match item {
         Item::Tick(interpolation) => {
             let [cost] = tick_costs(loaded, [&HapticsSpec { interpolation, ..scene.haptics.clone() }])?;
-            return Some(cost);
+            return Some(Estimate::of(cost));
         }
         Item::Effect(number) => {
             let effect = &EFFECTS[number];
             let mut without = scene.clone();
-            (effect.leave_out)(&mut without);
-            match effect.part {
-                Part::Tick => tick_costs(loaded, [&scene.haptics, &without.haptics])?,
-                Part::Frame => frame_costs(loaded, context, [&scene.graphics, &without.graphics])?,
+            effect.leave_out(&mut without);
+            if effect.is_drawn() {
+                frame_costs(loaded, context, [&scene.graphics, &without.graphics])?
+            } else {
+                tick_costs(loaded, [&scene.haptics, &without.haptics])?
             }
         }
     };
-    Some(with - without)
+    Some(Estimate::of(std::array::from_fn(|repeat| with[repeat] - without[repeat])))
 }
 
 /// Costs of a tick with each of `gains` [us]; none where the loop cannot run.
-fn tick_costs<const N: usize>(loaded: &Loaded, gains: [&HapticsSpec; N]) -> Option<[f64; N]> {
+fn tick_costs<const N: usize>(loaded: &Loaded, gains: [&HapticsSpec; N]) -> Option<[[f64; REPEATS]; N]> {
     let motion = match loaded.motions().into_iter().next() {
         Some((_, motion)) => motion,
         None => {
@@ -149,22 +227,20 @@ fn tick_costs<const N: usize>(loaded: &Loaded, gains: [&HapticsSpec; N]) -> Opti
     for gains in gains {
         loops.push((loaded.tuned(gains).ok()?.0, gains));
     }
-    let mut least = [[f64::INFINITY; BLOCKS]; N];
-    for _ in 0..ROUNDS {
-        for ((haptics, gains), least) in loops.iter().zip(&mut least) {
-            let mut hand = SimulatedHand::new(gains, motion.clone()).ok()?;
-            let mut driver = Driver::new(haptics, &mut hand).ok()?;
-            let period = haptics.period();
-            for least in least {
-                let begin = Instant::now();
-                for _ in 0..TICKS {
-                    black_box(driver.tick(period, period));
-                }
-                *least = least.min(microseconds(begin));
+    in_turns(|turn| {
+        let (haptics, gains) = &loops[turn];
+        let mut hand = SimulatedHand::new(gains, motion.clone()).ok()?;
+        let mut driver = Driver::new(haptics, &mut hand).ok()?;
+        let period = haptics.period();
+        let block = |_| {
+            let begin = Instant::now();
+            for _ in 0..TICKS {
+                black_box(driver.tick(period, period));
             }
-        }
-    }
-    Some(least.map(|blocks| blocks.iter().sum::<f64>() / (BLOCKS * TICKS) as f64))
+            1e6 * begin.elapsed().as_secs_f64() / (BLOCKS * TICKS) as f64
+        };
+        Some((0..BLOCKS).map(block).collect())
+    })
 }
 
 /// Costs of a frame of the object with each of `effects` [us]; none where there is no object, or the device fails.
@@ -172,27 +248,67 @@ fn frame_costs<const N: usize>(
     loaded: &Loaded,
     context: &Arc<Context>,
     effects: [&GraphicsEffects; N],
-) -> Option<[f64; N]> {
+) -> Option<[[f64; REPEATS]; N]> {
     let mut objects = Vec::with_capacity(N);
     for effects in effects {
         objects.push(Nodes::new(context, loaded, effects).ok()??);
     }
     let start = loaded.start();
     let latest = Latest { time: 0.0, proxy: start, device: start, share: 1.0 };
-    let mut least = [f64::INFINITY; N];
-    for _ in 0..FRAME_ROUNDS {
-        for (nodes, least) in objects.iter_mut().zip(&mut least) {
-            let begin = Instant::now();
-            for _ in 0..FRAMES {
-                nodes.advance(&latest, nodes.period()).ok()?;
-            }
-            nodes.update.read().ok()?;
-            *least = least.min(microseconds(begin));
+    in_turns(|turn| {
+        let nodes = &mut objects[turn];
+        let begin = Instant::now();
+        for _ in 0..FRAMES {
+            nodes.advance(&latest, nodes.period()).ok()?;
         }
-    }
-    Some(least.map(|block| block / FRAMES as f64))
+        nodes.update.read().ok()?;
+        Some(vec![1e6 * begin.elapsed().as_secs_f64() / FRAMES as f64])
+    })
 }
 
-fn microseconds(since: Instant) -> f64 {
-    1e6 * since.elapsed().as_secs_f64()
+/// Costs of `N` kinds of work, of which `work` does one in blocks and answers with the time of each [us]: the sum over blocks,
+/// each the fastest of some rounds; and that again and again.
+fn in_turns<const N: usize>(mut work: impl FnMut(usize) -> Option<Vec<f64>>) -> Option<[[f64; REPEATS]; N]> {
+    let mut costs = [[0.0; REPEATS]; N];
+    for repeat in 0..REPEATS {
+        let mut least: [Vec<f64>; N] = std::array::from_fn(|_| Vec::new());
+        for _ in 0..ROUNDS {
+            for (turn, least) in least.iter_mut().enumerate() {
+                let blocks = work(turn)?;
+                least.resize(blocks.len(), f64::INFINITY);
+                least.iter_mut().zip(blocks).for_each(|(least, time)| *least = least.min(time));
+            }
+        }
+        costs.iter_mut().zip(&least).for_each(|(cost, blocks)| cost[repeat] = blocks.iter().sum());
+    }
+    Some(costs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_price_is_told_with_its_spread_or_to_be_below_the_noise() {
+        let told = |found| Price::Known(Estimate::of(found)).told("tick");
+        assert_eq!(told([0.5, 0.3, 0.4, 0.6, 0.45, 0.42, 0.38]), "+0.42 ± 0.15 µs a tick");
+        assert_eq!(told([-20.0, -12.0, -30.0, -25.0, -18.0, -21.0, -28.0]), "−21 ± 9.00 µs a tick");
+        let noisy = Price::Known(Estimate::of([0.1, -0.3, 0.2, 0.2, 0.2, 0.2, 0.2]));
+        assert_eq!(noisy.told("frame"), "< 0.30 µs a frame");
+        assert!(noisy.meaning().contains("from -0.30 to +0.20 µs; with both signs"), "{}", noisy.meaning());
+    }
+
+    #[test]
+    fn of_each_block_the_fastest_time_counts() {
+        // The second kind takes twice as long; now and then something else delays a block.
+        let mut calls = 0;
+        let costs: [[f64; REPEATS]; 2] = in_turns(|turn| {
+            calls += 1;
+            let time = [1.0, 2.0][turn];
+            Some((0..4).map(|block| time + if (calls / 2 + block) % 3 == 0 { 50.0 } else { 0.0 }).collect())
+        })
+        .unwrap();
+        assert_eq!(costs, [[4.0; REPEATS], [8.0; REPEATS]]);
+        assert_eq!(in_turns::<1>(|_| None), None);
+    }
 }

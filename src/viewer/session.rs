@@ -1,6 +1,7 @@
 //! A dataset being felt: its haptic loop, what was felt lately, and the panels that belong to it alone.
 
 use super::{
+    background::Following,
     cloud::Cloud,
     controls::Controls,
     feel::{Feel, Pace},
@@ -10,7 +11,12 @@ use super::{
     slices::Slices,
     theme::{FINE_GAP, GAP, PLANE_WIDGETS, ROOM_FOR_BOTH},
 };
-use crate::{JointVector, gpu::Context, render::passivity::Bound};
+use crate::{
+    JointVector,
+    gpu::Context,
+    render::{haptic::Haptics, passivity::Bound, setup::SetupError},
+    scene::HapticsSpec,
+};
 use eframe::egui::Ui;
 use std::sync::Arc;
 
@@ -19,6 +25,9 @@ pub struct Session {
     pub loaded: Loaded,
     pub feel: Feel,
     pub history: History,
+    pace: Pace,
+    /// The loop with the gains that the controls have, made in the background.
+    retuning: Following<HapticsSpec, Result<Tuned, SetupError>>,
     slices: Slices,
     cloud: Cloud,
     pub controls: Controls,
@@ -27,6 +36,9 @@ pub struct Session {
     /// Whether the cloud is shown where there is no height for plane and cloud.
     cloud_first: bool,
 }
+
+/// A loop, and which of its gains are beyond their bound.
+type Tuned = (Arc<Haptics>, Vec<Bound>);
 
 impl Session {
     /// Begins to feel `loaded`.
@@ -40,12 +52,14 @@ impl Session {
         wake: impl Fn() + Send + 'static,
     ) -> Result<Self, String> {
         let controls = Controls::new(&loaded, context, wake);
-        let gains = &controls.tuning.haptics;
-        let (haptics, exceeded) = loaded.tuned(gains).map_err(|error| error.to_string())?;
+        let gains = controls.tuning.haptics.clone();
+        let haptics = Arc::clone(&loaded.setup.haptics);
         let history = History::new(haptics.period()).ok_or("no memory for histograms; close other programs")?;
-        let feel = Feel::start(haptics, gains, Guide::new(&loaded), pace)?;
+        let feel = Feel::start(haptics, &gains, Guide::new(&loaded), pace)?;
         let (slices, cloud) = (Slices::new(&loaded.dataset), Cloud::new(&loaded.dataset));
-        Ok(Self { loaded, feel, history, slices, cloud, controls, exceeded, cloud_first: false })
+        let exceeded = loaded.setup.exceeded.clone();
+        let retuning = Following::new(gains);
+        Ok(Self { loaded, feel, history, pace, retuning, slices, cloud, controls, exceeded, cloud_first: false })
     }
 
     /// Plane and cloud of C-space, one below the other, or one of them where there is no height for both.
@@ -70,17 +84,99 @@ impl Session {
         }
     }
 
-    /// Goes on with gains and effects of the controls, the hand where it is.
+    /// Whether gains or effects were changed that are not felt yet.
+    #[must_use]
+    pub fn is_retuning(&self) -> bool {
+        self.retuning.is_busy()
+    }
+
+    /// Lets the loop follow gains and effects of the controls. It is made in the background, for the energies of a million
+    /// points take seconds to interpolate; what is felt stays until then. `wake` is called when there is news.
     ///
     /// # Errors
-    /// In words, when they do not make a loop.
-    pub fn retune(&mut self, pace: Pace) -> Result<(), String> {
+    /// In words, when they do not make a loop; the last one goes on.
+    pub fn follow(&mut self, wake: impl FnOnce() + Send + 'static) -> Result<(), String> {
+        let loaded = self.loaded.clone();
         let gains = &self.controls.tuning.haptics;
-        let (haptics, exceeded) = self.loaded.tuned(gains).map_err(|error| error.to_string())?;
-        let guide = self.feel.guide().clone();
-        let history = History::new(haptics.period()).ok_or("no memory for histograms; close other programs")?;
-        self.feel = Feel::start(haptics, gains, guide, pace)?;
-        (self.history, self.exceeded) = (history, exceeded);
+        let made = self.retuning.follow(gains, "tuning", move |gains| loaded.tuned(gains), wake)?;
+        made.map_or(Ok(()), |made| self.go_on(made))
+    }
+
+    /// Waits until the loop has gains and effects of the controls; for pictures and tests.
+    ///
+    /// # Errors
+    /// As [`Session::follow`].
+    pub fn wait(&mut self) -> Result<(), String> {
+        self.follow(|| ())?;
+        while let Some(made) = self.retuning.wait()? {
+            self.go_on(made)?;
+            self.follow(|| ())?;
+        }
         Ok(())
+    }
+
+    /// Goes on with another loop, the hand where it is.
+    fn go_on(&mut self, made: Result<Tuned, SetupError>) -> Result<(), String> {
+        let (haptics, exceeded) = made.map_err(|error| error.to_string())?;
+        let guide = self.feel.guide().clone();
+        self.history.collect(&mut self.feel);
+        self.feel = Feel::start(haptics, &self.controls.tuning.haptics, guide, self.pace)?;
+        self.history.begin_anew();
+        self.exceeded = exceeded;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        gpu::AdapterChoice,
+        haptize::{BackendChoice, Bake},
+        scene::{Interpolation, Scene},
+    };
+    use std::sync::{atomic::AtomicBool, mpsc};
+
+    #[test]
+    fn what_is_felt_stays_until_another_loop_is_made() {
+        let text = include_str!("../../datasets/sphere.toml").replace("count = 36", "count = 3");
+        let scene = Scene::parse(&text, "sphere.toml").unwrap();
+        let stop = AtomicBool::new(false);
+        let bake = Bake { scene: &scene, backend: BackendChoice::Cpu, date: "", stop: &stop, progress: &mut |_| () };
+        let loaded = Loaded::new(bake.in_memory().unwrap().0, None, None).unwrap();
+        let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
+        let mut session = Session::new(loaded, &context, Pace::Steps, || ()).unwrap();
+        let (open, gate) = mpsc::channel::<()>();
+        let other = HapticsSpec { interpolation: Interpolation::Potential, ..session.controls.tuning.haptics.clone() };
+        session.controls.tuning.haptics = other.clone();
+        let loaded = session.loaded.clone();
+        let slowly = move |gains: &HapticsSpec| {
+            gate.recv().unwrap();
+            loaded.tuned(gains)
+        };
+        assert!(session.retuning.follow(&other, "slow", slowly, || ()).unwrap().is_none());
+        // The loop goes on while another one is made.
+        for _ in 0..3 {
+            session.follow(|| ()).unwrap();
+            session.feel.step(10);
+            session.history.collect(&mut session.feel);
+        }
+        assert!(session.is_retuning());
+        let last = session.history.last().unwrap().time;
+        assert!((last - 0.029).abs() < 1e-9, "{last}");
+        open.send(()).unwrap();
+        session.wait().unwrap();
+        assert!(!session.is_retuning());
+        session.feel.step(10);
+        session.history.collect(&mut session.feel);
+        // Its time goes on where the last one's ended.
+        let ticks: Vec<f64> = session.history.recent(1.0, 100).map(|tick| tick.time).collect();
+        assert!(ticks.len() == 40 && ticks.windows(2).all(|pair| (pair[1] - pair[0] - 1e-3).abs() < 1e-9), "{ticks:?}");
+        // What does not make a loop is told once, and the last one goes on.
+        session.controls.tuning.haptics.boundary_slope[0] = -1.0;
+        session.controls.tuning.haptics.interpolation = Interpolation::Linear;
+        assert!(session.wait().unwrap_err().contains("slope"));
+        session.wait().unwrap();
+        session.feel.step(1);
     }
 }

@@ -2,6 +2,7 @@
 //! configuration or is set by a slider. A cell is a grid point with the number that is stored there, not interpolated.
 
 use super::{
+    column::{Column, status_colour, untrusted},
     history::History,
     loaded::Loaded,
     number,
@@ -15,7 +16,7 @@ use crate::{
     report::colour::ColourMap,
 };
 use eframe::egui::{
-    self, Color32, ColorImage, ComboBox, Painter, Rect, RichText, Slider, TextureHandle, TextureOptions, Ui, pos2, vec2,
+    self, ColorImage, ComboBox, Painter, Rect, RichText, Slider, TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
 use egui_plot::{HoverPosition, Line, MarkerShape, Plot, PlotImage, PlotPoint, Points};
 
@@ -28,21 +29,6 @@ const TRAIL_POINTS: usize = 200;
 const NAMES_WIDTH: f32 = 150.0;
 const RANGE_WIDTH: f32 = 60.0;
 const LEAST_WIDTH: f32 = 40.0;
-
-/// What a cell's colour says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Column {
-    /// Torque of a joint, by its number.
-    Torque(usize),
-    /// Stored energy U.
-    Energy,
-    /// Smallest signed distance at rest.
-    Gap,
-    /// What became of the point.
-    Status,
-    /// Relative residual.
-    Residual,
-}
 
 /// The panel's state.
 pub struct Slices {
@@ -63,66 +49,6 @@ struct Key {
     lines: Vec<usize>,
     dark: bool,
     dataset: *const Dataset,
-}
-
-impl Column {
-    /// Those that `dataset` has.
-    #[must_use]
-    pub fn all(dataset: &Dataset) -> Vec<Self> {
-        let torques = (0..dataset.grid.joints()).map(Self::Torque);
-        let rest = [
-            dataset.energy.is_some().then_some(Self::Energy),
-            dataset.gap.is_some().then_some(Self::Gap),
-            Some(Self::Status),
-            dataset.residual.is_some().then_some(Self::Residual),
-        ];
-        torques.chain(rest.into_iter().flatten()).collect()
-    }
-
-    /// With its unit.
-    #[must_use]
-    pub fn name(self, grid: &Grid) -> String {
-        match self {
-            Self::Torque(joint) => {
-                let axis = &grid.axes[joint];
-                let effort = if axis.unit == "m" { "force" } else { "torque" };
-                format!("{} {effort} [{}]", axis.name, axis.effort_unit())
-            }
-            Self::Energy => "energy U [mJ]".into(),
-            Self::Gap => "gap [mm]".into(),
-            Self::Status => "status".into(),
-            Self::Residual => "log10 of residual".into(),
-        }
-    }
-
-    /// Its number at grid point `point`, in the unit of its name.
-    fn value(self, dataset: &Dataset, point: usize) -> f64 {
-        match self {
-            Self::Torque(joint) => dataset.torque(point)[joint],
-            Self::Energy => dataset.energy.as_ref().map_or(f64::NAN, |energy| 1e3 * energy[point]),
-            Self::Gap => dataset.gap.as_ref().map_or(f64::NAN, |gap| 1e3 * f64::from(gap[point])),
-            Self::Status => f64::from(dataset.status[point]),
-            // Free points have no residual.
-            Self::Residual => {
-                let residual = dataset.residual.as_ref().map_or(f64::NAN, |residual| residual[point].into());
-                if residual > 0.0 { residual.log10() } else { f64::NAN }
-            }
-        }
-    }
-
-    /// Colours over the whole dataset, so that planes can be compared.
-    fn map(self, dataset: &Dataset) -> ColourMap {
-        let trusted = (0..dataset.grid.points())
-            .filter(|&point| matches!(dataset.status(point), Status::Contact | Status::Free))
-            .map(|point| self.value(dataset, point))
-            .filter(|value| value.is_finite());
-        let [low, high] = trusted.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
-        match self {
-            Self::Torque(_) | Self::Gap => ColourMap::Diverging { bound: low.abs().max(high.abs()) },
-            Self::Energy => ColourMap::Root { high },
-            Self::Status | Self::Residual => ColourMap::Sequential { low, high },
-        }
-    }
 }
 
 impl Slices {
@@ -374,23 +300,6 @@ fn picture(dataset: &Dataset, key: &Key, map: ColourMap, palette: &Palette) -> C
         }
     };
     ColorImage::new(size, plane(grid, key).map(|(_, point)| colour(point)).collect())
-}
-
-/// Whether a point's numbers are not to be trusted.
-#[must_use]
-pub fn untrusted(status: Status) -> bool {
-    matches!(status, Status::Unconverged | Status::Overflow)
-}
-
-fn status_colour(status: Status, palette: &Palette) -> Color32 {
-    match status {
-        Status::Free => palette.free,
-        Status::Contact => palette.ghost,
-        Status::Filled => palette.ghost.gamma_multiply(0.5),
-        Status::Unconverged => palette.flagged,
-        Status::Overflow => palette.force,
-        Status::Outside => palette.absent,
-    }
 }
 
 /// A colour bar from left to right; `by_root`: the map's own scale is that of a square root.

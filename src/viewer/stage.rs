@@ -1,9 +1,9 @@
 //! The 3-D picture: the surface straight from the frame update's buffers, and [`Shape`]s, drawn into a texture of its own
-//! with depth and four samples a pixel. The window shows the texture; a screenshot reads it.
+//! with depth and several samples a pixel. The window shows the texture; a screenshot reads it.
 
 use super::{
     camera::Camera,
-    pipelines::{self, DEPTH, FORMAT, SAMPLES, View, bind},
+    pipelines::{self, DEPTH, FORMAT, View, bind},
     shapes::{Shape, unit_shape},
 };
 use crate::{
@@ -55,12 +55,15 @@ pub struct Stage {
     unit_vertices: u32,
     /// Stands for the state where there is no object.
     no_state: wgpu::Buffer,
+    /// Samples a pixel.
+    samples: u32,
     targets: Option<Targets>,
 }
 
 struct Targets {
     size: [u32; 2],
-    samples: wgpu::TextureView,
+    /// Where there are several a pixel.
+    samples: Option<wgpu::TextureView>,
     depth: wgpu::TextureView,
     picture: wgpu::Texture,
 }
@@ -97,11 +100,11 @@ impl Surface {
 }
 
 impl Stage {
-    /// Compiles the drawing shaders.
+    /// Compiles the drawing shaders, for one or four `samples` a pixel.
     ///
     /// # Errors
     /// When the device refuses them.
-    pub fn new(context: Arc<Context>) -> Result<Self, GpuError> {
+    pub fn new(context: Arc<Context>, samples: u32) -> Result<Self, GpuError> {
         let unit_shape = unit_shape();
         let (surface, shapes, view, unit, no_state) = context.scoped(|device| {
             let view = wgpu::BufferDescriptor {
@@ -121,15 +124,15 @@ impl Stage {
                 usage: wgpu::BufferUsages::STORAGE,
             };
             (
-                pipelines::surface(device),
-                pipelines::shapes(device),
+                pipelines::surface(device, samples),
+                pipelines::shapes(device, samples),
                 device.create_buffer(&view),
                 device.create_buffer_init(&unit),
                 device.create_buffer_init(&no_state),
             )
         })?;
         let unit_vertices = unit_shape.len() as u32;
-        Ok(Self { context, surface, shapes, view, unit, unit_vertices, no_state, targets: None })
+        Ok(Self { context, surface, shapes, view, unit, unit_vertices, no_state, samples, targets: None })
     }
 
     /// Draws one picture of `size` pixels and returns its texture; the texture is the same one until the size changes.
@@ -147,7 +150,7 @@ impl Stage {
         let size = size.map(|pixels| pixels.clamp(1, LARGEST_SIDE));
         let targets = match self.targets.take().filter(|targets| targets.size == size) {
             Some(targets) => targets,
-            None => Targets::new(&self.context, size)?,
+            None => Targets::new(&self.context, size, self.samples)?,
         };
         let targets = self.targets.insert(targets);
         let view = view(size, camera, look, surface);
@@ -212,7 +215,7 @@ fn view(size: [u32; 2], camera: &Camera, look: &Look, surface: Option<&Surface>)
 }
 
 impl Targets {
-    fn new(context: &Context, size: [u32; 2]) -> Result<Self, GpuError> {
+    fn new(context: &Context, size: [u32; 2], samples: u32) -> Result<Self, GpuError> {
         context.scoped(|device| {
             let texture = |label, format, sample_count, usage| {
                 device.create_texture(&wgpu::TextureDescriptor {
@@ -230,8 +233,9 @@ impl Targets {
             let shown = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
             Self {
                 size,
-                samples: texture("scene samples", FORMAT, SAMPLES, none).create_view(&Default::default()),
-                depth: texture("scene depth", DEPTH, SAMPLES, none).create_view(&Default::default()),
+                samples: (samples > 1)
+                    .then(|| texture("scene samples", FORMAT, samples, none).create_view(&Default::default())),
+                depth: texture("scene depth", DEPTH, samples, none).create_view(&Default::default()),
                 picture: texture("scene picture", FORMAT, 1, shown),
             }
         })
@@ -244,15 +248,13 @@ impl Targets {
     ) -> wgpu::RenderPass<'encoder> {
         let picture = self.picture.create_view(&Default::default());
         let [r, g, b] = background.map(f64::from);
+        let store = if self.samples.is_some() { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store };
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("scene"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.samples,
-                resolve_target: Some(&picture),
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
-                    store: wgpu::StoreOp::Discard,
-                },
+                view: self.samples.as_ref().unwrap_or(&picture),
+                resolve_target: self.samples.as_ref().map(|_| &picture),
+                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store },
                 depth_slice: None,
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {

@@ -113,7 +113,7 @@ pub const CONTROLS_RANGE: std::ops::RangeInclusive<f32> = 200.0..=360.0;
 /// Height of the plots and width of C-space: this share of the window [1], within these limits.
 pub const SIDE_SHARE: f32 = 0.27;
 /// See [`SIDE_SHARE`].
-pub const PLOTS_RANGE: [f32; 2] = [130.0, 320.0];
+pub const PLOTS_RANGE: [f32; 2] = [165.0, 320.0];
 /// See [`SIDE_SHARE`].
 pub const SPACE_RANGE: [f32; 2] = [240.0, 420.0];
 /// Height from which on plane and cloud of C-space find room, one below the other.

@@ -1,12 +1,15 @@
 //! The viewer in a window of the desktop.
 
-use super::{Pace, Start, ViewError, Viewer, dress, theme};
-use crate::gpu::{AdapterChoice, Context};
+use super::{Pace, Rescue, Start, ViewError, Viewer, dress, theme};
+use crate::gpu::{AdapterChoice, Context, GpuError};
 use eframe::{
     egui::{self, ViewportBuilder},
     egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupExisting},
 };
 use std::{
+    cell::Cell,
+    panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
+    rc::Rc,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -14,17 +17,39 @@ use std::{
 /// Time between two frames where nothing but the loop moves [s]: 60 a second.
 const FRAME: Duration = Duration::from_micros(16_667);
 
-/// Longest time that one frame makes up for [s]: after a pause of the window the object goes on from where it was.
-const LONGEST_FRAME: f64 = 0.2;
+/// Least time between two losses of the device after which a window is opened anew [s]: a device that is lost again and again
+/// is no use.
+const LEAST_LIFE: Duration = Duration::from_secs(30);
 
 /// Opens a window on `start` and returns when it is closed. A file that cannot be read is told before there is a window;
-/// what is wrong within it, in the window, where another one can be opened.
+/// what is wrong within it, in the window, where another one can be opened. A window whose device is lost cannot draw any
+/// more: it is closed, and another one opened on a new device.
 ///
 /// # Errors
-/// When the file cannot be read, or there is no device or no display.
+/// When the file cannot be read, there is no device or no display, or the device is lost again and again.
 pub fn open(start: Start) -> Result<(), ViewError> {
     start.check()?;
-    let context = Arc::new(Context::open(AdapterChoice::Any)?);
+    let mut context = Arc::new(Context::open(AdapterChoice::Any)?);
+    let mut begin = Begin::Start(start);
+    loop {
+        let opened = Instant::now();
+        let Some(rescue) = show(&context, begin)? else { return Ok(()) };
+        if opened.elapsed() < LEAST_LIFE {
+            return Err(GpuError::Lost(rescue.why).into());
+        }
+        context = Arc::new(context.reopen()?);
+        begin = Begin::Resume(rescue);
+    }
+}
+
+/// What a window begins with.
+enum Begin {
+    Start(Start),
+    Resume(Rescue),
+}
+
+/// A window on the device of `context`, until it is closed; answers with what is left where the device was lost.
+fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<Rescue>, ViewError> {
     let (instance, adapter, device, queue) = context.shared();
     let options = eframe::NativeOptions {
         viewport: ViewportBuilder::default()
@@ -32,41 +57,61 @@ pub fn open(start: Start) -> Result<(), ViewError> {
             .with_inner_size(theme::WINDOW)
             .with_min_inner_size(theme::LEAST_WINDOW)
             .with_drag_and_drop(true),
+        // A software rasteriser has no time to smooth gradients.
+        dithering: context.adapter().hardware,
         wgpu_options: WgpuConfiguration {
             wgpu_setup: WgpuSetup::Existing(WgpuSetupExisting { instance, adapter, device, queue }),
             ..Default::default()
         },
         ..Default::default()
     };
-    let shown = eframe::run_native(
-        "haptize",
-        options,
-        Box::new(move |creation| {
-            let render = creation.wgpu_render_state.clone().ok_or("the window has no renderer")?;
-            dress(&creation.egui_ctx);
-            let folder = std::env::current_dir().unwrap_or_else(|_| ".".into());
-            let mut viewer = Viewer::new(context, render, Pace::Clock, folder)?;
-            viewer.start(&start, &creation.egui_ctx);
-            Ok(Box::new(App { viewer, last: Instant::now() }))
-        }),
-    );
-    shown.map_err(|error| match error {
-        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => ViewError::NoDisplay,
-        other => ViewError::Window(other.to_string()),
-    })
+    let lost = Rc::new(Cell::new(None));
+    let (context, left) = (Arc::clone(context), Rc::clone(&lost));
+    let create: eframe::AppCreator<'_> = Box::new(move |creation| {
+        let render = creation.wgpu_render_state.clone().ok_or("the window has no renderer")?;
+        dress(&creation.egui_ctx);
+        let folder = std::env::current_dir().unwrap_or_else(|_| ".".into());
+        let mut viewer = Viewer::new(context, render, Pace::Clock, folder)?;
+        match begin {
+            Begin::Start(start) => viewer.start(&start, &creation.egui_ctx),
+            Begin::Resume(rescue) => viewer.resume(rescue, &creation.egui_ctx),
+        }
+        Ok(Box::new(App { viewer, last: Instant::now(), lost: left }))
+    });
+    // egui's renderer panics where its device is lost before the window knows.
+    let shown = catch_unwind(AssertUnwindSafe(|| eframe::run_native("haptize", options, create)));
+    match (lost.take(), shown) {
+        (Some(rescue), _) => Ok(Some(rescue)),
+        (None, Ok(Ok(()))) => Ok(None),
+        (None, Ok(Err(eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_)))) => Err(ViewError::NoDisplay),
+        (None, Ok(Err(other))) => Err(ViewError::Window(other.to_string())),
+        (None, Err(panic)) => resume_unwind(panic),
+    }
 }
 
 struct App {
     viewer: Viewer,
     last: Instant,
+    /// What is left of the window once its device is lost.
+    lost: Rc<Cell<Option<Rescue>>>,
 }
 
 impl eframe::App for App {
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
+        if self.viewer.rescue().is_some() {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+            return;
+        }
         let now = Instant::now();
-        self.viewer.advance((now - self.last).as_secs_f64().min(LONGEST_FRAME), ui.ctx());
+        self.viewer.advance((now - self.last).as_secs_f64(), ui.ctx());
         self.last = now;
         self.viewer.ui(ui);
         ui.ctx().request_repaint_after(FRAME);
+    }
+}
+
+impl Drop for App {
+    fn drop(&mut self) {
+        self.lost.set(self.viewer.rescue());
     }
 }

@@ -1,0 +1,105 @@
+//! The columns of a dataset as the plane of C-space shows them: names with units, numbers, colours.
+
+use super::palette::Palette;
+use crate::{
+    contact::Status,
+    dataset::{Dataset, Grid},
+    report::colour::ColourMap,
+};
+use eframe::egui::Color32;
+
+/// What a cell's colour says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Column {
+    /// Torque of a joint, by its number.
+    Torque(usize),
+    /// Stored energy U.
+    Energy,
+    /// Smallest signed distance at rest.
+    Gap,
+    /// What became of the point.
+    Status,
+    /// Relative residual.
+    Residual,
+}
+
+impl Column {
+    /// Those that `dataset` has.
+    #[must_use]
+    pub fn all(dataset: &Dataset) -> Vec<Self> {
+        let torques = (0..dataset.grid.joints()).map(Self::Torque);
+        let rest = [
+            dataset.energy.is_some().then_some(Self::Energy),
+            dataset.gap.is_some().then_some(Self::Gap),
+            Some(Self::Status),
+            dataset.residual.is_some().then_some(Self::Residual),
+        ];
+        torques.chain(rest.into_iter().flatten()).collect()
+    }
+
+    /// With its unit.
+    #[must_use]
+    pub fn name(self, grid: &Grid) -> String {
+        match self {
+            Self::Torque(joint) => {
+                let axis = &grid.axes[joint];
+                let effort = if axis.unit == "m" { "force" } else { "torque" };
+                format!("{} {effort} [{}]", axis.name, axis.effort_unit())
+            }
+            Self::Energy => "energy U [mJ]".into(),
+            Self::Gap => "gap [mm]".into(),
+            Self::Status => "status".into(),
+            Self::Residual => "log10 of residual".into(),
+        }
+    }
+
+    /// Its number at grid point `point`, in the unit of its name.
+    #[must_use]
+    pub fn value(self, dataset: &Dataset, point: usize) -> f64 {
+        match self {
+            Self::Torque(joint) => dataset.torque(point)[joint],
+            Self::Energy => dataset.energy.as_ref().map_or(f64::NAN, |energy| 1e3 * energy[point]),
+            Self::Gap => dataset.gap.as_ref().map_or(f64::NAN, |gap| 1e3 * f64::from(gap[point])),
+            Self::Status => f64::from(dataset.status[point]),
+            // Free points have no residual.
+            Self::Residual => {
+                let residual = dataset.residual.as_ref().map_or(f64::NAN, |residual| residual[point].into());
+                if residual > 0.0 { residual.log10() } else { f64::NAN }
+            }
+        }
+    }
+
+    /// Colours over the whole dataset, so that planes can be compared.
+    #[must_use]
+    pub fn map(self, dataset: &Dataset) -> ColourMap {
+        let trusted = (0..dataset.grid.points())
+            .filter(|&point| matches!(dataset.status(point), Status::Contact | Status::Free))
+            .map(|point| self.value(dataset, point))
+            .filter(|value| value.is_finite());
+        let [low, high] = trusted.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+        match self {
+            Self::Torque(_) | Self::Gap => ColourMap::Diverging { bound: low.abs().max(high.abs()) },
+            Self::Energy => ColourMap::Root { high },
+            Self::Status | Self::Residual => ColourMap::Sequential { low, high },
+        }
+    }
+}
+
+/// Whether a point's numbers are not to be trusted.
+#[must_use]
+pub fn untrusted(status: Status) -> bool {
+    matches!(status, Status::Unconverged | Status::Overflow)
+}
+
+/// Colour of a status wherever statuses are told by colour.
+#[must_use]
+pub fn status_colour(status: Status, palette: &Palette) -> Color32 {
+    match status {
+        Status::Free => palette.free,
+        Status::Contact => palette.ghost,
+        Status::Filled => palette.ghost.gamma_multiply(0.5),
+        Status::Unconverged => palette.flagged,
+        Status::Overflow => palette.force,
+        Status::Outside => palette.absent,
+    }
+}

@@ -1,0 +1,121 @@
+//! What lies on top of the 3-D picture: axes, a scale, what colours and arrows say.
+
+use super::{
+    body::Body,
+    camera::Camera,
+    number,
+    palette::Palette,
+    slices::gradient,
+    stage::Quantity,
+    theme::{self, AXIS_LINE, COLOUR_BAR, FINE_GAP, GAP, GROUP_GAP, TICK},
+    trimmed,
+};
+use crate::report::colour::ColourMap;
+use eframe::egui::{Align2, Painter, Rect, Stroke, Ui, Vec2, vec2};
+use glam::Vec3;
+
+// From the picture's lower left corner [points]: axes, how long they are and where their names are over that [1], the scale
+// and how long it is at most. From its lower right: the end of the bar of colours, and how long that is. In a narrow picture
+// both are shorter.
+const AXES_AT: Vec2 = vec2(34.0, -34.0);
+const AXES_LENGTH: f32 = 22.0;
+const AXES_NAMES: f32 = 1.38;
+const SCALE_AT: Vec2 = vec2(78.0, -22.0);
+const LONGEST_SCALE: f32 = 90.0;
+const LEAST_SCALE: f32 = 20.0;
+const BAR_END: Vec2 = vec2(-20.0, -26.0);
+const BAR_WIDTH: [f32; 2] = [60.0, 136.0];
+/// Left of the bar: axes, a short scale.
+const LEFT_OF_BAR: f32 = 132.0;
+
+/// Draws it over the picture in `rect`, seen by `camera`. `arrows`: whether those of the forces are shown.
+pub fn show(
+    ui: &Ui,
+    rect: Rect,
+    palette: &Palette,
+    camera: &Camera,
+    body: Option<&Body>,
+    quantity: Quantity,
+    arrows: bool,
+) {
+    let painter = ui.painter_at(rect);
+    axes(ui, &painter, rect, palette, camera);
+    scale(ui, &painter, rect, palette, camera);
+    if let Some(body) = body {
+        colours(ui, &painter, rect, body, quantity);
+        let most = body.contacts().map(|(_, force)| force.length()).fold(0.0, f64::max);
+        if most > 0.0 && arrows {
+            let note = format!("arrows: forces on the proxy, longest {} N", number(most));
+            let place = rect.left_top() + vec2(GROUP_GAP, GROUP_GAP);
+            painter.text(place, Align2::LEFT_TOP, note, theme::small(), ui.visuals().text_color());
+        }
+    }
+}
+
+/// Axes, turned as the scene is.
+fn axes(ui: &Ui, painter: &Painter, rect: Rect, palette: &Palette, camera: &Camera) {
+    let [right, up] = camera.right_and_up();
+    let origin = rect.left_bottom() + AXES_AT;
+    for (axis, name) in [(Vec3::X, "x"), (Vec3::Y, "y"), (Vec3::Z, "z")] {
+        let end = vec2(axis.dot(right), -axis.dot(up)) * AXES_LENGTH;
+        painter.line_segment([origin, origin + end], Stroke::new(AXIS_LINE, palette.axis));
+        let at = origin + end * AXES_NAMES;
+        painter.text(at, Align2::CENTER_CENTER, name, theme::small(), ui.visuals().text_color());
+    }
+}
+
+/// A round length at the distance of what is looked at.
+fn scale(ui: &Ui, painter: &Painter, rect: Rect, palette: &Palette, camera: &Camera) {
+    let points_per_metre = rect.height() / camera.height_at_target();
+    let room = bar(rect).left() - rect.left() - SCALE_AT.x - GAP;
+    let length = round_length(f64::from(room.clamp(LEAST_SCALE, LONGEST_SCALE) / points_per_metre));
+    let width = length as f32 * points_per_metre;
+    let left = rect.left_bottom() + SCALE_AT;
+    let stroke = Stroke::new(AXIS_LINE, palette.axis);
+    painter.line_segment([left, left + vec2(width, 0.0)], stroke);
+    for end in [left, left + vec2(width, 0.0)] {
+        painter.line_segment([end - vec2(0.0, TICK), end + vec2(0.0, TICK)], stroke);
+    }
+    let label = format!("{} mm", trimmed(format!("{:.3}", 1e3 * length)));
+    let at = left + vec2(0.5 * width, -GAP);
+    painter.text(at, Align2::CENTER_BOTTOM, label, theme::small(), ui.visuals().text_color());
+}
+
+/// What the surface's colours say.
+fn colours(ui: &Ui, painter: &Painter, rect: Rect, body: &Body, quantity: Quantity) {
+    let (title, top) = match quantity {
+        Quantity::Displacement => ("displacement [mm]", 1e3 * body.extremes[0]),
+        Quantity::Force => ("contact force [N]", body.extremes[1]),
+    };
+    let (small, text) = (theme::small(), ui.visuals().text_color());
+    let bar = bar(rect);
+    gradient(painter, bar, ColourMap::Pale { low: 0.0, high: 1.0 }, false);
+    painter.text(bar.center_top() - vec2(0.0, FINE_GAP), Align2::CENTER_BOTTOM, title, small.clone(), text);
+    painter.text(bar.left_bottom() + vec2(0.0, FINE_GAP), Align2::CENTER_TOP, "0", small.clone(), text);
+    painter.text(bar.right_bottom() + vec2(0.0, FINE_GAP), Align2::CENTER_TOP, number(top), small, text);
+}
+
+/// Where the bar of colours lies in the picture `rect`.
+fn bar(rect: Rect) -> Rect {
+    let [least, most] = BAR_WIDTH;
+    let width = (rect.width() - LEFT_OF_BAR + BAR_END.x).clamp(least, most);
+    Rect::from_min_size(rect.right_bottom() + BAR_END - vec2(width, 0.0), vec2(width, COLOUR_BAR))
+}
+
+/// The largest of 1, 2, 5 times a power of ten that is not longer than `limit` [m].
+fn round_length(limit: f64) -> f64 {
+    let decade = 10.0_f64.powf(limit.max(f64::MIN_POSITIVE).log10().floor());
+    [5.0, 2.0, 1.0].into_iter().map(|digit| digit * decade).find(|length| *length <= limit).unwrap_or(decade)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::round_length;
+
+    #[test]
+    fn scale_bars_are_round_and_fit() {
+        for (limit, length) in [(0.0231, 0.02), (0.0999, 0.05), (1.0, 1.0), (0.0019, 0.001)] {
+            assert!((round_length(limit) - length).abs() < 1e-12, "{limit}");
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Whence the 3-D scene is seen, and the hand in it: orbit, pan, zoom, reset; the pointer takes the proxy by a node and drags
+//! it; keys move joints.
+
+use super::{camera::Camera, grip::Grip, guide::Guide};
+use crate::{
+    JointVector,
+    proxy::{Chain, Pose},
+};
+use eframe::egui::{CursorIcon, Key, PointerButton, Pos2, Rect, Response, Ui};
+use glam::Vec2;
+
+/// Camera and grip.
+pub struct Steering {
+    /// Whence the scene is seen.
+    pub camera: Camera,
+    home: Camera,
+    /// The node in the pointer's hand.
+    pub grip: Option<Grip>,
+}
+
+/// What pointer and keys do over the scene, for the window's help.
+pub const HELP: [(&str, &str); 8] = [
+    ("Drag a node of the arm", "move the device"),
+    ("A, D", "turn its first joint"),
+    ("W, S", "turn its second joint"),
+    ("E, Q", "turn its third joint"),
+    ("Drag elsewhere", "orbit"),
+    ("Right-drag, Shift-drag", "pan"),
+    ("Wheel, pinch", "zoom"),
+    ("Double-click", "reset the view"),
+];
+
+/// Zoom for each point that the wheel turns, as a logarithm [1/point]: a notch, some 50 points, brings the eye nearer by a
+/// tenth.
+const ZOOM_PER_POINT: f32 = 0.002;
+
+/// How far a key moves a joint in a second, as a share of its range [1/s]: all of it in four seconds, slowly enough to
+/// press with care.
+const KEY_SPEED: f64 = 0.25;
+
+/// Longest time that a key held through one frame moves a joint for [s]: a window that stood still must not throw the arm.
+const LONGEST_KEY: f32 = 0.1;
+
+impl Steering {
+    /// Looks from `home`.
+    #[must_use]
+    pub fn new(home: Camera) -> Self {
+        Self { camera: home, home, grip: None }
+    }
+
+    /// Looks from where one looked first.
+    pub fn reset(&mut self) {
+        self.camera = self.home;
+    }
+
+    /// Does what pointer and keys ask for over the picture in `rect`: `response` is that of the picture, `pose` the proxy's as
+    /// it is shown there.
+    pub fn steer(&mut self, ui: &Ui, response: &Response, rect: Rect, chain: &Chain, pose: &Pose, guide: &mut Guide) {
+        let aspect = rect.width() / rect.height().max(1.0);
+        let at = |p: Pos2| {
+            let from_centre = p - rect.center();
+            Vec2::new(2.0 * from_centre.x / rect.width(), -2.0 * from_centre.y / rect.height())
+        };
+        let pressed = ui.input(|input| input.pointer.press_origin());
+        if response.drag_started_by(PointerButton::Primary)
+            && let Some(origin) = pressed
+        {
+            self.grip = Grip::take(&self.camera, aspect, at(origin), pose);
+        }
+        if response.drag_stopped() {
+            self.grip = None;
+        }
+        let moved = response.drag_delta() / rect.height().max(1.0);
+        let moved = Vec2::new(moved.x, moved.y);
+        match (self.grip, response.interact_pointer_pos()) {
+            (Some(grip), Some(pointer)) if response.dragged() => {
+                let from = guide.goal();
+                if let Some(goal) = grip.lead(&self.camera, aspect, at(pointer), chain, &from) {
+                    guide.point(goal);
+                }
+            }
+            _ if response.dragged_by(PointerButton::Primary) && !ui.input(|input| input.modifiers.shift) => {
+                self.camera.orbit(moved);
+            }
+            _ if response.dragged() => self.camera.pan(moved),
+            _ => {}
+        }
+        if response.double_clicked() {
+            self.reset();
+        }
+        if response.contains_pointer() {
+            let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
+            self.camera.zoom((-ZOOM_PER_POINT * scroll).exp() / pinch);
+        }
+        if response.hovered() && ui.memory(|memory| memory.focused().is_none()) {
+            nudge(ui, chain, guide);
+        }
+        if self.grip.is_some() {
+            ui.ctx().set_cursor_icon(CursorIcon::Grabbing);
+        } else if let Some(pointer) = response.hover_pos()
+            && Grip::take(&self.camera, aspect, at(pointer), pose).is_some()
+        {
+            ui.ctx().set_cursor_icon(CursorIcon::Grab);
+        }
+    }
+}
+
+/// Keys move joints: A and D the first, W and S the second, Q and E the third.
+fn nudge(ui: &Ui, chain: &Chain, guide: &mut Guide) {
+    use Key::{A, D, E, Q, S, W};
+    let (pressed, elapsed) = ui.input(|input| {
+        let way = |less, more| f64::from(i8::from(input.key_down(more)) - i8::from(input.key_down(less)));
+        ([way(A, D), way(S, W), way(Q, E)], f64::from(input.stable_dt.min(LONGEST_KEY)))
+    });
+    if pressed == [0.0; 3] {
+        return;
+    }
+    let mut goal: JointVector = guide.goal();
+    for ((goal, way), joint) in goal.iter_mut().zip(pressed).zip(&chain.joints) {
+        *goal += way * KEY_SPEED * (joint.limits[1] - joint.limits[0]) * elapsed;
+    }
+    guide.point(goal);
+    ui.ctx().request_repaint();
+}

@@ -1,0 +1,184 @@
+//! What is felt: motions, the pointer, keys, gains, interpolation, effects.
+
+use super::window::{Window, scanned, small_scene};
+use eframe::egui::{Theme, accesskit::Role};
+use egui_kittest::kittest::{NodeT, Queryable};
+use haptize::viewer::Start;
+
+#[test]
+fn a_motion_plays_pauses_and_is_scrubbed() {
+    let mut window = Window::sphere();
+    window.pass(0.5);
+    assert!(window.shows("free") && window.torque() == 0.0);
+    window.click("Press");
+    window.pass(2.2);
+    assert!(window.torque() > 0.1 && window.shows("nodes in contact"), "{}", window.torque());
+    window.click("Pause");
+    let held = window.torque();
+    window.pass(0.5);
+    assert!((window.torque() - held).abs() < 0.05 * held, "{} after {held}", window.torque());
+    let time = window.harness.get_by_label("Time in the motion");
+    time.set_value_accesskit(0.0);
+    window.harness.run_ok();
+    window.pass(1.0);
+    assert_eq!(window.torque(), 0.0);
+}
+
+#[test]
+fn a_drag_ends_in_contact_and_shows_torque() {
+    use eframe::egui::{Event, PointerButton, vec2};
+    let mut window = Window::sphere();
+    window.pass(0.5);
+    assert_eq!(window.torque(), 0.0);
+    let scene = window.harness.get_by_label("3-D scene").rect();
+    let from = window.harness.state().tip_in(scene).unwrap();
+    let button = |pos, pressed| Event::PointerButton {
+        pos,
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: Default::default(),
+    };
+    window.harness.event(Event::PointerMoved(from));
+    window.harness.event(button(from, true));
+    window.harness.step();
+    // Up, with the forearm's tip: the arm's fold lies over the sphere, so that the rest of it comes down.
+    for step in 1..=20 {
+        window.harness.event(Event::PointerMoved(from + step as f32 * vec2(5.0, 4.0)));
+        window.harness.step();
+        window.advance(0.05);
+    }
+    let end = from + 20.0 * vec2(5.0, 4.0);
+    window.pass(0.5);
+    assert!(window.torque() > 0.05, "no torque: {}", window.torque());
+    assert!(window.shows("nodes in contact"));
+    window.harness.event(button(end, false));
+    window.harness.step();
+    // The hand stays where it was let go, and keeps pressing.
+    window.pass(0.3);
+    assert!(window.torque() > 0.05);
+}
+
+#[test]
+fn keys_press_the_arm_onto_the_object_and_off_it() {
+    use eframe::egui::Key;
+    let mut window = Window::sphere();
+    let scene = window.harness.get_by_label("3-D scene").rect();
+    window.harness.hover_at(scene.center());
+    window.harness.run_ok();
+    for (key, touches) in [(Key::E, true), (Key::Q, false)] {
+        window.harness.key_down(key);
+        for _ in 0..30 {
+            window.harness.step();
+            window.advance(0.05);
+            if (window.torque() > 0.05) == touches {
+                break;
+            }
+        }
+        window.harness.key_up(key);
+        window.harness.step();
+        assert_eq!(window.torque() > 0.05, touches, "{key:?}: {} N m", window.torque());
+    }
+    // Elsewhere, keys are not meant for the arm.
+    window.pass(0.5);
+    let tip = window.harness.state().tip_in(scene);
+    let plots = window.harness.get_by_label("Configuration").rect();
+    window.harness.hover_at(plots.center());
+    window.harness.run_ok();
+    window.harness.key_down(Key::E);
+    window.pass(0.5);
+    assert_eq!(window.harness.state().tip_in(scene), tip);
+}
+
+#[test]
+fn gains_beyond_their_bound_are_told_and_taken_back() {
+    let mut window = Window::sphere();
+    assert!(window.shows("All gains within their passivity bounds"));
+    window.harness.get_by_label("Boundary slope Ks").set_value_accesskit(35.0);
+    window.harness.step();
+    window.wait();
+    assert!(window.shows("beyond"), "no warning of Ks");
+    window.click("Gains of the scene");
+    window.wait();
+    assert!(window.shows("All gains within their passivity bounds"));
+}
+
+#[test]
+fn each_interpolation_is_felt_and_has_its_cost_of_a_tick() {
+    // Torques from shortly before contact on, with the last of these choices.
+    let approach = |choices: &[&str]| -> (Window, Vec<f64>) {
+        let mut window = Window::sphere();
+        choices.iter().for_each(|choice| window.choose("Interpolation", choice));
+        window.click("Press");
+        window.pass(1.0);
+        let torques = (0..40).map(|_| {
+            window.advance(0.02);
+            window.torque()
+        });
+        let torques = torques.collect();
+        (window, torques)
+    };
+    let linear = approach(&[]).1;
+    let greatest = linear.iter().copied().fold(0.0, f64::max);
+    let most = |other: &[f64]| linear.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / greatest;
+    assert!(greatest > 0.1, "{greatest}");
+    for other in ["gap-field", "potential"] {
+        let difference = most(&approach(&[other]).1);
+        assert!(difference > 1e-2 && difference < 0.5, "{other}: {difference}");
+    }
+    let (window, again) = approach(&["potential", "linear"]);
+    assert_eq!(most(&again), 0.0);
+    let costs = window.harness.query_all_by_label_contains("µs a tick").next().unwrap().accesskit_node();
+    let costs = costs.value().or(costs.label()).unwrap();
+    let numbers: Vec<f64> = costs.split([' ', ',', '\n']).filter_map(|word| word.parse().ok()).collect();
+    assert!(numbers.len() == 3 && numbers.iter().all(|cost| *cost > 0.0), "{costs}");
+}
+
+#[test]
+fn what_a_dataset_does_not_hold_cannot_interpolate() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = scanned(folder.path());
+    let mut window = Window::open(&Start::File(file), [1200.0, 800.0], Theme::Light);
+    window.harness.get_by_role_and_label(Role::ComboBox, "Interpolation").click();
+    window.harness.run_ok();
+    for (choice, enabled) in [("gap-field", false), ("potential", false)] {
+        let choice = window.harness.get_by_label(choice);
+        assert_eq!(!choice.accesskit_node().is_disabled(), enabled);
+    }
+}
+
+#[test]
+fn effects_of_tick_and_frame_have_prices_and_are_left_out_and_taken_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("effects.toml");
+    let text = small_scene().replace("[graphics]", "[graphics]\ngravity = [0.0, 0.0, -30.0]\nsmoothing = 0.05");
+    let text = text.replace("[haptics]", "[haptics]\nproxy_inertia = \"configuration\"");
+    std::fs::write(&scene, text).unwrap();
+    let mut window = Window::open(&Start::File(scene), [1200.0, 900.0], Theme::Light);
+    assert_eq!(window.harness.state().error(), None);
+    for effect in ["Varying inertia", "Gravity", "Smoothing"] {
+        assert!(window.shows(effect), "{effect} is missing");
+    }
+    for absent in ["Contact friction", "Strain stiffening", "Quasi-static object"] {
+        assert!(!window.shows(absent), "{absent} is not named");
+    }
+    let prices = |part: &str| window.harness.query_all_by_label_contains(part).count();
+    assert_eq!((prices("µs a frame"), prices("µs a tick")), (2, 1 + 1), "prices, and the costs of interpolation");
+    // Each with its spread, or told to be less than can be measured.
+    for price in window.harness.query_all_by_label_contains("µs a frame") {
+        let told = price.accesskit_node().value().unwrap();
+        assert!(told.contains(" ± ") || told.starts_with("< "), "{told}");
+    }
+    window.pass(0.5);
+    let sagging = window.picture_of("3-D scene");
+    window.reach("Gravity");
+    window.wait();
+    window.pass(0.5);
+    let weightless = window.picture_of("3-D scene");
+    assert!(sagging != weightless, "the object has its weight without gravity");
+    window.reach("Gravity");
+    window.wait();
+    window.pass(0.5);
+    assert!(sagging == window.picture_of("3-D scene"), "gravity taken back is another");
+    window.reach("Varying inertia");
+    assert_eq!(window.harness.state().error(), None);
+}

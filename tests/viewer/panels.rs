@@ -1,0 +1,99 @@
+//! That every panel is there and answers.
+
+use super::window::{DEVICE_NAME, Window};
+use eframe::egui::{Event, Rect, accesskit::Role, pos2, vec2};
+use egui_kittest::kittest::{NodeT, Queryable};
+
+#[test]
+fn every_panel_is_there_and_answers() {
+    let mut window = Window::sphere();
+    for label in ["Feel", "Scene", "Haptization", "C-space", "3-D scene", "Cloud of contacts in C-space"] {
+        assert!(window.shows(label), "{label} is missing");
+    }
+    for slider in ["Coupling stiffness Kvc", "Boundary slope Ks", "Proxy damping bv", "Contact threshold Ith"] {
+        assert!(window.shows(slider), "{slider} is missing");
+    }
+    window.click("Press");
+    window.pass(2.0);
+    for (tab, axis) in
+        [("Configuration", "elbow proxy"), ("Contacts", "object nodes in contact"), ("Energy", "proxy's damping")]
+    {
+        window.click(tab);
+        assert!(window.shows(axis), "{tab} lacks {axis}");
+    }
+    window.click("Timing");
+    assert!(window.shows("cost of a tick [µs]: median") && window.shows("the window holding still: not measured yet"));
+    // The plane of C-space shows what it is told to.
+    for column in ["energy U [mJ]", "gap [mm]", "status", "log10 of residual", "yaw torque [N m]"] {
+        window.choose("Show", column);
+    }
+}
+
+#[test]
+fn the_plane_of_c_space_goes_through_the_grid_line_that_its_slider_says() {
+    let mut window = Window::sphere();
+    window.pass(0.1);
+    let slider = |window: &Window| window.harness.query_all_by_role_and_label(Role::Slider, "yaw").next().is_some();
+    let disabled =
+        |window: &Window| window.harness.get_by_role_and_label(Role::Slider, "yaw").accesskit_node().is_disabled();
+    assert!(disabled(&window), "the plane follows q, and can be moved");
+    let before = window.picture_of("Plane of C-space");
+    window.click("follow q");
+    assert!(!disabled(&window));
+    window.harness.get_by_role_and_label(Role::Slider, "yaw").set_value_accesskit(2.0);
+    window.harness.run_ok();
+    assert!(window.shows("-0.812 rad"), "the slider does not say where it is");
+    assert!(before != window.picture_of("Plane of C-space"));
+    // Any two joints, which then have no slider.
+    window.choose("Across", "yaw");
+    assert!(!slider(&window));
+}
+
+#[test]
+fn plots_freeze_and_are_then_zoomed() {
+    let mut window = Window::sphere();
+    window.click("Press");
+    window.pass(1.6);
+    window.click("Freeze");
+    let scene = window.harness.get_by_label("3-D scene").rect();
+    let tabs = window.harness.get_by_label("Configuration").rect();
+    let rect = Rect::from_min_size(pos2(scene.min.x, tabs.max.y + 30.0), vec2(scene.width(), 120.0));
+    let before = window.picture_in(rect);
+    window.pass(0.5);
+    assert!(before == window.picture_in(rect), "a frozen plot moves");
+    window.harness.hover_at(rect.center());
+    window.harness.step();
+    window.harness.event(Event::Zoom(2.0));
+    window.harness.run_ok();
+    let zoomed = window.picture_in(rect);
+    assert!(before != zoomed, "a frozen plot is not zoomed");
+    // Live again, it goes with the time.
+    window.click("Freeze");
+    window.pass(0.2);
+    assert!(window.picture_in(rect) != zoomed);
+}
+
+#[test]
+fn what_was_felt_is_exported() {
+    let mut window = Window::sphere();
+    window.click("Press");
+    window.pass(1.6);
+    window.click("CSV");
+    window.click("PNG");
+    let csv = std::fs::read_to_string(window.folder.path().join("viewer-trace.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + 1600);
+    for figure in ["viewer-press.png", "viewer-energy.png"] {
+        assert!(image::open(window.folder.path().join(figure)).unwrap().width() > 300, "{figure}");
+    }
+}
+
+#[test]
+fn the_window_says_what_pointer_and_keys_do_and_what_draws() {
+    let mut window = Window::sphere();
+    let adapter = DEVICE_NAME.get().unwrap();
+    assert!(window.shows(&format!("drawn by {}", adapter.split(" (").next().unwrap())));
+    window.click("Help");
+    for help in ["Drag a node of the arm", "A, D", "reset the view", "Right-drag, Ctrl-wheel"] {
+        assert!(window.shows(help), "{help} is missing");
+    }
+}
