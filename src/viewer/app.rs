@@ -76,7 +76,7 @@ pub struct Rescue {
     /// Why it was lost.
     pub why: String,
     /// What was open.
-    loaded: Option<Loaded>,
+    pub(super) loaded: Option<Loaded>,
 }
 
 /// Samples a pixel of the 3-D scene, for smooth edges.

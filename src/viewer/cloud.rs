@@ -215,7 +215,7 @@ fn points(dataset: &Dataset, others: &[usize], pitch: usize) -> Vec<Point> {
         axes.iter().rev().all(|axis| {
             let line = rest % axis.count;
             rest /= axis.count;
-            line % pitch == 0
+            line.is_multiple_of(pitch)
         })
     };
     let block: usize = dataset.grid.axes.iter().skip(3).map(|axis| axis.count).product();

@@ -43,11 +43,17 @@ pub fn egui_colour(colour: Colour) -> Color32 {
     Color32::from_rgb(red, green, blue).gamma_multiply(colour.opacity)
 }
 
-/// Colour of series `number` in a plot: Okabe and Ito's, on dark ground the blue in its lighter shade.
+/// Colour of series `number` in a plot: Okabe and Ito's, on dark ground the blue in its lighter shade, on light ground the three
+/// light ones in a darker shade, since a line is thin.
 #[must_use]
 pub fn series(number: usize, dark: bool) -> Color32 {
     const ON_DARK: [usize; 6] = [4, 5, 2, 3, 0, 1];
-    egui_colour(colour::series(if dark { ON_DARK[number % ON_DARK.len()] } else { number }))
+    const DARKENED: [u32; 3] = [0xb0_52_8a, 0x2a_86_bd, 0xa8_74_00];
+    egui_colour(match number % ON_DARK.len() {
+        number if dark => colour::series(ON_DARK[number]),
+        number @ 3.. => Colour::hex(DARKENED[number - 3]),
+        number => colour::series(number),
+    })
 }
 
 /// The palette that goes with `visuals`.
@@ -63,7 +69,7 @@ pub fn of(visuals: &Visuals) -> Palette {
             ghost: hex(0x56_b4_e9),
             axis: hex(0x8a_94_a3),
             here: hex(0xff_ff_ff),
-            flagged: hex(0xf0_3e_6e),
+            flagged: hex(0xf6_5a_83),
             free: hex(0x24_2a_33),
             absent: hex(0x10_13_17),
             good: hex(0x3d_b8_8f),
@@ -212,7 +218,7 @@ mod tests {
 
     #[test]
     fn text_and_marks_stand_out_from_their_ground() {
-        assert_eq!(contrast(Color32::BLACK, Color32::WHITE), 21.0);
+        assert!((contrast(Color32::BLACK, Color32::WHITE) - 21.0).abs() < 1e-4);
         assert!((contrast(Color32::from_rgb(0x76, 0x76, 0x76), Color32::WHITE) - 4.54).abs() < 0.01);
         for visuals in [light(), dark()] {
             let palette = of(&visuals);

@@ -1,6 +1,6 @@
 //! The viewer in a window of the desktop.
 
-use super::{Pace, Rescue, Start, ViewError, Viewer, dress, theme};
+use super::{Pace, Rescue, Start, ViewError, Viewer, dress, loaded::Loaded, theme};
 use crate::gpu::{AdapterChoice, Context, GpuError};
 use eframe::{
     egui::{self, ViewportBuilder},
@@ -20,6 +20,9 @@ const FRAME: Duration = Duration::from_micros(16_667);
 /// Least time between two losses of the device after which a window is opened anew [s]: a device that is lost again and again
 /// is no use.
 const LEAST_LIFE: Duration = Duration::from_secs(30);
+
+/// Longest wait for the last frame of a window that is closed.
+const LAST_WORK: Duration = Duration::from_secs(1);
 
 /// Opens a window on `start` and returns when it is closed. A file that cannot be read is told before there is a window;
 /// what is wrong within it, in the window, where another one can be opened. A window whose device is lost cannot draw any
@@ -65,35 +68,37 @@ fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<Rescue>, ViewErro
         },
         ..Default::default()
     };
-    let lost = Rc::new(Cell::new(None));
-    let (context, left) = (Arc::clone(context), Rc::clone(&lost));
+    let open = Rc::new(Cell::new(None));
+    let (device, left) = (Arc::clone(context), Rc::clone(&open));
     let create: eframe::AppCreator<'_> = Box::new(move |creation| {
         let render = creation.wgpu_render_state.clone().ok_or("the window has no renderer")?;
         dress(&creation.egui_ctx);
         let folder = std::env::current_dir().unwrap_or_else(|_| ".".into());
-        let mut viewer = Viewer::new(context, render, Pace::Clock, folder)?;
+        let mut viewer = Viewer::new(device, render, Pace::Clock, folder)?;
         match begin {
             Begin::Start(start) => viewer.start(&start, &creation.egui_ctx),
             Begin::Resume(rescue) => viewer.resume(rescue, &creation.egui_ctx),
         }
-        Ok(Box::new(App { viewer, last: Instant::now(), lost: left }))
+        Ok(Box::new(App { viewer, last: Instant::now(), open: left }))
     });
     // egui's renderer panics where its device is lost before the window knows.
     let shown = catch_unwind(AssertUnwindSafe(|| eframe::run_native("haptize", options, create)));
-    match (lost.take(), shown) {
-        (Some(rescue), _) => Ok(Some(rescue)),
-        (None, Ok(Ok(()))) => Ok(None),
-        (None, Ok(Err(eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_)))) => Err(ViewError::NoDisplay),
-        (None, Ok(Err(other))) => Err(ViewError::Window(other.to_string())),
-        (None, Err(panic)) => resume_unwind(panic),
+    // Once it has nothing to do any more, a lost device says so.
+    let _ = context.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(LAST_WORK) });
+    match (context.check(), shown) {
+        (Err(GpuError::Lost(why)), _) => Ok(Some(Rescue { why, loaded: open.take() })),
+        (_, Ok(Ok(()))) => Ok(None),
+        (_, Ok(Err(eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_)))) => Err(ViewError::NoDisplay),
+        (_, Ok(Err(other))) => Err(ViewError::Window(other.to_string())),
+        (_, Err(panic)) => resume_unwind(panic),
     }
 }
 
 struct App {
     viewer: Viewer,
     last: Instant,
-    /// What is left of the window once its device is lost.
-    lost: Rc<Cell<Option<Rescue>>>,
+    /// What was open, once it is closed.
+    open: Rc<Cell<Option<Loaded>>>,
 }
 
 impl eframe::App for App {
@@ -112,6 +117,6 @@ impl eframe::App for App {
 
 impl Drop for App {
     fn drop(&mut self) {
-        self.lost.set(self.viewer.rescue());
+        self.open.set(self.viewer.session.as_ref().map(|session| session.loaded.clone()));
     }
 }
