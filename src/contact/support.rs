@@ -14,8 +14,8 @@ pub struct Support {
     nodes: Vec<u32>,
     /// C_AA, row-major, of order 3 |A| [m/N].
     compliance: Vec<f64>,
-    /// Number of slots for which `compliance` was gathered.
-    gathered: usize,
+    /// Nodes for which `compliance` was gathered.
+    gathered: Vec<u32>,
 }
 
 /// No slot.
@@ -25,7 +25,7 @@ impl Support {
     /// An empty support on `surface_nodes` nodes.
     #[must_use]
     pub fn new(surface_nodes: usize) -> Self {
-        Self { slots: vec![ABSENT; surface_nodes], nodes: Vec::new(), compliance: Vec::new(), gathered: 0 }
+        Self { slots: vec![ABSENT; surface_nodes], nodes: Vec::new(), compliance: Vec::new(), gathered: Vec::new() }
     }
 
     /// Forgets all nodes.
@@ -34,7 +34,6 @@ impl Support {
             self.slots[node as usize] = ABSENT;
         }
         self.nodes.clear();
-        self.gathered = 0;
     }
 
     /// Slot of `node`, which is added if it has none.
@@ -62,10 +61,10 @@ impl Support {
     /// Brings C_AA up to date with the nodes. A node that the compliance does not cover does not give way: what touches it is
     /// flagged at the end.
     pub fn gather(&mut self, compliance: &Compliance) {
-        if self.gathered == self.nodes.len() {
+        if self.gathered == self.nodes {
             return;
         }
-        self.gathered = self.nodes.len();
+        self.gathered.clone_from(&self.nodes);
         self.compliance.clear();
         for &row_node in &self.nodes {
             let row_place = compliance.place(row_node);
@@ -96,6 +95,9 @@ impl Support {
     /// `displacement = C forces` on all surface nodes that the compliance covers, zero on others; `forces` are on A.
     pub fn displace(&self, compliance: &Compliance, forces: &[f64], displacement: &mut [f64]) {
         let blocks = self.nodes.iter().zip(forces.as_chunks().0).filter_map(|(&node, &force)| {
+            if force == [0.0; 3] {
+                return None;
+            }
             let rows = 3 * compliance.place(node)? * compliance.order;
             Some((&compliance.entries[rows..rows + 3 * compliance.order], force))
         });

@@ -91,13 +91,12 @@ impl TrustRegion {
             self.previous_force.copy_from_slice(&self.force);
             self.previous_displacement.copy_from_slice(&self.displacement);
             let stopped = self.conjugate_gradients(support, springs, radius, stop);
-            self.deepen(springs);
-            let decrease = self.decrease(springs, residual);
+            let decrease = self.assess(springs, residual);
             if pass > 0 && (decrease <= predicted || decrease.is_nan()) {
                 // Contacts came and went to no avail: the pass before was better.
                 std::mem::swap(&mut self.force, &mut self.previous_force);
                 std::mem::swap(&mut self.displacement, &mut self.previous_displacement);
-                self.deepen(springs);
+                self.assess(springs, residual);
                 break;
             }
             predicted = decrease;
@@ -112,11 +111,13 @@ impl TrustRegion {
         Step { predicted, length, at_boundary }
     }
 
-    /// The zero step.
+    /// The zero step, and room for the rest.
     fn reset(&mut self, order: usize, contacts: &[Contact]) {
+        for vector in [&mut self.force, &mut self.displacement] {
+            vector.clear();
+            vector.resize(order, 0.0);
+        }
         for vector in [
-            &mut self.force,
-            &mut self.displacement,
             &mut self.previous_force,
             &mut self.previous_displacement,
             &mut self.residual,
@@ -125,7 +126,6 @@ impl TrustRegion {
             &mut self.direction,
             &mut self.image,
         ] {
-            vector.clear();
             vector.resize(order, 0.0);
         }
         self.deepening.clear();
@@ -183,23 +183,16 @@ impl TrustRegion {
         if mixed > 0.0 { left / (mixed + root) } else { (root - mixed) / direction_square }
     }
 
-    /// What the step deepens each contact by: g_i . du.
-    fn deepen(&mut self, springs: Springs) {
-        let Self { deepening: all, displacement, own, .. } = self;
-        springs.for_each_depth(|first, rows| {
-            let v = |k: usize| nodes_of(displacement, springs.slots[first + k]);
-            all[first..first + rows.len()].fill(deepening(rows, v, own));
-        });
-    }
-
-    /// m(0) - m(df), in differences that do not cancel near the solution [J].
-    fn decrease(&mut self, springs: Springs, residual: &[f64]) -> f64 {
+    /// What the step deepens each contact by, g_i . du; returns m(0) - m(df), in differences that do not cancel near the
+    /// solution [J].
+    fn assess(&mut self, springs: Springs, residual: &[f64]) -> f64 {
         let mut decrease = dot(&self.displacement, residual) - 0.5 * dot(&self.displacement, &self.force);
-        let Self { displacement, own, .. } = self;
+        let Self { deepening: all, displacement, own, .. } = self;
         springs.for_each_depth(|first, rows| {
             let v = |k: usize| nodes_of(displacement, springs.slots[first + k]);
             let Contact { depth, multiplier, .. } = rows[0];
             let deepening = deepening(rows, v, own);
+            all[first..first + rows.len()].fill(deepening);
             let before = depth.max(0.0);
             let after = (depth + deepening).max(0.0);
             // The part of 1/2 kc depth^2 that is of first order is in the residual.

@@ -14,7 +14,8 @@
 //! which are left to the solver.
 //!
 //! A block counts as free only if it stays so when widened by [`FreeSpace::MARGIN`] grid steps all round. So every point within as many
-//! steps of a point in contact is solved for and has its exact gap; a skipped point has a positive lower bound of its gap.
+//! steps of a point in contact is solved for and has its exact gap; a skipped point has a positive lower bound of its gap. And so
+//! a block whose middle touches spares looking at those that are as near to it.
 //! Blocks are cut from the grid alone, so that a point is skipped or not whatever chunks, threads and backend there are.
 
 use crate::{
@@ -36,8 +37,8 @@ use std::{
 /// points.
 const SHARE: usize = 4096;
 
-/// Blocks of as many points are not cut any further: proving one of them free costs as much as the gaps of all of them do.
-const SMALLEST: usize = 4;
+/// Blocks of as many points are not cut any further, and not looked at: of so few, too few are free to save what that takes.
+const SMALLEST: usize = 8;
 
 /// Most points for which bounds are kept at a time: four megabytes.
 const SLAB: usize = 1 << 20;
@@ -63,6 +64,19 @@ pub struct FreeGaps {
 struct Block {
     low: [usize; MAX_JOINTS],
     high: [usize; MAX_JOINTS],
+}
+
+/// A place on or between grid points, in steps from the first along each axis.
+type Place = [f64; MAX_JOINTS];
+
+/// What is known of a block.
+enum Found {
+    /// It is skipped.
+    Free,
+    /// Something touches here.
+    Touching(Place),
+    /// Neither.
+    Unknown,
 }
 
 impl<'a> FreeSpace<'a> {
@@ -121,9 +135,10 @@ impl<'a> FreeSpace<'a> {
                 blocks.extend(block.halves(self.grid, &self.reach));
             }
         }
-        shares
-            .par_iter()
-            .for_each_init(|| Proximity::new(self.model), |proximity, block| self.search(proximity, *block, &gaps));
+        shares.par_iter().for_each_init(
+            || Proximity::new(self.model),
+            |proximity, block| self.search(proximity, *block, None, &gaps),
+        );
         Ok(gaps)
     }
 }
@@ -154,6 +169,25 @@ impl Block {
         }
         let ascends = low.iter().zip(&high).all(|(low, high)| low < high);
         Some(Self { low, high }).filter(|block| ascends && first == 0 && last == 0 && block.points() == points.len())
+    }
+
+    /// The middle, which lies between points where their number is even.
+    fn middle(&self) -> Place {
+        std::array::from_fn(|j| 0.5 * (self.low[j] + self.high[j] - 1) as f64)
+    }
+
+    /// Whether the block contains `place` when widened by the margin.
+    fn is_near(&self, place: &Place) -> bool {
+        let margin = FreeSpace::MARGIN as f64;
+        (0..MAX_JOINTS)
+            .all(|j| self.low[j] as f64 - margin <= place[j] && place[j] <= (self.high[j] - 1) as f64 + margin)
+    }
+
+    /// Whether all its points are within the margin of `place`.
+    fn is_all_near(&self, place: &Place) -> bool {
+        let margin = FreeSpace::MARGIN as f64;
+        (0..MAX_JOINTS)
+            .all(|j| place[j] - margin <= self.low[j] as f64 && (self.high[j] - 1) as f64 <= place[j] + margin)
     }
 
     fn points(&self) -> usize {
@@ -225,39 +259,51 @@ impl Reach {
 }
 
 impl FreeSpace<'_> {
-    fn search(&self, proximity: &mut Proximity<'_>, block: Block, gaps: &FreeGaps) {
+    /// Skips what can be in `block`; `touching` is a place of the grid, in steps, where something touches.
+    fn search(&self, proximity: &mut Proximity<'_>, block: Block, touching: Option<Place>, gaps: &FreeGaps) {
         if block.points() <= SMALLEST {
             return;
         }
+        // No block with such a place within the margin counts as free.
+        let touching = match touching.filter(|place| block.is_near(place)) {
+            None => match self.skip_whole(proximity, block, gaps) {
+                Found::Free => return,
+                Found::Unknown => None,
+                Found::Touching(place) => Some(place),
+            },
+            touching => touching,
+        };
+        if touching.is_none_or(|place| !block.is_all_near(&place)) {
+            for half in block.halves(self.grid, &self.reach) {
+                self.search(proximity, half, touching, gaps);
+            }
+        }
+    }
+
+    /// Skips `block` if it is proven free.
+    fn skip_whole(&self, proximity: &mut Proximity<'_>, block: Block, gaps: &FreeGaps) -> Found {
         let joints = self.grid.joints();
-        let (mut centre, mut half, mut wide) =
-            (JointVector::zeros(joints), JointVector::zeros(joints), JointVector::zeros(joints));
+        let (mut centre, mut wide) = (JointVector::zeros(joints), JointVector::zeros(joints));
         for (j, axis) in self.grid.axes.iter().enumerate() {
             let steps = 0.5 * (block.high[j] - block.low[j] - 1) as f64;
             centre[j] = axis.coordinate(block.low[j]) + steps * axis.step;
-            half[j] = steps * axis.step;
             wide[j] = (steps + FreeSpace::MARGIN as f64) * axis.step;
         }
         let nearest = proximity.place(&centre);
         let rounding = FREE_SPACE_ROUNDING * (self.reach.length + self.model.extent);
-        let stays = |(i, clearance): (usize, f64)| clearance - self.motion(proximity, i, &wide, &wide) > rounding;
+        let stays = |(i, clearance): (usize, f64)| clearance - self.motion(proximity, i, &wide) > rounding;
         let least = proximity.clearances().nth(nearest).unwrap_or(f64::INFINITY);
         if stays((nearest, least)) && proximity.clearances().enumerate().all(stays) {
             self.skip(block, &centre, least - rounding, &self.slopes(proximity, &wide), gaps);
-            return;
+            return Found::Free;
         }
-        // Halving it is of no use where something touches all over it.
-        let gap = if least < 0.0 { proximity.gap(&centre) } else { least };
-        if (0..self.model.chain.nodes.len()).any(|i| gap + self.motion(proximity, i, &wide, &half) >= 0.0) {
-            block.halves(self.grid, &self.reach).into_iter().for_each(|half| self.search(proximity, half, gaps));
-        }
+        if least < 0.0 && proximity.gap(&centre) < 0.0 { Found::Touching(block.middle()) } else { Found::Unknown }
     }
 
-    /// How far a node moves at most, within the block of half-widths `wide` around the configuration placed last, where joints
-    /// move by up to `by`.
-    fn motion(&self, proximity: &Proximity<'_>, node: usize, wide: &JointVector, by: &JointVector) -> f64 {
+    /// How far a node moves at most, within the block of half-widths `wide` around the configuration placed last.
+    fn motion(&self, proximity: &Proximity<'_>, node: usize, wide: &JointVector) -> f64 {
         let link = self.model.chain.nodes[node].link;
-        (0..=link).map(|j| self.slope(proximity, node, j, wide) * by[j]).sum()
+        (0..=link).map(|j| self.slope(proximity, node, j, wide) * wide[j]).sum()
     }
 
     /// Greatest slope of any node in each joint.
