@@ -32,11 +32,13 @@ pub struct Contact {
     pub weights: [f64; 3],
     /// Outward unit direction N.
     pub normal: DVec3,
-    /// r + s, or of a point node the smooth depth of [`super::blend`]; positive in contact [m].
+    /// r + s, or the smooth depth of [`super::blend`]; positive in contact [m].
     pub depth: f64,
     /// How often the spring counts: one, or what [`super::features`] says of nodes with a radius, or what a smooth depth changes
     /// by with the row's own distance.
     pub share: f64,
+    /// What a smooth depth changes by with the logarithm of the triangle's area, else zero; see [`super::blend`] [m].
+    pub stretch: f64,
     /// What it is part of, where it is one of the rows of a smooth depth; see [`super::blend`].
     pub part: Option<super::blend::Part>,
     /// Force lambda by which the curvature counts; kc depth at the solution [N].
@@ -148,7 +150,18 @@ impl Contact {
     #[must_use]
     pub fn new(proxy_node: u32, nodes: [u32; 3], weights: [f64; 3], measured: (DVec3, f64, Curvature)) -> Self {
         let (normal, depth, curvature) = measured;
-        Self { proxy_node, nodes, weights, normal, depth, share: 1.0, part: None, multiplier: 0.0, curvature }
+        Self {
+            proxy_node,
+            nodes,
+            weights,
+            normal,
+            depth,
+            share: 1.0,
+            stretch: 0.0,
+            part: None,
+            multiplier: 0.0,
+            curvature,
+        }
     }
 
     /// What displacements `v` of its nodes bring the feature nearer by, to first order [m].
@@ -160,11 +173,25 @@ impl Contact {
             + self.weights[2] * self.normal.dot(v[2])
     }
 
-    /// What a force `push` along the depth gives to the feature's nodes: push p w_j N [N].
+    /// By what share displacements `v` of its nodes stretch the triangle's area, to first order [1].
+    #[must_use]
+    pub fn stretching(&self, v: [DVec3; 3]) -> f64 {
+        let g = self.curvature.gradients;
+        g[0].dot(v[0]) + g[1].dot(v[1]) + g[2].dot(v[2])
+    }
+
+    /// What displacements `v` of its nodes add to the depth that the row is part of, to first order [m].
+    #[must_use]
+    pub fn first_order(&self, v: [DVec3; 3]) -> f64 {
+        self.share * self.deepening(v) + self.stretch * self.stretching(v)
+    }
+
+    /// What a force `push` along the depth gives to the feature's nodes: push (share w_j N + stretch g_j) [N].
     #[inline]
     #[must_use]
     pub fn spread(&self, push: f64) -> [DVec3; 3] {
-        self.weights.map(|weight| self.normal * (push * self.share * weight))
+        let Self { weights, normal, share, stretch, curvature, .. } = self;
+        [0, 1, 2].map(|j| (*normal * (share * weights[j]) + curvature.gradients[j] * *stretch) * push)
     }
 }
 

@@ -76,7 +76,7 @@ impl Closest {
 pub enum Walls {
     /// The closest one.
     Closest,
-    /// All that it feels: within its radius (see [`super::features`]), or what is near a point (see
+    /// All that it feels: within its radius (see [`super::features`]), or where facets are blended what is near it (see
     /// [`super::blend`]).
     All,
 }
@@ -181,13 +181,13 @@ impl Detection {
     }
 
     /// The gap of the configuration taken up: the smallest signed distance of a proxy node to the surface at rest, less its
-    /// radius; for point nodes to the smooth surface (see [`super::blend`]) [m].
+    /// radius; where facets are blended, to the smooth surface (see [`super::blend`]) [m].
     pub fn gap(&mut self, model: &Model) -> f64 {
         let mut gap = f64::MAX;
         for i in 0..self.nodes.len() {
             let radius = model.chain.nodes[i].radius;
             let signed = |standing: &Standing| if standing.inside { -standing.distance } else { standing.distance };
-            let nearest = radius + model.bulge(radius);
+            let nearest = radius + model.bulge();
             if signed(&self.standings[i]) - nearest >= gap {
                 continue;
             }
@@ -196,18 +196,18 @@ impl Detection {
             }
             let distance = signed(&self.standings[i]);
             if distance - nearest < gap {
-                let smooth = model.bulge(radius) > 0.0;
+                let smooth = model.blending > 0.0;
                 gap = gap.min(if smooth { -self.depth_at_rest(model, i) } else { distance - radius });
             }
         }
         gap
     }
 
-    /// Smooth depth of point node `i` at rest [m].
+    /// Smooth depth of node `i` at rest [m].
     fn depth_at_rest(&mut self, model: &Model, i: usize) -> f64 {
         self.rows.clear();
         let Self { blend, rows, nodes, standings, .. } = self;
-        blended_at_rest(model, i, nodes[i], standings[i].distance, blend, rows);
+        blended_at_rest(model, i, nodes[i], &standings[i], blend, rows);
         rows.first().map_or(f64::NAN, |row| row.depth)
     }
 
@@ -229,7 +229,7 @@ impl Detection {
             let x = self.nodes[i];
             let radius = model.chain.nodes[i].radius;
             let standing = &mut self.standings[i];
-            let bulge = model.bulge(radius);
+            let bulge = model.bulge();
             let smooth = walls == Walls::All && bulge > 0.0;
             if !standing.inside && standing.distance - radius - bulge > moved * (1.0 + 1e3 * f64::EPSILON) {
                 continue;
@@ -243,7 +243,7 @@ impl Detection {
             let mut closest = Closest::none();
             closest.consider(x, positions, &model.object.triangles, standing.last);
             let distance = closest.distance_squared.sqrt();
-            let feels = walls == Walls::All && radius > 0.0;
+            let feels = walls == Walls::All && radius > 0.0 && !smooth;
             let wanted = |spread: f64| match () {
                 () if smooth => blend::reach(model, distance, spread),
                 () if feels => distance.max(radius),
@@ -270,7 +270,9 @@ impl Detection {
                     self.candidates.list(model, x, wanted(spread), &mut standing.listed);
                 };
                 let first = contacts.len();
-                self.blend.rows(model, i, x, positions, spread, contacts);
+                let outside = contact_at(model, i, x, 0.0, positions, closest.triangle, closest.point)
+                    .is_some_and(|closest| closest.depth < 0.0);
+                self.blend.rows(model, (i, x, outside), positions, spread, contacts);
                 standing.watched |= contacts.get(first).is_some_and(|row| row.depth > 0.0);
                 if !standing.watched {
                     contacts.truncate(first);
@@ -313,13 +315,13 @@ impl Detection {
             let x = self.nodes[i];
             let radius = model.chain.nodes[i].radius;
             let standing = &mut self.standings[i];
-            if !standing.inside && standing.distance - radius - model.bulge(radius) > reach {
+            if !standing.inside && standing.distance - radius - model.bulge() > reach {
                 continue;
             }
             let closest = find_standing(model, x, standing);
             let first = rows.len();
-            if model.bulge(radius) > 0.0 {
-                blended_at_rest(model, i, x, standing.distance, &mut self.blend, rows);
+            if model.blending > 0.0 {
+                blended_at_rest(model, i, x, standing, &mut self.blend, rows);
             } else {
                 let Closest { triangle, point, .. } = closest;
                 rows.extend(contact_at(model, i, x, radius, &model.rest, triangle, point));
@@ -365,11 +367,11 @@ fn find_standing(model: &Model, x: DVec3, standing: &mut Standing) -> Closest {
     closest
 }
 
-/// Adds the rows of the smooth depth at rest of point node `i` at `x`, whose closest triangle is at `distance`.
-fn blended_at_rest(model: &Model, i: usize, x: DVec3, distance: f64, blend: &mut Blend, rows: &mut Vec<Contact>) {
+/// Adds the rows of the smooth depth at rest of node `i` at `x`, which stands as `standing` says.
+fn blended_at_rest(model: &Model, i: usize, x: DVec3, standing: &Standing, blend: &mut Blend, rows: &mut Vec<Contact>) {
     let mut spread = BLEND_SPREAD;
     loop {
-        let reach = blend::reach(model, distance, spread);
+        let reach = blend::reach(model, standing.distance, spread);
         blend.clear();
         model.bounds.search(x, reach * reach, |t, _| {
             blend.consider(model, x, reach, &model.rest, t);
@@ -377,7 +379,7 @@ fn blended_at_rest(model: &Model, i: usize, x: DVec3, distance: f64, blend: &mut
         });
         let needed = blend.spread();
         if needed <= spread || !needed.is_finite() {
-            return blend.rows(model, i, x, &model.rest, needed, rows);
+            return blend.rows(model, (i, x, !standing.inside), &model.rest, needed, rows);
         }
         spread = needed;
     }

@@ -240,8 +240,9 @@ impl EnergySearch {
         for contact in &state.contacts {
             let mut contact_slots = [0; 3];
             for (slot, (&node, &weight)) in contact_slots.iter_mut().zip(contact.nodes.iter().zip(&contact.weights)) {
-                // Nodes without weight take no force; their entries are multiplied by zero in any slot.
-                if weight != 0.0 {
+                // Nodes without weight take no force, but of what stretches a triangle; their entries are multiplied by zero in any
+                // slot.
+                if weight != 0.0 || contact.stretch != 0.0 {
                     *slot = support.add(node);
                 }
             }
@@ -346,6 +347,6 @@ fn linear_change(rows: &[Contact], displacement: &[f64]) -> f64 {
     let moves = |row: &Contact| row.nodes.map(|node| DVec3::from_slice(&displacement[3 * node as usize..]));
     match rows {
         [row] if row.part.is_none() => row.deepening(moves(row)),
-        _ => rows.iter().map(|row| row.share * row.deepening(moves(row))).sum(),
+        _ => rows.iter().map(|row| row.first_order(moves(row))).sum(),
     }
 }

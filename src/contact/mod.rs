@@ -14,6 +14,7 @@ pub(crate) mod detection;
 mod distance_bounds;
 mod energy;
 mod facet;
+mod facet_depth;
 mod features;
 mod model;
 mod paper;
@@ -89,8 +90,9 @@ pub struct NodeForce {
 
 /// One proxy node in contact with one feature of the surface: pushed by `force` at x_i, pushing back on three object nodes.
 ///
-/// A point node has at most one. A node with a radius has one for each wall that it touches, and in a crease one of opposite
-/// sign for the edge between two (`features.rs`): the node's force is their sum.
+/// Where facets are sharp, a point node has at most one; a node with a radius has one for each wall that it touches, and in a crease
+/// one of opposite sign for the edge between two (`features.rs`). Where they are blended (`blend.rs`), a node has one or two for each
+/// triangle near it, and stretches those besides, without a net force. The node's force is their sum.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
     /// Number of the proxy's node.

@@ -11,7 +11,7 @@ use crate::JointVector;
 use crate::object::{Compliance, Object, ObjectError};
 use crate::proxy::Chain;
 use crate::scene::{Algorithm, Blending, ContactSpec};
-use crate::tolerances::RIGID_STIFFNESS;
+use crate::tolerances::{BLEND_BULGE, RIGID_STIFFNESS};
 use glam::DVec3;
 
 /// An object and a proxy, prepared for contact.
@@ -28,7 +28,7 @@ pub struct Model<'a> {
     /// normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
     /// [`RIGID_STIFFNESS`] [N/m].
     pub kc: f64,
-    /// Width w over which facets pass into each other for point nodes, zero where they are sharp [m].
+    /// Width w over which facets pass into each other, zero where they are sharp [m].
     pub blending: f64,
     /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
     /// loses no digits.
@@ -135,9 +135,8 @@ impl<'a> Model<'a> {
     /// Takes another blending.
     pub fn set_blending(&mut self, blending: Blending) {
         self.contact.blending = blending;
-        let points = self.chain.nodes.iter().any(|node| node.radius == 0.0);
         self.blending = match blending {
-            _ if !points || self.contact.algorithm == Algorithm::Paper => 0.0,
+            _ if self.contact.algorithm == Algorithm::Paper => 0.0,
             Blending::Width(width) => width,
             Blending::Mesh => blend::width(&self.rest, &self.object.triangles, &self.bounds),
         };
@@ -146,8 +145,8 @@ impl<'a> Model<'a> {
     /// By how much a proxy node's gap may be less than its signed distance to the surface less its radius: where smooth facets
     /// bulge [m].
     #[must_use]
-    pub fn bulge(&self, radius: f64) -> f64 {
-        if radius == 0.0 { self.blending } else { 0.0 }
+    pub fn bulge(&self) -> f64 {
+        BLEND_BULGE * self.blending
     }
 
     /// Takes another contact stiffness Kc; infinity is rigid [N/m].

@@ -39,10 +39,7 @@ impl<'a> Proximity<'a> {
     /// A lower bound of what each proxy node contributes to the last gap [m].
     pub fn clearances(&self) -> impl Iterator<Item = f64> {
         let nodes = self.model.chain.nodes.iter();
-        self.detection
-            .distances()
-            .zip(nodes)
-            .map(|(distance, node)| distance - node.radius - self.model.bulge(node.radius))
+        self.detection.distances().zip(nodes).map(|(distance, node)| distance - node.radius - self.model.bulge())
     }
 
     /// The proxy's pose at the last configuration measured.

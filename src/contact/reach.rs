@@ -48,7 +48,7 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
         if clearance > motion {
             continue;
         }
-        let radius = (clearance + node.radius).abs() + 2.0 * motion + 2.0 * model.bulge(node.radius);
+        let radius = (clearance + node.radius).abs() + 2.0 * motion + 2.0 * model.bulge();
         for_triangles_within(model, *x - model.centre, radius, |t| {
             model.object.triangles[t as usize].iter().for_each(|&node| marked[node as usize] = true);
         });

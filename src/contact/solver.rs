@@ -152,6 +152,13 @@ impl<'a> Solver<'a> {
                 }
             }
         }
+        // What stretches triangles has no net force: the proxy does not feel it.
+        for contact in state.contacts.iter().filter(|c| c.depth > 0.0 && c.stretch != 0.0) {
+            let tension = -self.model.kc * contact.depth * contact.stretch;
+            for (node, gradient) in contact.nodes.into_iter().zip(contact.curvature.gradients) {
+                push(&mut self.node_forces, &mut self.marked, &mut self.touched, node, gradient * tension);
+            }
+        }
         outcome
     }
 

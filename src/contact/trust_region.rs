@@ -19,7 +19,7 @@
 // Indexed loops as in the kernel of the same name.
 #![allow(clippy::needless_range_loop)]
 
-use super::blend::{deepening, strength, together, vary};
+use super::blend::{RowChange, deepening, strength, together, vary};
 use super::depth::{Contact, stiffness_product};
 use super::support::{Support, dot, root};
 use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES};
@@ -66,8 +66,8 @@ pub struct TrustRegion {
     direction_force: Vec<f64>,
     direction: Vec<f64>,
     image: Vec<f64>,
-    /// What the rows of one depth are brought nearer by [m].
-    own: Vec<f64>,
+    /// What happens to the rows of one depth.
+    own: Vec<RowChange>,
 }
 
 impl TrustRegion {
@@ -251,7 +251,7 @@ impl<'a> Springs<'a> {
 }
 
 /// Adds B p, the product of the Hessian of the contact terms with the displacement `p` on the support, to `product`.
-fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], own: &mut Vec<f64>, product: &mut [f64]) {
+fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], own: &mut Vec<RowChange>, product: &mut [f64]) {
     springs.for_each_depth(|first, rows| {
         let multiplier = rows[0].multiplier;
         if !touching[first] && multiplier == 0.0 {

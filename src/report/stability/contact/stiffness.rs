@@ -1,6 +1,6 @@
 //! Every combination of contact stiffness, ground, springs, resolution and node radius, on random configurations: what share
-//! converges, with how many iterations, in what time; that E never rises and no number breaks; and beside it the paper's
-//! iteration.
+//! converges, with how many iterations, in what time; that E never rises and no number breaks; and beside it, on a tenth of them,
+//! the same with blended facets, and the paper's iteration.
 
 use super::super::{Bound, Effort, Failure, Outcome, Setting};
 use super::world::{BALL, Ball, RADIUS, contact, floating_bar, pressed, sphere};
@@ -9,7 +9,7 @@ use crate::{
     contact::{Model, Solver, Status},
     gpu::{Context, GpuSolver},
     haptize::Backend,
-    scene::{Algorithm, SpringKind},
+    scene::{Algorithm, Blending, SpringKind},
 };
 use rayon::prelude::*;
 use std::{
@@ -35,6 +35,8 @@ struct Cell {
     time: Duration,
     paper: (usize, usize),
     paper_time: Duration,
+    blended: (usize, usize),
+    blended_time: Duration,
     gpu: (usize, usize),
     gpu_on_cpu: usize,
 }
@@ -75,6 +77,19 @@ pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
         let (from, to, share) = DEPTHS[depth];
         outcomes.push(cell.outcome(stiffness, radius == 1, from, to, share));
     }
+    for (depth, (from, to, share)) in DEPTHS.into_iter().enumerate() {
+        let of = |place: &(usize, &Cell)| place.0 % 2 == depth;
+        let blended = cells.iter().enumerate().filter(of).map(|(_, cell)| cell.blended);
+        let (converged, solved) = blended.fold((0, 0), |sum, cell| (sum.0 + cell.0, sum.1 + cell.1));
+        outcomes.push(Outcome {
+            case: "stiffness".into(),
+            varied: format!("all of these, blended, depth {from} to {to} R"),
+            measure: "share converged [1]".into(),
+            worst: converged as f64 / solved.max(1) as f64,
+            bound: Bound::AtLeast(share),
+            note: format!("{solved} solved"),
+        });
+    }
     let figure = |varied: &str, measure: &str, worst: f64, bound: f64| Outcome {
         case: "stiffness".into(),
         varied: varied.into(),
@@ -112,9 +127,11 @@ impl Cell {
         let each = |time: Duration, count: usize| 1e6 * time.as_secs_f64() / count.max(1) as f64;
         let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
         let mut note = format!(
-            "{} solved, {median}/{most} iterations (median/max), {:.0} us; paper {:.0} %, {:.0} us; least {:.1} % with {which}",
+            "{} solved, {median}/{most} iterations (median/max), {:.0} us; blended {:.0} %, {:.0} us; paper {:.0} %, {:.0} us; least {:.1} % with {which}",
             self.solved,
             each(self.time, self.solved),
+            percent(self.blended.0, self.blended.1),
+            each(self.blended_time, self.blended.1),
             percent(self.paper.0, self.paper.1),
             each(self.paper_time, self.paper.1),
             100.0 * least,
@@ -191,7 +208,12 @@ fn combination(
                     let nodes = rings * rings + 2;
                     cell.least = Some((share, format!("{nodes} nodes, {springs:?}, Kg {ground} on {held}")));
                 }
-                paper(&mut model, &configurations, cell);
+                model.set_blending(Blending::Mesh);
+                tenth(&model, &configurations, &mut cell.blended, &mut cell.blended_time);
+                model.set_blending(Blending::Width(0.0));
+                model.contact.algorithm = Algorithm::Paper;
+                tenth(&model, &configurations, &mut cell.paper, &mut cell.paper_time);
+                model.contact.algorithm = Algorithm::Energy;
                 if let (Some(context), true) = (&setting.gpu, ball.rings <= 10) {
                     on_gpu(context, &model, &configurations, cell, worst)?;
                 }
@@ -201,17 +223,15 @@ fn combination(
     Ok(())
 }
 
-/// The paper's iteration on a tenth of the configurations.
-fn paper(model: &mut Model<'_>, configurations: &[Vec<f64>], cell: &mut Cell) {
-    model.contact.algorithm = Algorithm::Paper;
+/// The model on a tenth of the configurations: how many of how many converge, and in what time.
+fn tenth(model: &Model<'_>, configurations: &[Vec<f64>], share: &mut (usize, usize), time: &mut Duration) {
     let mut solver = Solver::new(model);
     for q in configurations.iter().step_by(10) {
         let since = Instant::now();
-        cell.paper.0 += usize::from(solver.solve(q).status == Status::Contact);
-        cell.paper.1 += 1;
-        cell.paper_time += since.elapsed();
+        share.0 += usize::from(solver.solve(q).status == Status::Contact);
+        share.1 += 1;
+        *time += since.elapsed();
     }
-    model.contact.algorithm = Algorithm::Energy;
 }
 
 /// The same by the kernels.
