@@ -23,6 +23,9 @@ use std::{collections::BTreeMap, error::Error, path::Path, process::Command, tim
 /// The peer solves every so many-th configuration: enough to know its rate to some percent.
 const PEER_STRIDE: usize = 16;
 
+/// Everything is timed so many times, the peer as well, and the fastest counts: a busy machine slows some down.
+const TURNS: usize = 7;
+
 /// Torques agree if they differ by less than this share of the greatest.
 const AGREEMENT: f64 = 1e-6;
 
@@ -32,9 +35,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let cores = std::thread::available_parallelism()?.get();
     println!("datasets/sphere.toml on {cores} cores\n");
     scene.contact.algorithm = Algorithm::Paper;
-    let paper = rate(&scene)?;
+    let paper = fastest(&scene)?;
     scene.contact.algorithm = Algorithm::Energy;
-    let energy = rate(&scene)?;
+    let energy = fastest(&scene)?;
     println!("{:<34} {:>16} {:>9} {:>10}", "", "configurations/s", "contact", "converged");
     for (name, run) in [("haptize, the paper's iteration", &paper), ("haptize, energy", &energy)] {
         println!("{name:<34} {:>16.0} {:>9} {:>10}", run.rate, run.contact, run.converged);
@@ -63,6 +66,17 @@ struct Sweep {
     contact: usize,
     converged: usize,
     results: Vec<(Status, JointVector)>,
+}
+
+fn fastest(scene: &Scene) -> Result<Sweep, Box<dyn Error>> {
+    let mut fastest = rate(scene)?;
+    for _ in 1..TURNS {
+        let sweep = rate(scene)?;
+        if sweep.rate > fastest.rate {
+            fastest = sweep;
+        }
+    }
+    Ok(fastest)
 }
 
 fn rate(scene: &Scene) -> Result<Sweep, Box<dyn Error>> {
@@ -145,6 +159,7 @@ fn peer(root: &Path, scene: &Scene, processes: usize) -> Result<Peer, Box<dyn Er
         .arg(root.join("benches/peers/sweep_numpy.py"))
         .arg(&file)
         .arg(processes.to_string())
+        .arg(TURNS.to_string())
         .output()?;
     if !output.status.success() {
         return Err(String::from_utf8_lossy(&output.stderr).lines().last().unwrap_or_default().into());
@@ -190,9 +205,7 @@ fn curves(root: &Path, scene: &Scene) -> Result<(), Box<dyn Error>> {
         let (mut seconds, mut count) = (0.0, 0);
         for point in (0..grid.points()).step_by(11) {
             let q = grid.configuration(point);
-            let start = Instant::now();
-            let equilibrium = solver.solve(&q);
-            let time = start.elapsed().as_secs_f64();
+            let (time, equilibrium) = quickest(|| solver.solve(&q));
             if equilibrium.gap < 0.0 {
                 seconds += time;
                 count += 1;
@@ -217,21 +230,37 @@ fn curves(root: &Path, scene: &Scene) -> Result<(), Box<dyn Error>> {
     let mut free_points = Vec::new();
     for finer in [1, 2, 3, 5] {
         let grid = grid_of(finer);
-        let start = Instant::now();
-        let free_space = FreeSpace::new(&model, &grid).find(0..grid.points())?;
-        let found = start.elapsed().as_secs_f64();
+        let (found, free_space) = quickest(|| FreeSpace::new(&model, &grid).find(0..grid.points()));
+        let free_space = free_space?;
         let mut proximity = Proximity::new(&model);
         let left = (0..grid.points()).filter(|&p| free_space.gap(p).is_none()).map(|p| grid.configuration(p));
         let left: Vec<JointVector> = left.filter(|q| proximity.gap(q) >= 0.0).collect();
-        let start = Instant::now();
-        backend.solve(&left)?;
-        let time = found + start.elapsed().as_secs_f64();
+        let (solved, equilibria) = quickest(|| backend.solve(&left));
+        equilibria?;
+        let time = found + solved;
         let (skipped, all) = (free_space.skipped(), free_space.skipped() + left.len());
         let each = 1e6 * time / all as f64;
         println!("  {:>9} points, {all:>8} free, {skipped:>8} of them skipped {each:>6.2} us each", grid.points());
         free_points.push((grid.points() as f64 / 1e6, each));
     }
     draw(root, nodes, contacts, free_points)
+}
+
+/// The least time that `work` takes [s], and what it gives.
+fn quickest<T>(mut work: impl FnMut() -> T) -> (f64, T) {
+    let mut time = || {
+        let start = Instant::now();
+        let result = work();
+        (start.elapsed().as_secs_f64(), result)
+    };
+    let mut quickest = time();
+    for _ in 1..TURNS {
+        let turn = time();
+        if turn.0 < quickest.0 {
+            quickest = turn;
+        }
+    }
+    quickest
 }
 
 fn draw(

@@ -334,9 +334,9 @@ impl Detection {
     }
 }
 
-/// Signed distance of `x` to the surface at rest [m], and the closest triangle.
-pub(super) fn signed_distance(model: &Model, x: DVec3) -> (f64, u32) {
-    let mut standing = Standing { last: u32::MAX, ..Standing::default() };
+/// Signed distance of `x` to the surface at rest [m], and the closest triangle; `near` is a triangle near by, if any is known.
+pub(super) fn signed_distance(model: &Model, x: DVec3, near: Option<u32>) -> (f64, u32) {
+    let mut standing = Standing { last: near.unwrap_or(u32::MAX), ..Standing::default() };
     let triangle = find_standing(model, x, &mut standing).triangle;
     (if standing.inside { -standing.distance } else { standing.distance }, triangle)
 }

@@ -19,11 +19,15 @@ use crate::tolerances::DEPTH_ROUNDING;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Cubes for each triangle, about: their sides are a fraction of a triangle's where the lattice is twice as wide as the object.
-const CUBES_PER_TRIANGLE: usize = 64;
+/// Cubes for each triangle, about: their sides are not much longer than a triangle's where the lattice is twice as wide as the
+/// object.
+const CUBES_PER_TRIANGLE: usize = 16;
 
-/// Most cubes: five megabytes.
-const MOST_CUBES: usize = 1 << 18;
+/// Least number of cubes: about twenty-five along each axis.
+const LEAST_CUBES: usize = 1 << 14;
+
+/// Most cubes: less than three megabytes.
+const MOST_CUBES: usize = 1 << 17;
 
 /// The bound within one cube, in single precision to stay in cache, and rounded down.
 #[derive(Clone, Copy)]
@@ -62,17 +66,22 @@ impl DistanceBounds {
         let high = model.rest.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         let margin = 0.5 * (high - low).max_element();
         let (low, size) = (low - margin, high - low + 2.0 * margin);
-        let wanted = MOST_CUBES.min(CUBES_PER_TRIANGLE * model.object.triangles.len());
+        let wanted = (CUBES_PER_TRIANGLE * model.object.triangles.len()).clamp(LEAST_CUBES, MOST_CUBES);
         let side = (size.element_product() / wanted as f64).cbrt();
         if !(side > 0.0 && side.is_finite()) {
             return Self::none();
         }
         let counts = (size / side).to_array().map(|count| count.ceil() as usize);
         let slack = DEPTH_ROUNDING * (low.abs() + size).length();
-        let cubes = (0..counts.iter().product()).into_par_iter().map(|k| {
-            let index = [k / counts[2] / counts[1], k / counts[2] % counts[1], k % counts[2]];
-            let middle = low + (DVec3::from_array(index.map(|place| place as f64)) + 0.5) * side;
-            cube(model, middle, 0.5 * side, slack)
+        let cubes = (0..counts[0] * counts[1]).into_par_iter().flat_map_iter(|line| {
+            let mut near = None;
+            (0..counts[2]).map(move |k| {
+                let index = [line / counts[1], line % counts[1], k];
+                let middle = low + (DVec3::from_array(index.map(|place| place as f64)) + 0.5) * side;
+                let cube = cube(model, middle, 0.5 * side, slack, near);
+                near = Some(cube.triangle);
+                cube
+            })
         });
         Self { low, inverse_side: side.recip(), counts, cubes: cubes.collect() }
     }
@@ -92,11 +101,11 @@ impl DistanceBounds {
     }
 }
 
-/// The bound around `c`, `half` of a side to either side of it.
-fn cube(model: &Model, c: DVec3, half: f64, slack: f64) -> Cube {
+/// The bound around `c`, `half` of a side to either side of it; `near` is a triangle near by, if any is known.
+fn cube(model: &Model, c: DVec3, half: f64, slack: f64, near: Option<u32>) -> Cube {
     let corners = |t: u32| surface::corners(&model.rest, model.object.triangles[t as usize]);
     let offset = |t: u32, x: DVec3| x - point_at(corners(t), closest_point(x, corners(t)).weights);
-    let (s, triangle) = signed_distance(model, c);
+    let (s, triangle) = signed_distance(model, c, near);
     let reach = 3.0_f64.sqrt() * half;
     let nearest = offset(triangle, c);
     // The direction as it is stored.

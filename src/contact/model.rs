@@ -75,9 +75,11 @@ impl<'a> Model<'a> {
         if object.surface_nodes <= Self::WHOLE {
             return Ok(Self::new(object, chain, contact));
         }
-        let blind = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
-        let compliance = Compliance::on(object, reach::reached(&blind, configurations))?;
-        Ok(Self::with_compliance(object, chain, contact, compliance))
+        let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
+        model.compliance = Compliance::on(object, reach::reached(&model, configurations))?;
+        model.softest = softest(&model.compliance);
+        model.set_stiffness(contact.stiffness);
+        Ok(model)
     }
 
     /// Surface nodes up to which all of the compliance is formed: 0.3 GB, in some seconds.
@@ -103,14 +105,12 @@ impl<'a> Model<'a> {
                     surface::pseudonormal(&rest, triangles, &object.topology, t, Feature::Vertex(k));
             }
         }
-        let diagonal = |k: usize| compliance.entries[k * compliance.order + k];
-        let softest =
-            (0..compliance.nodes.len()).map(|j| (3 * j..3 * j + 3).map(diagonal).sum::<f64>()).fold(0.0, f64::max);
         let bounds = BoundingVolumes::new(&rest, triangles);
         let facets = triangles.iter().map(|nodes| Facet::new(surface::corners(&rest, *nodes))).collect();
         let mut model = Self {
             object,
             chain,
+            softest: softest(&compliance),
             compliance,
             contact,
             kc: 0.0,
@@ -118,7 +118,6 @@ impl<'a> Model<'a> {
             centre,
             extent,
             rest,
-            softest,
             bounds,
             facets,
             distance_bounds: DistanceBounds::none(),
@@ -165,4 +164,10 @@ impl<'a> Model<'a> {
             Feature::Vertex(k) => self.rest_pseudonormals[self.object.triangles[t][k] as usize],
         }
     }
+}
+
+/// Largest trace of a node's own block [m/N].
+fn softest(compliance: &Compliance) -> f64 {
+    let diagonal = |k: usize| compliance.entries[k * compliance.order + k];
+    (0..compliance.nodes.len()).map(|j| (3 * j..3 * j + 3).map(diagonal).sum()).fold(0.0, f64::max)
 }
