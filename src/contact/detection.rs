@@ -241,7 +241,10 @@ impl Detection {
                 }
             }
             let mut closest = Closest::none();
-            closest.consider(x, positions, &model.object.triangles, standing.last);
+            // None was closest where the pass before was not a number.
+            if (standing.last as usize) < model.object.triangles.len() {
+                closest.consider(x, positions, &model.object.triangles, standing.last);
+            }
             let distance = closest.distance_squared.sqrt();
             let feels = walls == Walls::All && radius > 0.0 && !smooth;
             let wanted = |spread: f64| match () {
