@@ -118,7 +118,7 @@ pub(super) fn spacing(accuracy: &Accuracy) -> Canvas {
     let mut canvas = sheet(
         "Error of the rendered torque against grid spacing",
         &format!(
-            "{} random configurations; rms torque {:.3} N m; the reference itself errs by {:.0e} N m",
+            "{} random configurations; rms torque {:.3} N m, known to {:.0e}",
             accuracy.configurations, accuracy.torque, accuracy.reference_error
         ),
     );
