@@ -26,13 +26,13 @@ pub struct Arguments {
     time: f64,
 }
 
-/// Least and greatest side of a picture [points].
-const SIDES: std::ops::RangeInclusive<f32> = 400.0..=4000.0;
+/// Greatest side of a picture [points].
+const GREATEST: f32 = 4000.0;
 
 fn size(text: &str) -> Result<[f32; 2], String> {
     let sides = text.split_once('x').and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]));
-    let within = |sides: &[f32; 2]| sides.iter().all(|side| SIDES.contains(side));
-    sides.filter(within).ok_or_else(|| "give two sides from 400 to 4000 points, such as 1280x800".into())
+    let within = |sides: &[f32; 2]| sides.iter().all(|side| (0.0..=GREATEST).contains(side));
+    sides.filter(within).ok_or_else(|| "give two sides of at most 4000 points, such as 1280x800".into())
 }
 
 /// Opens the window, or draws it.
@@ -46,6 +46,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     if !(0.0..=60.0).contains(&arguments.time) {
         return Err(format!("cannot play {} s: give --time from 0 to 60", arguments.time).into());
+    }
+    let [least_width, least_height] = viewer::LEAST_WINDOW;
+    if arguments.size[0] < least_width || arguments.size[1] < least_height {
+        return Err(
+            format!("the window has no room below {least_width}x{least_height} points: give a larger --size").into()
+        );
     }
     let picture = Picture {
         size: arguments.size,

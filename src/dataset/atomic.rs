@@ -8,25 +8,63 @@ use std::{
     io::{self, BufWriter, Write},
     path::Path,
 };
+use tempfile::{NamedTempFile, TempPath};
 
 /// Buffer between the writer and the file [bytes].
 pub(crate) const BUFFER: usize = 1 << 20;
 
-/// Replaces the file at `path` by what `write` writes.
+/// A file that is to appear.
+#[derive(Clone, Copy, Debug)]
+pub struct Target<'a> {
+    path: &'a Path,
+    growing: Option<&'a Path>,
+}
+
+impl<'a, P: AsRef<Path> + ?Sized> From<&'a P> for Target<'a> {
+    fn from(path: &'a P) -> Self {
+        Self { path: path.as_ref(), growing: None }
+    }
+}
+
+impl<'a> Target<'a> {
+    /// The file is called `growing` until it is whole. Nobody else may write there meanwhile; what a killed process has left there
+    /// is overwritten.
+    #[must_use]
+    pub fn growing(path: &'a Path, growing: &'a Path) -> Self {
+        Self { path, growing: Some(growing) }
+    }
+
+    /// The file's path.
+    #[must_use]
+    pub fn path(&self) -> &'a Path {
+        self.path
+    }
+}
+
+/// Replaces the file `target` by what `write` writes. Unless the target says otherwise, it grows under a name that no other file has.
 ///
 /// # Errors
 /// What `write` or the system says; then the old file is untouched and the temporary one is gone.
-pub fn replace_file(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
+pub fn replace_file<'a>(
+    target: impl Into<Target<'a>>,
+    write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
+) -> io::Result<()> {
+    let Target { path, growing } = target.into();
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".haptize-").suffix(".tmp");
-    // Like any other new file: readable by whom the umask allows, not by the owner alone.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let temporary = builder.tempfile_in(folder)?;
+    let temporary = match growing {
+        Some(growing) => NamedTempFile::from_parts(File::create(growing)?, TempPath::try_from_path(growing)?),
+        None => {
+            let mut builder = tempfile::Builder::new();
+            builder.prefix(".haptize-").suffix(".tmp");
+            // Like any other new file: readable by whom the umask allows, not by the owner alone.
+            #[cfg(unix)]
+            builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+            builder.tempfile_in(folder)?
+        }
+    };
     let mut writer = BufWriter::with_capacity(BUFFER, temporary.as_file());
     write(&mut writer)?;
     writer.flush()?;
@@ -63,6 +101,25 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["a.bin"]);
         replace_file(&path, |w| w.write_all(b"new")).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"new");
+        assert_eq!(names(folder.path()), ["a.bin"]);
+    }
+
+    #[test]
+    fn a_file_that_grows_under_a_given_name_overwrites_what_is_left_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, growing) = (folder.path().join("a.bin"), folder.path().join("a.bin.new"));
+        std::fs::write(&growing, b"left by a killed process").unwrap();
+        let target = Target::growing(&path, &growing);
+        let full = replace_file(target, |_| Err(io::Error::from(io::ErrorKind::StorageFull)));
+        assert_eq!(full.unwrap_err().kind(), io::ErrorKind::StorageFull);
+        assert!(names(folder.path()).is_empty());
+        std::fs::write(&growing, b"left by a killed process").unwrap();
+        replace_file(target, |w| {
+            assert_eq!(names(folder.path()), ["a.bin.new"]);
+            w.write_all(b"new")
+        })
+        .unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
         assert_eq!(names(folder.path()), ["a.bin"]);
     }

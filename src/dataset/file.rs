@@ -27,14 +27,13 @@
 //! A mapped file must not be cut short by anyone while it is open: the system then kills the reader (SIGBUS). Programs
 //! of this crate never do that, they rename; the haptic loop reads through [`Dataset::load`], which copies.
 
-use super::{Column, Contacts, Dataset, Error, Grid, Provenance, Surface, check, replace_file};
+use super::{Column, Contacts, Dataset, Error, Grid, Provenance, Surface, Target, check, replace_file};
 use bytemuck::Pod;
 use safetensors::{Dtype, tensor::TensorInfo};
 use serde::Serialize;
 use std::{
     collections::BTreeMap,
     io::{self, Seek, SeekFrom, Write},
-    path::Path,
 };
 
 #[cfg(target_endian = "big")]
@@ -150,14 +149,15 @@ pub(super) fn bytes(dataset: &Dataset) -> usize {
 }
 
 impl Dataset {
-    /// Writes the dataset, replacing the file at `path` whole or not at all.
+    /// Writes the dataset, replacing the file `target` whole or not at all.
     ///
     /// # Errors
     /// [`Error::Inconsistent`] when it would be refused on reading, [`Error::Write`] from the system.
-    pub fn save(&self, path: &Path) -> Result<(), Error> {
-        check::check(self).map_err(|reason| Error::Inconsistent { path: path.into(), reason })?;
+    pub fn save<'a>(&self, target: impl Into<Target<'a>>) -> Result<(), Error> {
+        let target = target.into();
+        check::check(self).map_err(|reason| Error::Inconsistent { path: target.path().into(), reason })?;
         let heading = Heading { grid: &self.grid, provenance: &self.provenance, scene: &self.scene };
-        write_file(path, heading, tensors(self))
+        write_file(target, heading, tensors(self))
     }
 }
 
@@ -169,12 +169,13 @@ pub(crate) struct Heading<'a> {
     pub(crate) scene: &'a str,
 }
 
-/// Writes a dataset's file, replacing the one at `path` whole or not at all. The tensors are as in the table above, in any order.
+/// Writes a dataset's file, replacing the one that is `target` whole or not at all. The tensors are as in the table above, in any order.
 pub(crate) fn write_file<C: Contents>(
-    path: &Path,
+    target: Target<'_>,
     heading: Heading<'_>,
     mut tensors: Vec<Tensor<C>>,
 ) -> Result<(), Error> {
+    let path = target.path();
     let inconsistent = |reason| Error::Inconsistent { path: path.into(), reason };
     tensors.sort_by_key(|tensor| std::cmp::Reverse(tensor.dtype.bitsize()));
     let mut text = header(heading, &tensors).map_err(|error| inconsistent(error.to_string()))?;
@@ -182,7 +183,7 @@ pub(crate) fn write_file<C: Contents>(
     if text.len() > MAX_HEADER {
         return Err(inconsistent(format!("its header, scene included, is longer than {MAX_HEADER} bytes")));
     }
-    replace_file(path, |writer| {
+    replace_file(target, |writer| {
         let mut hashed = Hashed { writer: &mut *writer, hasher: crc32fast::Hasher::new(), bytes: 0 };
         hashed.write_all(&(text.len() as u64).to_le_bytes())?;
         hashed.write_all(&text)?;

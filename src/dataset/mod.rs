@@ -17,7 +17,7 @@ mod read;
 mod summary;
 
 pub(crate) use atomic::BUFFER;
-pub use atomic::replace_file;
+pub use atomic::{Target, replace_file};
 pub use column::Column;
 pub use error::Error;
 pub use export::Format;

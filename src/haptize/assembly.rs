@@ -5,10 +5,9 @@ use super::{
     columns::{Section, Shape},
     part::{self, Part},
 };
-use crate::dataset::{self, Heading, Surface, Tensor, TensorContents, write_file};
+use crate::dataset::{self, Heading, Surface, Target, Tensor, TensorContents, write_file};
 use std::{
     io::{self, Read, Write},
-    path::Path,
     sync::atomic::{AtomicBool, Ordering},
 };
 
@@ -25,7 +24,7 @@ pub(super) struct Results<'a> {
 
 impl Results<'_> {
     /// Writes all points as the dataset `output`.
-    pub fn assemble(&self, output: &Path, heading: Heading<'_>, surface: &Surface) -> Result<(), dataset::Error> {
+    pub fn assemble(&self, output: Target<'_>, heading: Heading<'_>, surface: &Surface) -> Result<(), dataset::Error> {
         let of = |section| Contents::Section(self, section);
         let grid = heading.grid.counts();
         let mut tensors = vec![

@@ -85,8 +85,18 @@ pub enum SweepError {
         /// The part.
         path: PathBuf,
     },
+    /// A part is there already, and was not to be continued.
+    #[error(
+        "{path}: holds what an unfinished bake has solved; add --resume to go on with it, or delete it to begin anew"
+    )]
+    Unfinished {
+        /// The part.
+        path: PathBuf,
+    },
     /// A file in the part's place that is none.
-    #[error("{path}: cannot be continued: {reason}; move it away, or bake without --resume")]
+    #[error(
+        "{path}: is in the way of the bake and cannot be continued: {reason}; move it away, or choose another output"
+    )]
     ForeignPart {
         /// The part.
         path: PathBuf,
@@ -94,7 +104,7 @@ pub enum SweepError {
         reason: String,
     },
     /// The part of another sweep.
-    #[error("{path}: cannot be continued, it was begun with {difference}; restore that, or bake without --resume")]
+    #[error("{path}: cannot be continued, it was begun with {difference}; restore that, or delete it to begin anew")]
     OtherPart {
         /// The part.
         path: PathBuf,

@@ -76,7 +76,7 @@ pub(super) struct Part {
 
 impl Part {
     /// Begins a part at `path`, or with `resume` continues the one that is there, and counts its points; `binding` then takes its
-    /// date and notices.
+    /// date and notices. Results that are there are never thrown away: without `resume` they are an error.
     pub fn open(path: &Path, resume: bool, binding: &mut Binding) -> Result<(Self, Tally), SweepError> {
         let failed = |source| SweepError::Part { path: path.into(), source };
         let file = OpenOptions::new()
@@ -93,6 +93,9 @@ impl Part {
             Err(TryLockError::Error(_)) => (),
         }
         let mut part = Self { path: path.into(), file, results: 0, contacts: 0 };
+        if !resume && part.holds_results()? {
+            return Err(SweepError::Unfinished { path: path.into() });
+        }
         let found = if resume { part.read(binding)? } else { None };
         match found {
             Some(tally) => Ok((part, tally)),
@@ -202,26 +205,46 @@ impl Part {
         Ok(())
     }
 
-    /// Reads the part from its start, cuts off what is not whole, and leaves the file there; `None` when nothing is.
-    fn read(&mut self, binding: &mut Binding) -> Result<Option<Tally>, SweepError> {
+    /// The binding of the file that is there, which `reader` then stands behind with `left` bytes left; `None` when the file
+    /// ends before its binding does.
+    fn opening(&self, reader: &mut impl Read, left: &mut u64) -> Result<Option<Binding>, SweepError> {
         let failed = |source| SweepError::Part { path: self.path.clone(), source };
-        let mut left = self.file.metadata().map_err(failed)?.len();
-        let mut reader = BufReader::new(&self.file);
         let mut magic = Vec::new();
-        (&mut reader).take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(failed)?;
+        reader.take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(failed)?;
         if magic != MAGIC {
             // Killed while it wrote its first line; anything else is not ours to overwrite.
             return if MAGIC.starts_with(&magic) { Ok(None) } else { Err(self.foreign("it is no part of a bake")) };
         }
-        left -= MAGIC.len() as u64;
-        let mut whole = MAGIC.len() as u64;
+        *left -= MAGIC.len() as u64;
+        let Some(body) = frame(reader, left).map_err(failed)? else { return Ok(None) };
+        serde_json::from_slice(&body).map(Some).map_err(|error| self.foreign(&error.to_string()))
+    }
+
+    /// Whether there is anything behind the binding.
+    fn holds_results(&self) -> Result<bool, SweepError> {
+        let mut left = self.length()?;
+        Ok(self.opening(&mut BufReader::new(&self.file), &mut left)?.is_some() && left > 0)
+    }
+
+    /// [bytes]
+    fn length(&self) -> Result<u64, SweepError> {
+        let metadata = self.file.metadata().map_err(|source| SweepError::Part { path: self.path.clone(), source })?;
+        Ok(metadata.len())
+    }
+
+    /// Reads the part from its start, cuts off what is not whole, and leaves the file there; `None` when nothing is.
+    fn read(&mut self, binding: &mut Binding) -> Result<Option<Tally>, SweepError> {
+        let failed = |source| SweepError::Part { path: self.path.clone(), source };
+        let length = self.length()?;
+        let mut left = length;
+        let mut reader = BufReader::new(&self.file);
+        let Some(found) = self.opening(&mut reader, &mut left)? else { return Ok(None) };
+        let mut whole = length - left;
         let mut next = |whole: &mut u64| -> Result<Option<Vec<u8>>, SweepError> {
             let body = frame(&mut reader, &mut left).map_err(failed)?;
             *whole += body.as_ref().map_or(0, |body| (FRAME + body.len()) as u64);
             Ok(body)
         };
-        let Some(body) = next(&mut whole)? else { return Ok(None) };
-        let found: Binding = serde_json::from_slice(&body).map_err(|error| self.foreign(&error.to_string()))?;
         if let Some(difference) = found.difference(binding) {
             return Err(SweepError::OtherPart { path: self.path.clone(), difference });
         }

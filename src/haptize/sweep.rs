@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     contact::Model,
-    dataset::{Axis, Contacts, Dataset, Grid, Heading, Provenance, Surface},
+    dataset::{Axis, Contacts, Dataset, Grid, Heading, Provenance, Surface, Target},
     object::Object,
     scene::{JointKind, Scene},
 };
@@ -190,9 +190,7 @@ impl<'a> Sweep<'a> {
     /// Where [`Sweep::bake`] keeps what it has of `output`.
     #[must_use]
     pub fn part_of(output: &Path) -> PathBuf {
-        let mut name = OsString::from(output);
-        name.push(".part");
-        name.into()
+        with_suffix(output, ".part")
     }
 
     /// Sweeps in memory.
@@ -222,7 +220,7 @@ impl<'a> Sweep<'a> {
     /// with the grid.
     ///
     /// With `resume` it continues from such a part; the file is then the same, bit for bit, as without the interruption,
-    /// the date of the beginning included. Without a part it begins.
+    /// the date of the beginning included. Without a part it begins. Without `resume` a part that holds results is an error.
     ///
     /// # Errors
     /// Any [`SweepError`]; the part then keeps what is done, and an earlier file `output` is untouched.
@@ -257,6 +255,9 @@ impl<'a> Sweep<'a> {
         }
         let footprint = self.footprint(run.chunk, false);
         let begun = Begun { tally, provenance };
+        // Nobody else writes there: the part is locked.
+        let growing = with_suffix(output, ".growing");
+        let target = Target::growing(output, &growing);
         let stop = run.stop;
         let kept_in = part.path().to_path_buf();
         let unwritten = |source, points| {
@@ -272,14 +273,14 @@ impl<'a> Sweep<'a> {
             let kept = Kept { store: &mut part, resumed };
             let (columns, report, provenance) = refinement::fill(self, filling, backend, run, begun, kept)?;
             let dataset = self.dataset(columns, provenance);
-            dataset.save(output).map_err(|source| unwritten(source, report.points))?;
+            dataset.save(target).map_err(|source| unwritten(source, report.points))?;
             part.remove()?;
             return Ok(report);
         }
         let (report, provenance) = self.solve(backend, run, begun, footprint, &mut part)?;
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
         let results = Results { part: &part, shape: self.shape, stop };
-        results.assemble(output, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
+        results.assemble(target, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
         part.remove()?;
         Ok(report)
     }
@@ -313,4 +314,10 @@ impl<'a> Sweep<'a> {
             provenance,
         }
     }
+}
+
+fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = OsString::from(path);
+    name.push(suffix);
+    name.into()
 }

@@ -111,31 +111,44 @@ pub fn sliders(ui: &mut Ui, axes: &[Axis], chosen: Option<usize>, gains: &mut Ha
     }
 }
 
-/// Everything to the right of the mark may create energy.
+/// Everything to the right of the mark may create energy. Joints whose gains in the scene differ, in unit or in size, share a
+/// slider of what all are multiplied by.
 fn slider(ui: &mut Ui, gain: &Gain, axes: &[Axis], joints: &[usize], gains: &mut HapticsSpec, original: &HapticsSpec) {
-    let first = joints[0];
-    let bound = joints.iter().filter_map(|&joint| (gain.bound)(gains, joint)).reduce(f64::min);
-    let mut value = (gain.of)(gains)[first];
-    let from = (gain.of)(&mut original.clone())[first];
-    let end = (HEADROOM * from.max(bound.unwrap_or(0.0))).max(LEAST_END);
-    let unit = theme::units(joints.iter().map(|&joint| {
+    let unit = |joint: usize| {
         let axis = &axes[joint];
         format!("{}{}/{}", axis.effort_unit(), if gain.damps { " s" } else { "" }, axis.unit)
-    }));
+    };
+    let from = *(gain.of)(&mut original.clone());
+    let differ = joints.windows(2).any(|pair| from[pair[0]] != from[pair[1]] || unit(pair[0]) != unit(pair[1]));
+    let multiplied = differ && joints.iter().all(|&joint| from[joint] > 0.0);
+    let one = |joint: usize| if multiplied { from[joint] } else { 1.0 };
+    let unit = if multiplied { "times the scene's".into() } else { theme::units(joints.iter().copied().map(unit)) };
+
+    let values = *(gain.of)(gains);
+    let (mut bound, mut beyond) = (None, false);
+    for &joint in joints {
+        if let Some(here) = (gain.bound)(gains, joint) {
+            bound = Some(bound.map_or(f64::MAX, |least: f64| least).min(here / one(joint)));
+            beyond |= values[joint] > here;
+        }
+    }
+    let first = joints[0];
+    let mut value = values[first] / one(first);
+    let end = (HEADROOM * (from[first] / one(first)).max(bound.unwrap_or(0.0))).max(LEAST_END);
     ui.add_space(FINE_GAP);
     let name = format!("{} [{unit}]", gain.name);
     let typed = Typed { greatest: TYPED * end, speed: DRAG * end, decimals: 0..=4 };
     let (response, changed) = row(ui, [gain.name, &name], &mut value, end, typed);
     match bound {
         Some(bound) => {
-            mark(ui, &response, bound / end, value > bound);
+            mark(ui, &response, bound / end, beyond);
             response.on_hover_text(format!("{}. Bound here: {} {unit}", gain.what, number(bound)));
         }
         None => drop(response.on_hover_text(gain.what)),
     }
     if changed {
         let least = if gain.positive { LEAST_SHARE * end } else { 0.0 };
-        joints.iter().for_each(|&joint| (gain.of)(gains)[joint] = value.max(least));
+        joints.iter().for_each(|&joint| (gain.of)(gains)[joint] = value.max(least) * one(joint));
     }
 }
 

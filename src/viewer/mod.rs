@@ -53,7 +53,7 @@ pub use app::{Rescue, Start, Viewer};
 pub use eframe::egui_wgpu::RenderState;
 pub use feel::Pace;
 pub use offscreen::{Picture, render_state, screenshot};
-pub use theme::apply as dress;
+pub use theme::{LEAST_WINDOW, apply as dress};
 pub use window::open;
 
 use crate::gpu::{FrameError, GpuError};

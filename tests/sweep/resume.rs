@@ -85,14 +85,43 @@ fn a_part_of_another_sweep_is_refused_with_the_difference() {
     let mut paper = scene();
     paper.contact.algorithm = haptize::scene::Algorithm::Paper;
     assert_eq!(refused(&sweep_of(&paper, "none", date)), "another algorithm");
-    // A refusal changes nothing; baking anew replaces.
+    // A refusal changes nothing.
     assert_eq!(
         bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 9, usize::MAX).unwrap().resumed_points,
         3
     );
+}
+
+#[test]
+fn what_an_unfinished_bake_has_solved_is_not_thrown_away() {
     let folder = stopped_after(3);
-    let anew = sweep_of(&scene(), "other", date);
-    assert_eq!(bake(&anew, &mut MadeUp::default(), &folder.output(), false, 9, usize::MAX).unwrap().resumed_points, 0);
+    let kept = std::fs::read(folder.part()).unwrap();
+    let error = bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 9, usize::MAX).unwrap_err();
+    assert!(matches!(error, SweepError::Unfinished { .. }), "{error}");
+    assert!(error.to_string().contains("--resume") && error.to_string().contains("delete it"), "{error}");
+    assert!(std::fs::read(folder.part()).unwrap() == kept);
+    // Nor is a file that is none of ours; one that holds nothing yet is.
+    std::fs::write(folder.part(), "my notes").unwrap();
+    let error = bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 9, usize::MAX).unwrap_err();
+    assert!(matches!(error, SweepError::ForeignPart { .. }), "{error}");
+    assert_eq!(std::fs::read(folder.part()).unwrap(), b"my notes");
+    let binding = kept.len() - frames(&kept)[1..].iter().sum::<usize>();
+    for length in [0, 7, 40, binding] {
+        std::fs::write(folder.part(), &kept[..length]).unwrap();
+        bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 9, usize::MAX).unwrap();
+        assert_eq!(folder.names(), ["a.haptize"], "{length} bytes");
+    }
+}
+
+/// Lengths of the frames of a part [bytes].
+fn frames(part: &[u8]) -> Vec<usize> {
+    let mut left = &part[part.iter().position(|&byte| byte == b'\n').unwrap() + 1..];
+    let mut lengths = Vec::new();
+    while let Some((length, _)) = left.split_first_chunk() {
+        lengths.push(12 + u64::from_le_bytes(*length) as usize);
+        left = &left[lengths[lengths.len() - 1]..];
+    }
+    lengths
 }
 
 #[cfg(unix)]

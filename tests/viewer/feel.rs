@@ -102,6 +102,28 @@ fn gains_beyond_their_bound_are_told_and_taken_back() {
     assert!(window.shows("All gains within their passivity bounds"));
 }
 
+/// Joints may differ in unit: one number for all would be nonsense.
+#[test]
+fn gains_that_differ_between_joints_are_multiplied_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("three.toml");
+    let scene = small_scene();
+    let (old, new) = ("coupling_stiffness = 20.0", "coupling_stiffness = [10.0, 16.0, 20.0]");
+    assert!(scene.contains(old));
+    std::fs::write(&file, scene.replace(old, new)).unwrap();
+    let mut window = Window::open(&Start::File(file), [1200.0, 800.0], Theme::Light);
+    assert!(window.shows("Coupling stiffness Kvc [times the scene's]"));
+    assert!(window.shows("Boundary slope Ks [N m/rad]"));
+    window.harness.get_by_role_and_label(Role::Slider, "Coupling stiffness Kvc").set_value_accesskit(0.5);
+    window.harness.step();
+    window.wait();
+    for (joint, gain) in [("yaw", 5.0), ("shoulder", 8.0), ("elbow", 10.0)] {
+        window.choose("Joint", joint);
+        let slider = window.harness.get_by_role_and_label(Role::Slider, "Coupling stiffness Kvc");
+        assert_eq!(slider.accesskit_node().numeric_value(), Some(gain), "{joint}");
+    }
+}
+
 #[test]
 fn each_interpolation_is_felt_and_has_its_cost_of_a_tick() {
     // Torques from shortly before contact on, with the last of these choices.
