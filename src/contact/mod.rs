@@ -56,6 +56,18 @@ impl Status {
         let all = [Self::Free, Self::Contact, Self::Unconverged, Self::Overflow, Self::Outside, Self::Filled];
         all.into_iter().nth(number.into())
     }
+
+    /// Whether the proxy touches the object, solved for or not.
+    #[must_use]
+    pub fn is_in_contact(self) -> bool {
+        matches!(self, Self::Contact | Self::Filled) || self.is_failed()
+    }
+
+    /// Whether there is contact whose torque is not to be trusted.
+    #[must_use]
+    pub fn is_failed(self) -> bool {
+        matches!(self, Self::Unconverged | Self::Overflow)
+    }
 }
 
 /// Equilibrium of the object with the proxy at one configuration.

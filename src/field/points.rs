@@ -29,7 +29,7 @@ impl Point {
             Status::Unconverged | Status::Overflow => Flags::UNCONVERGED,
             Status::Outside => Flags::ABSENT,
         };
-        let in_contact = matches!(status, Status::Contact | Status::Unconverged | Status::Overflow | Status::Filled);
+        let in_contact = status.is_in_contact();
         Self { contacts, flags, in_contact, touching: in_contact }
     }
 

@@ -71,7 +71,7 @@ type Worth = (bool, f64);
 impl Tally {
     fn count(&mut self, dataset: &Dataset, point: usize) {
         self.points += 1;
-        self.contacts += usize::from(touching(dataset.status(point)));
+        self.contacts += usize::from(dataset.status(point).is_in_contact());
         let size = torque_size(dataset, point);
         self.torque += if size.is_finite() { size } else { 0.0 };
     }
@@ -179,7 +179,7 @@ impl Slice {
             (_, Status::Outside) => f64::NAN,
             (Some(gap), _) => f64::from(gap[point]),
             (None, status) => {
-                if touching(status) {
+                if status.is_in_contact() {
                     -0.5
                 } else {
                     0.5
@@ -231,7 +231,7 @@ impl Slice {
         if !self.boundary(dataset, self.cells(dataset)).is_empty() {
             entries.push(entry("contact boundary", colour::INK, Mark::Line));
         }
-        if !statuses().any(touching) {
+        if !statuses().any(Status::is_in_contact) {
             entries.push(entry("no grid point is in contact", colour::WHITE, Mark::Box));
         }
         if statuses().any(|status| status == Status::Unconverged) {
@@ -250,11 +250,6 @@ impl Slice {
 /// Distance between neighbours along an axis, in point numbers.
 fn pitch(dataset: &Dataset, axis: usize) -> usize {
     dataset.grid.axes[axis + 1..].iter().map(|axis| axis.count).product()
-}
-
-/// Whether the proxy touches the object, solved for or not.
-pub(super) fn touching(status: Status) -> bool {
-    matches!(status, Status::Contact | Status::Unconverged | Status::Overflow | Status::Filled)
 }
 
 /// Whether the chain has revolute and prismatic joints.
@@ -289,8 +284,8 @@ fn line(dataset: &Dataset) -> Canvas {
     let curve = Curve { name: String::new(), colour: colour::series(0), dashed: false, points: points.collect() };
     let numbers: Vec<usize> = (0..axis.count).collect();
     let shaded = numbers
-        .chunk_by(|&a, &b| touching(dataset.status(a)) == touching(dataset.status(b)))
-        .filter(|run| touching(dataset.status(run[0])))
+        .chunk_by(|&a, &b| dataset.status(a).is_in_contact() == dataset.status(b).is_in_contact())
+        .filter(|run| dataset.status(run[0]).is_in_contact())
         .map(|run| [axis.coordinate(run[0]), axis.coordinate(run[run.len() - 1])])
         .collect();
     Stack {

@@ -13,7 +13,7 @@ use super::{
     plot::{self, Entry, Mark},
     press::{subscript, torque_unit},
     raster::{Camera, Raster},
-    slices::{is_mixed, torque_size, touching},
+    slices::{is_mixed, torque_size},
     ticks,
 };
 use crate::{contact::Status, dataset::Dataset, report::PIXELS};
@@ -84,7 +84,7 @@ const UNTRUSTED: colour::Colour = colour::Colour::hex(0xd5_5e_00);
 fn points_in_contact(dataset: &Dataset) -> Vec<usize> {
     let pitch: usize = dataset.grid.axes.iter().skip(3).map(|axis| axis.count).product();
     let mut of_slice: HashMap<usize, usize> = HashMap::new();
-    let touching = |point: &usize| touching(dataset.status(*point));
+    let touching = |point: &usize| dataset.status(*point).is_in_contact();
     for point in (0..dataset.grid.points()).filter(touching) {
         *of_slice.entry(point % pitch.max(1)).or_default() += 1;
     }
@@ -95,7 +95,7 @@ fn points_in_contact(dataset: &Dataset) -> Vec<usize> {
 
 fn caption(dataset: &Dataset, shown: &[usize]) -> String {
     let grid = &dataset.grid;
-    let all = (0..grid.points()).filter(|&point| touching(dataset.status(point))).count();
+    let all = (0..grid.points()).filter(|&point| dataset.status(point).is_in_contact()).count();
     let mut text = format!("{} of {} configurations in contact", thousands(all), thousands(grid.points()));
     if all == 0 {
         text = format!("none of {} configurations in contact", thousands(grid.points()));

@@ -4,7 +4,6 @@
 
 use super::{
     camera::Camera,
-    column::untrusted,
     loaded::Loaded,
     number, palette,
     slices::gradient,
@@ -30,6 +29,9 @@ const DOT: f32 = 0.4;
 const DOTS: [f32; 2] = [1.0, 6.0];
 const LEAST_SHARE: f64 = 0.45;
 
+/// Radius of a dot that was filled over that of one that was solved [1].
+const FILLED: f32 = 0.45;
+
 /// Most dots that are shown: more overlap one another, and cost frames.
 const MOST: usize = 12_000;
 
@@ -52,15 +54,16 @@ struct Point {
     /// In the box from -1 to 1.
     place: Vec3,
     torque: f64,
-    trusted: bool,
+    status: Status,
 }
 
 impl Cloud {
     /// The cloud of `dataset`.
     #[must_use]
     pub fn new(dataset: &Dataset) -> Self {
-        let contact = || (0..dataset.grid.points()).filter(|&point| dataset.status(point) == Status::Contact);
-        let high = contact().map(|point| size(dataset, point)).fold(0.0, f64::max);
+        let contact = || (0..dataset.grid.points()).filter(|&point| dataset.status(point).is_in_contact());
+        let trusted = contact().filter(|&point| !dataset.status(point).is_failed());
+        let high = trusted.map(|point| size(dataset, point)).fold(0.0, f64::max);
         let axes = &dataset.grid.axes;
         let others: usize = axes.iter().skip(3).map(|axis| axis.count).product();
         Self { camera: home(), points: None, pitch: pitch(contact().count() / others, axes.len().min(3)), high }
@@ -115,18 +118,21 @@ impl Cloud {
         let radius = (DOT * cell / self.camera.height_at_target() * rect.height()).clamp(DOTS[0], DOTS[1]);
         for (at, _, point) in dots {
             let share = (point.torque / self.high.max(f64::MIN_POSITIVE)).cbrt().clamp(LEAST_SHARE, 1.0) as f32;
-            let colour = if point.trusted { palette::egui_colour(map.colour(point.torque)) } else { palette.flagged };
+            let colour =
+                if point.status.is_failed() { palette.flagged } else { palette::egui_colour(map.colour(point.torque)) };
+            let share = if point.status == Status::Filled { FILLED * share } else { share };
             painter.circle_filled(at, radius * share, colour);
         }
         let (here, _) = show(place(dataset, q));
         for (radius, colour) in palette::ring(&palette) {
             painter.circle_filled(here, radius, colour);
         }
-        if self.pitch > 1 {
-            let note = format!("every {}th grid line", self.pitch);
-            let at = rect.left_top() + vec2(GAP, GAP);
-            painter.text(at, Align2::LEFT_TOP, note, theme::small(), ui.visuals().weak_text_color());
-        }
+        let pitch = (self.pitch > 1).then(|| format!("one grid line in {}", self.pitch));
+        let filled =
+            points.iter().any(|point| point.status == Status::Filled).then(|| "small: filled, not solved".into());
+        let note = pitch.into_iter().chain(filled).collect::<Vec<String>>().join("\n");
+        let at = rect.left_top() + vec2(GAP, GAP);
+        painter.text(at, Align2::LEFT_TOP, note, theme::small(), ui.visuals().weak_text_color());
         let unit = grid.axes.first().map_or("N m", |axis| axis.effort_unit());
         let bar = Rect::from_min_size(rect.right_top() + BAR_AT, vec2(BAR_WIDTH, COLOUR_BAR));
         gradient(&painter, bar, map, true);
@@ -207,7 +213,7 @@ fn pitch(count: usize, axes: usize) -> usize {
     share.powf(1.0 / axes.max(1) as f64).ceil().max(1.0) as usize
 }
 
-/// Configurations that are not free, on every `pitch`th grid line of the first three joints.
+/// Configurations in contact, on every `pitch`th grid line of the first three joints.
 fn points(dataset: &Dataset, others: &[usize], pitch: usize) -> Vec<Point> {
     let axes = &dataset.grid.axes[..dataset.grid.axes.len().min(3)];
     let is_on_a_line = |block: &usize| {
@@ -223,11 +229,11 @@ fn points(dataset: &Dataset, others: &[usize], pitch: usize) -> Vec<Point> {
     (0..dataset.grid.points() / block)
         .filter(is_on_a_line)
         .map(|number| number * block + within)
-        .filter(|&point| !matches!(dataset.status(point), Status::Free | Status::Outside))
+        .filter(|&point| dataset.status(point).is_in_contact())
         .map(|point| Point {
             place: place(dataset, &dataset.grid.configuration(point)),
             torque: size(dataset, point),
-            trusted: !untrusted(dataset.status(point)),
+            status: dataset.status(point),
         })
         .collect()
 }

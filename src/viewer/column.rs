@@ -85,12 +85,6 @@ impl Column {
     }
 }
 
-/// Whether a point's numbers are not to be trusted.
-#[must_use]
-pub fn untrusted(status: Status) -> bool {
-    matches!(status, Status::Unconverged | Status::Overflow)
-}
-
 /// Colour of a status wherever statuses are told by colour.
 #[must_use]
 pub fn status_colour(status: Status, palette: &Palette) -> Color32 {

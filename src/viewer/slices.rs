@@ -2,7 +2,7 @@
 //! configuration or is set by a slider. A cell is a grid point with the number that is stored there, not interpolated.
 
 use super::{
-    column::{Column, status_colour, untrusted},
+    column::{Column, status_colour},
     history::History,
     loaded::Loaded,
     number,
@@ -181,7 +181,7 @@ impl Slices {
         let place = |q: &JointVector| if single { [q[0], 0.5] } else { [q[self.axes[0]], q[self.axes[1]]] };
         let trail: Vec<[f64; 2]> = history.recent(TRAIL, TRAIL_POINTS).map(|tick| place(&tick.proxy)).collect();
         let flagged: Vec<[f64; 2]> = plane(grid, key)
-            .filter(|&(_, point)| untrusted(loaded.dataset.status(point)))
+            .filter(|&(_, point)| loaded.dataset.status(point).is_failed())
             .map(|(_, point)| place(&grid.configuration(point)))
             .collect();
         let here = place(q);

@@ -175,7 +175,7 @@ pub(super) fn fill<B: Backend>(
             result.is_some_and(|result| forecast.error(point, result.torque) <= filling.tolerance)
         };
         let is_refined = |cell: &usize| {
-            let sound = level.corners(*cell).all(|corner| is_sound(record.status(corner)));
+            let sound = level.corners(*cell).all(|corner| !record.status(corner).is_failed());
             !sound || !foretold(level.centre(*cell), &record)
         };
         let mut refined: BTreeSet<usize> = doubtful.into_iter().filter(is_refined).collect();
@@ -210,11 +210,6 @@ pub(super) fn fill<B: Backend>(
     Ok((columns, SweepReport::of(&tally, facts, &provenance, &sweep.warnings), provenance))
 }
 
-/// Whether a result of `status` may foretell others.
-fn is_sound(status: Status) -> bool {
-    !matches!(status, Status::Unconverged | Status::Overflow)
-}
-
 /// Cells of `level` in which something is to be found out, ascending: with a corner that did not converge, or a point in contact
 /// halfway where linear interpolation and the potential differ by more than `tolerance`.
 fn doubtful_cells(level: &Level<'_>, forecast: &Forecast<'_>, record: &Record, tolerance: f64) -> Vec<usize> {
@@ -222,7 +217,7 @@ fn doubtful_cells(level: &Level<'_>, forecast: &Forecast<'_>, record: &Record, t
     let doubtful = |&cell: &usize| {
         let mut open = level.halfway(cell).filter(|&point| record.is_open(point)).peekable();
         open.peek().is_some()
-            && (level.corners(cell).any(|corner| !is_sound(record.status(corner)))
+            && (level.corners(cell).any(|corner| record.status(corner).is_failed())
                 || open.any(|point| forecast.doubt(point, record) > tolerance))
     };
     cells.into_par_iter().filter(doubtful).collect()
