@@ -10,33 +10,18 @@
 // Geometry frozen at rest: linearised contact.
 override FROZEN: bool = false;
 
-// Contact forces -kc depth w_j N on the object's nodes: columns.
-fn contact_forces(contact: Contact, kc: f32) -> mat3x3<f32> {
-    let force = contact.normal * (-kc * max(contact.depth, 0.0));
-    return mat3x3<f32>(force * contact.weights.x, force * contact.weights.y, force * contact.weights.z);
-}
-
-// A frozen row's contact at the displacement at hand.
-fn frozen_contact(row: Contact) -> Contact {
-    var contact = row;
-    for (var k = 0u; k < 3u; k += 1u) {
-        contact.depth += row.weights[k] * dot(row.normal, displacement[displacement_base + row.nodes[k]].xyz);
-    }
-    return contact;
-}
-
 // Brings support, contact forces and residual force up to date with a contact of each invocation; returns r . C r and
 // c . C c.
-fn balance(contact: Contact, kc: f32, local: u32) -> vec2<f32> {
-    assign_slots(acting_nodes(contact), local);
-    shares[local] = contact_forces(contact, kc);
-    workgroupBarrier();
+fn balance(contact: Spring, kc: f32, local: u32) -> vec2<f32> {
+    occupy(contact, local);
+    press(contact, kc, local);
+    sync();
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
         let force = gather(slot);
         vectors[at(IMAGE, slot)] = force;
         vectors[at(BALANCE, slot)] = force - vectors[at(FORCES, slot)];
     }
-    workgroupBarrier();
+    sync();
     var squares = vec4<f32>(0.0);
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
         let product = multiply(BALANCE, slot);
@@ -60,6 +45,7 @@ fn main(
     }
     displacement_base = place * parameters.surface_nodes;
     position_base = list[1u + parameters.first + place] * parameters.proxy_nodes;
+    begin(place, local);
     for (var slot = local; slot < SUPPORT; slot += WORKGROUP) {
         vectors[at(FORCES, slot)] = vec3<f32>(0.0);
     }
@@ -87,8 +73,8 @@ fn main(
         kc = min(kc, CONTINUATION_START / parameters.softest * greatest(radii, local));
     }
     var outcome = Outcome();
-    var contact = Contact();
-    var row = Contact();
+    var contact = Spring();
+    var row = Spring();
     var elastic = 0.0;
     var energy = 0.0;
     var square = 0.0;
@@ -99,6 +85,8 @@ fn main(
     var settled = false;
     var new_stage = false;
     var converged = false;
+    // Where the forces of the result are.
+    var result = FORCES;
     // Each pass takes up a new stage, or tries the forces in DIRECTION_FORCE, none at first; and then steps on.
     while overflow == 0u {
         let at_rest = outcome.iterations == 0u && !new_stage;
@@ -109,15 +97,11 @@ fn main(
             kc = min(parameters.kc, CONTINUATION_FACTOR * kc);
         } else {
             if !FROZEN || at_rest {
-                trial = deformed(moved, reach, local);
+                trial = detect(moved, reach, local);
             }
             if FROZEN {
                 if at_rest {
-                    row = trial;
-                    row.along = vec3<f32>(0.0);
-                    row.distance = 0.0;
-                    row.inverse_distance = 0.0;
-                    row.gradients = mat3x3<f32>();
+                    row = freeze(trial);
                 }
                 trial = frozen_contact(row);
             }
@@ -157,7 +141,7 @@ fn main(
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
                 vectors[at(FORCES, slot)] = vectors[at(DIRECTION_FORCE, slot)];
             }
-            workgroupBarrier();
+            sync();
             let squares = balance(contact, kc, local);
             square = squares.x;
             scale = max(sqrt(squares.y), RESIDUAL_FLOOR);
@@ -170,7 +154,7 @@ fn main(
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
                 vectors[at(DIRECTION_FORCE, slot)] = vectors[at(FORCES, slot)];
             }
-            workgroupBarrier();
+            sync();
             continue;
         }
         converged = kc == parameters.kc && outcome.residual <= parameters.tolerance;
@@ -204,21 +188,19 @@ fn main(
                 for (var slot = local; slot < support_count; slot += WORKGROUP) {
                     vectors[at(DIRECTION_FORCE, slot)] = vectors[at(FORCES, slot)];
                 }
-                workgroupBarrier();
+                sync();
                 continue;
             }
             elastic += work.x;
             contact.depth = after;
+            result = DIRECTION_FORCE;
             outcome.residual = step.length / scale;
             converged = true;
             break;
         }
     }
 
-    let used = u32(greatest(select(0.0, f32(local + 1u), contact.depth > 0.0), local));
-    if local < used {
-        write_touch(place, local, contact.nodes, contact.proxy_node, contact_forces(contact, kc));
-    }
+    let used = write_contacts(contact, kc, result, place, local);
     if local == 0u {
         outcome.status = select(STATUS_UNCONVERGED, STATUS_CONTACT, converged);
         outcome.elastic = elastic;

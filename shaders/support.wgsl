@@ -1,8 +1,11 @@
 // What the equilibrium stages share: one workgroup a configuration, the object nodes A that carry contact force, the
-// compliance among them, and contact with the deformed surface (twins: src/contact/support.rs and detection.rs).
+// compliance among them, and the closest triangle of the deformed surface (twins: src/contact/support.rs and detection.rs).
 //
 // Forces live on A only and displacement is u = C f. Every sum runs in the same order in every invocation, so that all
 // agree to the bit on what to do next, and barriers stay in uniform control flow.
+//
+// How contacts act on A is one of two parts: springs.wgsl, where facets are as they are, and blend.wgsl. They have the same
+// functions, and keep the vectors on A, of which `at(vector, slot)` is the place of an entry.
 
 // Invocations of the workgroup, and most proxy nodes in contact at a time: invocation k keeps contact k.
 override WORKGROUP: u32 = 32u;
@@ -10,8 +13,6 @@ override WORKGROUP: u32 = 32u;
 override SUPPORT: u32 = 64u;
 // Most contacts, at most WORKGROUP.
 override CONTACTS: u32 = 32u;
-// A size that follows; named, because naga 30 loses count of overrides in array sizes that are expressions.
-override VECTOR_ENTRIES: u32 = VECTORS * SUPPORT;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
 // Surface nodes at rest; then the bounding sphere (centre, radius) of each triangle; then each proxy node's radius in x.
@@ -40,24 +41,24 @@ var<workgroup> partial: array<vec4<f32>, WORKGROUP>;
 // Sum of `value` over the workgroup, in every invocation.
 fn add_up(value: vec4<f32>, local: u32) -> vec4<f32> {
     partial[local] = value;
-    workgroupBarrier();
+    sync();
     var sum = vec4<f32>(0.0);
     for (var k = 0u; k < parameters.lanes; k += 1u) {
         sum += partial[k];
     }
-    workgroupBarrier();
+    sync();
     return sum;
 }
 
 // Greatest `value` of the workgroup, in every invocation.
 fn greatest(value: f32, local: u32) -> f32 {
     partial[local].x = value;
-    workgroupBarrier();
+    sync();
     var most = partial[0].x;
     for (var k = 1u; k < parameters.lanes; k += 1u) {
         most = max(most, partial[k].x);
     }
-    workgroupBarrier();
+    sync();
     return most;
 }
 
@@ -68,17 +69,6 @@ var<workgroup> support_nodes: array<u32, SUPPORT>;
 var<workgroup> support_count: u32;
 // Not zero once A or the contacts outgrew their room.
 var<workgroup> overflow: u32;
-// Slots of each contact's three nodes, ABSENT for nodes that it does not act on.
-var<workgroup> slots: array<vec3<u32>, WORKGROUP>;
-// What each contact gives to its three nodes.
-var<workgroup> shares: array<mat3x3<f32>, WORKGROUP>;
-// Vectors on the support, one behind the other.
-var<workgroup> vectors: array<vec3<f32>, VECTOR_ENTRIES>;
-
-// Place of a vector's entry.
-fn at(vector: u32, slot: u32) -> u32 {
-    return vector * SUPPORT + slot;
-}
 
 // Slot of `node`, which is added if it has none. For one invocation.
 fn support_add(node: u32) -> u32 {
@@ -97,38 +87,6 @@ fn support_add(node: u32) -> u32 {
     support_nodes[support_count] = node;
     support_count += 1u;
     return support_count - 1u;
-}
-
-// Gives slots to the nodes of every contact; `nodes` is ABSENT where the contact does not act.
-fn assign_slots(nodes: vec3<u32>, local: u32) {
-    slots[local] = nodes;
-    workgroupBarrier();
-    if local == 0u {
-        for (var k = 0u; k < parameters.lanes; k += 1u) {
-            let nodes_k = slots[k];
-            let slot_0 = support_add(nodes_k.x);
-            let slot_1 = support_add(nodes_k.y);
-            slots[k] = vec3<u32>(slot_0, slot_1, support_add(nodes_k.z));
-        }
-    }
-    workgroupBarrier();
-}
-
-// Sum of all contacts' shares on one slot.
-fn gather(slot: u32) -> vec3<f32> {
-    var sum = vec3<f32>(0.0);
-    for (var k = 0u; k < parameters.lanes; k += 1u) {
-        let mine = vec3<f32>(slots[k] == vec3<u32>(slot));
-        sum += shares[k] * mine;
-    }
-    return sum;
-}
-
-// A vector's entries at a contact's three nodes: columns.
-fn entries(vector: u32, contact_slots: vec3<u32>) -> mat3x3<f32> {
-    // ABSENT slots read slot 0: what is read there is multiplied by zero.
-    let safe = select(contact_slots, vec3<u32>(0u), contact_slots == vec3<u32>(ABSENT));
-    return mat3x3<f32>(vectors[at(vector, safe.x)], vectors[at(vector, safe.y)], vectors[at(vector, safe.z)]);
 }
 
 // Entry `slot` of C_AA times a vector.
@@ -188,11 +146,7 @@ fn proxy_radius(proxy_node: u32) -> f32 {
 
 // Proxy node of each contact. Invocation k keeps contact k from the first touch on, also as a near miss.
 var<workgroup> contact_nodes: array<u32, WORKGROUP>;
-// Closest triangle of each contact, ABSENT while the node is far outside.
-var<workgroup> contact_triangles: array<u32, WORKGROUP>;
 var<workgroup> contact_count: u32;
-// Proxy nodes near the surface, with their closest triangles, on their way to the contacts.
-var<workgroup> near: array<vec2<u32>, WORKGROUP>;
 // Closest triangle among each invocation's.
 var<workgroup> candidates: array<u32, WORKGROUP>;
 
@@ -233,7 +187,7 @@ fn closest_triangle(proxy_node: u32, moved: f32, local: u32) -> u32 {
     }
     partial[local].x = least;
     candidates[local] = best;
-    workgroupBarrier();
+    sync();
     var nearest = partial[0].x;
     var triangle = candidates[0];
     for (var k = 1u; k < parameters.lanes; k += 1u) {
@@ -242,87 +196,11 @@ fn closest_triangle(proxy_node: u32, moved: f32, local: u32) -> u32 {
             triangle = candidates[k];
         }
     }
-    workgroupBarrier();
+    sync();
     return triangle;
 }
 
-// Brings the contacts up to date with `waiting` near nodes, of which `partial` says which touch. For one invocation.
-fn sift(waiting: u32) {
-    for (var k = 0u; k < waiting; k += 1u) {
-        let place = near[k];
-        var contact = 0u;
-        while contact < contact_count && contact_nodes[contact] != place.x {
-            contact += 1u;
-        }
-        if contact == contact_count {
-            if partial[k].x == 0.0 {
-                continue;
-            }
-            if contact == CONTACTS {
-                overflow = 1u;
-                continue;
-            }
-            contact_nodes[contact] = place.x;
-            contact_count += 1u;
-        }
-        contact_triangles[contact] = place.y;
-    }
-}
-
-// This invocation's contact with the surface as displaced, at most by `moved`: of every node that touches, or comes within
-// `reach`, now or did so before in this configuration (then with a depth below zero, as it may touch again). Without one,
-// depth and weights are zero.
-fn deformed(moved: f32, reach: f32, local: u32) -> Contact {
-    contact_triangles[local] = ABSENT;
-    var contact = Contact();
-    var proxy_node = 0u;
-    var finished = false;
-    // Passes over as many near nodes as there are invocations; a last one, without any, turns to the contacts.
-    while !finished {
-        var waiting = 0u;
-        while proxy_node < parameters.proxy_nodes && waiting < WORKGROUP {
-            // A node outside at rest by more than the surface moves is outside still.
-            if positions[position_base + proxy_node].w <= moved + reach + parameters.least_distance {
-                let triangle = closest_triangle(proxy_node, moved, local);
-                if local == 0u {
-                    near[waiting] = vec2<u32>(proxy_node, triangle);
-                }
-                waiting += 1u;
-            }
-            proxy_node += 1u;
-        }
-        workgroupBarrier();
-        finished = waiting == 0u;
-        var place = near[local];
-        var taking_part = local < waiting;
-        if finished {
-            place = vec2<u32>(contact_nodes[local], contact_triangles[local]);
-            taking_part = local < contact_count && place.y != ABSENT;
-        }
-        contact = Contact();
-        if taking_part {
-            contact = contact_at(place.x, place.y);
-        }
-        partial[local].x = select(0.0, 1.0, contact.depth > -reach);
-        workgroupBarrier();
-        if local == 0u {
-            sift(waiting);
-        }
-        workgroupBarrier();
-    }
-    return contact;
-}
-
-// Nodes that a contact acts on.
-fn acting_nodes(contact: Contact) -> vec3<u32> {
-    return select(vec3<u32>(ABSENT), contact.nodes, contact.weights != vec3<f32>(0.0));
-}
-
 // --- Results ---
-
-fn write_touch(place: u32, k: u32, nodes: vec3<u32>, proxy_node: u32, forces: mat3x3<f32>) {
-    touches[place * CONTACTS + k] = Touch(nodes, proxy_node, forces[0], 0u, forces[1], 0u, forces[2], 0u);
-}
 
 // Where room ran out, nothing of the result counts.
 fn write_outcome(place: u32, outcome: Outcome) {

@@ -43,13 +43,13 @@ fn share_to_boundary(radius: f32, step_square: f32, mixed: f32, direction_square
 
 // Step for the residual force BALANCE with energy norm `square`^(1/2), within `radius`, solved to `tolerance` relative to
 // it; the step is left in STEP_FORCE and STEP.
-fn trust_region_step(contact: Contact, kc: f32, square: f32, radius: f32, tolerance: f32, local: u32) -> Step {
+fn trust_region_step(contact: Spring, kc: f32, square: f32, radius: f32, tolerance: f32, local: u32) -> Step {
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
         vectors[at(RESIDUAL, slot)] = vectors[at(BALANCE, slot)];
         vectors[at(STEP_FORCE, slot)] = vec3<f32>(0.0);
         vectors[at(STEP, slot)] = vec3<f32>(0.0);
     }
-    workgroupBarrier();
+    sync();
     let stop = tolerance * tolerance * square;
     var touching = contact.depth > 0.0;
     var result = Step();
@@ -61,17 +61,15 @@ fn trust_region_step(contact: Contact, kc: f32, square: f32, radius: f32, tolera
         let stopped = conjugate_gradients(contact, select(0.0, kc, touching), radius, stop, local);
 
         // m(0) - m(df), in differences that do not cancel near the solution.
-        let v = entries(STEP, slots[local]);
-        let bend = second_variation(contact, v);
-        let deepening = dot(contact.normal, v * contact.weights);
+        let change = vary(contact, STEP, local);
+        let deepening = change.x;
         let before = max(contact.depth, 0.0);
         let after = max(contact.depth + deepening, 0.0);
         // The part of 1/2 kc depth^2 that is of first order is in the residual.
         let stretch = select(after * after - before * (before + 2.0 * deepening), deepening * deepening,
             before > 0.0 && after > 0.0);
-        let bending = dot(v[0], bend[0]) + dot(v[1], bend[1]) + dot(v[2], bend[2]);
         let touches = contact.depth + deepening > 0.0;
-        var sums = vec4<f32>(-0.5 * (kc * stretch + contact.multiplier * bending), 0.0, 0.0, 0.0);
+        var sums = vec4<f32>(-0.5 * (kc * stretch + contact.multiplier * change.y), 0.0, 0.0, 0.0);
         sums.y = select(0.0, 1.0, touches != touching);
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
             let step = vectors[at(STEP, slot)];
@@ -86,7 +84,7 @@ fn trust_region_step(contact: Contact, kc: f32, square: f32, radius: f32, tolera
                 vectors[at(STEP_FORCE, slot)] = vectors[at(PREVIOUS_FORCE, slot)];
                 vectors[at(STEP, slot)] = vectors[at(PREVIOUS_STEP, slot)];
             }
-            workgroupBarrier();
+            sync();
             break;
         }
         result = Step(sums.x, sqrt(max(sums.z, 0.0)), deepening, stopped);
@@ -96,31 +94,26 @@ fn trust_region_step(contact: Contact, kc: f32, square: f32, radius: f32, tolera
         }
 
         // Residual force of the model at the step.
-        let push = kc * (after - before);
-        shares[local] = mat3x3<f32>(
-            -(contact.normal * (push * contact.weights.x) + bend[0] * contact.multiplier),
-            -(contact.normal * (push * contact.weights.y) + bend[1] * contact.multiplier),
-            -(contact.normal * (push * contact.weights.z) + bend[2] * contact.multiplier),
-        );
-        workgroupBarrier();
+        press_on(contact, kc * (after - before), local);
+        sync();
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
             vectors[at(RESIDUAL, slot)] = vectors[at(BALANCE, slot)] - vectors[at(STEP_FORCE, slot)] + gather(slot);
         }
-        workgroupBarrier();
+        sync();
     }
     return result;
 }
 
 // Goes on from the current step, contacts having stiffness `kc` or, where they do not touch, none, until the residual's
 // squared energy norm is at most `stop`; true when the boundary stopped it.
-fn conjugate_gradients(contact: Contact, kc: f32, radius: f32, stop: f32, local: u32) -> bool {
+fn conjugate_gradients(contact: Spring, kc: f32, radius: f32, stop: f32, local: u32) -> bool {
     var square = 0.0;
     let most = INNER_ITERATIONS_PER_UNKNOWN * 3u * support_count;
     // Iteration 0 only begins: one place for the product with C keeps the program small.
     for (var iteration = 0u; iteration <= most; iteration += 1u) {
         if iteration > 0u {
-            shares[local] = hessian_product(contact, kc, entries(DIRECTION, slots[local]));
-            workgroupBarrier();
+            resist(contact, kc, DIRECTION, local);
+            sync();
             var products = vec4<f32>(0.0);
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
                 let direction_force = vectors[at(DIRECTION_FORCE, slot)];
@@ -142,7 +135,7 @@ fn conjugate_gradients(contact: Contact, kc: f32, radius: f32, stop: f32, local:
                 vectors[at(STEP, slot)] += share * vectors[at(DIRECTION, slot)];
                 vectors[at(RESIDUAL, slot)] -= share * vectors[at(IMAGE, slot)];
             }
-            workgroupBarrier();
+            sync();
             if !inside {
                 return true;
             }
@@ -161,7 +154,7 @@ fn conjugate_gradients(contact: Contact, kc: f32, radius: f32, stop: f32, local:
                 vectors[at(RESIDUAL, slot)] + ratio * vectors[at(DIRECTION_FORCE, slot)];
             vectors[at(DIRECTION, slot)] = vectors[at(PRECONDITIONED, slot)] + ratio * vectors[at(DIRECTION, slot)];
         }
-        workgroupBarrier();
+        sync();
         if square <= stop {
             break;
         }

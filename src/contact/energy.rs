@@ -13,6 +13,7 @@
 //! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`; each of its updates freezes the geometry anew at the
 //! displacement found and solves again.
 
+use super::NodeForce;
 use super::blend::{self, strength, together};
 use super::depth::Contact;
 use super::detection::{Detection, Walls};
@@ -50,6 +51,15 @@ pub struct State {
     pub energy: f64,
     /// Its elastic part [J].
     pub elastic: f64,
+}
+
+/// When a search ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Relative residual at which it has converged [1].
+    pub tolerance: f64,
+    /// Steps tried at most.
+    pub iterations: u32,
 }
 
 /// What became of a search.
@@ -119,20 +129,56 @@ impl EnergySearch {
         };
         self.start(model, detection, geometry);
         let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
-        self.descend(model, detection, geometry, &mut outcome);
+        let limits = Limits { tolerance: model.contact.tolerance, iterations: model.contact.max_iterations };
+        self.descend(model, detection, geometry, limits, &mut outcome);
         let updates = if geometry == Geometry::Frozen { model.contact.updates } else { 0 };
         for _ in 0..updates {
             if !outcome.converged {
                 break;
             }
             self.freeze_here(model, detection);
-            self.descend(model, detection, geometry, &mut outcome);
+            self.descend(model, detection, geometry, limits, &mut outcome);
         }
         outcome
     }
 
+    /// Searches from where `forces` on the object's nodes hold it, which should be near the minimum, for the configuration that
+    /// `detection` has taken up.
+    pub fn settle(
+        &mut self,
+        model: &Model,
+        detection: &mut Detection,
+        geometry: Geometry,
+        forces: &[NodeForce],
+        limits: Limits,
+    ) -> Outcome {
+        self.kc = model.kc;
+        self.start(model, detection, geometry);
+        self.trial.forces.clear();
+        for &NodeForce { node, force } in forces {
+            let at = 3 * self.support.add(node);
+            self.trial.forces.resize(self.support.order(), 0.0);
+            self.trial.forces[at..at + 3].copy_from_slice(&force.to_array());
+        }
+        self.evaluate(model, detection, geometry);
+        std::mem::swap(&mut self.state, &mut self.trial);
+        for contact in &mut self.state.contacts {
+            contact.multiplier = self.kc * contact.depth.max(0.0);
+        }
+        let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
+        self.descend(model, detection, geometry, limits, &mut outcome);
+        outcome
+    }
+
     /// Descends from the current state until it is balanced or there is no going on.
-    fn descend(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry, outcome: &mut Outcome) {
+    fn descend(
+        &mut self,
+        model: &Model,
+        detection: &mut Detection,
+        geometry: Geometry,
+        limits: Limits,
+        outcome: &mut Outcome,
+    ) {
         let mut first_radius = self.begin_stage(model, outcome);
         let mut radius = first_radius;
         while outcome.residual.is_finite() {
@@ -144,8 +190,8 @@ impl EnergySearch {
                 radius = first_radius;
                 continue;
             }
-            outcome.converged = self.kc == model.kc && outcome.residual <= model.contact.tolerance;
-            if outcome.converged || outcome.iterations >= model.contact.max_iterations || stuck {
+            outcome.converged = self.kc == model.kc && outcome.residual <= limits.tolerance;
+            if outcome.converged || outcome.iterations >= limits.iterations || stuck {
                 break;
             }
             outcome.iterations += 1;
@@ -269,19 +315,11 @@ impl EnergySearch {
 
     /// The state that the last trust-region step leads to.
     fn try_step(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
-        let Self { state, trial, support, trust_region, .. } = self;
+        let Self { state, trial, trust_region, .. } = self;
         trial.forces.clear();
         trial.forces.extend(state.forces.iter().zip(&trust_region.force).map(|(f, df)| f + df));
-        support.displace(&model.compliance, &trial.forces, &mut trial.displacement);
-        match geometry {
-            Geometry::Deformed => {
-                for (node, position) in trial.positions.iter_mut().enumerate() {
-                    *position = model.rest[node] + DVec3::from_slice(&trial.displacement[3 * node..]);
-                }
-                detection.deformed(model, &trial.displacement, &trial.positions, Walls::All, &mut trial.contacts);
-            }
-            Geometry::Frozen => frozen_contacts(&self.frozen, &trial.displacement, &mut trial.contacts),
-        }
+        self.evaluate(model, detection, geometry);
+        let Self { state, trial, trust_region, .. } = self;
         // Multipliers as the step predicted them, of the wall that faces the same way; zero for a node that it did not
         // know of. Both lists ascend by proxy node.
         let mut first = 0;
@@ -301,6 +339,21 @@ impl EnergySearch {
                     contact.multiplier = self.kc * (before.depth + deepening).max(0.0);
                 }
             }
+        }
+    }
+
+    /// Displacement, contacts and energy that the trial's forces lead to.
+    fn evaluate(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
+        let Self { trial, support, .. } = self;
+        support.displace(&model.compliance, &trial.forces, &mut trial.displacement);
+        match geometry {
+            Geometry::Deformed => {
+                for (node, position) in trial.positions.iter_mut().enumerate() {
+                    *position = model.rest[node] + DVec3::from_slice(&trial.displacement[3 * node..]);
+                }
+                detection.deformed(model, &trial.displacement, &trial.positions, Walls::All, &mut trial.contacts);
+            }
+            Geometry::Frozen => frozen_contacts(&self.frozen, &trial.displacement, &mut trial.contacts),
         }
         let mut work = 0.0;
         for (slot, &node) in support.nodes().iter().enumerate() {

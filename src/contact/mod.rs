@@ -5,14 +5,14 @@
 use crate::JointVector;
 use glam::DVec3;
 
-mod blend;
+pub(crate) mod blend;
 mod bounding_volumes;
 mod candidates;
 pub(crate) mod closest_point;
 pub(crate) mod depth;
 pub(crate) mod detection;
 mod distance_bounds;
-mod energy;
+pub(crate) mod energy;
 mod facet;
 mod facet_depth;
 mod features;

@@ -1,7 +1,7 @@
 //! Equilibrium of one configuration: dispatch to the scene's algorithm and the account of its result.
 
 use super::detection::Detection;
-use super::energy::{EnergySearch, Geometry, Outcome};
+use super::energy::{EnergySearch, Geometry, Limits, Outcome};
 use super::model::Model;
 use super::paper::PaperIteration;
 use super::reach;
@@ -56,6 +56,25 @@ impl<'a> Solver<'a> {
     /// one: nothing is balanced.
     #[must_use]
     pub fn solve(&mut self, q: &[f64]) -> Equilibrium {
+        self.find(q, |solver, equilibrium| match solver.model.contact.algorithm {
+            Algorithm::Energy => solver.minimise(Geometry::Deformed, None, equilibrium),
+            Algorithm::Linearised => solver.minimise(Geometry::Frozen, None, equilibrium),
+            Algorithm::Paper => solver.iterate(equilibrium),
+        })
+    }
+
+    /// The same by the energy form, from near the solution on: where `forces` on the object's nodes hold it.
+    #[must_use]
+    pub(crate) fn settle(&mut self, q: &[f64], forces: &[NodeForce], limits: Limits) -> Equilibrium {
+        let geometry = match self.model.contact.algorithm {
+            Algorithm::Linearised => Geometry::Frozen,
+            Algorithm::Energy | Algorithm::Paper => Geometry::Deformed,
+        };
+        self.find(q, |solver, equilibrium| solver.minimise(geometry, Some((forces, limits)), equilibrium))
+    }
+
+    /// What `search` finds at `q`, where there is contact.
+    fn find(&mut self, q: &[f64], search: impl FnOnce(&mut Self, &mut Equilibrium) -> Outcome) -> Equilibrium {
         let model = self.model;
         if std::mem::take(&mut self.displaced) {
             self.displacement.fill(0.0);
@@ -74,11 +93,7 @@ impl<'a> Solver<'a> {
         if gap >= 0.0 {
             return equilibrium;
         }
-        let outcome = match model.contact.algorithm {
-            Algorithm::Energy => self.minimise(Geometry::Deformed, &mut equilibrium),
-            Algorithm::Linearised => self.minimise(Geometry::Frozen, &mut equilibrium),
-            Algorithm::Paper => self.iterate(&mut equilibrium),
-        };
+        let outcome = search(self, &mut equilibrium);
         self.displaced = true;
         equilibrium.iterations = outcome.iterations;
         equilibrium.residual = outcome.residual;
@@ -133,9 +148,18 @@ impl<'a> Solver<'a> {
         &self.energy.history
     }
 
-    /// The energy form: touches, displacement and U.
-    fn minimise(&mut self, geometry: Geometry, equilibrium: &mut Equilibrium) -> Outcome {
-        let outcome = self.energy.search(self.model, &mut self.detection, geometry);
+    /// The energy form: touches, displacement and U, from the rest state or from forces near the solution.
+    fn minimise(
+        &mut self,
+        geometry: Geometry,
+        near: Option<(&[NodeForce], Limits)>,
+        equilibrium: &mut Equilibrium,
+    ) -> Outcome {
+        let Self { model, detection, energy, .. } = self;
+        let outcome = match near {
+            None => energy.search(model, detection, geometry),
+            Some((forces, limits)) => energy.settle(model, detection, geometry, forces, limits),
+        };
         let state = &self.energy.state;
         self.displacement.copy_from_slice(&state.displacement);
         equilibrium.energy = state.energy;

@@ -10,7 +10,7 @@
 //! | `pipeline` | the stages of a batch and their buffers |
 //! | `solver` | the backend of a sweep: chunks, batches, retries |
 //! | `refinement` | the energy form's results settled in f64 |
-//! | `unpack` | from what the kernels wrote to equilibria, in f64 |
+//! | `unpack` | from what the kernels wrote to equilibria, in f64; between blended facets by the CPU's search |
 //! | `frame` | the object's nodes, one passive step a frame |
 //! | `kernel` | one compute pipeline with its bindings; buffers, poison, read-back |
 //!

@@ -24,7 +24,7 @@ pub struct DeviceModel {
     pub(super) rest: StorageBuffer,
     pub(super) mesh: StorageBuffer,
     pub(super) compliance: StorageBuffer,
-    /// Gaps within this of zero are decided in f64 [m].
+    /// Gaps within this of zero are decided in f64; between blended facets all are [m].
     pub(super) gap_band: f64,
 }
 
@@ -35,7 +35,8 @@ impl DeviceModel {
     /// When a buffer exceeds the device's limits or memory.
     pub fn new(context: &Context, model: &contact::Model<'_>) -> Result<Self, GpuError> {
         let contact::Model { object, chain, compliance, contact, .. } = model;
-        let unsupported = [("blending", model.blending > 0.0), ("updates", contact.updates > 0)];
+        let unsupported =
+            [("blending", model.blending > 0.0 && !context.binds_facets()), ("updates", contact.updates > 0)];
         if let Some((what, _)) = unsupported.into_iter().find(|(_, asked)| *asked) {
             return Err(GpuError::Unsupported(what));
         }
@@ -43,6 +44,7 @@ impl DeviceModel {
             return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });
         }
         let extent = model.rest.iter().map(|n| n.length()).fold(0.0, f64::max);
+        let gap_band = tolerances::GPU_GAP_BAND_PER_EXTENT * extent;
         let corners = |t: &[u32; 3]| t.map(|j| model.rest[j as usize]);
         let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
         let longest_edge = object.triangles.iter().map(|t| edge(corners(t))).fold(0.0, f64::max);
@@ -61,6 +63,9 @@ impl DeviceModel {
                 least_distance: (tolerances::GPU_LEAST_DISTANCE_PER_EXTENT * extent) as f32,
                 depth_rounding: (tolerances::GPU_DEPTH_ROUNDING_PER_EDGE * longest_edge) as f32,
                 lanes: LANES,
+                blending: model.blending as f32,
+                // Where facets are blended contact is decided in f64: here, whether there may be any.
+                bulge: if model.blending > 0.0 { (model.bulge() + gap_band) as f32 } else { 0.0 },
                 ..bytemuck::Zeroable::zeroed()
             },
             kinds: chain.joints.iter().map(|joint| joint.kind).collect(),
@@ -69,7 +74,7 @@ impl DeviceModel {
             rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, extent))?,
             mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(object))?,
             compliance: StorageBuffer::from_slice(context, "compliance", &compliance)?,
-            gap_band: tolerances::GPU_GAP_BAND_PER_EXTENT * extent,
+            gap_band: if model.blending > 0.0 { 0.0 } else { gap_band },
         })
     }
 

@@ -21,6 +21,7 @@ use crate::{
     scene::Algorithm,
     tolerances::GPU_RESOLVED_RESIDUAL,
 };
+use rayon::prelude::*;
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -124,6 +125,9 @@ impl<'a> GpuSolver<'a> {
         self.chunk.adapt(chunk.len(), since.elapsed());
         let mut results: Vec<Equilibrium> =
             gaps.iter().zip(chunk).map(|(&gap, q)| free(f64::from(gap), q.len())).collect();
+        if self.model.blending > 0.0 {
+            measure_gaps(self.model, chunk, &touching, &mut results);
+        }
         let mut flight = None;
         let mut first = 0;
         while first < touching.len() || flight.is_some() {
@@ -165,8 +169,9 @@ impl<'a> GpuSolver<'a> {
         self.batch.adapt(flight.count, flight.since.elapsed());
         let unpacked = unpack(self.model, self.room.contacts, chunk, members, &outcomes, &touches)?;
         for (&member, equilibrium) in members.iter().zip(unpacked) {
-            let gap = results[member as usize].gap;
-            results[member as usize] = Equilibrium { gap, ..equilibrium };
+            let result = &mut results[member as usize];
+            let gap = if self.model.blending > 0.0 { equilibrium.gap } else { result.gap };
+            *result = Equilibrium { gap, ..equilibrium };
         }
         Ok(())
     }
@@ -195,6 +200,16 @@ impl<'a> GpuSolver<'a> {
         }
         Ok(())
     }
+}
+
+/// Gaps to blended facets of the configurations that touch nothing, in f64: a microsecond each.
+fn measure_gaps(model: &contact::Model<'_>, chunk: &[JointVector], touching: &[u32], results: &mut [Equilibrium]) {
+    let mut free = vec![true; chunk.len()];
+    touching.iter().for_each(|&member| free[member as usize] = false);
+    (results.par_iter_mut(), chunk, free)
+        .into_par_iter()
+        .filter(|(_, _, free)| *free)
+        .for_each_init(|| contact::Solver::new(model), |solver, (result, q, _)| result.gap = solver.gap(q));
 }
 
 /// No contact.

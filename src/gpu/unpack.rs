@@ -9,16 +9,16 @@ use super::{
 };
 use crate::{
     JointVector,
-    contact::{self, Equilibrium, NodeForce, Status},
+    contact::{self, Equilibrium, NodeForce, Status, energy::Limits},
     proxy::Pose,
     scene::Algorithm,
-    tolerances::MINIMUM_SQUARE,
+    tolerances::{GPU_REFINED_RESIDUAL, MINIMUM_SQUARE, REFINEMENT_PASSES},
 };
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Equilibria of the configurations `chunk[member]`; their gaps are left at zero. `touches` holds `contacts` entries a
-/// member.
+/// Equilibria of the configurations `chunk[member]`; their gaps are left at zero, but between blended facets, where they are
+/// found anew. `touches` holds `contacts` entries a member.
 ///
 /// # Errors
 /// When a result was never written.
@@ -31,21 +31,58 @@ pub(super) fn unpack(
     touches: &[Touch],
 ) -> Result<Vec<Equilibrium>, GpuError> {
     let lists = touches.par_chunks_exact(contacts);
-    let unpacked: Vec<Option<Equilibrium>> = (members.par_iter(), outcomes, lists)
-        .into_par_iter()
-        .map_init(
-            || (model.chain.new_pose(), Refinement::new(model)),
-            |(pose, refinement), (&member, outcome, list)| {
-                equilibrium(model, &chunk[member as usize], pose, refinement, outcome, list)
-            },
-        )
-        .collect();
+    let results = (members.par_iter(), outcomes, lists).into_par_iter();
+    let unpacked: Vec<Option<Equilibrium>> = if model.blending > 0.0 {
+        results
+            .map_init(
+                || contact::Solver::new(model),
+                |solver, (&member, outcome, list)| settled(solver, &chunk[member as usize], outcome, list),
+            )
+            .collect()
+    } else {
+        results
+            .map_init(
+                || (model.chain.new_pose(), Refinement::new(model)),
+                |(pose, refinement), (&member, outcome, list)| {
+                    equilibrium(model, &chunk[member as usize], pose, refinement, outcome, list)
+                },
+            )
+            .collect()
+    };
     let total = unpacked.len();
     let written: Vec<Equilibrium> = unpacked.into_iter().flatten().collect();
     if written.len() < total {
         return Err(GpuError::NeverWritten { count: total - written.len(), total });
     }
     Ok(written)
+}
+
+/// As a number that no kernel writes.
+const UNWRITTEN: u32 = u32::from_ne_bytes([POISON; 4]);
+
+/// What the kernel wrote of touches; `None` when it did not write them.
+fn written<'a>(outcome: &Outcome, list: &'a [Touch]) -> Option<&'a [Touch]> {
+    let list = list.get(..outcome.touches as usize)?;
+    list.iter().all(|touch| touch.proxy_node != UNWRITTEN).then_some(list)
+}
+
+/// One equilibrium between blended facets: the kernel tells the forces on the object's nodes, near which the CPU's search finds
+/// it. `None` when the kernel did not write it.
+fn settled(solver: &mut contact::Solver<'_>, q: &[f64], outcome: &Outcome, list: &[Touch]) -> Option<Equilibrium> {
+    let status = Status::from_number(u8::try_from(outcome.status).ok()?)?;
+    if status != Status::Contact {
+        return Some(Equilibrium { status, residual: 1.0, ..free(0.0, q.len()) });
+    }
+    let nodes = |touch: &Touch| touch.nodes.into_iter().zip([touch.force_0, touch.force_1, touch.force_2]);
+    let forces: Vec<NodeForce> = written(outcome, list)?
+        .iter()
+        .flat_map(nodes)
+        .filter(|(node, _)| *node != contact::support::ABSENT)
+        .map(|(node, force)| NodeForce { node, force: DVec3::from(force.map(f64::from)) })
+        .collect();
+    let limits = Limits { tolerance: GPU_REFINED_RESIDUAL, iterations: REFINEMENT_PASSES as u32 };
+    let result = solver.settle(q, &forces, limits);
+    Some(Equilibrium { iterations: outcome.iterations + result.iterations, ..result })
 }
 
 /// One equilibrium; `None` when the kernel did not write it.
@@ -57,7 +94,6 @@ fn equilibrium(
     outcome: &Outcome,
     list: &[Touch],
 ) -> Option<Equilibrium> {
-    const UNWRITTEN: u32 = u32::from_ne_bytes([POISON; 4]);
     let status = Status::from_number(u8::try_from(outcome.status).ok()?)?;
     let mut result = free(0.0, model.chain.joints.len());
     result.status = status;
@@ -68,10 +104,7 @@ fn equilibrium(
     }
     result.energy = f64::from(outcome.elastic);
     model.chain.pose(q, pose);
-    let list = list.get(..outcome.touches as usize)?;
-    if list.iter().any(|touch| touch.proxy_node == UNWRITTEN) {
-        return None;
-    }
+    let list = written(outcome, list)?;
     let mut parts = Vec::new();
     if model.contact.algorithm == Algorithm::Energy && status == Status::Contact {
         // Without a result in f64 nothing is known to be balanced.
