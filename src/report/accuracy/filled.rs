@@ -73,7 +73,8 @@ pub(super) fn rows(
 }
 
 impl Accuracy {
-    /// What filling saves at most at equal worst error, where a grid that is solved throughout errs as little.
+    /// What filling saves at most at equal worst error, where a grid that is solved throughout errs as little; `None` where it
+    /// saves nothing.
     #[must_use]
     pub fn saving(&self) -> Option<Saving> {
         let potential = Interpolation::Potential.name();
@@ -84,6 +85,6 @@ impl Accuracy {
             let times = uniform.solved as f64 / filled.solved.max(1) as f64;
             Some(Saving { filled: filled.clone(), uniform: uniform.clone(), times })
         });
-        savings.max_by(|a, b| a.times.total_cmp(&b.times))
+        savings.filter(|saving| saving.times > 1.0).max_by(|a, b| a.times.total_cmp(&b.times))
     }
 }
