@@ -86,5 +86,6 @@ pub mod viewer;
 pub mod tolerances;
 
 mod joint_vector;
+mod random;
 
 pub use joint_vector::{JointVector, MAX_JOINTS};

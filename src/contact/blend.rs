@@ -377,6 +377,7 @@ mod tests {
     use crate::contact::detection::{Detection, Walls};
     use crate::object::Object;
     use crate::proxy::Chain;
+    use crate::random::sequence;
     use crate::scene::Scene;
 
     const SCENE: &str = r#"
@@ -417,11 +418,7 @@ mod tests {
     /// facets felt from their sides.
     fn compare_derivatives(model: &Model, least: f64, most: f64) -> [usize; 3] {
         let mut detection = Detection::new(model);
-        let mut state = 5u64;
-        let mut next = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
+        let mut next = sequence(5);
         let order = 3 * model.rest.len();
         let mut counts = [0; 3];
         for _ in 0..80 {

@@ -93,15 +93,7 @@ pub fn point_at(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A fixed pseudo-random sequence in [-1, 1).
-    fn sequence(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-    }
+    use crate::random::sequence;
 
     #[test]
     fn no_sampled_point_of_the_triangle_is_closer() {

@@ -411,19 +411,11 @@ mod tests {
     use super::*;
     use crate::object::Object;
     use crate::proxy::Chain;
+    use crate::random::sequence;
     use crate::scene::{
         Algorithm, Blending, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec,
         ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
     };
-
-    /// A fixed pseudo-random sequence in [-1, 1).
-    fn sequence(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-    }
 
     fn ball() -> Object {
         Object::build(&ObjectSpec {

@@ -138,7 +138,7 @@ fn cube(model: &Model, c: DVec3, half: f64, slack: f64, near: Option<u32>) -> Cu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{object::Object, proxy::Chain, scene::Scene};
+    use crate::{object::Object, proxy::Chain, random::Random, scene::Scene};
     use std::path::Path;
 
     /// Distances by trial of every triangle, sides by solid angles: on a convex surface and on one with a hollow. Bounds hold,
@@ -152,11 +152,8 @@ mod tests {
             let bounds = &model.distance_bounds;
             let side = bounds.inverse_side.recip();
             let size = DVec3::from_array(bounds.counts.map(|count| count as f64)) * side;
-            let mut state = 1_u64;
-            let mut next = || {
-                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-                (state >> 11) as f64 / (1_u64 << 53) as f64
-            };
+            let mut random = Random::new(1);
+            let mut next = || random.between(0.0, 1.0);
             let (mut slack, mut count, mut inside) = (0.0, 0.0, 0);
             for _ in 0..4000 {
                 let x = bounds.low + size * DVec3::new(next(), next(), next());

@@ -68,15 +68,7 @@ impl Facet {
 mod tests {
     use super::*;
     use crate::contact::closest_point::{closest_point, point_at};
-
-    /// A fixed pseudo-random sequence in [-1, 1).
-    fn sequence(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-    }
+    use crate::random::sequence;
 
     /// Against the branching search of Voronoi regions, slivers included.
     #[test]

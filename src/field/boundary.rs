@@ -206,19 +206,16 @@ fn beside(lattice: &Lattice, set: &[bool]) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::synthetic::grid;
+    use crate::{field::synthetic::grid, random::Random};
 
     fn slope(values: &[f64]) -> JointVector {
         JointVector::from_slice(values)
     }
 
-    /// Numbers that look random, the same every time.
+    /// Free points, one in `sparsity`, the same every time.
     fn scattered(lattice: &Lattice, sparsity: u64) -> Vec<bool> {
-        let mut seed = 12345_u64;
-        let mut next = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 33).is_multiple_of(sparsity)
-        };
+        let mut random = Random::new(12345);
+        let mut next = || random.between(0.0, sparsity as f64) < 1.0;
         let mut free: Vec<bool> = (0..lattice.points()).map(|_| next()).collect();
         free[lattice.points() / 2] = true;
         free

@@ -4,6 +4,7 @@ use super::{Backend, BackendError, CpuBackend};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},
+    random::Random,
     scene::{Algorithm, ContactSpec, JointKind, Scene},
     tolerances::{LEVER_ARM, REFERENCE_TOLERANCE},
 };
@@ -43,11 +44,11 @@ pub enum ReferenceError {
 impl Reference {
     /// Solves `count` random configurations within the grid of `scene`, the same ones every time for the same `seed`.
     pub fn solve(scene: &Scene, model: &Model<'_>, seed: u64, count: usize) -> Result<Self, ReferenceError> {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let place = |_| {
             let mut q = JointVector::zeros(scene.grid.axes.len());
             for (q, axis) in q.iter_mut().zip(&scene.grid.axes) {
-                *q = axis.start + random.next() * axis.step * (axis.count - 1) as f64;
+                *q = axis.start + random.between(0.0, 1.0) * axis.step * (axis.count - 1) as f64;
             }
             q
         };
@@ -136,14 +137,4 @@ pub(crate) fn equilibria(
     let model = Model::new(model.object, model.chain, contact);
     let mut backend = CpuBackend::new(&model, 0)?;
     Ok(backend.solve(places).unwrap_or_else(|never| match never {}))
-}
-
-/// Numbers in 0..1, the same every time (a 64-bit linear congruence, upper bits; Knuth 1998, section 3.3.4).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
 }

@@ -53,6 +53,7 @@ impl Chain {
 mod tests {
     use super::super::random;
     use super::*;
+    use crate::random::Random;
 
     /// Twice the kinetic energy at `rate`.
     fn twice_energy(inertia: &JointMatrix, rate: &[f64]) -> f64 {
@@ -86,7 +87,7 @@ mod tests {
             let inertia = chain.inertia(&random::at(&chain, &q, &rate, 0.0));
             let count = q.len();
             let least_rotor = chain.joints.iter().map(|joint| joint.rotor_inertia).fold(f64::INFINITY, f64::min);
-            let mut random = random::Random::new(11);
+            let mut random = Random::new(11);
             for (i, row) in inertia.iter().enumerate() {
                 for (j, entry) in row.iter().enumerate() {
                     assert_eq!(*entry, inertia[j][i]);
@@ -94,7 +95,7 @@ mod tests {
                 }
             }
             for _ in 0..50 {
-                let direction: Vec<f64> = (0..count).map(|_| random.next()).collect();
+                let direction: Vec<f64> = (0..count).map(|_| random.between(-1.0, 1.0)).collect();
                 let squared: f64 = direction.iter().map(|x| x * x).sum();
                 assert!(twice_energy(&inertia, &direction) >= 0.999 * least_rotor * squared);
             }

@@ -39,6 +39,7 @@ impl Chain {
 mod tests {
     use super::super::random;
     use super::*;
+    use crate::random::Random;
 
     /// Step of central differences: their error is a sixth of its square times third derivatives of order one.
     const STEP: f64 = 1e-5;
@@ -62,7 +63,7 @@ mod tests {
 
     #[test]
     fn torque_does_the_work_of_the_force() {
-        let mut random = random::Random::new(5);
+        let mut random = Random::new(5);
         for (chain, q, rate) in random::chains() {
             let pose = random::at(&chain, &q, &rate, 0.0);
             let (mut torque, mut power) = (JointVector::zeros(q.len()), 0.0);

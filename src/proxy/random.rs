@@ -2,51 +2,31 @@
 
 use super::{Chain, Joint, Node};
 use crate::JointVector;
+use crate::random::Random;
 use crate::scene::JointKind;
-use glam::DVec3;
-
-/// A linear congruential generator.
-pub struct Random(u64);
-
-impl Random {
-    /// Starts at `seed`.
-    pub fn new(seed: u64) -> Self {
-        Self(seed * 7919 + 1)
-    }
-
-    /// Between -1 and 1.
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    /// In the cube from -1 to 1.
-    pub fn vector(&mut self) -> DVec3 {
-        DVec3::new(self.next(), self.next(), self.next())
-    }
-}
 
 /// Sixty chains, each with a configuration and a rate.
 pub fn chains() -> impl Iterator<Item = (Chain, JointVector, JointVector)> {
     (0..60).map(|seed: u64| {
-        let mut random = Random::new(seed);
+        let mut random = Random::new(seed * 7919 + 1);
         let count = 1 + seed as usize % 6;
         let joints = (0..count).map(|index| Joint {
             name: format!("q{index}"),
-            kind: if random.next() < 0.3 { JointKind::Prismatic } else { JointKind::Revolute },
+            kind: if random.between(-1.0, 1.0) < 0.3 { JointKind::Prismatic } else { JointKind::Revolute },
             origin: 0.2 * random.vector(),
             axis: random.vector().normalize(),
             limits: [-2.0, 2.0],
-            mass: 0.1 + random.next().abs(),
+            mass: 0.1 + random.between(-1.0, 1.0).abs(),
             centre_of_mass: 0.1 * random.vector(),
             inertia: 1e-3 * random.vector().abs(),
-            rotor_inertia: 1e-3 * (1.1 + random.next()),
+            rotor_inertia: 1e-3 * (1.1 + random.between(-1.0, 1.0)),
         });
         let joints: Vec<Joint> = joints.collect();
         let nodes = (0..3 * count).map(|k| Node { link: k / 3, position: 0.2 * random.vector(), radius: 0.0 });
         let nodes = nodes.collect();
-        let mut vector =
-            |size: f64| JointVector::from_slice(&(0..count).map(|_| size * random.next()).collect::<Vec<_>>());
+        let mut vector = |size: f64| {
+            JointVector::from_slice(&(0..count).map(|_| size * random.between(-1.0, 1.0)).collect::<Vec<_>>())
+        };
         let (q, rate) = (vector(2.0), vector(3.0));
         (Chain { joints, nodes }, q, rate)
     })

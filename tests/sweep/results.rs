@@ -51,21 +51,6 @@ fn the_dataset_is_what_the_backend_answered_at_every_grid_point() {
     assert_eq!(report.iterations.mean, f64::from(sum) / in_contact.len() as f64);
     assert_eq!(report.max_residual, f64::from(3e-9_f32));
     let json = serde_json::to_value(&report).unwrap();
-    for key in [
-        "points",
-        "contact_points",
-        "unconverged",
-        "overflowed",
-        "max_residual",
-        "iterations",
-        "seconds",
-        "configurations_per_second",
-        "backend",
-        "adapter",
-        "algorithm",
-    ] {
-        assert!(!json[key].is_null(), "{key}");
-    }
     assert!(json["iterations"]["mean"].is_number() && json["iterations"]["max"].is_number());
 }
 

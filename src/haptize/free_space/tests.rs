@@ -2,23 +2,14 @@
 
 use super::*;
 use crate::object::Object;
+use crate::random::Random;
 use crate::scene::Scene as SceneFile;
 use std::fmt::Write;
 
-/// Numbers in 0..1 that depend on `seed` alone.
-fn sequence(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
 /// A random chain of one to four joints of either kind, somewhere about a sphere, over a grid of some thousand points.
 fn random_scene(seed: u64) -> String {
-    let mut next = sequence(seed);
+    let mut random = Random::new(seed);
+    let mut next = || random.between(0.0, 1.0);
     let joints = 1 + seed as usize % 4;
     let count = [2000, 60, 16, 8][joints - 1];
     let mut axes = String::new();
@@ -141,7 +132,8 @@ fn slopes_bound_the_motion_of_every_node() {
     for seed in 0..40 {
         with_model(&random_scene(seed), |model, grid| {
             let free_space = FreeSpace::new(model, grid);
-            let mut next = sequence(seed + 100);
+            let mut random = Random::new(seed + 100);
+            let mut next = || random.between(0.0, 1.0);
             let mut proximity = Proximity::new(model);
             let joints = grid.joints();
             for _ in 0..50 {

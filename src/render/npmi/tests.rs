@@ -3,17 +3,21 @@
 use super::*;
 use crate::{
     proxy::{Chain, Joint},
+    random::Random,
     scene::JointKind,
 };
 use glam::DVec3;
 
 /// Numbers between -1 and 1, the same every time.
-struct Noise(u64);
+struct Noise(Random);
 
 impl Noise {
+    fn new(seed: u64) -> Self {
+        Self(Random::new(seed))
+    }
+
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        self.0.between(-1.0, 1.0)
     }
 
     fn vector(&mut self, joints: usize, scale: f64) -> JointVector {
@@ -71,7 +75,7 @@ fn imbalance(npmi: &Npmi, motion: &mut Motion, interval: f64, load: &Load) -> (f
 
 #[test]
 fn energy_balances_to_rounding_for_any_sequence_of_steps() {
-    let mut noise = Noise(7);
+    let mut noise = Noise::new(7);
     for joints in 1..=MAX_JOINTS {
         let npmi = Npmi::new(&noise.inertia(joints), &WIDE[..joints]).unwrap();
         let mut motion = npmi.moving(&noise.vector(joints, 1.0), &noise.vector(joints, 5.0));
@@ -87,7 +91,7 @@ fn energy_balances_to_rounding_for_any_sequence_of_steps() {
 
 #[test]
 fn the_balance_notices_a_wrong_step() {
-    let mut noise = Noise(3);
+    let mut noise = Noise::new(3);
     let npmi = Npmi::new(&noise.inertia(3), &WIDE[..3]).unwrap();
     let mut motion = npmi.moving(&noise.vector(3, 1.0), &noise.vector(3, 1.0));
     let load = noise.load(3);
@@ -102,7 +106,7 @@ fn the_balance_notices_a_wrong_step() {
 
 #[test]
 fn the_step_satisfies_the_equation_of_motion() {
-    let mut noise = Noise(11);
+    let mut noise = Noise::new(11);
     let inertia = noise.inertia(4);
     let npmi = Npmi::new(&inertia, &WIDE[..4]).unwrap();
     let start = npmi.moving(&noise.vector(4, 1.0), &noise.vector(4, 1.0));
@@ -120,7 +124,7 @@ fn the_step_satisfies_the_equation_of_motion() {
 
 #[test]
 fn stops_hold_and_only_take_energy() {
-    let mut noise = Noise(23);
+    let mut noise = Noise::new(23);
     for joints in 1..=MAX_JOINTS {
         let limits = [[-0.1, 0.15]; MAX_JOINTS];
         let npmi = Npmi::new(&noise.inertia(joints), &limits[..joints]).unwrap();
@@ -141,9 +145,9 @@ fn stops_hold_and_only_take_energy() {
 
 #[test]
 fn a_stop_pushes_and_never_holds_back() {
-    let npmi = Npmi::new(&Noise(1).inertia(2), &[[-1.0, 0.0], [-1.0, 1.0]]).unwrap();
+    let npmi = Npmi::new(&Noise::new(1).inertia(2), &[[-1.0, 0.0], [-1.0, 1.0]]).unwrap();
     let mut motion = Motion::at_rest(&JointVector::zeros(2));
-    let mut load = Noise(1).load(2);
+    let mut load = Noise::new(1).load(2);
     load.stiffness = JointVector::zeros(2);
     load.torque = JointVector::from_slice(&[1.0, 0.0]);
     let step = npmi.step(&mut motion, 1e-3, &load);
@@ -186,7 +190,7 @@ fn an_explicit_spring_is_bounded_at_the_bound_and_diverges_below_it() {
 
 #[test]
 fn impossible_proxies_are_refused() {
-    let mut inertia = Noise(5).inertia(3);
+    let mut inertia = Noise::new(5).inertia(3);
     assert!(matches!(Npmi::new(&inertia, &[[0.0, f64::NAN]; 3]), Err(InertiaError::Limits { joint: 0, .. })));
     assert!(matches!(Npmi::new(&inertia, &[[1.0, 0.0]; 3]), Err(InertiaError::Limits { .. })));
     inertia[2][2] = 0.0;
@@ -213,7 +217,7 @@ fn arm(count: usize, limits: [f64; 2]) -> Chain {
 
 #[test]
 fn energy_balances_with_the_inertia_of_a_chain_too() {
-    let mut noise = Noise(29);
+    let mut noise = Noise::new(29);
     for joints in 1..=MAX_JOINTS {
         for (limits, speed) in [([-1e3, 1e3], 20.0), ([-0.3, 0.4], 20.0)] {
             let npmi = Npmi::of_chain(&arm(joints, limits)).unwrap();
@@ -236,7 +240,7 @@ fn energy_balances_with_the_inertia_of_a_chain_too() {
 /// Free motion of a chain for `seconds`, with steps of `interval`.
 fn flown(npmi: &Npmi, interval: f64, seconds: f64) -> Motion {
     let joints = npmi.joints();
-    let mut noise = Noise(5);
+    let mut noise = Noise::new(5);
     let mut motion = npmi.moving(&noise.vector(joints, 0.5), &noise.vector(joints, 4.0));
     let zero = JointVector::zeros(joints);
     let load = Load { stiffness: zero, target: zero, damping: [[0.0; MAX_JOINTS]; MAX_JOINTS], torque: zero };

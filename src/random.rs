@@ -1,0 +1,34 @@
+//! Numbers that look random, the same in every run.
+
+#[cfg(test)]
+use glam::DVec3;
+
+/// A linear congruential generator, of which the upper 53 bits count (Knuth 1998, The Art of Computer Programming, volume 2,
+/// section 3.3.4).
+pub(crate) struct Random(u64);
+
+impl Random {
+    /// Starts at `seed`.
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// Uniform in `[low, high)`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Uniform in the cube from -1 to 1.
+    #[cfg(test)]
+    pub fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
+    }
+}
+
+/// Numbers in `[-1, 1)`.
+#[cfg(test)]
+pub(crate) fn sequence(seed: u64) -> impl FnMut() -> f64 {
+    let mut random = Random::new(seed);
+    move || random.between(-1.0, 1.0)
+}
