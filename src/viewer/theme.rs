@@ -100,9 +100,9 @@ pub const PROGRESS_HEIGHT: f32 = 18.0;
 
 // --- Panels ---
 
-/// The window as it is opened, and how small it can be made.
+/// The window as it is opened: width and height [points].
 pub const WINDOW: [f32; 2] = [1280.0, 800.0];
-/// See [`WINDOW`].
+/// How small the window can be made: width and height [points].
 pub const LEAST_WINDOW: [f32; 2] = [900.0, 560.0];
 /// Width of the window below which plots lie under all other panels.
 pub const NARROW: f32 = 1150.0;
