@@ -16,7 +16,8 @@ use super::depth::{Contact, measure};
 use super::features::{Features, Felt};
 use super::model::Model;
 use super::surface;
-use crate::tolerances::BLEND_SPREAD;
+use super::trust_region::Care;
+use crate::tolerances::{BLEND_SPREAD, KNOWN_WALLS};
 use glam::DVec3;
 
 /// Where a proxy node stands at rest, and its candidates.
@@ -87,6 +88,8 @@ pub struct Detection {
     nodes: Vec<DVec3>,
     standings: Vec<Standing>,
     candidates: Candidates,
+    /// Whether walls that a ball does not touch yet are listed, and its side is made sure of.
+    pub care: Care,
     /// Of the node at hand.
     features: Features,
     blend: Blend,
@@ -103,6 +106,7 @@ impl Detection {
             nodes: vec![DVec3::ZERO; count],
             standings: vec![Standing::default(); count],
             candidates: Candidates::new(model),
+            care: Care::Quick,
             features: Features::default(),
             blend: Blend::default(),
             rows: Vec::new(),
@@ -247,14 +251,15 @@ impl Detection {
             }
             let distance = closest.distance_squared.sqrt();
             let feels = walls == Walls::All && radius > 0.0 && !smooth;
+            let known = if self.care == Care::Thorough { KNOWN_WALLS * radius } else { radius };
             let wanted = |spread: f64| match () {
                 () if smooth => blend::reach(model, distance, spread),
-                () if feels => distance.max(radius),
+                () if feels => distance.max(known),
                 () => distance,
             };
             self.candidates.list(model, x, wanted(standing.spread), &mut standing.listed);
             self.features.clear();
-            let felt = feels.then_some((radius, &mut self.features));
+            let felt = feels.then_some((known, &mut self.features));
             self.candidates.find_closest(model, x, standing.listed, positions, felt, &mut closest);
             standing.last = closest.triangle;
             if smooth {
@@ -290,10 +295,12 @@ impl Detection {
                 continue;
             }
             let (triangles, topology) = (&model.object.triangles, &model.object.topology);
-            let felt = self.features.gather(x, radius, positions, triangles, topology);
-            let inner = felt.iter().filter(|felt| !felt.outer && felt.share > 0);
+            let felt = self.features.gather(x, known, positions, triangles, topology);
+            let touched = |felt: &&Felt| felt.share > 0 && felt.distance < radius;
+            let inner = felt.iter().filter(touched).filter(|felt| !felt.outer);
             let inner = inner.min_by(|a, b| a.distance.total_cmp(&b.distance));
-            let outer = felt.iter().any(|felt| felt.outer && felt.share > 0);
+            let outer = felt.iter().filter(touched).any(|felt| felt.outer);
+            let beyond = felt.iter().any(|felt| felt.outer && felt.share > 0);
             let wall = |felt: &Felt| {
                 let contact = contact_at(model, i, x, radius, positions, felt.triangle, felt.point)?;
                 Some(Contact { share: felt.share.into(), ..contact })
@@ -303,8 +310,13 @@ impl Detection {
                 Some(inner) if outer && surface::winding_number(positions, triangles, x) > 0.5 => {
                     contacts.extend(wall(inner));
                 }
-                _ if !outer => contacts.push(contact),
-                _ => {}
+                _ if outer || (beyond && contact.depth <= 0.0) => {}
+                // Where deformation has folded the surface over itself, the closest feature need not know the side.
+                _ if self.care == Care::Thorough
+                    && feels
+                    && contact.depth > radius
+                    && surface::winding_number(positions, triangles, x) < 0.5 => {}
+                _ => contacts.push(contact),
             }
             contacts.extend(felt.iter().filter(|felt| felt.outer).filter_map(wall));
         }

@@ -9,6 +9,12 @@
 //! valley, whose floor soft contact finds and stiffer contact only corrects. A stage's end never lies above the rest
 //! state in E at the final kc: E_s(u_s) <= E_s(0) bounds both its elastic energy and its depths by those at rest.
 //!
+//! What does not converge from the rest state, where balls may stand inside the object and be pressed out of it to any side, is
+//! approached from outside: the proxy is drawn out along the normal of its deepest contact and comes back in steps at full
+//! stiffness, each from the equilibrium before, as a hand would bring it there. On this way a step that E refuses gets a second
+//! chance: another step from where it led, where walls that it did not know of are seen and curved ones stand as they do there. If
+//! both together lower E by a fair share of the first promise, they are taken.
+//!
 //! With the geometry frozen at rest (`linearised`) the same steps minimise the convex
 //! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`; each of its updates freezes the geometry anew at the
 //! displacement found and solves again.
@@ -19,11 +25,11 @@ use super::depth::Contact;
 use super::detection::{Detection, Walls};
 use super::model::Model;
 use super::support::{Support, dot, root};
-use super::trust_region::{Springs, TrustRegion, add_contact_forces};
+use super::trust_region::{Care, Springs, Step, TrustRegion, add_contact_forces};
 use crate::tolerances::{
-    ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GIVE_UP_RADIUS,
-    GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, SHRINK, STAGE_TOLERANCE,
-    STALLED_RADIUS, WIDEN,
+    ACCEPTED_SHARE, APPROACH_STEPS, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING,
+    GIVE_UP_RADIUS, GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, RETREATS, SHRINK,
+    STAGE_TOLERANCE, STALLED_RADIUS, WIDEN,
 };
 use glam::DVec3;
 
@@ -78,6 +84,8 @@ pub struct EnergySearch {
     /// The current state; the result when the search has ended.
     pub state: State,
     trial: State,
+    /// The state before a step on probation.
+    before: State,
     /// The object nodes that carry force.
     pub support: Support,
     /// Contact stiffness of the current stage [N/m].
@@ -88,6 +96,7 @@ pub struct EnergySearch {
     residual: Vec<f64>,
     product: Vec<f64>,
     trust_region: TrustRegion,
+    care: Care,
     /// Rows of the frozen problem, with their depths at rest.
     frozen: Vec<Contact>,
     /// E at the start of the last stage and after each step taken since [J].
@@ -106,6 +115,7 @@ impl EnergySearch {
         Self {
             state: state(),
             trial: state(),
+            before: state(),
             support: Support::new(model.rest.len()),
             slots: Vec::new(),
             kc: 0.0,
@@ -113,13 +123,31 @@ impl EnergySearch {
             residual: Vec::new(),
             product: Vec::new(),
             trust_region: TrustRegion::default(),
+            care: Care::Quick,
             frozen: Vec::new(),
             history: Vec::new(),
         }
     }
 
-    /// Searches from the rest state, for the configuration that `detection` has taken up.
-    pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> Outcome {
+    /// The equilibrium of the configuration that `detection` has taken up, with proxy nodes at `nodes` [m] in the world.
+    pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry, nodes: &[DVec3]) -> Outcome {
+        let outcome = self.search_from_rest(model, detection, geometry);
+        if outcome.converged || geometry == Geometry::Frozen {
+            return outcome;
+        }
+        self.take_care(Care::Thorough, detection);
+        let approached = self.approach(model, detection, nodes);
+        self.take_care(Care::Quick, detection);
+        Outcome { iterations: outcome.iterations + approached.iterations, ..approached }
+    }
+
+    fn take_care(&mut self, care: Care, detection: &mut Detection) {
+        self.care = care;
+        detection.care = care;
+    }
+
+    /// Searches from the rest state.
+    fn search_from_rest(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> Outcome {
         self.kc = match geometry {
             // A spring pressed in beyond a node's radius would pull the node's centre through the surface.
             Geometry::Deformed => {
@@ -158,7 +186,7 @@ impl EnergySearch {
         for &NodeForce { node, force } in forces {
             let at = 3 * self.support.add(node);
             self.trial.forces.resize(self.support.order(), 0.0);
-            self.trial.forces[at..at + 3].iter_mut().zip(force.to_array()).for_each(|(sum, part)| *sum += part);
+            self.trial.forces[at..at + 3].copy_from_slice(&force.to_array());
         }
         self.evaluate(model, detection, geometry);
         std::mem::swap(&mut self.state, &mut self.trial);
@@ -167,6 +195,46 @@ impl EnergySearch {
         }
         let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
         self.descend(model, detection, geometry, limits, &mut outcome);
+        outcome
+    }
+
+    /// Searches along the way in from outside, with proxy nodes in the end at `nodes` [m]. An equilibrium that stores more than
+    /// the rest state is none.
+    fn approach(&mut self, model: &Model, detection: &mut Detection, nodes: &[DVec3]) -> Outcome {
+        let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
+        self.start(model, detection, Geometry::Deformed);
+        let at_rest = contact_energy(&self.state.contacts, model.kc);
+        let deepest = self.state.contacts.iter().max_by(|a, b| a.depth.total_cmp(&b.depth));
+        let Some(&Contact { normal, .. }) = deepest else { return outcome };
+        let mut moved = nodes.to_vec();
+        let mut move_out = |detection: &mut Detection, way: f64| {
+            for (moved, node) in moved.iter_mut().zip(nodes) {
+                *moved = *node + normal * way;
+            }
+            detection.take_up(model, &moved);
+        };
+        let mut way = 0.0;
+        for _ in 0..RETREATS {
+            let gap = detection.gap(model);
+            if gap >= 0.0 {
+                break;
+            }
+            way -= gap;
+            move_out(detection, way);
+        }
+        self.start(model, detection, Geometry::Deformed);
+        self.kc = model.kc;
+        for step in (0..APPROACH_STEPS).rev() {
+            move_out(detection, way * f64::from(step) / f64::from(APPROACH_STEPS));
+            std::mem::swap(&mut self.state.contacts, &mut self.trial.contacts);
+            let Self { state, trial, kc, .. } = self;
+            detection.deformed(model, &state.displacement, &state.positions, Walls::All, &mut state.contacts);
+            foresee(&mut state.contacts, &trial.contacts, |before, _| *kc * before.depth);
+            let tolerance = if step == 0 { model.contact.tolerance } else { STAGE_TOLERANCE };
+            let limits = Limits { tolerance, iterations: model.contact.max_iterations };
+            self.descend(model, detection, Geometry::Deformed, limits, &mut outcome);
+        }
+        outcome.converged &= self.state.energy <= at_rest;
         outcome
     }
 
@@ -182,7 +250,8 @@ impl EnergySearch {
         let mut first_radius = self.begin_stage(model, outcome);
         let mut radius = first_radius;
         while outcome.residual.is_finite() {
-            let stuck = radius < GIVE_UP_RADIUS * first_radius;
+            // An energy below zero, as of a surface turned inside out, has no radius.
+            let stuck = radius.is_nan() || radius < GIVE_UP_RADIUS * first_radius;
             let stalled = radius < STALLED_RADIUS * first_radius;
             if self.kc < model.kc && (outcome.residual <= STAGE_TOLERANCE || stalled) {
                 self.kc = model.kc.min(CONTINUATION_FACTOR * self.kc);
@@ -195,20 +264,22 @@ impl EnergySearch {
                 break;
             }
             outcome.iterations += 1;
-            let step = self.trust_region.step(
-                &self.support,
-                Springs { contacts: &self.state.contacts, slots: &self.slots, kc: self.kc },
-                (&self.residual, &self.product),
-                radius,
-                outcome.residual.clamp(INNER_TOLERANCE_FLOOR, INNER_TOLERANCE),
-            );
+            let step = self.step(outcome.residual, radius);
             self.try_step(model, detection, geometry);
             // Near the solution both decreases drown in rounding, which must not refuse a good step.
             let rounding = self.energy_rounding(detection.nodes());
             let promised = step.predicted + rounding;
-            let ratio = (self.state.energy - self.trial.energy + rounding) / promised;
+            let energy = self.state.energy;
             // Contacts that come and go may leave a step that promises nothing.
-            let ratio = if promised > 0.0 { ratio } else { 0.0 };
+            let share =
+                |trial: &State| if promised > 0.0 { (energy - trial.energy + rounding) / promised } else { 0.0 };
+            let mut ratio = share(&self.trial);
+            let on_probation = self.care == Care::Thorough && ratio < ACCEPTED_SHARE && promised > 0.0;
+            if on_probation {
+                outcome.iterations += 1;
+                self.correct(model, detection, geometry, step.length);
+                ratio = share(&self.trial);
+            }
             if ratio < POOR_SHARE || ratio.is_nan() {
                 radius = SHRINK * step.length;
             } else if ratio > GOOD_SHARE && step.at_boundary {
@@ -217,9 +288,33 @@ impl EnergySearch {
             if ratio >= ACCEPTED_SHARE {
                 std::mem::swap(&mut self.state, &mut self.trial);
                 self.history.push(self.state.energy);
+            }
+            if ratio >= ACCEPTED_SHARE || on_probation {
                 outcome.residual = self.balance(model);
             }
         }
+    }
+
+    /// The trust region's step from the current state, whose relative residual is `residual`.
+    fn step(&mut self, residual: f64, radius: f64) -> Step {
+        self.trust_region.step(
+            &self.support,
+            Springs { contacts: &self.state.contacts, slots: &self.slots, kc: self.kc },
+            (&self.residual, &self.product),
+            radius,
+            residual.clamp(INNER_TOLERANCE_FLOOR, INNER_TOLERANCE),
+            self.care,
+        )
+    }
+
+    /// Puts in the trial's place what another step leads to from there. The state stays as it is, its balance does not.
+    fn correct(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry, radius: f64) {
+        std::mem::swap(&mut self.before, &mut self.state);
+        std::mem::swap(&mut self.state, &mut self.trial);
+        let residual = self.balance(model);
+        self.step(residual, radius);
+        self.try_step(model, detection, geometry);
+        std::mem::swap(&mut self.state, &mut self.before);
     }
 
     /// Freezes the geometry anew, as it is at the current displacement: an update of linearised contact.
@@ -320,26 +415,8 @@ impl EnergySearch {
         trial.forces.extend(state.forces.iter().zip(&trust_region.force).map(|(f, df)| f + df));
         self.evaluate(model, detection, geometry);
         let Self { state, trial, trust_region, .. } = self;
-        // Multipliers as the step predicted them, of the wall that faces the same way; zero for a node that it did not
-        // know of. Both lists ascend by proxy node.
-        let mut first = 0;
-        for contact in &mut trial.contacts {
-            while first < state.contacts.len() && state.contacts[first].proxy_node < contact.proxy_node {
-                first += 1;
-            }
-            let mut likest = -2.0;
-            contact.multiplier = 0.0;
-            for (before, deepening) in state.contacts[first..].iter().zip(&trust_region.deepening[first..]) {
-                if before.proxy_node != contact.proxy_node {
-                    break;
-                }
-                let alike = before.normal.dot(contact.normal);
-                if alike > likest {
-                    likest = alike;
-                    contact.multiplier = self.kc * (before.depth + deepening).max(0.0);
-                }
-            }
-        }
+        let deepening = &trust_region.deepening;
+        foresee(&mut trial.contacts, &state.contacts, |before, k| self.kc * (before.depth + deepening[k]));
     }
 
     /// Displacement, contacts and energy that the trial's forces lead to.
@@ -372,6 +449,29 @@ impl EnergySearch {
                 self.kc * contact.share.abs() * contact.depth.max(0.0) * nodes[contact.proxy_node as usize].length();
         }
         ENERGY_ROUNDING * size
+    }
+}
+
+/// Multipliers as `force` foretells them from the contacts before, by contact and place in the list: of the wall that faces the same
+/// way; zero for a node that was not known. Both lists ascend by proxy node [N].
+fn foresee(contacts: &mut [Contact], before: &[Contact], force: impl Fn(&Contact, usize) -> f64) {
+    let mut first = 0;
+    for contact in contacts {
+        while first < before.len() && before[first].proxy_node < contact.proxy_node {
+            first += 1;
+        }
+        let mut likest = -2.0;
+        contact.multiplier = 0.0;
+        for (k, before) in before.iter().enumerate().skip(first) {
+            if before.proxy_node != contact.proxy_node {
+                break;
+            }
+            let alike = before.normal.dot(contact.normal);
+            if alike > likest {
+                likest = alike;
+                contact.multiplier = force(before, k).max(0.0);
+            }
+        }
     }
 }
 

@@ -10,6 +10,11 @@
 //! point, as for a point node; in a crease its two walls, +1 each, and -1 for the edge between them where that is within
 //! reach, so that the second wall is not felt before there is one.
 //!
+//! Where the centre passes the surface itself, E has a kink at the edges and vertices of dents: inside it is the closest feature that
+//! pushes, in any direction of a cone. A ball about as soft as the object may come to rest there, and no force balances; it is
+//! flagged as unconverged. Of 61 configurations that do not converge in four combinations of Kc = Kg = 100 to 1e4 N/m (balls of
+//! 8 mm, 102 nodes, to half a radius deep, 6 to 9 % of all) 59 end so. Blended facets have no such place.
+//!
 //! Only what is seen from outside counts (the pseudonormal decides): the far side of a thin wall does not push.
 
 use super::closest_point::{ClosestPoint, Feature, point_at};

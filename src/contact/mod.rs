@@ -75,7 +75,8 @@ impl Status {
 pub struct Equilibrium {
     /// What became of it.
     pub status: Status,
-    /// Steps tried (`energy`, `linearised`) or passes (`paper`).
+    /// Steps tried (`energy`, `linearised`) or passes (`paper`); of `energy` those from the rest state, and those of an approach from
+    /// outside where the former did not converge.
     pub iterations: u32,
     /// Relative residual of the force balance, in the energy norm; one where nothing could be computed [1].
     pub residual: f64,

@@ -155,9 +155,9 @@ impl<'a> Solver<'a> {
         near: Option<(&[NodeForce], Limits)>,
         equilibrium: &mut Equilibrium,
     ) -> Outcome {
-        let Self { model, detection, energy, .. } = self;
+        let Self { model, detection, energy, pose, .. } = self;
         let outcome = match near {
-            None => energy.search(model, detection, geometry),
+            None => energy.search(model, detection, geometry, &pose.nodes),
             Some((forces, limits)) => energy.settle(model, detection, geometry, forces, limits),
         };
         let state = &self.energy.state;

@@ -5,7 +5,8 @@
 //! on the ball df . C df <= radius^2, with g_i the depth's gradient. Two things make it a better model than the plain second
 //! derivative of the energy, and neither costs a detection:
 //! - the maximum is kept, so contacts may come and go within a step: a pass of conjugate gradients for the contacts that
-//!   touch is followed by another where the step has changed which do;
+//!   touch is followed by another where the step has changed which do; with [`Care::Thorough`] one that leads uphill is followed
+//!   back to the least energy on its way, so that the passes end at the minimum for any number of contacts;
 //! - curvature is weighted by the multiplier lambda_i that the step before predicted, not by kc depth_i, which at stiff contact
 //!   is far too large until the depth has settled (as in sequential quadratic programming). Both agree in the end,
 //!   so convergence stays quadratic.
@@ -22,7 +23,7 @@
 use super::blend::{RowChange, deepening, strength, together, vary};
 use super::depth::{Contact, stiffness_product};
 use super::support::{Support, dot, root};
-use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES};
+use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES, STEP_BACK_HALVINGS, THOROUGH_MODEL_PASSES};
 use glam::DVec3;
 
 /// Contacts, where their nodes are on the support, and their stiffness.
@@ -34,6 +35,16 @@ pub struct Springs<'a> {
     pub slots: &'a [[usize; 3]],
     /// kc [N/m].
     pub kc: f64,
+}
+
+/// How much is done for a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Care {
+    /// What nearly all configurations converge with.
+    Quick,
+    /// What the others need: walls that a ball does not touch yet are known, passes go on to the model's minimum, and a step that
+    /// E refuses gets a second chance.
+    Thorough,
 }
 
 /// What a step promises.
@@ -68,6 +79,8 @@ pub struct TrustRegion {
     image: Vec<f64>,
     /// What happens to the rows of one depth.
     own: Vec<RowChange>,
+    /// Of each depth on the way back: kc times its change, where it starts, and its change.
+    springs_on_the_way: Vec<[f64; 3]>,
 }
 
 impl TrustRegion {
@@ -80,6 +93,7 @@ impl TrustRegion {
         (residual, preconditioned): (&[f64], &[f64]),
         radius: f64,
         tolerance: f64,
+        care: Care,
     ) -> Step {
         self.reset(support.order(), springs.contacts);
         self.residual.copy_from_slice(residual);
@@ -87,11 +101,18 @@ impl TrustRegion {
         let stop = tolerance * tolerance * dot(&self.residual, &self.preconditioned);
         let mut predicted = 0.0;
         let mut at_boundary = false;
-        for pass in 0..MODEL_PASSES {
+        let mut left = INNER_ITERATIONS_PER_UNKNOWN * support.order();
+        let passes = if care == Care::Thorough { THOROUGH_MODEL_PASSES } else { MODEL_PASSES };
+        for pass in 0..passes {
             self.previous_force.copy_from_slice(&self.force);
             self.previous_displacement.copy_from_slice(&self.displacement);
-            let stopped = self.conjugate_gradients(support, springs, radius, stop);
-            let decrease = self.assess(springs, residual);
+            let mut stopped = self.conjugate_gradients(support, springs, radius, stop, &mut left);
+            let mut decrease = self.assess(springs, residual);
+            if care == Care::Thorough && decrease <= predicted {
+                self.step_back(springs, residual);
+                decrease = self.assess(springs, residual);
+                stopped = false;
+            }
             if pass > 0 && (decrease <= predicted || decrease.is_nan()) {
                 // Contacts came and went to no avail: the pass before was better.
                 std::mem::swap(&mut self.force, &mut self.previous_force);
@@ -135,16 +156,20 @@ impl TrustRegion {
     }
 
     /// Goes on from the current step for the contacts that touch, until the residual's squared energy norm is at most
-    /// `stop`; true when the boundary stopped it.
-    fn conjugate_gradients(&mut self, support: &Support, springs: Springs, radius: f64, stop: f64) -> bool {
-        let order = support.order();
+    /// `stop` or no iterations are `left`; true when the boundary stopped it.
+    fn conjugate_gradients(
+        &mut self,
+        support: &Support,
+        springs: Springs,
+        radius: f64,
+        stop: f64,
+        left: &mut usize,
+    ) -> bool {
         self.direction_force.copy_from_slice(&self.residual);
         self.direction.copy_from_slice(&self.preconditioned);
         let mut square = dot(&self.residual, &self.preconditioned);
-        for _ in 0..INNER_ITERATIONS_PER_UNKNOWN * order {
-            if square <= stop {
-                break;
-            }
+        while *left > 0 && square > stop {
+            *left -= 1;
             self.image.copy_from_slice(&self.direction_force);
             add_contact_hessian(springs, &self.touching, &self.direction, &mut self.own, &mut self.image);
             let curvature = dot(&self.direction, &self.image);
@@ -207,6 +232,50 @@ impl TrustRegion {
             decrease -= 0.5 * (share * springs.kc * stretch + multiplier * bending);
         });
         decrease
+    }
+
+    /// Goes back along the last pass to where the model's energy, quadratic piece by piece on the way, is least.
+    fn step_back(&mut self, springs: Springs, residual: &[f64]) {
+        let Self { force, displacement, previous_force, previous_displacement, direction_force, .. } = self;
+        let (direction, own, springs_on_the_way) = (&mut self.direction, &mut self.own, &mut self.springs_on_the_way);
+        for k in 0..force.len() {
+            direction_force[k] = force[k] - previous_force[k];
+            direction[k] = displacement[k] - previous_displacement[k];
+        }
+        // The energy falls, at the share t of the way, by slope - bend t - sum_i weight_i max(0, depth_i + change_i t).
+        let mut slope = dot(direction, residual) - dot(direction, previous_force);
+        let mut bend = dot(direction, direction_force);
+        springs_on_the_way.clear();
+        springs.for_each_depth(|first, rows| {
+            let before = |k: usize| nodes_of(previous_displacement, springs.slots[first + k]);
+            let along = |k: usize| nodes_of(direction, springs.slots[first + k]);
+            let Contact { depth, multiplier, .. } = rows[0];
+            let start = depth + deepening(rows, before, own);
+            vary(rows, before, own, |k, part| slope -= multiplier * inner(along(k), part));
+            let change = deepening(rows, along, own);
+            vary(rows, along, own, |k, part| bend += multiplier * inner(along(k), part));
+            let weight = springs.kc * strength(rows) * change;
+            slope += weight * depth.max(0.0);
+            springs_on_the_way.push([weight, start, change]);
+        });
+        let falls = |t: f64| {
+            let pushes =
+                springs_on_the_way.iter().map(|[weight, start, change]| weight * (start + t * change).max(0.0));
+            slope - bend * t > pushes.sum()
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..STEP_BACK_HALVINGS {
+            let middle = 0.5 * (low + high);
+            if falls(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        for k in 0..force.len() {
+            force[k] = previous_force[k] + low * direction_force[k];
+            displacement[k] = previous_displacement[k] + low * direction[k];
+        }
     }
 
     /// Notes which contacts touch at the step; true when that has changed.

@@ -197,23 +197,29 @@ fn outside_the_gap_tends_to_the_true_distance() {
     }
 }
 
-/// The hardest of springs, without stiffness against bending, held at the underside alone and pressed as deep as half the radius:
-/// what does not converge between sharp facets mostly does between blended ones.
+/// Balls as soft as what they press: centres come to lie on sharp edges and vertices of their dents, to which E falls from all
+/// sides, and no force balances there. Between blended facets there is no such place. The hardest of springs, without stiffness
+/// against bending, held at the underside alone and pressed as deep as half the radius, converge either way.
 #[test]
-fn stiff_contact_in_deep_dents_converges() {
-    let hard = Ball { rings: 10, springs: SpringKind::Axial, ground: 1e4, patch: true };
-    let object = world::sphere(hard).unwrap();
-    let chain = floating_bar(world::BALL);
-    let mut model = Model::new(&object, &chain, world::contact(1e4));
-    let configurations = pressed(&model, 1, 30, 0.2 * RADIUS, 0.5 * RADIUS);
-    let converged = |model: &Model| {
-        let mut solver = Solver::new(model);
-        configurations.iter().filter(|q| solver.solve(q).status == Status::Contact).count()
-    };
-    let sharp = converged(&model);
-    model.set_blending(Blending::Mesh);
-    let smooth = converged(&model);
-    assert!(sharp < 28 && smooth >= 29, "{sharp}, then {smooth} of 30");
+fn contact_in_deep_dents_converges() {
+    let axial = |ground: f64, patch: bool| Ball { rings: 10, springs: SpringKind::Axial, ground, patch };
+    for (ball, stiffness, least_sharp, most_sharp) in
+        [(axial(1e3, false), 1e3, 24, 27), (axial(1e4, true), 1e4, 29, 30)]
+    {
+        let object = world::sphere(ball).unwrap();
+        let chain = floating_bar(world::BALL);
+        let mut model = Model::new(&object, &chain, world::contact(stiffness));
+        let configurations = pressed(&model, 1, 30, 0.2 * RADIUS, 0.5 * RADIUS);
+        let converged = |model: &Model| {
+            let mut solver = Solver::new(model);
+            configurations.iter().filter(|q| solver.solve(q).status == Status::Contact).count()
+        };
+        let sharp = converged(&model);
+        assert!((least_sharp..=most_sharp).contains(&sharp), "{sharp} of 30 between sharp facets");
+        model.set_blending(Blending::Mesh);
+        let smooth = converged(&model);
+        assert!(smooth >= 29, "{smooth} of 30 between blended ones");
+    }
 }
 
 /// The gap is one continuous function inside and outside, contact begins where it is zero, and linearised contact tends to the
