@@ -338,8 +338,7 @@ fn frozen_contact(row: Spring) -> Spring {
     var contact = row;
     for (var k = 0u; k < row.count; k += 1u) {
         let nodes = facets[row.first + k].plane.nodes;
-        let v = mat3x3<f32>(displacement[displacement_base + nodes.x].xyz, displacement[displacement_base + nodes.y].xyz,
-            displacement[displacement_base + nodes.z].xyz);
+        let v = mat3x3<f32>(displaced(nodes.x), displaced(nodes.y), displaced(nodes.z));
         contact.depth += first_order(row.first + k, changes(row.first + k, v));
     }
     return contact;

@@ -26,7 +26,7 @@ fn balance(contact: Spring, kc: f32, local: u32) -> vec2<f32> {
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
         let product = multiply(BALANCE, slot);
         // C c = C f + C r.
-        let whole = displacement[displacement_base + support_nodes[slot]].xyz + product;
+        let whole = displaced(support_nodes[slot]) + product;
         squares.x += dot(vectors[at(BALANCE, slot)], product);
         squares.y += dot(vectors[at(IMAGE, slot)], whole);
     }
@@ -43,7 +43,7 @@ fn main(
     if place >= parameters.configurations {
         return;
     }
-    displacement_base = place * parameters.surface_nodes;
+    displacement_base = place * parameters.covered;
     position_base = list[1u + parameters.first + place] * parameters.proxy_nodes;
     begin(place, local);
     for (var slot = local; slot < SUPPORT; slot += WORKGROUP) {
@@ -110,7 +110,7 @@ fn main(
         }
         var sums = vec4<f32>(0.0);
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            sums.x += dot(vectors[at(DIRECTION_FORCE, slot)], displacement[displacement_base + support_nodes[slot]].xyz);
+            sums.x += dot(vectors[at(DIRECTION_FORCE, slot)], displaced(support_nodes[slot]));
         }
         let trial_depth = max(trial.depth, 0.0);
         sums.y = trial_depth * trial_depth;

@@ -179,9 +179,9 @@ fn main(
     if place >= parameters.configurations {
         return;
     }
-    displacement_base = place * parameters.surface_nodes;
+    displacement_base = place * parameters.covered;
     position_base = list[1u + parameters.first + place] * parameters.proxy_nodes;
-    for (var node = local; node < parameters.surface_nodes; node += WORKGROUP) {
+    for (var node = local; node < parameters.covered; node += WORKGROUP) {
         displacement[displacement_base + node] = vec4<f32>(0.0);
     }
     storageBarrier();
@@ -227,7 +227,7 @@ fn main(
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
             let force = vectors[at(FORCES, slot)];
             sums.x += dot(vectors[at(RESIDUAL, slot)], multiply(RESIDUAL, slot));
-            sums.y += dot(force, displacement[displacement_base + support_nodes[slot]].xyz);
+            sums.y += dot(force, displaced(support_nodes[slot]));
             sums.w += dot(abs(force), vec3<f32>(1.0));
         }
         sums = add_up(sums, local);

@@ -152,7 +152,7 @@ fn freeze(contact: Spring) -> Spring {
 fn frozen_contact(row: Spring) -> Spring {
     var contact = row;
     for (var k = 0u; k < 3u; k += 1u) {
-        contact.depth += row.weights[k] * dot(row.normal, displacement[displacement_base + row.nodes[k]].xyz);
+        contact.depth += row.weights[k] * dot(row.normal, displaced(row.nodes[k]));
     }
     return contact;
 }

@@ -13,12 +13,14 @@ override WORKGROUP: u32 = 32u;
 override SUPPORT: u32 = 64u;
 // Most contacts, at most WORKGROUP.
 override CONTACTS: u32 = 32u;
+// Whether the compliance leaves out surface nodes: then they do not give way, and none may carry force.
+override PARTIAL: bool = false;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
 // Surface nodes at rest; then the bounding sphere (centre, radius) of each triangle; then each proxy node's radius in x.
 @group(0) @binding(1) var<storage, read> rest: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> mesh: array<u32>;
-// C over the surface coordinates, row-major [m/N].
+// C over the coordinates of the surface nodes that it covers, row-major [m/N].
 @group(0) @binding(3) var<storage, read> compliance: array<f32>;
 // Proxy nodes of all configurations of the chunk; w is the gap at rest.
 @group(0) @binding(4) var<storage, read> positions: array<vec4<f32>>;
@@ -27,7 +29,7 @@ override CONTACTS: u32 = 32u;
 @group(0) @binding(6) var<storage, read_write> outcomes: array<Outcome>;
 // CONTACTS a configuration.
 @group(0) @binding(7) var<storage, read_write> touches: array<Touch>;
-// Displacement of all surface nodes, one configuration behind the other; w is unused.
+// Displacement of the covered surface nodes, one configuration behind the other; w is unused.
 @group(0) @binding(8) var<storage, read_write> displacement: array<vec4<f32>>;
 
 const ABSENT: u32 = 0xffffffffu;
@@ -67,12 +69,33 @@ fn greatest(value: f32, local: u32) -> f32 {
 // Surface node of each slot.
 var<workgroup> support_nodes: array<u32, SUPPORT>;
 var<workgroup> support_count: u32;
-// Not zero once A or the contacts outgrew their room.
+// Not zero once A or the contacts outgrew their room, or the compliance.
 var<workgroup> overflow: u32;
+
+// Place of a node among those that the compliance covers, or ABSENT.
+fn place_of(node: u32) -> u32 {
+    if PARTIAL {
+        return mesh[9u * parameters.triangles + parameters.surface_nodes + 1u + node];
+    }
+    return node;
+}
+
+// Displacement of a surface node.
+fn displaced(node: u32) -> vec3<f32> {
+    let place = place_of(node);
+    if PARTIAL && place == ABSENT {
+        return vec3<f32>(0.0);
+    }
+    return displacement[displacement_base + place].xyz;
+}
 
 // Slot of `node`, which is added if it has none. For one invocation.
 fn support_add(node: u32) -> u32 {
     if node == ABSENT {
+        return ABSENT;
+    }
+    if PARTIAL && place_of(node) == ABSENT {
+        overflow = 1u;
         return ABSENT;
     }
     for (var slot = 0u; slot < support_count; slot += 1u) {
@@ -91,12 +114,12 @@ fn support_add(node: u32) -> u32 {
 
 // Entry `slot` of C_AA times a vector.
 fn multiply(vector: u32, slot: u32) -> vec3<f32> {
-    let order = 3u * parameters.surface_nodes;
-    let row = 3u * support_nodes[slot] * order;
+    let order = 3u * parameters.covered;
+    let row = 3u * place_of(support_nodes[slot]) * order;
     var sum = vec3<f32>(0.0);
     for (var other = 0u; other < support_count; other += 1u) {
         let v = vectors[at(vector, other)];
-        let first = row + 3u * support_nodes[other];
+        let first = row + 3u * place_of(support_nodes[other]);
         let second = first + order;
         let third = second + order;
         sum += vec3<f32>(compliance[first], compliance[second], compliance[third]) * v.x
@@ -106,15 +129,15 @@ fn multiply(vector: u32, slot: u32) -> vec3<f32> {
     return sum;
 }
 
-// Displacement C v of all surface nodes, v a vector on the support; returns its greatest length.
+// Displacement C v of all covered nodes, v a vector on the support; returns its greatest length.
 fn displace(vector: u32, local: u32) -> f32 {
-    let order = 3u * parameters.surface_nodes;
+    let order = 3u * parameters.covered;
     var most = 0.0;
-    for (var node = local; node < parameters.surface_nodes; node += WORKGROUP) {
+    for (var place = local; place < parameters.covered; place += WORKGROUP) {
         var u = vec3<f32>(0.0);
         for (var slot = 0u; slot < support_count; slot += 1u) {
             // C is symmetric: along a row, neighbouring invocations read neighbouring entries.
-            let row = 3u * support_nodes[slot] * order + 3u * node;
+            let row = 3u * place_of(support_nodes[slot]) * order + 3u * place;
             let v = vectors[at(vector, slot)];
             u += vec3<f32>(compliance[row], compliance[row + 1u], compliance[row + 2u]) * v.x;
             let second = row + order;
@@ -122,7 +145,7 @@ fn displace(vector: u32, local: u32) -> f32 {
             let third = second + order;
             u += vec3<f32>(compliance[third], compliance[third + 1u], compliance[third + 2u]) * v.z;
         }
-        displacement[displacement_base + node] = vec4<f32>(u, 0.0);
+        displacement[displacement_base + place] = vec4<f32>(u, 0.0);
         most = max(most, length(u));
     }
     storageBarrier();
@@ -133,7 +156,7 @@ fn displace(vector: u32, local: u32) -> f32 {
 
 // Node j's position less x.
 fn node_from(node: u32, x: vec3<f32>) -> vec3<f32> {
-    return (rest[node].xyz - x) + displacement[displacement_base + node].xyz;
+    return (rest[node].xyz - x) + displaced(node);
 }
 
 fn proxy_position(proxy_node: u32) -> vec3<f32> {

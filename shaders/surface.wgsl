@@ -3,7 +3,7 @@
 // The stage declares `parameters`, `mesh` and `node_from(j, x)`: node j's position less x. Geometry is computed relative
 // to the point in question, where f32 is finest. `mesh` holds, one behind the other, three corners a triangle, three
 // neighbours a triangle (across edge k), the starts of the lists of triangles around each node (one more than there are
-// nodes), and those lists.
+// nodes), and those lists; where the compliance leaves out surface nodes, the place of each among those that it covers.
 
 fn corner(triangle: u32, k: u32) -> u32 {
     return mesh[3u * triangle + k];

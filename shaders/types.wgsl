@@ -30,6 +30,11 @@ struct Parameters {
     blending: f32,
     // By how much a gap may be less than that to facets as they are [m].
     bulge: f32,
+    // Surface nodes that the compliance covers.
+    covered: u32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
 }
 
 // One joint of the chain; axis is a unit vector.

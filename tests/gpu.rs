@@ -7,7 +7,7 @@ use haptize::JointVector;
 use haptize::contact::{Equilibrium, Model, Solver, Status};
 use haptize::gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuError, GpuSolver, Room, adapters};
 use haptize::haptize::Backend;
-use haptize::object::Object;
+use haptize::object::{Compliance, Object};
 use haptize::proxy::Chain;
 use haptize::render::graphics::ObjectMotion;
 use haptize::scene::{Algorithm, Blending, GraphicsEffects, Scene, StiffeningSpec};
@@ -216,6 +216,40 @@ fn blended_facets_have_the_same_equilibria_on_gpu_and_cpu() {
     check_blended("mesh.toml", Algorithm::Energy, Blending::Mesh, 101);
     check_blended("mesh.toml", Algorithm::Linearised, Blending::Mesh, 101);
     check_blended("mesh.toml", Algorithm::Energy, Blending::Width(0.01), 149);
+}
+
+/// Of a large object only the compliance within reach is formed: equilibria are the CPU's, and so is what reaches beyond.
+#[test]
+fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
+    let (scene, object, chain) = load("sphere.toml");
+    let configurations = configurations(&scene, 11, 131);
+    let part = |algorithm, blending| {
+        let contact = haptize::scene::ContactSpec { algorithm, blending, ..scene.contact };
+        let mut model = Model::new(&object, &chain, contact);
+        let reached = |node: &u32| model.rest[*node as usize].z > 0.01;
+        model.compliance = Compliance::on(&object, (0..object.surface_nodes as u32).filter(reached).collect()).unwrap();
+        model
+    };
+    for (algorithm, blending) in [
+        (Algorithm::Energy, Blending::Width(0.0)),
+        (Algorithm::Linearised, Blending::Width(0.0)),
+        (Algorithm::Energy, Blending::Mesh),
+    ] {
+        let model = part(algorithm, blending);
+        let mut cpu = Solver::new(&model);
+        let results = GpuSolver::new(context(), &model).unwrap().solve(&configurations).unwrap();
+        let (mut touching, mut beyond) = (0, 0);
+        for (q, result) in configurations.iter().zip(&results) {
+            let reference = cpu.solve(q);
+            assert_eq!(difference(&reference, result), None, "{algorithm:?}, {blending:?}, {q:?}");
+            touching += usize::from(reference.status == Status::Contact);
+            beyond += usize::from(reference.status == Status::Overflow);
+        }
+        println!("{algorithm:?}, {blending:?}: {touching} touch, {beyond} reach beyond");
+        assert!(touching >= 3 && beyond >= 3, "{algorithm:?}, {blending:?}: {touching}, {beyond}");
+    }
+    let refusal = GpuSolver::new(context(), &part(Algorithm::Paper, Blending::Width(0.0))).err().unwrap();
+    assert!(matches!(refusal, GpuError::TooManyNodes { .. }), "{refusal}");
 }
 
 /// Facets beyond what the kernel has room for are no reason to leave any out.

@@ -186,7 +186,7 @@ impl EnergySearch {
         for &NodeForce { node, force } in forces {
             let at = 3 * self.support.add(node);
             self.trial.forces.resize(self.support.order(), 0.0);
-            self.trial.forces[at..at + 3].copy_from_slice(&force.to_array());
+            self.trial.forces[at..at + 3].iter_mut().zip(force.to_array()).for_each(|(sum, part)| *sum += part);
         }
         self.evaluate(model, detection, geometry);
         std::mem::swap(&mut self.state, &mut self.trial);

@@ -72,8 +72,11 @@ pub enum GpuError {
         /// The limit [B].
         limit: u64,
     },
-    /// Of a large object only a part of the compliance is formed, which the kernels cannot address.
-    #[error("the GPU takes objects of at most {limit} surface nodes, not {nodes}. Use --backend cpu for this scene")]
+    /// Of a large object only a part of the compliance is formed, beyond which nobody would see the paper's iteration go.
+    #[error(
+        "the GPU takes objects of at most {limit} surface nodes, not {nodes}, by the paper's iteration. Use --backend cpu for \
+         this scene"
+    )]
     TooManyNodes {
         /// Nodes on the surface.
         nodes: usize,

@@ -23,6 +23,10 @@ pub struct Parameters {
     pub lanes: u32,
     pub blending: f32,
     pub bulge: f32,
+    pub covered: u32,
+    pub padding_0: u32,
+    pub padding_1: u32,
+    pub padding_2: u32,
 }
 
 /// `Joint` of `shaders/types.wgsl`.
@@ -126,7 +130,7 @@ mod tests {
     fn every_shared_struct_is_laid_out_as_in_wgsl() {
         let reflected = reflect();
         let expected = [
-            layout!(Parameters: configurations, first, joints, proxy_nodes, surface_nodes, triangles, max_iterations, stiffness, kc, tolerance, softest, least_distance, depth_rounding, lanes, blending, bulge),
+            layout!(Parameters: configurations, first, joints, proxy_nodes, surface_nodes, triangles, max_iterations, stiffness, kc, tolerance, softest, least_distance, depth_rounding, lanes, blending, bulge, covered, padding_0, padding_1, padding_2),
             layout!(Joint: origin, kind, axis, padding),
             layout!(ProxyNode: position, link),
             layout!(Outcome: status, iterations, residual, elastic, touches, padding_0, padding_1, padding_2),

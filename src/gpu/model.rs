@@ -8,7 +8,11 @@ use super::{
     kernel::StorageBuffer,
     layout::{Joint, Parameters, ProxyNode},
 };
-use crate::{JointVector, contact, object::Object, proxy, scene::JointKind, tolerances};
+use crate::{
+    JointVector, contact, proxy,
+    scene::{Algorithm, JointKind},
+    tolerances,
+};
 use glam::DVec3;
 
 /// Invocations of a workgroup of the equilibrium stages, one of which keeps one contact: the least that GPUs run in step.
@@ -40,7 +44,7 @@ impl DeviceModel {
         if let Some((what, _)) = unsupported.into_iter().find(|(_, asked)| *asked) {
             return Err(GpuError::Unsupported(what));
         }
-        if !compliance.is_whole() {
+        if !compliance.is_whole() && contact.algorithm == Algorithm::Paper {
             return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });
         }
         let extent = model.rest.iter().map(|n| n.length()).fold(0.0, f64::max);
@@ -48,12 +52,13 @@ impl DeviceModel {
         let corners = |t: &[u32; 3]| t.map(|j| model.rest[j as usize]);
         let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
         let longest_edge = object.triangles.iter().map(|t| edge(corners(t))).fold(0.0, f64::max);
-        let compliance: Vec<f32> = compliance.entries.iter().map(|&entry| entry as f32).collect();
+        let entries: Vec<f32> = compliance.entries.iter().map(|&entry| entry as f32).collect();
         Ok(Self {
             parameters: Parameters {
                 joints: chain.joints.len() as u32,
                 proxy_nodes: chain.nodes.len() as u32,
                 surface_nodes: object.surface_nodes as u32,
+                covered: compliance.nodes.len() as u32,
                 triangles: object.triangles.len() as u32,
                 max_iterations: contact.max_iterations.min(tolerances::GPU_MAX_ITERATIONS),
                 stiffness: contact.stiffness as f32,
@@ -72,8 +77,8 @@ impl DeviceModel {
             joints: StorageBuffer::from_slice(context, "joints", &joints(chain, model.centre))?,
             proxy_nodes: StorageBuffer::from_slice(context, "proxy nodes", &proxy_nodes(chain))?,
             rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, extent))?,
-            mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(object))?,
-            compliance: StorageBuffer::from_slice(context, "compliance", &compliance)?,
+            mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(model))?,
+            compliance: StorageBuffer::from_slice(context, "compliance", &entries)?,
             gap_band: if model.blending > 0.0 { 0.0 } else { gap_band },
         })
     }
@@ -127,13 +132,18 @@ fn rest(model: &contact::Model<'_>, extent: f64) -> Vec<[f32; 4]> {
     nodes.chain(spheres).chain(radii).collect()
 }
 
-/// Corners, neighbours and lists around nodes, one behind the other: see `shaders/surface.wgsl`.
-fn mesh(object: &Object) -> Vec<u32> {
+/// Corners, neighbours, lists around nodes and places, one behind the other: see `shaders/surface.wgsl`.
+fn mesh(model: &contact::Model<'_>) -> Vec<u32> {
+    let object = model.object;
     let topology = &object.topology;
     let mut mesh = Vec::new();
     mesh.extend(object.triangles.iter().flatten());
     mesh.extend(topology.across.iter().flatten());
     mesh.extend(&topology.around_offsets);
     mesh.extend(&topology.around);
+    if !model.compliance.is_whole() {
+        let place = |node| model.compliance.place(node).map_or(u32::MAX, |place| place as u32);
+        mesh.extend((0..object.surface_nodes as u32).map(place));
+    }
     mesh
 }

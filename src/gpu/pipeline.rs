@@ -42,7 +42,9 @@ impl Room {
         let facets = if model.blending > 0.0 { Blended::of(contacts).bytes() } else { 0 };
         Self {
             chunk: self.chunk.clamp(1, fit(16 * model.chain.nodes.len().max(model.chain.joints.len()))),
-            batch: self.batch.clamp(1, fit((16 * model.rest.len()).max(size_of::<Touch>() * contacts).max(facets))),
+            batch: self
+                .batch
+                .clamp(1, fit((16 * model.compliance.nodes.len()).max(size_of::<Touch>() * contacts).max(facets))),
             contacts,
         }
     }
@@ -132,7 +134,7 @@ impl Pipeline {
         let positions = buffer("proxy positions", 16 * chunk * nodes)?;
         let gaps = buffer("gaps", 4 * chunk)?;
         let list = buffer("list of contacts", 4 * (chunk + 1))?;
-        let displacement = buffer("displacement", 16 * room.batch as u64 * u64::from(device.parameters.surface_nodes))?;
+        let displacement = buffer("displacement", 16 * room.batch as u64 * u64::from(device.parameters.covered))?;
         let stage = |shader, bindings: &[(Access, &StorageBuffer)]| Stage::new(context, shader, &[], bindings);
         let kinematics = stage(
             &shaders::KINEMATICS,
@@ -162,6 +164,9 @@ impl Pipeline {
         let mut search = Vec::new();
         if model.contact.algorithm == Algorithm::Linearised {
             overrides.push(("FROZEN", 1.0));
+        }
+        if !model.compliance.is_whole() {
+            overrides.push(("PARTIAL", 1.0));
         }
         if let Some(Blended { support, facets }) = blended {
             overrides.extend([("SUPPORT", support as f64), ("FACETS", facets as f64)]);

@@ -63,6 +63,9 @@ pub static COMPACTION: Shader = Shader {
     overrides: &[&[]],
 };
 
+/// The compliance covers a part of a large object.
+const PARTIAL: &[(&str, f64)] = &[("PARTIAL", 1.0)];
+
 /// Least room for contacts and support that the engine uses: tests of the overflow path.
 const CRAMPED: &[(&str, f64)] = &[("CONTACTS", 2.0)];
 
@@ -71,7 +74,7 @@ pub static ENERGY: Shader = Shader {
     name: "energy",
     entry: "main",
     parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, SUPPORT, SPRINGS, TRUST_REGION, ENERGY_SEARCH],
-    overrides: &[&[], &[("FROZEN", 1.0)], CRAMPED],
+    overrides: &[&[], &[("FROZEN", 1.0)], PARTIAL, CRAMPED],
 };
 
 /// The same between facets that pass into each other.
@@ -79,7 +82,7 @@ pub static ENERGY_BLENDED: Shader = Shader {
     name: "energy_blended",
     entry: "main",
     parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, FACET_DEPTH, SUPPORT, BLEND, TRUST_REGION, ENERGY_SEARCH],
-    overrides: &[&[], &[("FROZEN", 1.0)], CRAMPED],
+    overrides: &[&[], &[("FROZEN", 1.0)], PARTIAL, CRAMPED],
 };
 
 /// Equilibrium by the paper's iteration.

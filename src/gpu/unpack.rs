@@ -32,7 +32,7 @@ pub(super) fn unpack(
 ) -> Result<Vec<Equilibrium>, GpuError> {
     let lists = touches.par_chunks_exact(contacts);
     let results = (members.par_iter(), outcomes, lists).into_par_iter();
-    let unpacked: Vec<Option<Equilibrium>> = if model.blending > 0.0 {
+    let unpacked: Vec<Option<Equilibrium>> = if model.blending > 0.0 || !model.compliance.is_whole() {
         results
             .map_init(
                 || contact::Solver::new(model),
@@ -66,8 +66,8 @@ fn written<'a>(outcome: &Outcome, list: &'a [Touch]) -> Option<&'a [Touch]> {
     list.iter().all(|touch| touch.proxy_node != UNWRITTEN).then_some(list)
 }
 
-/// One equilibrium between blended facets: the kernel tells the forces on the object's nodes, near which the CPU's search finds
-/// it. `None` when the kernel did not write it.
+/// One equilibrium between blended facets, or with a part of the compliance, whose limits the CPU keeps an eye on: the kernel
+/// tells the forces on the object's nodes, near which the CPU's search finds it. `None` when the kernel did not write it.
 fn settled(solver: &mut contact::Solver<'_>, q: &[f64], outcome: &Outcome, list: &[Touch]) -> Option<Equilibrium> {
     let status = Status::from_number(u8::try_from(outcome.status).ok()?)?;
     if status != Status::Contact {
@@ -77,7 +77,7 @@ fn settled(solver: &mut contact::Solver<'_>, q: &[f64], outcome: &Outcome, list:
     let forces: Vec<NodeForce> = written(outcome, list)?
         .iter()
         .flat_map(nodes)
-        .filter(|(node, _)| *node != contact::support::ABSENT)
+        .filter(|(node, force)| *node != contact::support::ABSENT && *force != [0.0; 3])
         .map(|(node, force)| NodeForce { node, force: DVec3::from(force.map(f64::from)) })
         .collect();
     let limits = Limits { tolerance: GPU_REFINED_RESIDUAL, iterations: REFINEMENT_PASSES as u32 };
