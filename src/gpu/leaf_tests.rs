@@ -21,6 +21,7 @@ use crate::{
     haptize::Backend,
     object::Object,
     proxy::Chain,
+    random::sequence,
     scene::{JointKind, Scene},
 };
 use bytemuck::{Pod, Zeroable};
@@ -32,15 +33,6 @@ fn context() -> Arc<Context> {
     Arc::clone(CONTEXT.get_or_init(|| {
         Arc::new(Context::open(AdapterChoice::Any).unwrap_or_else(|error| panic!("GPU tests need an adapter: {error}")))
     }))
-}
-
-/// A fixed pseudo-random sequence in [-1, 1).
-fn sequence(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
 }
 
 /// A triangle relative to a proxy node, and displacements of its corners.
