@@ -43,6 +43,11 @@ impl BoundingVolumes {
         Self { entries, slack: CULLING_SLACK * size }
     }
 
+    /// All triangles, those side by side that are near each other.
+    pub fn order(&self) -> impl Iterator<Item = u32> {
+        self.entries.iter().map(|entry| entry.triangle).filter(|&triangle| triangle != u32::MAX)
+    }
+
     /// Squared distance of `x` to the box around the whole surface; zero inside it [m^2].
     #[must_use]
     pub fn distance_squared(&self, x: DVec3) -> f64 {

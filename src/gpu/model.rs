@@ -7,6 +7,7 @@ use super::{
     context::{Context, GpuError},
     kernel::StorageBuffer,
     layout::{Joint, Parameters, ProxyNode},
+    shaders::CLUSTER,
 };
 use crate::{
     JointVector, contact, proxy,
@@ -27,6 +28,7 @@ pub struct DeviceModel {
     pub(super) proxy_nodes: StorageBuffer,
     pub(super) rest: StorageBuffer,
     pub(super) mesh: StorageBuffer,
+    pub(super) clusters: StorageBuffer,
     pub(super) compliance: StorageBuffer,
     /// Gaps within this of zero are decided in f64; between blended facets all are [m].
     pub(super) gap_band: f64,
@@ -52,6 +54,7 @@ impl DeviceModel {
         let corners = |t: &[u32; 3]| t.map(|j| model.rest[j as usize]);
         let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
         let longest_edge = object.triangles.iter().map(|t| edge(corners(t))).fold(0.0, f64::max);
+        let clusters: Vec<u32> = model.bounds.order().collect();
         let entries: Vec<f32> = compliance.entries.iter().map(|&entry| entry as f32).collect();
         Ok(Self {
             parameters: Parameters {
@@ -76,8 +79,9 @@ impl DeviceModel {
             kinds: chain.joints.iter().map(|joint| joint.kind).collect(),
             joints: StorageBuffer::from_slice(context, "joints", &joints(chain, model.centre))?,
             proxy_nodes: StorageBuffer::from_slice(context, "proxy nodes", &proxy_nodes(chain))?,
-            rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, extent))?,
+            rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, &clusters, extent))?,
             mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(model))?,
+            clusters: StorageBuffer::from_slice(context, "clusters", &clusters)?,
             compliance: StorageBuffer::from_slice(context, "compliance", &entries)?,
             gap_band: if model.blending > 0.0 { 0.0 } else { gap_band },
         })
@@ -117,19 +121,25 @@ fn proxy_nodes(chain: &proxy::Chain) -> Vec<ProxyNode> {
     chain.nodes.iter().map(convert).collect()
 }
 
-/// Surface nodes, bounding spheres of the triangles, radii of the proxy nodes, one behind the other.
-fn rest(model: &contact::Model<'_>, extent: f64) -> Vec<[f32; 4]> {
-    let sphere = |triangle: &[u32; 3]| {
-        let corners = triangle.map(|j| model.rest[j as usize]);
-        let centre = corners.into_iter().sum::<DVec3>() / 3.0;
-        let radius = corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max);
+/// Surface nodes, bounding spheres of the triangles, radii of the proxy nodes, bounding spheres of the clusters of triangles, one
+/// behind the other.
+fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 4]> {
+    let around = |nodes: &[u32]| {
+        let corners = nodes.iter().map(|&j| model.rest[j as usize]);
+        let centre = corners.clone().sum::<DVec3>() / nodes.len() as f64;
+        let radius = corners.map(|c| c.distance(centre)).fold(0.0, f64::max);
         let [x, y, z, _] = padded(centre);
         [x, y, z, (radius + tolerances::GPU_BOUND_SLACK * extent) as f32]
     };
+    let triangles = &model.object.triangles;
+    let cluster = |numbers: &[u32]| {
+        let nodes: Vec<u32> = numbers.iter().flat_map(|&t| triangles[t as usize]).collect();
+        around(&nodes)
+    };
     let nodes = model.rest.iter().map(|&n| padded(n));
-    let spheres = model.object.triangles.iter().map(sphere);
+    let spheres = triangles.iter().map(|nodes| around(nodes));
     let radii = model.chain.nodes.iter().map(|node| [node.radius as f32, 0.0, 0.0, 0.0]);
-    nodes.chain(spheres).chain(radii).collect()
+    nodes.chain(spheres).chain(radii).chain(clusters.chunks(CLUSTER).map(cluster)).collect()
 }
 
 /// Corners, neighbours, lists around nodes and places, one behind the other: see `shaders/surface.wgsl`.

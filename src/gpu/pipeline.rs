@@ -148,7 +148,13 @@ impl Pipeline {
         )?;
         let detection = stage(
             &shaders::DETECTION,
-            &[(Uniform, &parameters), (Read, &device.rest), (Read, &device.mesh), (Write, &positions)],
+            &[
+                (Uniform, &parameters),
+                (Read, &device.rest),
+                (Read, &device.mesh),
+                (Write, &positions),
+                (Read, &device.clusters),
+            ],
         )?;
         let classification =
             stage(&shaders::CLASSIFICATION, &[(Uniform, &parameters), (Read, &positions), (Write, &gaps)])?;

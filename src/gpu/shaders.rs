@@ -63,6 +63,9 @@ pub static COMPACTION: Shader = Shader {
     overrides: &[&[]],
 };
 
+/// Triangles that share a bounding sphere in the search for the closest one at rest.
+pub(super) const CLUSTER: usize = 16;
+
 /// The compliance covers a part of a large object.
 const PARTIAL: &[(&str, f64)] = &[("PARTIAL", 1.0)];
 
@@ -208,6 +211,7 @@ fn constants() -> String {
     for (name, count) in [
         ("INNER_ITERATIONS_PER_UNKNOWN", tolerances::INNER_ITERATIONS_PER_UNKNOWN),
         ("MODEL_PASSES", tolerances::MODEL_PASSES),
+        ("CLUSTER", CLUSTER),
     ] {
         text.push_str(&format!("const {name}: u32 = {count}u;\n"));
     }

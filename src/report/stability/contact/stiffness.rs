@@ -127,14 +127,15 @@ impl Cell {
         let each = |time: Duration, count: usize| 1e6 * time.as_secs_f64() / count.max(1) as f64;
         let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
         let mut note = format!(
-            "{} solved, {median}/{most} iterations (median/max), {:.0} us; blended {:.0} %, {:.0} us; paper {:.0} %, {:.0} us; least {:.1} % with {which}",
+            "worst with {which}; {:.1} % of all {}, {median}/{most} iterations (median/max), {:.0} us; blended {:.0} %, {:.0} us; \
+             paper {:.0} %, {:.0} us",
+            percent(self.converged, self.solved),
             self.solved,
             each(self.time, self.solved),
             percent(self.blended.0, self.blended.1),
             each(self.blended_time, self.blended.1),
             percent(self.paper.0, self.paper.1),
             each(self.paper_time, self.paper.1),
-            100.0 * least,
         );
         if self.gpu.1 > 0 {
             let (on_gpu, of) = (percent(self.gpu.0, self.gpu.1), percent(self.gpu_on_cpu, self.gpu.1));
@@ -145,8 +146,8 @@ impl Cell {
         Outcome {
             case: "stiffness".into(),
             varied: format!("Kc {stiffness}, {nodes}, depth {from} to {to} R"),
-            measure: "share converged [1]".into(),
-            worst: self.converged as f64 / self.solved.max(1) as f64,
+            measure: "share converged, worst combination [1]".into(),
+            worst: least,
             bound: Bound::AtLeast(share),
             note,
         }
