@@ -216,8 +216,8 @@ impl<'a> Sweep<'a> {
         Ok((self.dataset(columns, provenance), report))
     }
 
-    /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. Memory does not grow
-    /// with the grid.
+    /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. While it is put
+    /// together its name ends in `.growing`. Memory does not grow with the grid.
     ///
     /// With `resume` it continues from such a part; the file is then the same, bit for bit, as without the interruption,
     /// the date of the beginning included. Without a part it begins. Without `resume` a part that holds results is an error.

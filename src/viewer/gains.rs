@@ -112,7 +112,7 @@ pub fn sliders(ui: &mut Ui, axes: &[Axis], chosen: Option<usize>, gains: &mut Ha
 }
 
 /// Everything to the right of the mark may create energy. Joints whose gains in the scene differ, in unit or in size, share a
-/// slider of what all are multiplied by.
+/// slider of what all are multiplied by; those that have none there keep none.
 fn slider(ui: &mut Ui, gain: &Gain, axes: &[Axis], joints: &[usize], gains: &mut HapticsSpec, original: &HapticsSpec) {
     let unit = |joint: usize| {
         let axis = &axes[joint];
@@ -120,7 +120,8 @@ fn slider(ui: &mut Ui, gain: &Gain, axes: &[Axis], joints: &[usize], gains: &mut
     };
     let from = *(gain.of)(&mut original.clone());
     let differ = joints.windows(2).any(|pair| from[pair[0]] != from[pair[1]] || unit(pair[0]) != unit(pair[1]));
-    let multiplied = differ && joints.iter().all(|&joint| from[joint] > 0.0);
+    let some = joints.iter().copied().find(|&joint| from[joint] > 0.0);
+    let multiplied = differ && some.is_some();
     let one = |joint: usize| if multiplied { from[joint] } else { 1.0 };
     let unit = if multiplied { "times the scene's".into() } else { theme::units(joints.iter().copied().map(unit)) };
 
@@ -128,11 +129,13 @@ fn slider(ui: &mut Ui, gain: &Gain, axes: &[Axis], joints: &[usize], gains: &mut
     let (mut bound, mut beyond) = (None, false);
     for &joint in joints {
         if let Some(here) = (gain.bound)(gains, joint) {
-            bound = Some(bound.map_or(f64::MAX, |least: f64| least).min(here / one(joint)));
             beyond |= values[joint] > here;
+            if one(joint) > 0.0 {
+                bound = Some(bound.map_or(f64::MAX, |least: f64| least).min(here / one(joint)));
+            }
         }
     }
-    let first = joints[0];
+    let first = some.unwrap_or(joints[0]);
     let mut value = values[first] / one(first);
     let end = (HEADROOM * (from[first] / one(first)).max(bound.unwrap_or(0.0))).max(LEAST_END);
     ui.add_space(FINE_GAP);

@@ -108,18 +108,18 @@ fn gains_that_differ_between_joints_are_multiplied_together() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("three.toml");
     let scene = small_scene();
-    let (old, new) = ("coupling_stiffness = 20.0", "coupling_stiffness = [10.0, 16.0, 20.0]");
+    let (old, new) = ("coupling_damping = 0.01", "coupling_damping = [0.0, 0.016, 0.02]");
     assert!(scene.contains(old));
     std::fs::write(&file, scene.replace(old, new)).unwrap();
     let mut window = Window::open(&Start::File(file), [1200.0, 800.0], Theme::Light);
-    assert!(window.shows("Coupling stiffness Kvc [times the scene's]"));
+    assert!(window.shows("Coupling damping Bvc [times the scene's]"));
     assert!(window.shows("Boundary slope Ks [N m/rad]"));
-    window.harness.get_by_role_and_label(Role::Slider, "Coupling stiffness Kvc").set_value_accesskit(0.5);
+    window.harness.get_by_role_and_label(Role::Slider, "Coupling damping Bvc").set_value_accesskit(0.5);
     window.harness.step();
     window.wait();
-    for (joint, gain) in [("yaw", 5.0), ("shoulder", 8.0), ("elbow", 10.0)] {
+    for (joint, gain) in [("yaw", 0.0), ("shoulder", 0.008), ("elbow", 0.01)] {
         window.choose("Joint", joint);
-        let slider = window.harness.get_by_role_and_label(Role::Slider, "Coupling stiffness Kvc");
+        let slider = window.harness.get_by_role_and_label(Role::Slider, "Coupling damping Bvc");
         assert_eq!(slider.accesskit_node().numeric_value(), Some(gain), "{joint}");
     }
 }
