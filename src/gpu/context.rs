@@ -4,7 +4,10 @@
 //! (callback; wgpu's default is to panic), and waits that never end. All three end up in [`GpuError`]: the callbacks
 //! store the first message, [`Context::check`] returns it, and every wait has a limit.
 
-use super::adapter::{AdapterChoice, AdapterSummary, asked_for, candidates, instance};
+use super::{
+    adapter::{AdapterChoice, AdapterSummary, asked_for, candidates, instance},
+    timing::Stopwatch,
+};
 use std::{
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
@@ -83,6 +86,11 @@ pub enum GpuError {
         /// Nodes that are taken.
         limit: usize,
     },
+    /// The adapter cannot say how long a kernel takes.
+    #[error(
+        "adapter {0} does not stamp the time of its commands (TIMESTAMP_QUERY): its kernels cannot be timed one by one"
+    )]
+    NoClock(String),
     /// What the kernels do not do.
     #[error("the GPU does not solve contact with {0}. Use --backend cpu, or leave `{0}` out of [contact]")]
     Unsupported(&'static str),
@@ -114,6 +122,8 @@ pub struct Context {
     choice: AdapterChoice,
     adapter: AdapterSummary,
     failures: Arc<Mutex<Failures>>,
+    /// Where kernels are timed.
+    pub(super) stopwatch: Option<Stopwatch>,
 }
 
 fn lock(failures: &Mutex<Failures>) -> MutexGuard<'_, Failures> {
@@ -128,6 +138,18 @@ impl Context {
     /// [`GpuError::NoAdapter`] or [`GpuError::NotThere`] with what was found; [`GpuError::NoDevice`] when none of them gives
     /// a device.
     pub fn open(choice: AdapterChoice) -> Result<Self, GpuError> {
+        Self::open_with(choice, false)
+    }
+
+    /// The same, to time every kernel: see [`Context::kernel_times`].
+    ///
+    /// # Errors
+    /// As [`Context::open`], and [`GpuError::NoClock`] where the adapter has no such clock.
+    pub fn open_timed(choice: AdapterChoice) -> Result<Self, GpuError> {
+        Self::open_with(choice, true)
+    }
+
+    fn open_with(choice: AdapterChoice, timed: bool) -> Result<Self, GpuError> {
         let instance = instance();
         let found = candidates(&instance);
         let names: Vec<String> = found.iter().map(|adapter| AdapterSummary::of(adapter).to_string()).collect();
@@ -138,7 +160,7 @@ impl Context {
             if !choice.takes(&summary, part.as_deref()) {
                 continue;
             }
-            match Self::open_on(&instance, adapter, summary, choice.clone()) {
+            match Self::open_on(&instance, adapter, summary, choice.clone(), timed) {
                 Ok(context) => return Ok(context),
                 Err(error) => refusal = refusal.or(Some(error)),
             }
@@ -151,7 +173,12 @@ impl Context {
         adapter: &wgpu::Adapter,
         summary: AdapterSummary,
         choice: AdapterChoice,
+        timed: bool,
     ) -> Result<Self, GpuError> {
+        let clock = if timed { wgpu::Features::TIMESTAMP_QUERY } else { wgpu::Features::empty() };
+        if !adapter.features().contains(clock) {
+            return Err(GpuError::NoClock(summary.to_string()));
+        }
         let offered = adapter.limits();
         // WebGPU's defaults, which every device has, but for the two sizes that decide which objects fit, and the buffers that
         // blended facets take, which almost every device has.
@@ -164,8 +191,12 @@ impl Context {
                 .clamp(defaults.max_storage_buffers_per_shader_stage, MOST_BINDINGS),
             ..defaults
         };
-        let descriptor =
-            wgpu::DeviceDescriptor { label: Some("haptize"), required_limits: limits, ..Default::default() };
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("haptize"),
+            required_features: clock,
+            required_limits: limits,
+            ..Default::default()
+        };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|error| GpuError::NoDevice { adapter: summary.to_string(), reason: error.to_string() })?;
         let failures = Arc::new(Mutex::new(Failures::default()));
@@ -185,6 +216,7 @@ impl Context {
             choice,
             adapter: summary,
             failures,
+            stopwatch: timed.then(Stopwatch::default),
         })
     }
 
@@ -193,7 +225,7 @@ impl Context {
     /// # Errors
     /// As [`Context::open`].
     pub fn reopen(&self) -> Result<Self, GpuError> {
-        Self::open(self.choice.clone())
+        Self::open_with(self.choice.clone(), self.stopwatch.is_some())
     }
 
     /// The adapter in use.

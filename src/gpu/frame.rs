@@ -12,7 +12,7 @@
 
 use super::{
     context::{Context, GpuError},
-    kernel::{Access, Kernel, StorageBuffer},
+    kernel::{Access, Dispatch, Kernel, StorageBuffer},
     layout::FrameParameters,
     shaders,
 };
@@ -23,6 +23,9 @@ use std::sync::Arc;
 
 /// Invocations of a workgroup; the shader's default.
 const WORKGROUP: u32 = 64;
+
+/// Size of a node's force, displacement, velocity, or vector of the iteration [B].
+const VECTOR: u64 = 16;
 
 /// Which solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,8 +64,22 @@ pub enum FrameError {
     Period(f64),
 }
 
-/// One recorded dispatch: kernel, bindings, workgroups.
-type Stage = (Arc<Kernel>, wgpu::BindGroup, u32);
+/// One dispatch of every frame.
+#[derive(Clone)]
+struct Stage {
+    kernel: Arc<Kernel>,
+    bound: wgpu::BindGroup,
+    workgroups: u32,
+    /// See [`Dispatch::bytes`].
+    bytes: u64,
+}
+
+impl Stage {
+    fn dispatch(&self) -> Dispatch<'_> {
+        let Self { kernel, bound, workgroups, bytes } = self;
+        Dispatch { kernel, bound, workgroups: *workgroups, bytes: *bytes }
+    }
+}
 
 /// The nodes' state on the device, and the stages that advance it.
 pub struct FrameUpdate {
@@ -155,7 +172,9 @@ impl FrameUpdate {
             let constants = [("FACTOR", spec.factor), ("STRAIN", spec.strain)];
             let kernel = Arc::new(Kernel::new(gpu, &shaders::FRAME_STIFFENING, &constants, &DENSE)?);
             let bound = kernel.bind(gpu, &[&even, &structure, &blocks, masses, &forces, &state, &reach, loads])?;
-            stages.push((kernel, bound, groups));
+            // Forces and what is added to them are read and written, displacements read.
+            let bytes = structure.size() + blocks.size() + reach.size() + 3 * VECTOR * nodes as u64;
+            stages.push(Stage { kernel, bound, workgroups: groups, bytes });
         }
         match method {
             FrameMethod::Inverse => {
@@ -167,14 +186,14 @@ impl FrameUpdate {
             }
             FrameMethod::Iterations(iterations) => {
                 let odd = StorageBuffer::uniform(gpu, "frame parameters", &parameters(1))?;
-                let work = StorageBuffer::new(gpu, "conjugate gradients", 5 * 16 * nodes as u64)?;
+                let work = StorageBuffer::new(gpu, "conjugate gradients", WORK_VECTORS * VECTOR * nodes as u64)?;
                 let sums = StorageBuffer::new(gpu, "sums", 3 * 4 * u64::from(groups))?;
                 buffers.extend([odd.size(), work.size(), sums.size()]);
                 let (own, uniforms) = ([&work, &sums], [&even, &odd]);
                 stages.extend(iterative_stages(gpu, uniforms, common, own, [groups, iterations], overrides)?);
             }
         }
-        let mut pipelines: Vec<_> = stages.iter().map(|(kernel, ..)| Arc::as_ptr(kernel)).collect();
+        let mut pipelines: Vec<_> = stages.iter().map(|stage| Arc::as_ptr(&stage.kernel)).collect();
         pipelines.sort_unstable();
         pipelines.dedup();
         let takes = FrameCost {
@@ -210,12 +229,7 @@ impl FrameUpdate {
             loads.write(&self.context, &self.padded_forces);
         }
         let mut encoder = self.context.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            for (kernel, bound, workgroups) in &self.stages {
-                kernel.record(&mut pass, bound, *workgroups);
-            }
-        }
+        self.context.record(&mut encoder, self.stages.iter().map(Stage::dispatch));
         self.context.queue.submit([encoder.finish()]);
         self.context.check()
     }
@@ -277,6 +291,9 @@ const DENSE: [Access; 8] = {
     [Uniform, Read, Read, Read, Read, Write, Read, Write]
 };
 
+/// Vectors of the iteration: v_hat, residual, direction, product, diagonal.
+const WORK_VECTORS: u64 = 5;
+
 const ITERATIVE: [Access; 8] = {
     use Access::{Read, Uniform, Write};
     [Uniform, Read, Read, Read, Read, Write, Write, Write]
@@ -291,11 +308,14 @@ fn dense_stages(
     overrides: &[(&str, f64)],
 ) -> Result<Vec<Stage>, GpuError> {
     let buffers = [parameters, structure, blocks, inertia, forces, state, inverse, right];
+    let load = structure.size() + blocks.size() + inertia.size() + forces.size() + state.size() + right.size();
+    let advance = inverse.size() + right.size() + 2 * state.size();
     let mut stages = Vec::new();
-    for (shader, workgroups) in [(&shaders::FRAME_LOAD, groups), (&shaders::FRAME_ADVANCE, nodes)] {
+    for (shader, workgroups, bytes) in [(&shaders::FRAME_LOAD, groups, load), (&shaders::FRAME_ADVANCE, nodes, advance)]
+    {
         let kernel = Arc::new(Kernel::new(context, shader, overrides, &DENSE)?);
         let bound = kernel.bind(context, &buffers)?;
-        stages.push((kernel, bound, workgroups));
+        stages.push(Stage { kernel, bound, workgroups, bytes });
     }
     Ok(stages)
 }
@@ -308,25 +328,28 @@ fn iterative_stages(
     [groups, iterations]: [u32; 2],
     overrides: &[(&str, f64)],
 ) -> Result<Vec<Stage>, GpuError> {
-    let stage = |shader, odd: u32| -> Result<Stage, GpuError> {
+    let stage = |shader, bytes| -> Result<Stage, GpuError> {
         let kernel = Arc::new(Kernel::new(context, shader, overrides, &ITERATIVE)?);
-        let buffers = [parameters[odd as usize], structure, blocks, inertia, forces, state, work, sums];
+        let buffers = [parameters[0], structure, blocks, inertia, forces, state, work, sums];
         let bound = kernel.bind(context, &buffers)?;
-        Ok((kernel, bound, groups))
+        Ok(Stage { kernel, bound, workgroups: groups, bytes })
     };
     // The same kernel with the bindings of the odd iterations.
-    let odd = |(kernel, _, _): &Stage| -> Result<Stage, GpuError> {
+    let odd = |stage: &Stage| -> Result<Stage, GpuError> {
         let buffers = [parameters[1], structure, blocks, inertia, forces, state, work, sums];
-        Ok((Arc::clone(kernel), kernel.bind(context, &buffers)?, groups))
+        Ok(Stage { bound: stage.kernel.bind(context, &buffers)?, ..stage.clone() })
     };
-    let product = stage(&shaders::FRAME_PRODUCT, 0)?;
-    let correct = stage(&shaders::FRAME_CORRECT, 0)?;
-    let turn = stage(&shaders::FRAME_TURN, 0)?;
+    // Of the five vectors of the iteration, how many are read and written.
+    let vectors = |count: u64| count * work.size() / WORK_VECTORS;
+    let matrix = structure.size() + blocks.size() + inertia.size();
+    let product = stage(&shaders::FRAME_PRODUCT, matrix + vectors(2))?;
+    let correct = stage(&shaders::FRAME_CORRECT, vectors(7))?;
+    let turn = stage(&shaders::FRAME_TURN, vectors(4))?;
     let turns = [[product.clone(), correct.clone(), turn.clone()], [odd(&product)?, odd(&correct)?, odd(&turn)?]];
-    let mut stages = vec![stage(&shaders::FRAME_BEGIN, 0)?];
+    let mut stages = vec![stage(&shaders::FRAME_BEGIN, matrix + forces.size() + state.size() + vectors(4))?];
     for iteration in 0..iterations.max(1) as usize {
         stages.extend_from_slice(&turns[iteration % 2]);
     }
-    stages.push(stage(&shaders::FRAME_FINISH, 0)?);
+    stages.push(stage(&shaders::FRAME_FINISH, vectors(1) + 2 * state.size())?);
     Ok(stages)
 }

@@ -1,4 +1,4 @@
-//! One compute pipeline with its bindings, and the storage buffers it works on.
+//! One compute pipeline with its bindings, its dispatches, and the storage buffers it works on.
 //!
 //! Group 0 holds all bindings, numbered in the order of the kernel's [`Access`] list. Counts of workgroups above the
 //! limit of one dimension are folded into two; the shader unfolds them and guards the tail.
@@ -42,6 +42,8 @@ impl Access {
 
 /// A compute pipeline.
 pub struct Kernel {
+    /// The shader's, and that of its entry point where it has several.
+    pub(super) name: String,
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
 }
@@ -80,7 +82,11 @@ impl Kernel {
                 compilation_options: wgpu::PipelineCompilationOptions { constants: overrides, ..Default::default() },
                 cache: None,
             });
-            Self { pipeline, layout }
+            let name = match shader.entry {
+                "main" => shader.name.to_owned(),
+                entry => format!("{} {entry}", shader.name),
+            };
+            Self { name, pipeline, layout }
         })
     }
 
@@ -101,16 +107,46 @@ impl Kernel {
             })
         })
     }
+}
 
-    /// Records one dispatch of `workgroups` workgroups.
-    pub fn record(&self, pass: &mut wgpu::ComputePass<'_>, bound: &wgpu::BindGroup, workgroups: u32) {
-        if workgroups == 0 {
+/// One dispatch of a kernel.
+#[derive(Clone, Copy)]
+pub struct Dispatch<'a> {
+    /// What runs.
+    pub kernel: &'a Kernel,
+    /// On what.
+    pub bound: &'a wgpu::BindGroup,
+    /// Number of workgroups.
+    pub workgroups: u32,
+    /// What it reads and writes, each element once, twice where it does both [B].
+    pub bytes: u64,
+}
+
+impl Dispatch<'_> {
+    /// Records it in `pass`.
+    pub fn record(&self, pass: &mut wgpu::ComputePass<'_>) {
+        if self.workgroups == 0 {
             return;
         }
-        let [x, y] = fold(workgroups);
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, bound, &[]);
+        let [x, y] = fold(self.workgroups);
+        pass.set_pipeline(&self.kernel.pipeline);
+        pass.set_bind_group(0, self.bound, &[]);
         pass.dispatch_workgroups(x, y, 1);
+    }
+}
+
+impl Context {
+    /// Records `dispatches`, in order: in one pass, unless they are timed.
+    pub(super) fn record<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        dispatches: impl IntoIterator<Item = Dispatch<'a>>,
+    ) {
+        if let Some(stopwatch) = &self.stopwatch {
+            return stopwatch.record(&self.device, encoder, dispatches);
+        }
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        dispatches.into_iter().for_each(|dispatch| dispatch.record(&mut pass));
     }
 }
 

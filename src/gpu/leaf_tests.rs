@@ -3,7 +3,7 @@
 use super::{
     adapter::AdapterChoice,
     context::{Context, GpuError},
-    kernel::{Access, Kernel, StorageBuffer},
+    kernel::{Access, Dispatch, Kernel, StorageBuffer},
     layout::{Joint, Outcome, Parameters, ProxyNode, Touch},
     model::DeviceModel,
     pipeline::Room,
@@ -104,7 +104,7 @@ fn ask(questions: &[Question]) -> Vec<Answer> {
 fn run(context: &Context, kernel: &Kernel, buffers: &[&StorageBuffer], workgroups: u32) {
     let bound = kernel.bind(context, buffers).unwrap();
     let mut encoder = context.device.create_command_encoder(&Default::default());
-    kernel.record(&mut encoder.begin_compute_pass(&Default::default()), &bound, workgroups);
+    context.record(&mut encoder, [Dispatch { kernel, bound: &bound, workgroups, bytes: 0 }]);
     let submission = context.queue.submit([encoder.finish()]);
     context.wait(&submission).unwrap();
 }

@@ -12,7 +12,8 @@
 //! | `refinement` | the energy form's results settled in f64 |
 //! | `unpack` | from what the kernels wrote to equilibria, in f64; between blended facets by the CPU's search |
 //! | `frame` | the object's nodes, one passive step a frame |
-//! | `kernel` | one compute pipeline with its bindings; buffers, poison, read-back |
+//! | `kernel` | one compute pipeline with its bindings and dispatches; buffers, poison, read-back |
+//! | `timing` | how long each kernel takes, where that is asked for |
 //!
 //! A shader in `shaders/` and its CPU twin share names and order of statements. The GPU computes in f32 with
 //! coordinates relative to the object's centroid; what is summed over few terms (torque, forces of a node) is summed on
@@ -30,6 +31,7 @@ mod pipeline;
 mod refinement;
 pub mod shaders;
 mod solver;
+mod timing;
 mod unpack;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterChoice, AdapterSummary, adapters};
@@ -37,3 +39,4 @@ pub use context::{Context, GpuError};
 pub use frame::{FrameCost, FrameError, FrameMethod, FrameUpdate};
 pub use pipeline::Room;
 pub use solver::GpuSolver;
+pub use timing::KernelTime;

@@ -87,6 +87,21 @@ impl DeviceModel {
         })
     }
 
+    /// Size of what places the proxy [B].
+    pub(super) fn arm_bytes(&self) -> u64 {
+        self.joints.size() + self.proxy_nodes.size()
+    }
+
+    /// Size of what the proxy is tested against for contact at rest [B].
+    pub(super) fn surface_bytes(&self) -> u64 {
+        self.rest.size() + self.mesh.size() + self.clusters.size()
+    }
+
+    /// Size of what contact is solved with [B].
+    pub(super) fn object_bytes(&self) -> u64 {
+        self.rest.size() + self.mesh.size() + self.compliance.size()
+    }
+
     /// (cos q, sin q) of every joint, or (q, 0) of a prismatic one: all that kinematics needs of a configuration.
     pub(super) fn motions(&self, configurations: &[JointVector]) -> Vec<[f32; 2]> {
         let motion = |(&kind, &q): (&JointKind, &f64)| match kind {

@@ -2,7 +2,7 @@
 
 use super::{
     context::{Context, GpuError},
-    kernel::{Access, Kernel, POISON, Staging, StorageBuffer},
+    kernel::{Access, Dispatch, Kernel, POISON, Staging, StorageBuffer},
     layout::{FACET_BYTES, Outcome, Parameters, SEARCH_VECTORS, Touch},
     model::{DeviceModel, LANES},
     shaders::{self, Shader},
@@ -94,6 +94,10 @@ impl Stage {
         let bound = kernel.bind(context, &buffers)?;
         Ok(Self { kernel, bound })
     }
+
+    fn dispatch(&self, workgroups: u32, bytes: u64) -> Dispatch<'_> {
+        Dispatch { kernel: &self.kernel, bound: &self.bound, workgroups, bytes }
+    }
 }
 
 /// What one batch in flight writes. There are two, so that one is read while the other is written.
@@ -119,6 +123,8 @@ pub(super) struct Pipeline {
     classification: Stage,
     compaction: Stage,
     equilibrium: Kernel,
+    /// What `equilibrium` reads and writes for one configuration, besides its result [B].
+    own_bytes: u64,
     sets: [ResultSet; 2],
 }
 
@@ -182,6 +188,9 @@ impl Pipeline {
             search.push(buffer("search vectors", batch * SEARCH_VECTORS * 16 * support as u64)?);
         }
         let equilibrium = Kernel::new(context, shader, &overrides, &accesses)?;
+        // Its number and places are read, its workspace is written and read.
+        let workspace = displacement.size() + search.iter().map(StorageBuffer::size).sum::<u64>();
+        let own_bytes = 4 + 16 * nodes + 2 * workspace / room.batch as u64;
         let result_set = || -> Result<ResultSet, GpuError> {
             let parameters = StorageBuffer::uniform(context, "parameters", &device.parameters)?;
             let outcomes = buffer("outcomes", (size_of::<Outcome>() * room.batch) as u64)?;
@@ -217,6 +226,7 @@ impl Pipeline {
             classification,
             compaction,
             equilibrium,
+            own_bytes,
             sets,
         })
     }
@@ -237,18 +247,16 @@ impl Pipeline {
         self.gaps.poison(context, gap_bytes);
         self.list.poison(context, list_bytes);
         let placed = count * parameters.proxy_nodes;
+        let (motion_bytes, place_bytes) = (8 * u64::from(count * parameters.joints), 16 * u64::from(placed));
+        let (nodes, configurations) = (placed.div_ceil(WORKGROUP), count.div_ceil(WORKGROUP));
         let mut encoder = context.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            for (stage, workgroups) in [
-                (&self.kinematics, placed.div_ceil(WORKGROUP)),
-                (&self.detection, placed.div_ceil(WORKGROUP)),
-                (&self.classification, count.div_ceil(WORKGROUP)),
-                (&self.compaction, 1),
-            ] {
-                stage.kernel.record(&mut pass, &stage.bound, workgroups);
-            }
-        }
+        let dispatches = [
+            self.kinematics.dispatch(nodes, motion_bytes + self.model.arm_bytes() + place_bytes),
+            self.detection.dispatch(nodes, place_bytes + self.model.surface_bytes() + place_bytes),
+            self.classification.dispatch(configurations, place_bytes + gap_bytes),
+            self.compaction.dispatch(1, gap_bytes + list_bytes),
+        ];
+        context.record(&mut encoder, dispatches);
         self.detected.record(&mut encoder, &[(&self.gaps, gap_bytes), (&self.list, list_bytes)]);
         let submission = context.queue.submit([encoder.finish()]);
         self.detected.take(context, &submission, gap_bytes + list_bytes, |bytes| {
@@ -273,10 +281,10 @@ impl Pipeline {
         results.outcomes.poison(context, outcome_bytes);
         results.touches.poison(context, touch_bytes);
         let mut encoder = context.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            self.equilibrium.record(&mut pass, &results.bound, count as u32);
-        }
+        let bytes = self.model.object_bytes() + self.own_bytes * count as u64 + outcome_bytes + touch_bytes;
+        let workgroups = count as u32;
+        let dispatch = Dispatch { kernel: &self.equilibrium, bound: &results.bound, workgroups, bytes };
+        context.record(&mut encoder, [dispatch]);
         results.staging.record(&mut encoder, &[(&results.outcomes, outcome_bytes), (&results.touches, touch_bytes)]);
         context.queue.submit([encoder.finish()])
     }

@@ -1,0 +1,257 @@
+//! How long each kernel takes on the first adapter, what it moves, and what bounds it: those of a sweep of the sphere scene, by
+//! each algorithm, and those of the object's frame update. Then whole sweeps on that adapter beside the CPU backend.
+//!
+//!     cargo bench --bench kernels
+//!
+//! Kernels are timed by the device's own clock. Bytes are what a kernel reads and writes if nothing is read twice; beside them
+//! stands the rate at which the same device copies memory. Operations are counted where they do not depend on the data.
+
+use glam::DVec3;
+use haptize::{
+    contact::Model,
+    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver, KernelTime},
+    haptize::{Backend, BackendChoice, Bake, sample},
+    object::Object,
+    proxy::Chain,
+    scene::{Algorithm, GraphicsEffects, Scene, Shape},
+};
+use std::{
+    collections::BTreeMap,
+    error::Error,
+    path::Path,
+    sync::{Arc, atomic::AtomicBool},
+    time::Instant,
+};
+
+/// Frames that a figure of the frame update is taken from.
+const FRAMES: usize = 20;
+
+/// Rings and segments of the spheres whose frames are timed: 102 and 963 nodes by the inverse, the others iteratively.
+const RINGS: [usize; 4] = [10, 31, 100, 316];
+
+/// How much finer than the scene's the grid is on which the kernels of a GPU are timed: 59,427 points.
+const SWEPT: usize = 2;
+
+/// How much finer than the scene's the grids are that a GPU is compared on: up to 882,816 points.
+const FINER: [usize; 4] = [1, 2, 3, 5];
+
+/// A kernel that moves memory at this share of the rate of copying, or more, is bound by memory.
+const MEMORY_BOUND: f64 = 0.5;
+
+/// A dispatch of fewer workgroups leaves most of a GPU idle.
+const FEW_WORKGROUPS: f64 = 128.0;
+
+/// Size of what is copied [B], and how often.
+const COPIED: u64 = 64 << 20;
+const COPIES: usize = 16;
+
+/// What is known of the adapter beforehand.
+#[derive(Clone, Copy)]
+struct Adapter {
+    /// Bytes that it reads and writes a second when it copies [B/s].
+    copying: f64,
+    hardware: bool,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/sphere.toml"))?;
+    let plain = Context::open(AdapterChoice::Any)?;
+    println!("{}", plain.adapter());
+    let hardware = plain.adapter().hardware;
+    if !hardware {
+        println!("a software rasteriser: small cases only, and its figures say nothing of a GPU");
+    }
+    match Context::open_timed(AdapterChoice::Any) {
+        Ok(context) => kernels(&Arc::new(context), &scene)?,
+        Err(error) => println!("\nkernels skipped: {error}"),
+    }
+    compare(&scene, if hardware { &FINER } else { &FINER[..1] })
+}
+
+fn kernels(context: &Arc<Context>, scene: &Scene) -> Result<(), Box<dyn Error>> {
+    let (copying, hardware) = (copying(context)?, context.adapter().hardware);
+    println!("copies {:.1} GB/s, as many bytes read as written", 1e-9 * copying);
+    let adapter = Adapter { copying, hardware };
+    let swept = refined(scene, if hardware { SWEPT } else { 1 });
+    for algorithm in [Algorithm::Energy, Algorithm::Paper, Algorithm::Linearised] {
+        sweep(context, &swept, algorithm, adapter)?;
+    }
+    let rings = if hardware { &RINGS[..] } else { &RINGS[..3] };
+    rings.iter().try_for_each(|&rings| frames(context, scene, rings, adapter))
+}
+
+/// Bytes that the device reads and writes a second when it copies [B/s].
+fn copying(context: &Context) -> Result<f64, Box<dyn Error>> {
+    let (_, _, device, queue) = context.shared();
+    let size = COPIED.min(context.binding_limit());
+    let buffer = || {
+        let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
+    };
+    let (from, to) = (buffer(), buffer());
+    let copy = |times| {
+        let mut encoder = device.create_command_encoder(&Default::default());
+        (0..times).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size));
+        context.wait(&queue.submit([encoder.finish()]))
+    };
+    copy(1)?;
+    let begin = Instant::now();
+    copy(COPIES)?;
+    Ok(2.0 * size as f64 * COPIES as f64 / begin.elapsed().as_secs_f64())
+}
+
+/// One sweep over the scene's whole grid, after one that is not counted: it finds how much one dispatch should hold.
+fn sweep(context: &Arc<Context>, scene: &Scene, algorithm: Algorithm, adapter: Adapter) -> Result<(), Box<dyn Error>> {
+    let mut contact = scene.contact;
+    contact.algorithm = algorithm;
+    let (object, chain) = (Object::build(&scene.object)?, Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, contact);
+    let configurations = sample(scene);
+    let mut solver = GpuSolver::new(Arc::clone(context), &model)?;
+    solver.solve(&configurations)?;
+    context.kernel_times()?;
+    let begin = Instant::now();
+    let equilibria = solver.solve(&configurations)?;
+    let seconds = begin.elapsed().as_secs_f64();
+    let touching = equilibria.iter().filter(|equilibrium| equilibrium.gap < 0.0).count();
+    println!(
+        "\nsweep, {algorithm:?}: {} configurations, {touching} of them in contact, {} nodes",
+        configurations.len(),
+        object.rest.len()
+    );
+    let count = |kernel: &KernelTime| {
+        let at_rest = ["kinematics", "detection", "classification", "compaction"].contains(&kernel.name.as_str());
+        if at_rest { configurations.len() } else { touching }
+    };
+    table(&context.kernel_times()?, "configuration", count, &BTreeMap::new(), seconds, adapter);
+    Ok(())
+}
+
+/// `scene` on a grid so many times as fine.
+fn refined(scene: &Scene, finer: usize) -> Scene {
+    let mut scene = scene.clone();
+    for axis in &mut scene.grid.axes {
+        (axis.step, axis.count) = (axis.step / finer as f64, (axis.count - 1) * finer + 1);
+    }
+    scene
+}
+
+/// Frames of the object as a sphere of `rings` rings and segments.
+fn frames(context: &Arc<Context>, scene: &Scene, rings: usize, adapter: Adapter) -> Result<(), Box<dyn Error>> {
+    let mut spec = scene.object.clone();
+    if let Shape::Sphere { rings: r, segments: s, .. } = &mut spec.shape {
+        (*r, *s) = (rings, rings);
+    }
+    let object = Object::build(&spec)?;
+    let nodes = object.rest.len();
+    let method = FrameMethod::suitable(nodes);
+    let forces: Vec<DVec3> = (0..nodes).map(|k| DVec3::new(1e-4, 0.0, -1e-3 * (k % 7) as f64)).collect();
+    let mut update = FrameUpdate::new(Arc::clone(context), &object, 1.0 / 60.0, method, &GraphicsEffects::default())?;
+    update.step(&forces)?;
+    update.read()?;
+    context.kernel_times()?;
+    let begin = Instant::now();
+    for _ in 0..FRAMES {
+        update.step(&forces)?;
+    }
+    update.read()?;
+    let seconds = begin.elapsed().as_secs_f64();
+    println!("\nframe update, {nodes} nodes, {method:?}: {FRAMES} frames");
+    // A block of three by three times a vector, for each of a row; the rest is some operations a node.
+    let (product, blocks, square) = (18.0, object.stiffness.blocks.len() as f64, (nodes * nodes) as f64);
+    let operations = BTreeMap::from([
+        ("frame load", product * blocks),
+        ("frame advance", product * square),
+        ("frame_iterative begin", product * blocks),
+        ("frame_iterative product", product * blocks),
+    ]);
+    table(&context.kernel_times()?, "node and frame", |_| nodes * FRAMES, &operations, seconds, adapter);
+    Ok(())
+}
+
+/// Prints what was timed: `count` is how many configurations, or nodes and frames, a kernel was for, `operations` how many
+/// floating-point operations one dispatch does, `seconds` what all took by the clock on the wall.
+fn table(
+    kernels: &[KernelTime],
+    what: &str,
+    count: impl Fn(&KernelTime) -> usize,
+    operations: &BTreeMap<&str, f64>,
+    seconds: f64,
+    Adapter { copying, hardware }: Adapter,
+) {
+    let whole: f64 = kernels.iter().map(|kernel| kernel.seconds).sum();
+    println!(
+        "  {:<24} {:>10} {:>11} {:>13} {:>7} {:>11} {:>9} {:>8} {:>8} {:>9}  bound by",
+        "kernel",
+        "dispatches",
+        "time [us]",
+        "[us each]",
+        "share",
+        "workgroups",
+        "[MB]",
+        "[GB/s]",
+        "of copy",
+        "[GFLOP/s]"
+    );
+    for kernel in kernels {
+        let rate = kernel.bytes as f64 / kernel.seconds;
+        let workgroups = kernel.workgroups as f64 / kernel.dispatches as f64;
+        let flops = operations.get(kernel.name.as_str()).map_or_else(
+            || "-".into(),
+            |each| format!("{:.2}", 1e-9 * each * kernel.dispatches as f64 / kernel.seconds),
+        );
+        println!(
+            "  {:<24} {:>10} {:>11.0} {:>13.3} {:>5.1} % {:>11.0} {:>9.2} {:>8.2} {:>6.1} % {:>9}  {}",
+            kernel.name,
+            kernel.dispatches,
+            1e6 * kernel.seconds,
+            1e6 * kernel.seconds / count(kernel) as f64,
+            100.0 * kernel.seconds / whole,
+            workgroups,
+            1e-6 * kernel.bytes as f64,
+            1e-9 * rate,
+            100.0 * rate / copying,
+            flops,
+            bound(rate / copying, workgroups, hardware)
+        );
+    }
+    println!(
+        "  all: {:.1} ms of {:.1} ms; the rest is the host's, transfers included ([us each]: a {what})",
+        1e3 * whole,
+        1e3 * seconds
+    );
+}
+
+/// What bounds a kernel that moves memory at `share` of the rate of copying, in dispatches of so many `workgroups`.
+fn bound(share: f64, workgroups: f64, hardware: bool) -> &'static str {
+    if share > MEMORY_BOUND {
+        "memory"
+    } else if hardware && workgroups < FEW_WORKGROUPS {
+        "few workgroups"
+    } else {
+        "arithmetic or latency"
+    }
+}
+
+/// Whole sweeps as `haptize bake` does them, of grids so many times as fine as the scene's, on the adapter and on the CPU.
+fn compare(scene: &Scene, finer: &[usize]) -> Result<(), Box<dyn Error>> {
+    println!(
+        "\nwhole sweeps [configurations/s]\n  {:>11} {:>12} {:>12} {:>9}",
+        "grid points", "adapter", "CPU", "ratio"
+    );
+    for &finer in finer {
+        let scene = refined(scene, finer);
+        let rate = |backend| -> Result<(usize, f64), Box<dyn Error>> {
+            let stop = AtomicBool::new(false);
+            let bake = Bake { scene: &scene, backend, date: "", stop: &stop, progress: &mut |_| () };
+            let (_, report) = bake.in_memory()?;
+            for warning in &report.warnings {
+                println!("  {warning}");
+            }
+            Ok((report.points, report.configurations_per_second))
+        };
+        let ((points, adapter), (_, cpu)) = (rate(BackendChoice::Gpu)?, rate(BackendChoice::Cpu)?);
+        println!("  {points:>11} {adapter:>12.0} {cpu:>12.0} {:>9.3}", adapter / cpu);
+    }
+    Ok(())
+}
