@@ -92,9 +92,8 @@ pub const MINIMUM_CURVATURE_RADIUS: f64 = 1e-11;
 /// points of coordinates up to L is rounded by a few eps L^2 (eps = 2.2e-16); 64 eps covers bound and distance.
 pub const CULLING_SLACK: f64 = 64.0 * f64::EPSILON;
 
-/// Rounding of a path's length, relative to it [1]: a step, its addition and a difference of lengths are each good to a few
-/// eps, which are added on the safe side.
-pub const TRAVEL_ROUNDING: f64 = 8.0 * f64::EPSILON;
+/// Rounding of a length from its coordinates, relative to it [1]: a square of a sum of squares is good to a few eps.
+pub const LENGTH_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// Least contact force in the energy norm, sqrt(c^T C c), that a residual is measured against [sqrt(J)]: its square
 /// 1e-24 J is a nanonewton over a femtometre.

@@ -226,7 +226,7 @@ fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
     let part = |algorithm, blending| {
         let contact = haptize::scene::ContactSpec { algorithm, blending, ..scene.contact };
         let mut model = Model::new(&object, &chain, contact);
-        let reached = |node: &u32| model.rest[*node as usize].z > 0.01;
+        let reached = |node: &u32| model.rest[*node as usize].dot(DVec3::new(-0.3, 0.0, 1.0)) > 0.015;
         model.compliance = Compliance::on(&object, (0..object.surface_nodes as u32).filter(reached).collect()).unwrap();
         model
     };

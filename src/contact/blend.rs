@@ -213,7 +213,7 @@ pub fn width(rest: &[DVec3], triangles: &[[u32; 3]], bounds: &BoundingVolumes) -
         lengths += [0, 1, 2].map(|k: usize| corners[k].distance(corners[(k + 1) % 3])).iter().sum::<f64>();
         let area_vector = surface::area_vector(corners);
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-        bounds.search(middle, least * least, |t, _| {
+        bounds.search(middle, least * least, |t| {
             let other = surface::corners(rest, triangles[t as usize]);
             if surface::area_vector(other).dot(area_vector) < 0.0 {
                 least = least.min(middle.distance(point_at(other, closest_point(middle, other).weights)));

@@ -1,17 +1,15 @@
 //! Which proxy nodes touch the object, at rest and deformed.
 //!
 //! The closest feature is found exactly; culling only skips what cannot be closest, so results equal those of a search
-//! over all triangles. Three facts carry it, with |u| <= m everywhere on the surface:
+//! over all triangles. Two facts carry it, with |u| <= m everywhere on the surface:
 //! - a node outside at rest, farther than m from the surface, is outside still;
-//! - where some triangle is at a distance d, one that was farther than d + m at rest is not the closest one;
-//! - a triangle that was at a distance d cannot come to the node before the surface has travelled by d.
+//! - where some triangle is at a distance d, one that was farther than d + m at rest is not the closest one.
 //!
-//! Triangles somewhat farther than d + m at rest are listed once per configuration and node, and again only when d + m
-//! outgrows that. Ties go to the lower triangle number.
+//! Ties go to the lower triangle number.
 
 use super::blend::{self, Blend};
-use super::candidates::{Candidates, Listed};
 use super::closest_point::{ClosestPoint, Feature, closest_point, point_at};
+use super::deformation::Deformation;
 use super::depth::{Contact, measure};
 use super::features::{Features, Felt};
 use super::model::Model;
@@ -20,7 +18,7 @@ use super::trust_region::Care;
 use crate::tolerances::{BLEND_SPREAD, KNOWN_WALLS};
 use glam::DVec3;
 
-/// Where a proxy node stands at rest, and its candidates.
+/// Where a proxy node stands at rest, and what is known of it since.
 #[derive(Clone, Copy, Default)]
 struct Standing {
     /// Unsigned distance to the surface at rest, or a lower bound of it [m].
@@ -31,10 +29,10 @@ struct Standing {
     inside: bool,
     /// Greatest R - min e_t / w^2 (see [`super::blend`]) so far [1].
     spread: f64,
-    /// Candidates.
-    listed: Listed,
     /// Has touched since the configuration was taken up, and is reported as a near miss from then on.
     watched: bool,
+    /// Triangle that is closest at rest, where `distance` is exact.
+    at_rest: u32,
     /// Triangle that was closest last: tried first, which makes the search short.
     last: u32,
 }
@@ -87,7 +85,7 @@ pub struct Detection {
     /// Proxy nodes relative to the model's centre [m].
     nodes: Vec<DVec3>,
     standings: Vec<Standing>,
-    candidates: Candidates,
+    deformation: Deformation,
     /// Whether walls that a ball does not touch yet are listed, and its side is made sure of.
     pub care: Care,
     /// Of the node at hand.
@@ -105,7 +103,7 @@ impl Detection {
         Self {
             nodes: vec![DVec3::ZERO; count],
             standings: vec![Standing::default(); count],
-            candidates: Candidates::new(model),
+            deformation: Deformation::new(model),
             care: Care::Quick,
             features: Features::default(),
             blend: Blend::default(),
@@ -158,7 +156,6 @@ impl Detection {
     /// Places the proxy nodes at `nodes` [m] in the world, with lower bounds for distances that may be negative, and returns the
     /// one whose bound, less its radius, is least.
     pub fn place(&mut self, model: &Model, nodes: &[DVec3]) -> usize {
-        self.candidates.restart();
         let (mut first, mut least) = (0, f64::INFINITY);
         for (i, &node) in nodes.iter().enumerate() {
             let x = node - model.centre;
@@ -227,55 +224,60 @@ impl Detection {
         contacts: &mut Vec<Contact>,
     ) {
         contacts.clear();
-        self.candidates.travel.go_on(model, displacement, positions);
-        let moved = self.candidates.travel.moved;
+        self.deformation.take(displacement);
+        let moved = self.deformation.moved;
         for i in 0..self.nodes.len() {
             let x = self.nodes[i];
             let radius = model.chain.nodes[i].radius;
             let standing = &mut self.standings[i];
             let bulge = model.bulge();
             let smooth = walls == Walls::All && bulge > 0.0;
-            if !standing.inside && standing.distance - radius - bulge > moved * (1.0 + 1e3 * f64::EPSILON) {
+            if !standing.inside && standing.distance - radius - bulge > moved {
                 continue;
             }
             if !standing.exact {
                 find_standing(model, x, standing);
-                if !standing.inside && standing.distance - radius - bulge > moved * (1.0 + 1e3 * f64::EPSILON) {
+                if !standing.inside && standing.distance - radius - bulge > moved {
                     continue;
                 }
             }
+            let triangles = &model.object.triangles;
             let mut closest = Closest::none();
+            let likely = if moved == 0.0 { standing.at_rest } else { standing.last };
             // None was closest where the pass before was not a number.
-            if (standing.last as usize) < model.object.triangles.len() {
-                closest.consider(x, positions, &model.object.triangles, standing.last);
+            if (likely as usize) < triangles.len() {
+                closest.consider(x, positions, triangles, likely);
             }
-            let distance = closest.distance_squared.sqrt();
             let feels = walls == Walls::All && radius > 0.0 && !smooth;
             let known = if self.care == Care::Thorough { KNOWN_WALLS * radius } else { radius };
-            let wanted = |spread: f64| match () {
-                () if smooth => blend::reach(model, distance, spread),
-                () if feels => distance.max(known),
-                () => distance,
-            };
-            self.candidates.list(model, x, wanted(standing.spread), &mut standing.listed);
+            let felt = if feels { known * known } else { 0.0 };
             self.features.clear();
-            let felt = feels.then_some((known, &mut self.features));
-            self.candidates.find_closest(model, x, standing.listed, positions, felt, &mut closest);
+            if feels || moved != 0.0 {
+                self.deformation.search(model, positions, x, closest.distance_squared.max(felt), |triangle| {
+                    if feels || triangle != likely {
+                        let (point, distance_squared) = closest.consider(x, positions, triangles, triangle);
+                        if distance_squared < felt {
+                            self.features.push(triangle, point);
+                        }
+                    }
+                    closest.distance_squared.max(felt)
+                });
+            }
             standing.last = closest.triangle;
             if smooth {
                 let distance = closest.distance_squared.sqrt();
                 let spread = loop {
                     let reach = blend::reach(model, distance, standing.spread);
                     self.blend.clear();
-                    for triangle in self.candidates.within(standing.listed, reach) {
+                    self.deformation.search(model, positions, x, reach * reach, |triangle| {
                         self.blend.consider(model, x, reach, positions, triangle);
-                    }
+                        reach * reach
+                    });
                     let spread = self.blend.spread();
                     if spread <= standing.spread || !spread.is_finite() {
                         break spread;
                     }
                     standing.spread = spread;
-                    self.candidates.list(model, x, wanted(spread), &mut standing.listed);
                 };
                 let first = contacts.len();
                 let outside = contact_at(model, i, x, 0.0, positions, closest.triangle, closest.point)
@@ -294,7 +296,7 @@ impl Detection {
             if !standing.watched {
                 continue;
             }
-            let (triangles, topology) = (&model.object.triangles, &model.object.topology);
+            let topology = &model.object.topology;
             let felt = self.features.gather(x, known, positions, triangles, topology);
             let touched = |felt: &&Felt| felt.share > 0 && felt.distance < radius;
             let inner = felt.iter().filter(touched).filter(|felt| !felt.outer);
@@ -360,19 +362,20 @@ pub(super) fn signed_distance(model: &Model, x: DVec3, near: Option<u32>) -> (f6
 fn find_standing(model: &Model, x: DVec3, standing: &mut Standing) -> Closest {
     let triangles = &model.object.triangles;
     let mut closest = Closest::none();
-    let slack = model.bounds.slack(x);
-    let mut least = model.facets.get(standing.last as usize).map_or(f64::MAX, |facet| facet.distance_squared(x));
-    model.bounds.search(x, least, |t, _| {
-        if model.facets[t as usize].distance_squared(x) <= least + slack {
+    let last = standing.last;
+    if (last as usize) < triangles.len() {
+        closest.consider(x, &model.rest, triangles, last);
+    }
+    model.bounds.search(x, closest.distance_squared, |t| {
+        if t != last {
             closest.consider(x, &model.rest, triangles, t);
-            least = least.min(closest.distance_squared);
         }
-        least
+        closest.distance_squared
     });
     standing.exact = true;
     standing.distance = closest.distance_squared.sqrt();
+    standing.at_rest = closest.triangle;
     standing.last = closest.triangle;
-    standing.listed = Listed::none(standing.distance);
     standing.inside = false;
     if closest.triangle != u32::MAX {
         let t = closest.triangle as usize;
@@ -388,7 +391,7 @@ fn blended_at_rest(model: &Model, i: usize, x: DVec3, standing: &Standing, blend
     loop {
         let reach = blend::reach(model, standing.distance, spread);
         blend.clear();
-        model.bounds.search(x, reach * reach, |t, _| {
+        model.bounds.search(x, reach * reach, |t| {
             blend.consider(model, x, reach, &model.rest, t);
             reach * reach
         });

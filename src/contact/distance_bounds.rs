@@ -115,7 +115,7 @@ fn cube(model: &Model, c: DVec3, half: f64, slack: f64, near: Option<u32>) -> Cu
         let mut least = s;
         // |g - g_t|_1 is at most 2 sqrt(3).
         let radius = s + 2.0 * reach;
-        model.bounds.search(c, radius * radius, |t, _| {
+        model.bounds.search(c, radius * radius, |t| {
             let offset = offset(t, c);
             let distance = offset.length();
             least = least.min(distance - half * (g - offset / distance).abs().element_sum());

@@ -59,6 +59,16 @@ pub struct State {
     pub elastic: f64,
 }
 
+impl State {
+    /// Positions from displacement.
+    fn place(&mut self, model: &Model) {
+        let displacement = self.displacement.as_chunks().0;
+        for ((position, rest), u) in self.positions.iter_mut().zip(&model.rest).zip(displacement) {
+            *position = *rest + DVec3::from_array(*u);
+        }
+    }
+}
+
 /// When a search ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
@@ -320,9 +330,7 @@ impl EnergySearch {
     /// Freezes the geometry anew, as it is at the current displacement: an update of linearised contact.
     fn freeze_here(&mut self, model: &Model, detection: &mut Detection) {
         let Self { state, frozen, .. } = self;
-        for (node, position) in state.positions.iter_mut().enumerate() {
-            *position = model.rest[node] + DVec3::from_slice(&state.displacement[3 * node..]);
-        }
+        state.place(model);
         detection.deformed(model, &state.displacement, &state.positions, Walls::All, frozen);
         blend::freeze(frozen);
         // Depths at rest, by the slopes here.
@@ -425,9 +433,7 @@ impl EnergySearch {
         support.displace(&model.compliance, &trial.forces, &mut trial.displacement);
         match geometry {
             Geometry::Deformed => {
-                for (node, position) in trial.positions.iter_mut().enumerate() {
-                    *position = model.rest[node] + DVec3::from_slice(&trial.displacement[3 * node..]);
-                }
+                trial.place(model);
                 detection.deformed(model, &trial.displacement, &trial.positions, Walls::All, &mut trial.contacts);
             }
             Geometry::Frozen => frozen_contacts(&self.frozen, &trial.displacement, &mut trial.contacts),

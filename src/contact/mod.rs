@@ -7,16 +7,16 @@ use glam::DVec3;
 
 pub(crate) mod blend;
 mod bounding_volumes;
-mod candidates;
 pub(crate) mod closest_point;
+mod deformation;
 pub(crate) mod depth;
 pub(crate) mod detection;
 mod distance_bounds;
 pub(crate) mod energy;
-mod facet;
 mod facet_depth;
 mod features;
 mod model;
+mod packet;
 mod paper;
 mod proximity;
 mod reach;
@@ -24,8 +24,8 @@ mod rows;
 mod solver;
 pub(crate) mod support;
 pub(crate) mod surface;
-mod travel;
 mod trust_region;
+mod wide;
 
 pub use model::Model;
 pub use proximity::Proximity;

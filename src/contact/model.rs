@@ -4,7 +4,6 @@ use super::blend;
 use super::bounding_volumes::BoundingVolumes;
 use super::closest_point::Feature;
 use super::distance_bounds::DistanceBounds;
-use super::facet::Facet;
 use super::reach;
 use super::surface;
 use crate::JointVector;
@@ -41,8 +40,6 @@ pub struct Model<'a> {
     pub softest: f64,
     /// The triangles at rest, for closest-point queries.
     pub bounds: BoundingVolumes,
-    /// The triangles at rest, for distances.
-    pub facets: Vec<Facet>,
     /// What is known of distances to the surface at rest without such a query.
     pub distance_bounds: DistanceBounds,
     /// Areas of the triangles at rest [m^2].
@@ -106,7 +103,6 @@ impl<'a> Model<'a> {
             }
         }
         let bounds = BoundingVolumes::new(&rest, triangles);
-        let facets = triangles.iter().map(|nodes| Facet::new(surface::corners(&rest, *nodes))).collect();
         let mut model = Self {
             object,
             chain,
@@ -119,7 +115,6 @@ impl<'a> Model<'a> {
             extent,
             rest,
             bounds,
-            facets,
             distance_bounds: DistanceBounds::none(),
             rest_areas,
             rest_normals,

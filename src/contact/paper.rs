@@ -220,8 +220,9 @@ impl PaperIteration {
 
     /// Positions from displacement.
     fn place(&mut self, model: &Model) {
-        for (node, position) in self.positions.iter_mut().enumerate() {
-            *position = model.rest[node] + DVec3::from_slice(&self.displacement[3 * node..]);
+        let displacement = self.displacement.as_chunks().0;
+        for ((position, rest), u) in self.positions.iter_mut().zip(&model.rest).zip(displacement) {
+            *position = *rest + DVec3::from_array(*u);
         }
     }
 
@@ -273,17 +274,30 @@ fn same_selection(a: &[Tie], b: &[Tie]) -> bool {
 pub fn three_closest(x: DVec3, positions: &[DVec3]) -> [u32; 3] {
     let mut nodes = [0; 3];
     let mut squares = [f64::MAX; 3];
-    for (node, position) in positions.iter().enumerate() {
-        let mut entry = (position.distance_squared(x), node as u32);
-        if entry.0 >= squares[2] {
-            continue;
-        }
-        for (square, node) in squares.iter_mut().zip(&mut nodes) {
-            if entry.0 < *square {
-                std::mem::swap(square, &mut entry.0);
-                std::mem::swap(node, &mut entry.1);
+    let (fours, rest) = positions.as_chunks::<4>();
+    let mut consider = |mut entry: (f64, u32)| {
+        if entry.0 < squares[2] {
+            for (square, node) in squares.iter_mut().zip(&mut nodes) {
+                if entry.0 < *square {
+                    std::mem::swap(square, &mut entry.0);
+                    std::mem::swap(node, &mut entry.1);
+                }
             }
         }
+        squares[2]
+    };
+    let mut third = f64::MAX;
+    for (k, four) in fours.iter().enumerate() {
+        let four = four.map(|position| position.distance_squared(x));
+        // Most are not among the three.
+        if four.iter().any(|&square| square < third) {
+            for (lane, square) in four.into_iter().enumerate() {
+                third = consider((square, (4 * k + lane) as u32));
+            }
+        }
+    }
+    for (lane, position) in rest.iter().enumerate() {
+        consider((position.distance_squared(x), (4 * fours.len() + lane) as u32));
     }
     nodes
 }

@@ -83,9 +83,9 @@ pub(super) fn covers(
     within
 }
 
-/// Visits the triangles whose boxes at rest are within `radius` of `x`.
+/// Visits the triangles that are within `radius` of `x` at rest.
 fn for_triangles_within(model: &Model<'_>, x: DVec3, radius: f64, mut visit: impl FnMut(u32)) {
-    model.bounds.search(x, radius * radius, |t, _| {
+    model.bounds.search(x, radius * radius, |t| {
         visit(t);
         radius * radius
     });

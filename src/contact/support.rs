@@ -16,6 +16,8 @@ pub struct Support {
     compliance: Vec<f64>,
     /// Nodes for which `compliance` was gathered.
     gathered: Vec<u32>,
+    /// Their places in the compliance.
+    places: Vec<Option<usize>>,
 }
 
 /// No slot.
@@ -25,7 +27,13 @@ impl Support {
     /// An empty support on `surface_nodes` nodes.
     #[must_use]
     pub fn new(surface_nodes: usize) -> Self {
-        Self { slots: vec![ABSENT; surface_nodes], nodes: Vec::new(), compliance: Vec::new(), gathered: Vec::new() }
+        Self {
+            slots: vec![ABSENT; surface_nodes],
+            nodes: Vec::new(),
+            compliance: Vec::new(),
+            gathered: Vec::new(),
+            places: Vec::new(),
+        }
     }
 
     /// Forgets all nodes.
@@ -65,19 +73,14 @@ impl Support {
             return;
         }
         self.gathered.clone_from(&self.nodes);
-        self.compliance.clear();
-        for &row_node in &self.nodes {
-            let row_place = compliance.place(row_node);
-            for a in 0..3 {
-                for &column_node in &self.nodes {
-                    match (row_place, compliance.place(column_node)) {
-                        (Some(row), Some(column)) => {
-                            let row = compliance.row(3 * row + a);
-                            self.compliance.extend_from_slice(&row[3 * column..3 * column + 3]);
-                        }
-                        _ => self.compliance.extend_from_slice(&[0.0; 3]),
-                    }
-                }
+        self.places.clear();
+        self.places.extend(self.nodes.iter().map(|&node| compliance.place(node)));
+        let order = self.order();
+        self.compliance.resize(order * order, 0.0);
+        for (k, row) in self.compliance.chunks_exact_mut(order.max(1)).enumerate() {
+            let entries = self.places[k / 3].map_or(&[][..], |place| compliance.row(3 * place + k % 3).as_chunks().0);
+            for (block, column) in row.as_chunks_mut().0.iter_mut().zip(&self.places) {
+                *block = column.and_then(|column| entries.get(column)).copied().unwrap_or([0.0; 3]);
             }
         }
     }
@@ -120,6 +123,7 @@ impl Support {
 }
 
 /// Inner product.
+#[inline(always)]
 #[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four sums, none of which waits for another.

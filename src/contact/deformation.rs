@@ -1,0 +1,90 @@
+//! The surface where it is now, for searches near a point: packets of triangles, placed anew when a search first comes to them.
+
+use super::bounding_volumes::{Leaf, Volume};
+use super::model::Model;
+use super::packet::Packet;
+use crate::tolerances::LENGTH_ROUNDING;
+use glam::DVec3;
+
+/// A leaf's triangles where they are now.
+#[derive(Clone)]
+struct Place {
+    /// The surface's number when they were placed.
+    surface: u64,
+    packet: Packet,
+    /// Box around them.
+    volume: Volume,
+}
+
+/// The surface, as displaced last.
+pub struct Deformation {
+    /// How many surfaces there have been.
+    surface: u64,
+    /// An upper bound of how far any point of the surface is from where it rests [m].
+    pub moved: f64,
+    places: Vec<Place>,
+}
+
+impl Deformation {
+    /// For the surface of `model`.
+    #[must_use]
+    pub fn new(model: &Model) -> Self {
+        let place = |leaf: &Leaf| Place { surface: 0, packet: Packet::default(), volume: leaf.volume };
+        Self { surface: 0, moved: 0.0, places: model.bounds.leaves.iter().map(place).collect() }
+    }
+
+    /// Another surface, displaced by `displacement` [m].
+    pub fn take(&mut self, displacement: &[f64]) {
+        self.surface += 1;
+        let squares = displacement.as_chunks().0.iter().map(|u| DVec3::from_array(*u).length_squared());
+        let greatest = squares.fold(0.0, |greatest, square| if square > greatest { square } else { greatest });
+        self.moved = greatest.sqrt() * (1.0 + LENGTH_ROUNDING);
+    }
+
+    /// Calls `visit` with each triangle of the surface, nodes now at `positions`, that is nearer to `x` than the squared radius that
+    /// `visit` returned last; `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among them.
+    pub fn search(
+        &mut self,
+        model: &Model,
+        positions: &[DVec3],
+        x: DVec3,
+        radius_squared: f64,
+        mut visit: impl FnMut(u32) -> f64,
+    ) {
+        let slack = model.bounds.slack(x);
+        let moved = self.moved;
+        // Of boxes at rest.
+        let widened = |bound: f64| (bound.sqrt() + moved).powi(2) + slack;
+        let mut bound = radius_squared + slack;
+        let mut limit = widened(bound);
+        model.bounds.walk(x, limit, |leaf| {
+            let place = self.place(model, positions, leaf);
+            if place.volume.distance_squared(x) <= bound {
+                let mut nearer = false;
+                for (&triangle, square) in
+                    model.bounds.leaves[leaf].triangles.iter().zip(place.packet.distances_squared(x))
+                {
+                    if square <= bound {
+                        bound = visit(triangle) + slack;
+                        nearer = true;
+                    }
+                }
+                if nearer {
+                    limit = widened(bound);
+                }
+            }
+            limit
+        });
+    }
+
+    /// Where the triangles of leaf `leaf` are.
+    fn place(&mut self, model: &Model, positions: &[DVec3], leaf: usize) -> &Place {
+        let place = &mut self.places[leaf];
+        if place.surface != self.surface {
+            place.surface = self.surface;
+            place.packet.set(positions, &model.bounds.leaves[leaf].nodes);
+            place.volume = Volume::new(place.packet.bounds());
+        }
+        place
+    }
+}
