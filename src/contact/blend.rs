@@ -206,11 +206,9 @@ impl Blend {
 /// triangle that faces the other way, whose plane must take no part across a thin wall or a slot [m].
 #[must_use]
 pub fn width(rest: &[DVec3], triangles: &[[u32; 3]], bounds: &BoundingVolumes) -> f64 {
-    let mut lengths = 0.0;
     let mut least = f64::INFINITY;
     for &nodes in triangles {
         let corners = surface::corners(rest, nodes);
-        lengths += [0, 1, 2].map(|k: usize| corners[k].distance(corners[(k + 1) % 3])).iter().sum::<f64>();
         let area_vector = surface::area_vector(corners);
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
         bounds.search(middle, least * least, |t| {
@@ -221,7 +219,7 @@ pub fn width(rest: &[DVec3], triangles: &[[u32; 3]], bounds: &BoundingVolumes) -
             least * least
         });
     }
-    least.min(0.5 * lengths / (3.0 * triangles.len() as f64))
+    least.min(0.5 * surface::mean_edge(rest, triangles))
 }
 
 /// How far triangles may be from a node whose closest one is at `distance`, R - min e_t / w^2 being `spread` [m].

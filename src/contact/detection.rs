@@ -78,6 +78,8 @@ pub enum Walls {
     /// All that it feels: within its radius (see [`super::features`]), or where facets are blended what is near it (see
     /// [`super::blend`]).
     All,
+    /// The same, but where facets are sharp each triangle pushes by itself, however they join.
+    Each,
 }
 
 /// Detection for one thread: node positions of the current configuration and reusable lists.
@@ -231,7 +233,7 @@ impl Detection {
             let radius = model.chain.nodes[i].radius;
             let standing = &mut self.standings[i];
             let bulge = model.bulge();
-            let smooth = walls == Walls::All && bulge > 0.0;
+            let smooth = walls != Walls::Closest && bulge > 0.0;
             if !standing.inside && standing.distance - radius - bulge > moved {
                 continue;
             }
@@ -248,7 +250,7 @@ impl Detection {
             if (likely as usize) < triangles.len() {
                 closest.consider(x, positions, triangles, likely);
             }
-            let feels = walls == Walls::All && radius > 0.0 && !smooth;
+            let feels = walls != Walls::Closest && radius > 0.0 && !smooth;
             let known = if self.care == Care::Thorough { KNOWN_WALLS * radius } else { radius };
             let felt = if feels { known * known } else { 0.0 };
             self.features.clear();
@@ -297,7 +299,7 @@ impl Detection {
                 continue;
             }
             let topology = &model.object.topology;
-            let felt = self.features.gather(x, known, positions, triangles, topology);
+            let felt = self.features.gather(x, known, positions, triangles, topology, walls == Walls::All);
             let touched = |felt: &&Felt| felt.share > 0 && felt.distance < radius;
             let inner = felt.iter().filter(touched).filter(|felt| !felt.outer);
             let inner = inner.min_by(|a, b| a.distance.total_cmp(&b.distance));

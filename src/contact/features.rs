@@ -11,9 +11,8 @@
 //! reach, so that the second wall is not felt before there is one.
 //!
 //! Where the centre passes the surface itself, E has a kink at the edges and vertices of dents: inside it is the closest feature that
-//! pushes, in any direction of a cone. A ball about as soft as the object may come to rest there, and no force balances; it is
-//! flagged as unconverged. Of 61 configurations that do not converge in four combinations of Kc = Kg = 100 to 1e4 N/m (balls of
-//! 8 mm, 102 nodes, to half a radius deep, 6 to 9 % of all) 59 end so. Blended facets have no such place.
+//! pushes, in any direction of a cone. A ball about as soft as the object may come to rest there: see [`super::pins`]. Blended facets
+//! have no such place.
 //!
 //! Only what is seen from outside counts (the pseudonormal decides): the far side of a thin wall does not push.
 
@@ -60,7 +59,7 @@ impl Features {
     }
 
     /// The features, with what they count, that the node at `x` with `radius` feels through the triangles taken in, which
-    /// must be all within reach.
+    /// must be all within reach; not `joined`, each triangle counts by itself.
     pub fn gather(
         &mut self,
         x: DVec3,
@@ -68,12 +67,16 @@ impl Features {
         positions: &[DVec3],
         triangles: &[[u32; 3]],
         topology: &Topology,
+        joined: bool,
     ) -> &[Felt] {
         let Self { near, felt } = self;
         felt.clear();
         let reach = radius * radius;
         for &(t, point) in near.iter() {
             add(felt, triangles, t, point, 1);
+            if !joined {
+                continue;
+            }
             let nodes = triangles[t as usize];
             let corners = surface::corners(positions, nodes);
             for k in 0..3 {
@@ -121,7 +124,7 @@ fn add(felt: &mut Vec<Felt>, triangles: &[[u32; 3]], t: u32, point: ClosestPoint
 }
 
 /// Closest point of edge k.
-fn closest_on_edge(x: DVec3, corners: [DVec3; 3], k: usize) -> ClosestPoint {
+pub fn closest_on_edge(x: DVec3, corners: [DVec3; 3], k: usize) -> ClosestPoint {
     let (a, b) = (corners[k], corners[(k + 1) % 3]);
     let along = b - a;
     let share = (x - a).dot(along) / along.length_squared().max(MINIMUM_SQUARE);

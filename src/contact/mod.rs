@@ -18,6 +18,7 @@ mod features;
 mod model;
 mod packet;
 mod paper;
+mod pins;
 mod proximity;
 mod reach;
 mod rows;
@@ -75,8 +76,8 @@ impl Status {
 pub struct Equilibrium {
     /// What became of it.
     pub status: Status,
-    /// Steps tried (`energy`, `linearised`) or passes (`paper`); of `energy` those from the rest state, and those of an approach from
-    /// outside where the former did not converge.
+    /// Steps tried (`energy`, `linearised`) or passes (`paper`); of `energy` those from the rest state, and where these did not converge
+    /// those of all that was tried then, each with the scene's limit.
     pub iterations: u32,
     /// Relative residual of the force balance, in the energy norm; one where nothing could be computed [1].
     pub residual: f64,

@@ -42,6 +42,8 @@ pub struct Model<'a> {
     pub bounds: BoundingVolumes,
     /// What is known of distances to the surface at rest without such a query.
     pub distance_bounds: DistanceBounds,
+    /// Mean length of the surface's edges at rest [m].
+    pub mean_edge: f64,
     /// Areas of the triangles at rest [m^2].
     pub rest_areas: Vec<f64>,
     /// Unit normals of the triangles at rest.
@@ -94,6 +96,7 @@ impl<'a> Model<'a> {
             .map(|t| surface::pseudonormal(&rest, triangles, &object.topology, t, Feature::Face))
             .collect();
         let area = |nodes: &[u32; 3]| 0.5 * surface::area_vector(surface::corners(&rest, *nodes)).length();
+        let mean_edge = surface::mean_edge(&rest, triangles);
         let rest_areas = triangles.iter().map(area).collect();
         let mut rest_pseudonormals = vec![DVec3::ZERO; rest.len()];
         for (t, triangle) in triangles.iter().enumerate() {
@@ -116,6 +119,7 @@ impl<'a> Model<'a> {
             rest,
             bounds,
             distance_bounds: DistanceBounds::none(),
+            mean_edge,
             rest_areas,
             rest_normals,
             rest_pseudonormals,

@@ -17,6 +17,14 @@ pub fn corners(positions: &[DVec3], [a, b, c]: [u32; 3]) -> [DVec3; 3] {
     [positions[a as usize], positions[b as usize], positions[c as usize]]
 }
 
+/// Mean length of the triangles' edges [m].
+#[must_use]
+pub fn mean_edge(positions: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
+    let around = |[a, b, c]: [DVec3; 3]| a.distance(b) + b.distance(c) + c.distance(a);
+    let sum: f64 = triangles.iter().map(|&nodes| around(corners(positions, nodes))).sum();
+    sum / (3.0 * triangles.len() as f64)
+}
+
 /// Twice the area times the outward unit normal of a triangle [m^2].
 #[must_use]
 pub fn area_vector(corners: [DVec3; 3]) -> DVec3 {

@@ -198,14 +198,12 @@ fn outside_the_gap_tends_to_the_true_distance() {
 }
 
 /// Balls as soft as what they press: centres come to lie on sharp edges and vertices of their dents, to which E falls from all
-/// sides, and no force balances there. Between blended facets there is no such place. The hardest of springs, without stiffness
-/// against bending, held at the underside alone and pressed as deep as half the radius, converge either way.
+/// sides, and where only a mean of forces balances. Between blended facets there is no such place. The hardest of springs, without
+/// stiffness against bending, held at the underside alone and pressed as deep as half the radius, converge either way.
 #[test]
 fn contact_in_deep_dents_converges() {
     let axial = |ground: f64, patch: bool| Ball { rings: 10, springs: SpringKind::Axial, ground, patch };
-    for (ball, stiffness, least_sharp, most_sharp) in
-        [(axial(1e3, false), 1e3, 24, 27), (axial(1e4, true), 1e4, 29, 30)]
-    {
+    for (ball, stiffness) in [(axial(1e3, false), 1e3), (axial(1e4, true), 1e4)] {
         let object = world::sphere(ball).unwrap();
         let chain = floating_bar(world::BALL);
         let mut model = Model::new(&object, &chain, world::contact(stiffness));
@@ -215,7 +213,7 @@ fn contact_in_deep_dents_converges() {
             configurations.iter().filter(|q| solver.solve(q).status == Status::Contact).count()
         };
         let sharp = converged(&model);
-        assert!((least_sharp..=most_sharp).contains(&sharp), "{sharp} of 30 between sharp facets");
+        assert!(sharp >= 29, "{sharp} of 30 between sharp facets");
         model.set_blending(Blending::Mesh);
         let smooth = converged(&model);
         assert!(smooth >= 29, "{smooth} of 30 between blended ones");

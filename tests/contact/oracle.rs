@@ -148,8 +148,8 @@ pub fn check_account(object: &Object, chain: &Chain, q: &[f64], equilibrium: &Eq
 
 /// Balance and contact law: with u = K^-1 (stored forces), every proxy node's force is kc times its depth below the
 /// displaced surface along the normal there, and the object's nodes carry it by the weights of the closest point. Of a node
-/// with a radius each touch is checked as a spring; that none is missing shows in tau = -dU/dq. `tolerance` is relative to
-/// the largest force.
+/// with a radius each touch is checked as a spring, or where its centre lies on the surface as what a kink of E can bear; that none is
+/// missing shows in tau = -dU/dq. `tolerance` is relative to the largest force.
 pub fn check_contact_law(
     object: &Object,
     chain: &Chain,
@@ -177,15 +177,21 @@ pub fn check_contact_law(
                 let foot = touch.nodes.iter().zip(touch.weights).map(|(node, w)| positions[*node as usize] * w);
                 let offset = *x - foot.sum::<DVec3>();
                 let distance = offset.length();
+                for (node, weight) in touch.nodes.iter().zip(touch.weights) {
+                    expected[*node as usize] -= touch.force * weight;
+                }
+                if distance < 1e-7 * radius {
+                    if touch.force.length() > kc * radius || !touch.weights.contains(&0.0) {
+                        return Err(format!("node {i}: force {} on a kink", touch.force));
+                    }
+                    continue;
+                }
                 let along = touch.force.dot(offset) / distance;
                 let side = if along.abs() >= kc * radius { -1.0 } else { 1.0 };
                 let times = along / (kc * (side * radius - distance));
                 let lambda = offset / distance * (kc * times.round() * (side * radius - distance));
                 if (touch.force - lambda).length() > tolerance * scale || times.round() == 0.0 {
                     return Err(format!("node {i}: force {}, law {lambda}, largest {scale}", touch.force));
-                }
-                for (node, weight) in touch.nodes.iter().zip(touch.weights) {
-                    expected[*node as usize] -= touch.force * weight;
                 }
             }
             continue;
