@@ -42,20 +42,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (name, run) in [("haptize, the paper's iteration", &paper), ("haptize, energy", &energy)] {
         println!("{name:<34} {:>16.0} {:>9} {:>10}", run.rate, run.contact, run.converged);
     }
-    match peer(root, &scene, cores) {
-        Ok(theirs) => {
-            let rate = theirs.torque.len() as f64 / theirs.seconds;
-            let name = format!("NumPy {}, {cores} processes", theirs.numpy);
-            let count = |wanted: &[u8]| theirs.status.iter().filter(|status| wanted.contains(status)).count();
-            println!("{name:<34} {rate:>16.1} {:>9} {:>10}", count(&[1, 2]), count(&[1]));
-            println!(
-                "\nhaptize over NumPy: {:.0} with the same iteration, {:.0} with energy",
-                paper.rate / rate,
-                energy.rate / rate
-            );
-            compare(&paper, &theirs);
+    for processes in [1, cores] {
+        match peer(root, &scene, processes) {
+            Ok(theirs) => {
+                let rate = theirs.torque.len() as f64 / theirs.seconds;
+                let name = format!("NumPy {}, {processes} process(es)", theirs.numpy);
+                let count = |wanted: &[u8]| theirs.status.iter().filter(|status| wanted.contains(status)).count();
+                println!("{name:<34} {rate:>16.1} {:>9} {:>10}", count(&[1, 2]), count(&[1]));
+                println!(
+                    "  haptize over that: {:.0} with the same iteration, {:.0} with energy",
+                    paper.rate / rate,
+                    energy.rate / rate
+                );
+                compare(&paper, &theirs);
+            }
+            Err(reason) => println!("NumPy skipped: {reason} (bash benches/peers/setup.sh)"),
         }
-        Err(reason) => println!("NumPy skipped: {reason} (bash benches/peers/setup.sh)"),
     }
     curves(root, &scene)
 }
@@ -182,7 +184,7 @@ fn compare(ours: &Sweep, theirs: &Peer) {
     }
     let all = theirs.status.len();
     println!(
-        "same status at {same_status} of {all} configurations; same torque at {agree} of {both} converged in both"
+        "  same status at {same_status} of {all} configurations; same torque at {agree} of {both} converged in both"
     );
 }
 

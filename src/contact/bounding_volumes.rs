@@ -1,11 +1,11 @@
 //! A tree of axis-aligned boxes over the triangles of the surface at rest, for searches near a point.
 //!
-//! The tree is one array in depth-first order: a query walks it with a single index, entering a box by stepping to the
-//! next entry and leaving it by jumping to `skip`. Every leaf holds a packet of triangles, of which searches visit those near
-//! enough. Bounds carry a slack for rounding ([`CULLING_SLACK`]), and ties go to the lower triangle number, so that no result
-//! depends on the order of visits.
+//! Every leaf holds a packet of triangles, of which searches visit those near enough; every branch the boxes of eight leaves or
+//! branches, which are measured at once (as in the ray tracers' trees: Wald, Benthin & Boulos 2008). Bounds carry a slack for
+//! rounding ([`CULLING_SLACK`]), and ties go to the lower triangle number, so that no result depends on the order of visits.
 
 use super::packet::{LANES, Packet, greatest};
+use super::wide::{Kernel, widest};
 use crate::tolerances::CULLING_SLACK;
 use glam::DVec3;
 
@@ -42,14 +42,47 @@ impl Volume {
     }
 }
 
-/// One box of the tree.
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    volume: Volume,
-    /// Where to go on when this box is left out.
-    skip: u32,
-    /// Its leaf's number; else [`u32::MAX`].
-    leaf: u32,
+/// Up to eight boxes side by side: low and high corner, and of each the coordinates [m]; those beyond the last are nowhere.
+struct Branch {
+    low: [[f64; LANES]; 3],
+    high: [[f64; LANES]; 3],
+    /// Whether in the boxes are leaves, else branches; the first one's number, and how many there are.
+    holds_leaves: bool,
+    first: usize,
+    count: usize,
+}
+
+impl Branch {
+    fn new(volumes: &[Volume], first: usize, holds_leaves: bool) -> Self {
+        let lanes = |corner: fn(&Volume) -> DVec3, none: f64| {
+            [0, 1, 2].map(|axis| std::array::from_fn(|lane| volumes.get(lane).map_or(none, |v| corner(v)[axis])))
+        };
+        let (low, high) = (lanes(|v| v.low, f64::INFINITY), lanes(|v| v.high, f64::NEG_INFINITY));
+        Self { low, high, holds_leaves, first, count: volumes.len() }
+    }
+}
+
+/// Squared distances of `x` to the boxes of a branch; zero inside them [m^2].
+struct DistancesSquared<'b> {
+    branch: &'b Branch,
+    x: DVec3,
+}
+
+impl Kernel for DistancesSquared<'_> {
+    type Output = [f64; LANES];
+
+    #[inline(always)]
+    fn run(self) -> [f64; LANES] {
+        let Self { branch: Branch { low, high, .. }, x } = self;
+        let mut squares = [0.0; LANES];
+        for (axis, x) in x.to_array().into_iter().enumerate() {
+            for lane in 0..LANES {
+                let outside = greatest(greatest(low[axis][lane] - x, x - high[axis][lane]), 0.0);
+                squares[lane] += outside * outside;
+            }
+        }
+        squares
+    }
 }
 
 /// What a leaf holds.
@@ -66,7 +99,10 @@ pub struct Leaf {
 
 /// The tree.
 pub struct BoundingVolumes {
-    entries: Vec<Entry>,
+    /// Level by level from the leaves' own up: the last one is the root.
+    branches: Vec<Branch>,
+    /// Box around all.
+    volume: Option<Volume>,
     /// From left to right.
     pub leaves: Vec<Leaf>,
     /// Slack of squared distances [m^2].
@@ -79,9 +115,20 @@ impl BoundingVolumes {
     pub fn new(positions: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
         let size = positions.iter().map(|p| p.length_squared()).fold(0.0, f64::max);
-        let mut tree = Self { entries: Vec::new(), leaves: Vec::new(), slack: CULLING_SLACK * size };
-        tree.build(positions, triangles, &mut order);
-        tree
+        let mut leaves = Vec::with_capacity(triangles.len().div_ceil(LANES));
+        build(positions, triangles, &mut order, &mut leaves);
+        let mut branches: Vec<Branch> = Vec::new();
+        let mut volumes: Vec<Volume> = leaves.iter().map(|leaf| leaf.volume).collect();
+        let (mut first, mut holds_leaves) = (0, true);
+        while holds_leaves || volumes.len() > 1 {
+            let next = branches.len();
+            for (k, volumes) in volumes.chunks(LANES).enumerate() {
+                branches.push(Branch::new(volumes, first + LANES * k, holds_leaves));
+            }
+            volumes = volumes.chunks(LANES).filter_map(|some| some.iter().copied().reduce(Volume::join)).collect();
+            (first, holds_leaves) = (next, false);
+        }
+        Self { branches, volume: volumes.first().copied(), leaves, slack: CULLING_SLACK * size }
     }
 
     /// All triangles, those side by side that are near each other.
@@ -92,7 +139,7 @@ impl BoundingVolumes {
     /// Squared distance of `x` to the box around the whole surface; zero inside it [m^2].
     #[must_use]
     pub fn distance_squared(&self, x: DVec3) -> f64 {
-        self.entries.first().map_or(f64::MAX, |root| root.volume.distance_squared(x))
+        self.volume.map_or(f64::MAX, |volume| volume.distance_squared(x))
     }
 
     /// What squared lower bounds must exceed a squared distance by before they rule a triangle out, for a point `x` [m^2].
@@ -105,16 +152,22 @@ impl BoundingVolumes {
     /// `bound` is the first [m^2].
     #[inline]
     pub fn walk(&self, x: DVec3, mut bound: f64, mut visit: impl FnMut(usize) -> f64) {
-        let mut k = 0;
-        while let Some(entry) = self.entries.get(k) {
-            if entry.volume.distance_squared(x) > bound {
-                k = entry.skip as usize;
+        if let Some(root) = self.branches.last() {
+            self.walk_branch(root, x, &mut bound, &mut visit);
+        }
+    }
+
+    fn walk_branch(&self, branch: &Branch, x: DVec3, bound: &mut f64, visit: &mut impl FnMut(usize) -> f64) {
+        let squares = widest(DistancesSquared { branch, x });
+        for (k, square) in squares.into_iter().enumerate().take(branch.count) {
+            if square > *bound {
                 continue;
             }
-            if entry.leaf != u32::MAX {
-                bound = visit(entry.leaf as usize);
+            if branch.holds_leaves {
+                *bound = visit(branch.first + k);
+            } else {
+                self.walk_branch(&self.branches[branch.first + k], x, bound, visit);
             }
-            k += 1;
         }
     }
 
@@ -133,36 +186,35 @@ impl BoundingVolumes {
             bound
         });
     }
+}
 
-    /// Appends the subtree over the triangles `order`, split along the longest axis so that leaves are full.
-    fn build(&mut self, positions: &[DVec3], triangles: &[[u32; 3]], order: &mut [u32]) {
-        let corners = |t: u32| super::surface::corners(positions, triangles[t as usize]);
-        let volume = |t: u32| {
-            let [a, b, c] = corners(t);
-            Volume::new((a.min(b).min(c), a.max(b).max(c)))
-        };
-        let Some(volume) = order.iter().map(|&t| volume(t)).reduce(Volume::join) else { return };
-        let at = self.entries.len();
-        let is_leaf = order.len() <= LANES;
-        let leaf = if is_leaf { self.leaves.len() as u32 } else { u32::MAX };
-        self.entries.push(Entry { volume, skip: 0, leaf });
-        if is_leaf {
-            let nodes = std::array::from_fn(|lane| triangles[order[lane.min(order.len() - 1)] as usize]);
-            let mut packet = Packet::default();
-            packet.set(positions, &nodes);
-            self.leaves.push(Leaf { volume, triangles: order.to_vec(), nodes, packet });
-        } else {
-            let axis = (volume.high - volume.low).max_position();
-            let centre = |t: u32| {
-                let corners = corners(t).map(|corner| corner[axis]);
-                corners.iter().copied().fold(f64::MAX, f64::min) + corners.iter().copied().fold(f64::MIN, f64::max)
-            };
-            let middle = (order.len() / 2).next_multiple_of(LANES);
-            order.select_nth_unstable_by(middle, |&s, &t| centre(s).total_cmp(&centre(t)).then(s.cmp(&t)));
-            let (left, right) = order.split_at_mut(middle);
-            self.build(positions, triangles, left);
-            self.build(positions, triangles, right);
-        }
-        self.entries[at].skip = self.entries.len() as u32;
+/// Appends the leaves over the triangles `order`, split along the longest axis so that all leaves and branches but the last are full.
+fn build(positions: &[DVec3], triangles: &[[u32; 3]], order: &mut [u32], leaves: &mut Vec<Leaf>) {
+    let corners = |t: u32| super::surface::corners(positions, triangles[t as usize]);
+    let volume = |t: u32| {
+        let [a, b, c] = corners(t);
+        Volume::new((a.min(b).min(c), a.max(b).max(c)))
+    };
+    let Some(volume) = order.iter().map(|&t| volume(t)).reduce(Volume::join) else { return };
+    if order.len() <= LANES {
+        let nodes = std::array::from_fn(|lane| triangles[order[lane.min(order.len() - 1)] as usize]);
+        let mut packet = Packet::default();
+        packet.set(positions, &nodes);
+        leaves.push(Leaf { volume, triangles: order.to_vec(), nodes, packet });
+        return;
     }
+    let axis = (volume.high - volume.low).max_position();
+    let centre = |t: u32| {
+        let corners = corners(t).map(|corner| corner[axis]);
+        corners.iter().copied().fold(f64::MAX, f64::min) + corners.iter().copied().fold(f64::MIN, f64::max)
+    };
+    let mut full = LANES;
+    while full * LANES < order.len() {
+        full *= LANES;
+    }
+    let middle = (order.len() / 2).next_multiple_of(full);
+    order.select_nth_unstable_by(middle, |&s, &t| centre(s).total_cmp(&centre(t)).then(s.cmp(&t)));
+    let (left, right) = order.split_at_mut(middle);
+    build(positions, triangles, left, leaves);
+    build(positions, triangles, right, leaves);
 }

@@ -2,9 +2,31 @@
 
 use super::bounding_volumes::{Leaf, Volume};
 use super::model::Model;
-use super::packet::Packet;
+use super::packet::{LANES, Packet, greatest};
+use super::wide::{Kernel, widest};
 use crate::tolerances::LENGTH_ROUNDING;
 use glam::DVec3;
+
+/// The greatest of the squares of vectors, three numbers each, that is a number.
+struct GreatestSquare<'v>(&'v [f64]);
+
+impl Kernel for GreatestSquare<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let square = |[a, b, c]: [f64; 3]| a * a + b * b + c * c;
+        let (eights, rest) = self.0.as_chunks().0.as_chunks::<LANES>();
+        let mut most = [0.0; LANES];
+        for eight in eights {
+            for (most, vector) in most.iter_mut().zip(eight) {
+                *most = greatest(square(*vector), *most);
+            }
+        }
+        let rest = rest.iter().map(|vector| square(*vector));
+        most.into_iter().chain(rest).fold(0.0, |most, square| greatest(square, most))
+    }
+}
 
 /// A leaf's triangles where they are now.
 #[derive(Clone)]
@@ -36,9 +58,7 @@ impl Deformation {
     /// Another surface, displaced by `displacement` [m].
     pub fn take(&mut self, displacement: &[f64]) {
         self.surface += 1;
-        let squares = displacement.as_chunks().0.iter().map(|u| DVec3::from_array(*u).length_squared());
-        let greatest = squares.fold(0.0, |greatest, square| if square > greatest { square } else { greatest });
-        self.moved = greatest.sqrt() * (1.0 + LENGTH_ROUNDING);
+        self.moved = widest(GreatestSquare(displacement)).sqrt() * (1.0 + LENGTH_ROUNDING);
     }
 
     /// Calls `visit` with each triangle of the surface, nodes now at `positions`, that is nearer to `x` than the squared radius that
