@@ -20,6 +20,9 @@ use std::{
 /// need a thousand times that. Beyond it the device hangs.
 const WAIT_LIMIT: Duration = Duration::from_secs(120);
 
+/// Longest wait for what a device that refuses something still does.
+const LAST_WORK: Duration = Duration::from_secs(1);
+
 /// Most storage buffers that one kernel binds: that of the energy form between blended facets.
 pub(super) const MOST_BINDINGS: u32 = 10;
 
@@ -202,7 +205,8 @@ impl Context {
         let failures = Arc::new(Mutex::new(Failures::default()));
         let on_lost = Arc::clone(&failures);
         device.set_device_lost_callback(move |reason, message| {
-            lock(&on_lost).lost.get_or_insert_with(|| format!("{reason:?}: {message}"));
+            let why = format!("{reason:?}: {message}");
+            lock(&on_lost).lost.get_or_insert_with(|| why.trim_end_matches([':', ' ']).to_lowercase());
         });
         let on_error = Arc::clone(&failures);
         device.on_uncaptured_error(Arc::new(move |error| {
@@ -315,8 +319,13 @@ impl Context {
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let made = work(&self.device);
         let refused = [validation, internal, memory].map(|scope| pollster::block_on(scope.pop()));
+        let refused = refused.into_iter().flatten().next();
+        if refused.is_some() {
+            // A device that is lost refuses everything, and says why once it has nothing to do any more.
+            let _ = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(LAST_WORK) });
+        }
         self.check()?;
-        refused.into_iter().flatten().next().map_or(Ok(made), |error| Err(error.into()))
+        refused.map_or(Ok(made), |error| Err(error.into()))
     }
 }
 

@@ -6,9 +6,8 @@ use super::{
     feel::Pace,
     files::Files,
     job::{Job, Outcome, Solver, Task},
-    loaded::Loaded,
     plots::Plots,
-    scene::SceneView,
+    scene::{SceneView, Shown},
     session::Session,
 };
 use crate::{
@@ -71,12 +70,15 @@ pub struct Viewer {
     pub(super) frame_rate: Option<f64>,
 }
 
-/// What is left of a window whose device was lost.
+/// What is left of a window: all but what was drawn.
 pub struct Rescue {
-    /// Why it was lost.
-    pub why: String,
-    /// What was open.
-    pub(super) loaded: Option<Loaded>,
+    /// What is felt; its loop goes on.
+    session: Option<Session>,
+    /// What was being made.
+    task: Option<Task>,
+    solver: Solver,
+    shown: Shown,
+    theme: egui::ThemePreference,
 }
 
 /// Samples a pixel of the 3-D scene, for smooth edges.
@@ -110,13 +112,11 @@ impl Viewer {
         })
     }
 
-    /// What a window on another device can [`Viewer::resume`] from, once this one's is lost; none before.
-    pub fn rescue(&mut self) -> Option<Rescue> {
+    /// Why the window's device is lost, if it is: nothing is drawn any more.
+    pub fn is_lost(&mut self) -> Option<String> {
         match self.context.check() {
             Ok(()) => None,
-            Err(GpuError::Lost(why)) => {
-                Some(Rescue { why, loaded: self.session.as_ref().map(|session| session.loaded.clone()) })
-            }
+            Err(GpuError::Lost(why)) => Some(why),
             Err(other) => {
                 self.error = Some(other.to_string());
                 None
@@ -124,16 +124,34 @@ impl Viewer {
         }
     }
 
-    /// Opens again what was open in a window whose device was lost, and says so.
-    pub fn resume(&mut self, rescue: Rescue, egui: &egui::Context) {
-        if let Some(loaded) = rescue.loaded {
-            self.begin(Task::Show(Box::new(loaded)), egui);
+    /// What a window on another device can [`Viewer::resume`] from.
+    pub fn rescue(&mut self, egui: &egui::Context) -> Rescue {
+        Rescue {
+            session: self.session.take(),
+            task: self.job.take().map(|job| job.task.clone()),
+            solver: self.solver.clone(),
+            shown: self.scene.shown,
+            theme: egui.options(|options| options.theme_preference),
+        }
+    }
+
+    /// Goes on where another window had to stop because its device was lost, and says `why`. What was being made is begun
+    /// again.
+    pub fn resume(&mut self, rescue: Rescue, why: &str, egui: &egui::Context) {
+        egui.set_theme(rescue.theme);
+        (self.session, self.solver, self.scene.shown) = (rescue.session, rescue.solver, rescue.shown);
+        if let Some(session) = &mut self.session {
+            let egui = egui.clone();
+            session.move_to(&self.context, move || egui.request_repaint());
+            self.scene.look_at(&session.loaded);
+        }
+        if let Some(task) = rescue.task {
+            self.begin(task, egui);
         }
         self.error = Some(format!(
-            "The GPU that drew this window was lost ({}). It was opened again, with what was open; gains and effects are \
-             those of the scene. Update its driver if this comes back, or draw on another adapter: set {ADAPTER_VARIABLE} to a \
-             part of its name",
-            rescue.why
+            "The GPU that drew this window was lost ({why}). It was opened again; what was felt went on meanwhile. Update the \
+             GPU's driver if this comes back, or draw on another adapter: set {ADAPTER_VARIABLE} to a part of its name before \
+             haptize starts; haptize doctor lists them"
         ));
     }
 

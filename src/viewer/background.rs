@@ -52,15 +52,15 @@ impl<T: Send + 'static> Coming<T> {
 
 /// Something that is made anew in the background whenever something else is wanted of it; what there is stays in use until then.
 pub struct Following<W, T> {
-    /// What it was made as, or could not be.
-    last: W,
+    /// What it was made as, or could not be; none before there is any.
+    last: Option<W>,
     coming: Option<(W, Coming<T>)>,
 }
 
 impl<W: Clone + PartialEq + Send + 'static, T: Send + 'static> Following<W, T> {
-    /// There is one as `wanted`.
-    pub fn new(wanted: W) -> Self {
-        Self { last: wanted, coming: None }
+    /// There is one as `last`, or none yet.
+    pub fn new(last: Option<W>) -> Self {
+        Self { last, coming: None }
     }
 
     /// Whether another one is being made.
@@ -84,12 +84,12 @@ impl<W: Clone + PartialEq + Send + 'static, T: Send + 'static> Following<W, T> {
         if made.is_some() {
             self.over();
         }
-        if self.coming.is_none() && *wanted != self.last {
+        if self.coming.is_none() && self.last.as_ref() != Some(wanted) {
             let asked = wanted.clone();
             match Coming::begin(name, move || make(&asked), wake) {
                 Ok(coming) => self.coming = Some((wanted.clone(), coming)),
                 Err(error) => {
-                    self.last = wanted.clone();
+                    self.last = Some(wanted.clone());
                     return Err(error);
                 }
             }
@@ -107,7 +107,7 @@ impl<W: Clone + PartialEq + Send + 'static, T: Send + 'static> Following<W, T> {
 
     fn over(&mut self) -> Option<Coming<T>> {
         let (wanted, coming) = self.coming.take()?;
-        self.last = wanted;
+        self.last = Some(wanted);
         Some(coming)
     }
 }
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn what_is_wanted_is_made_one_at_a_time_and_the_latest_wish_counts() {
         let (open, gate) = mpsc::channel::<()>();
-        let mut following = Following::new(0);
+        let mut following = Following::new(Some(0));
         // Nothing is made where nothing else is wanted.
         assert_eq!(following.follow(&0, "test", |wanted| *wanted, || ()), Ok(None));
         assert!(!following.is_busy());
@@ -160,7 +160,7 @@ mod tests {
     fn work_that_ends_without_a_result_is_told_once() {
         let (sender, made) = mpsc::channel::<i32>();
         drop(sender);
-        let mut following = Following { last: 0, coming: Some((1, Coming { made })) };
+        let mut following = Following { last: Some(0), coming: Some((1, Coming { made })) };
         assert_eq!(following.follow(&1, "test", |wanted| *wanted, || ()), Err(ENDED.to_owned()));
         assert_eq!(following.follow(&1, "test", |wanted| *wanted, || ()), Ok(None));
     }

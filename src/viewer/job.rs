@@ -35,8 +35,6 @@ pub enum Task {
     Open(PathBuf),
     /// Bake a scene.
     Bake(Arc<Scene>),
-    /// Set up what was open on another device.
-    Show(Box<Loaded>),
 }
 
 /// What bakes.
@@ -107,7 +105,9 @@ pub enum Outcome {
 
 /// A job under way. Dropping it cancels it.
 pub struct Job {
-    /// What it does, for its progress bar.
+    /// What it does.
+    pub task: Task,
+    /// The same, for its progress bar.
     pub title: String,
     progress: Progress,
     stop: Arc<AtomicBool>,
@@ -133,18 +133,18 @@ impl Job {
         let title = match &task {
             Task::Open(path) => format!("Opening {}", path.file_name().unwrap_or(path.as_os_str()).display()),
             Task::Bake(scene) => format!("Haptizing {}", scene.name),
-            Task::Show(loaded) => format!("Opening {}", loaded.name),
         };
         let stop = Arc::new(AtomicBool::new(false));
         let (sender, reports) = mpsc::channel();
         let flag = Arc::clone(&stop);
+        let asked = task.clone();
         let work = move || {
             let mut progress = |progress| {
                 // A window that is gone needs no news.
                 let _ = sender.send(Report::Progress(progress));
                 wake();
             };
-            let outcome = match run(task, &solver, &context, &flag, &mut progress) {
+            let outcome = match run(asked, &solver, &context, &flag, &mut progress) {
                 Ok(loaded) => Outcome::Loaded(Box::new(loaded)),
                 Err(error) if is_cancelled(error.as_ref()) => Outcome::Cancelled,
                 Err(error) => Outcome::Failed(error.to_string()),
@@ -154,7 +154,7 @@ impl Job {
         };
         spawn("bake", work)?;
         let progress = Progress::default();
-        Ok(Self { title, progress, stop, reports })
+        Ok(Self { task, title, progress, stop, reports })
     }
 
     /// Takes the news; answers with the outcome once it is over.
@@ -216,7 +216,6 @@ fn run(
             Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
         }
         Task::Bake(scene) => bake((*scene).clone(), solver, context, stop, progress)?,
-        Task::Show(loaded) => *loaded,
     };
     let body = Body::new(context, &loaded, &loaded.tuning().graphics)?;
     Ok((loaded, body))

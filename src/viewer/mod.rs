@@ -56,7 +56,7 @@ pub use offscreen::{Picture, render_state, screenshot};
 pub use theme::{LEAST_WINDOW, apply as dress};
 pub use window::open;
 
-use crate::gpu::{FrameError, GpuError};
+use crate::gpu::{ADAPTER_VARIABLE, FrameError, GpuError};
 
 /// The viewer cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -64,6 +64,13 @@ pub enum ViewError {
     /// The device that draws.
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    /// It was lost, and no other window can be opened instead.
+    #[error(
+        "the GPU that draws the window was lost, and the window with it: {0}. Start haptize view again; if this comes back, \
+         update the GPU's driver, or draw on another adapter: set {ADAPTER_VARIABLE} to a part of its name; haptize doctor \
+         lists them"
+    )]
+    Lost(String),
     /// The object's frame update.
     #[error(transparent)]
     Frame(#[from] FrameError),
@@ -76,6 +83,12 @@ pub enum ViewError {
     /// There is a display, but no window to be had.
     #[error("no window can be opened: {0}. haptize view --screenshot FILE.png draws one picture without a window")]
     Window(String),
+    /// What shows the window gave up: most often the display is gone.
+    #[error(
+        "the window ended unexpectedly: {0}. Start haptize view again; if the display was there all the time, please report \
+         this with the output of haptize doctor"
+    )]
+    Ended(String),
     /// What was to be shown cannot be opened.
     #[error("{0}")]
     Open(String),

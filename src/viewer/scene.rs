@@ -88,7 +88,7 @@ impl SceneView {
             texture: None,
             steering: Steering::new(Camera::looking_at(Vec3::ZERO, NO_EXTENT)),
             body: None,
-            redrawing: Following::new(GraphicsEffects::default()),
+            redrawing: Following::new(None),
             pose: Pose::default(),
             ghost: Pose::default(),
             shown: Shown { edges: true, forces: true, ghost: true, quantity: Quantity::Displacement },
@@ -98,7 +98,12 @@ impl SceneView {
 
     /// Takes the proxy of `loaded` and its object, `body`, and looks at them.
     pub fn open(&mut self, loaded: &Loaded, body: Option<Body>) {
-        (self.body, self.redrawing) = (body, Following::new(loaded.tuning().graphics));
+        (self.body, self.redrawing) = (body, Following::new(Some(loaded.tuning().graphics)));
+        self.look_at(loaded);
+    }
+
+    /// Takes the proxy of `loaded` and looks at it. Where there was nothing before, its object follows.
+    pub fn look_at(&mut self, loaded: &Loaded) {
         let chain = &loaded.setup.chain;
         (self.pose, self.ghost) = (chain.new_pose(), chain.new_pose());
         chain.pose(&loaded.start(), &mut self.pose);

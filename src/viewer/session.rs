@@ -58,8 +58,15 @@ impl Session {
         let feel = Feel::start(haptics, &gains, Guide::new(&loaded), pace)?;
         let (slices, cloud) = (Slices::new(&loaded.dataset), Cloud::new(&loaded.dataset));
         let exceeded = loaded.setup.exceeded.clone();
-        let retuning = Following::new(gains);
+        let retuning = Following::new(Some(gains));
         Ok(Self { loaded, feel, history, pace, retuning, slices, cloud, controls, exceeded, cloud_first: false })
+    }
+
+    /// Makes anew what belongs to a window and a device that are gone; the loop goes on. `context` is the new one, `wake` is called
+    /// when there is news.
+    pub fn move_to(&mut self, context: &Arc<Context>, wake: impl Fn() + Send + 'static) {
+        self.slices.forget_picture();
+        self.controls.price_anew(&self.loaded, context, wake);
     }
 
     /// Plane and cloud of C-space, one below the other, or one of them where there is no height for both.

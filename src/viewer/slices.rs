@@ -61,6 +61,11 @@ impl Slices {
         Self { column: Column::Torque(axes[0]), axes, follow: true, lines, drawn: None }
     }
 
+    /// Draws its picture anew: the window that had it is gone.
+    pub fn forget_picture(&mut self) {
+        self.drawn = None;
+    }
+
     /// The panel, `height` points of it for the heat map.
     pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, q: &JointVector, history: &History, height: f32) {
         let grid = &loaded.dataset.grid;

@@ -12,7 +12,6 @@ use crate::{
     report::colour::ColourMap,
 };
 use std::sync::Arc;
-use wgpu::util::DeviceExt;
 
 /// The surface to draw: buffers on the device.
 pub struct Surface {
@@ -83,13 +82,7 @@ impl Surface {
         mesh.extend(&topology.around_offsets);
         mesh.extend(&topology.around);
         let storage = |label, contents: &[u8]| {
-            context.scoped(|device| {
-                device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                    label: Some(label),
-                    contents,
-                    usage: wgpu::BufferUsages::STORAGE,
-                })
-            })
+            context.scoped(|device| filled(device, &context.queue, label, contents, wgpu::BufferUsages::STORAGE))
         };
         let rest = storage("drawn rest positions", bytemuck::cast_slice(&rest))?;
         let mesh = storage("drawn mesh", bytemuck::cast_slice(&mesh))?;
@@ -113,22 +106,13 @@ impl Stage {
                 usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             };
-            let unit = wgpu::util::BufferInitDescriptor {
-                label: Some("unit shape"),
-                contents: bytemuck::cast_slice(&unit_shape),
-                usage: wgpu::BufferUsages::VERTEX,
-            };
-            let no_state = wgpu::util::BufferInitDescriptor {
-                label: Some("no state"),
-                contents: &[0; 16],
-                usage: wgpu::BufferUsages::STORAGE,
-            };
+            let filled = |label, contents: &[u8], usage| filled(device, &context.queue, label, contents, usage);
             (
                 pipelines::surface(device, samples),
                 pipelines::shapes(device, samples),
                 device.create_buffer(&view),
-                device.create_buffer_init(&unit),
-                device.create_buffer_init(&no_state),
+                filled("unit shape", bytemuck::cast_slice(&unit_shape), wgpu::BufferUsages::VERTEX),
+                filled("no state", &[0; 16], wgpu::BufferUsages::STORAGE),
             )
         })?;
         let unit_vertices = unit_shape.len() as u32;
@@ -166,11 +150,8 @@ impl Stage {
                 pass.draw(0..3 * surface.triangles, 0..1);
             }
             if !shapes.is_empty() {
-                let instances = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                    label: Some("shapes"),
-                    contents: bytemuck::cast_slice(shapes),
-                    usage: wgpu::BufferUsages::VERTEX,
-                });
+                let contents = bytemuck::cast_slice(shapes);
+                let instances = filled(device, &self.context.queue, "shapes", contents, wgpu::BufferUsages::VERTEX);
                 let state = surface.map_or(&self.no_state, |surface| &surface.bindings[1]);
                 let bound = bind(device, &self.shapes, &[&self.view, state]);
                 pass.set_pipeline(&self.shapes);
@@ -185,6 +166,24 @@ impl Stage {
         self.context.queue.submit([commands]);
         Ok(&targets.picture)
     }
+}
+
+/// A buffer that holds `contents`, of whole words. wgpu's own way to make one panics where the device is lost.
+fn filled(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    label: &str,
+    contents: &[u8],
+    usage: wgpu::BufferUsages,
+) -> wgpu::Buffer {
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: contents.len() as u64,
+        usage: usage | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    queue.write_buffer(&buffer, 0, contents);
+    buffer
 }
 
 /// Whence the light comes, to the right of the eye, above and behind it, in any unit: over its right shoulder. It goes with

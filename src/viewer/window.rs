@@ -1,14 +1,15 @@
 //! The viewer in a window of the desktop.
 
-use super::{Pace, Rescue, Start, ViewError, Viewer, dress, loaded::Loaded, theme};
+use super::{Pace, Rescue, Start, ViewError, Viewer, dress, theme};
 use crate::gpu::{AdapterChoice, Context, GpuError};
 use eframe::{
     egui::{self, ViewportBuilder},
     egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupExisting},
 };
 use std::{
+    any::Any,
     cell::Cell,
-    panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
+    panic::{AssertUnwindSafe, catch_unwind},
     rc::Rc,
     sync::Arc,
     time::{Duration, Instant},
@@ -17,8 +18,8 @@ use std::{
 /// Time between two frames where nothing but the loop moves [s]: 60 a second.
 const FRAME: Duration = Duration::from_micros(16_667);
 
-/// Least time between two losses of the device after which a window is opened anew [s]: a device that is lost again and again
-/// is no use.
+/// Least time that a window lasts which was opened anew, for another one to be opened when its device is lost, too [s]: one that
+/// is lost again and again is no use.
 const LEAST_LIFE: Duration = Duration::from_secs(30);
 
 /// Longest wait for the last frame of a window that is closed.
@@ -35,24 +36,24 @@ pub fn open(start: Start) -> Result<(), ViewError> {
     let mut context = Arc::new(Context::open(AdapterChoice::Any)?);
     let mut begin = Begin::Start(start);
     loop {
-        let opened = Instant::now();
-        let Some(rescue) = show(&context, begin)? else { return Ok(()) };
-        if opened.elapsed() < LEAST_LIFE {
-            return Err(GpuError::Lost(rescue.why).into());
+        let (opened, is_anew) = (Instant::now(), matches!(begin, Begin::Resume(..)));
+        let Some((rescue, why)) = show(&context, begin)? else { return Ok(()) };
+        if is_anew && opened.elapsed() < LEAST_LIFE {
+            return Err(ViewError::Lost(why));
         }
         context = Arc::new(context.reopen()?);
-        begin = Begin::Resume(rescue);
+        begin = Begin::Resume(Box::new(rescue), why);
     }
 }
 
 /// What a window begins with.
 enum Begin {
     Start(Start),
-    Resume(Rescue),
+    Resume(Box<Rescue>, String),
 }
 
-/// A window on the device of `context`, until it is closed; answers with what is left where the device was lost.
-fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<Rescue>, ViewError> {
+/// A window on the device of `context`, until it is closed; answers with what is left where the device was lost, and why.
+fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<(Rescue, String)>, ViewError> {
     let (instance, adapter, device, queue) = context.shared();
     let options = eframe::NativeOptions {
         viewport: ViewportBuilder::default()
@@ -68,8 +69,8 @@ fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<Rescue>, ViewErro
         },
         ..Default::default()
     };
-    let open = Rc::new(Cell::new(None));
-    let (device, left) = (Arc::clone(context), Rc::clone(&open));
+    let left = Rc::new(Cell::new(None));
+    let (device, leave) = (Arc::clone(context), Rc::clone(&left));
     let create: eframe::AppCreator<'_> = Box::new(move |creation| {
         let render = creation.wgpu_render_state.clone().ok_or("the window has no renderer")?;
         dress(&creation.egui_ctx);
@@ -77,46 +78,61 @@ fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<Rescue>, ViewErro
         let mut viewer = Viewer::new(device, render, Pace::Clock, folder)?;
         match begin {
             Begin::Start(start) => viewer.start(&start, &creation.egui_ctx),
-            Begin::Resume(rescue) => viewer.resume(rescue, &creation.egui_ctx),
+            Begin::Resume(rescue, why) => viewer.resume(*rescue, &why, &creation.egui_ctx),
         }
-        Ok(Box::new(App { viewer, last: Instant::now(), open: left }))
+        Ok(Box::new(App { viewer, last: Instant::now(), egui: creation.egui_ctx.clone(), leave }))
     });
-    // egui's renderer panics where its device is lost before the window knows.
+    // egui's renderer panics where its device is lost while it paints; winit, where the display is. After that there is no
+    // other window to be had from them.
     let shown = catch_unwind(AssertUnwindSafe(|| eframe::run_native("haptize", options, create)));
     // Once it has nothing to do any more, a lost device says so.
     let _ = context.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(LAST_WORK) });
     match (context.check(), shown) {
-        (Err(GpuError::Lost(why)), _) => Ok(Some(Rescue { why, loaded: open.take() })),
+        (Err(GpuError::Lost(why)), shown) => match (shown, left.take()) {
+            (Ok(_), Some(rescue)) => Ok(Some((rescue, why))),
+            _ => Err(ViewError::Lost(why)),
+        },
         (_, Ok(Ok(()))) => Ok(None),
         (_, Ok(Err(eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_)))) => Err(ViewError::NoDisplay),
         (_, Ok(Err(other))) => Err(ViewError::Window(other.to_string())),
-        (_, Err(panic)) => resume_unwind(panic),
+        (_, Err(panic)) => Err(ViewError::Ended(words(panic.as_ref()).to_owned())),
     }
+}
+
+/// What a panic said.
+fn words(panic: &(dyn Any + Send)) -> &str {
+    let whole = panic.downcast_ref::<String>().map(String::as_str);
+    whole.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a word")
 }
 
 struct App {
     viewer: Viewer,
     last: Instant,
-    /// What was open, once it is closed.
-    open: Rc<Cell<Option<Loaded>>>,
+    egui: egui::Context,
+    /// What is left of it, once it is closed.
+    leave: Rc<Cell<Option<Rescue>>>,
 }
 
 impl eframe::App for App {
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
-        if self.viewer.rescue().is_some() {
+        if self.viewer.is_lost().is_none() {
+            let now = Instant::now();
+            self.viewer.advance((now - self.last).as_secs_f64(), ui.ctx());
+            self.last = now;
+            self.viewer.ui(ui);
+        }
+        if self.viewer.is_lost().is_some() {
+            // Before this frame or in it: there is nothing left to paint with, and egui's renderer panics where it tries.
+            ui.ctx().graphics_mut(|painted| *painted = egui::layers::GraphicLayers::default());
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
             return;
         }
-        let now = Instant::now();
-        self.viewer.advance((now - self.last).as_secs_f64(), ui.ctx());
-        self.last = now;
-        self.viewer.ui(ui);
         ui.ctx().request_repaint_after(FRAME);
     }
 }
 
 impl Drop for App {
     fn drop(&mut self) {
-        self.open.set(self.viewer.session.as_ref().map(|session| session.loaded.clone()));
+        self.leave.set(Some(self.viewer.rescue(&self.egui)));
     }
 }

@@ -1,7 +1,7 @@
 //! How something is opened or baked, and what is said when it is not.
 
 use super::window::{DEVICE_NAME, SPHERE, Window, colours, scanned, small_scene};
-use eframe::egui::{Theme, accesskit::Role};
+use eframe::egui::{Pos2, RawInput, Rect, Theme, accesskit::Role, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 use haptize::{
     gpu::{AdapterChoice, Context},
@@ -210,8 +210,19 @@ fn a_window_whose_device_is_lost_says_so_and_goes_on_on_another_one() {
     viewer.start(&Start::File(SPHERE.1.clone()), &ctx);
     viewer.wait(&ctx);
     viewer.play("press");
-    assert!(viewer.rescue().is_none() && viewer.error().is_none());
+    assert!(viewer.is_lost().is_none() && viewer.error().is_none());
+    let screen = Rect::from_min_size(Pos2::ZERO, vec2(1200.0, 800.0));
+    let show = |viewer: &mut Viewer| {
+        let input = RawInput { screen_rect: Some(screen), ..Default::default() };
+        let mut output = ctx.run_ui(input, |ui| viewer.ui(ui));
+        // Nobody paints it.
+        output.textures_delta.clear();
+    };
+    show(&mut viewer);
     lost.shared().2.destroy();
+    // In the midst of a frame: what there is to draw is refused, not panicked about.
+    show(&mut viewer);
+    assert!(viewer.is_lost().is_some(), "{:?}", viewer.error());
     for _ in 0..60 {
         viewer.advance(0.05, &ctx);
     }
@@ -219,16 +230,49 @@ fn a_window_whose_device_is_lost_says_so_and_goes_on_on_another_one() {
     assert!(viewer.contact_torque().unwrap() > 0.1);
     let error = viewer.error().unwrap();
     assert!(error.contains("was lost") && error.contains("start haptize view again"), "{error}");
-    let rescue = viewer.rescue().unwrap();
-    assert!(!rescue.why.is_empty());
+    let why = viewer.is_lost().unwrap();
+    assert!(!why.is_empty());
+    let (held, time) = (viewer.contact_torque().unwrap(), viewer.time_in_motion().unwrap());
+    ctx.set_theme(Theme::Dark);
+    let rescue = viewer.rescue(&ctx);
+    drop(viewer);
     let mut window = Window::empty([1200.0, 800.0], Theme::Light);
-    window.harness.state_mut().resume(rescue, &ctx);
+    let ctx = window.harness.ctx.clone();
+    window.harness.state_mut().resume(rescue, &why, &ctx);
+    // What is felt is what was felt, where the motion was.
+    assert_eq!((window.torque(), window.harness.state().time_in_motion().unwrap()), (held, time));
     window.wait();
-    assert!(window.shows("was lost") && window.shows("Update its driver"), "{:?}", window.harness.state().error());
+    assert!(
+        window.shows("was lost") && window.shows("Update the GPU's driver"),
+        "{:?}",
+        window.harness.state().error()
+    );
+    assert_eq!(ctx.theme(), Theme::Dark);
     window.click("Dismiss");
     window.click("Press");
     window.pass(2.2);
-    assert!(window.torque() > 0.1 && colours(&window.picture_of("3-D scene")) > 20);
+    assert!(window.torque() > 0.1);
+    for picture in ["3-D scene", "Plane of C-space"] {
+        assert!(colours(&window.picture_of(picture)) > 20, "{picture} is empty");
+    }
+}
+
+#[test]
+fn what_was_being_baked_when_the_device_was_lost_is_baked_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let lost = Arc::new(Context::open(AdapterChoice::Any).unwrap());
+    let ctx = eframe::egui::Context::default();
+    let render = viewer::render_state(&lost).unwrap();
+    let mut viewer = Viewer::new(Arc::clone(&lost), render, Pace::Steps, folder.path().to_owned()).unwrap();
+    viewer.start(&Start::Sphere, &ctx);
+    lost.shared().2.destroy();
+    let why = std::iter::repeat_with(|| viewer.is_lost()).flatten().next().unwrap();
+    let rescue = viewer.rescue(&ctx);
+    drop(viewer);
+    let mut window = Window::empty([1200.0, 800.0], Theme::Light);
+    window.harness.state_mut().resume(rescue, &why, &ctx);
+    window.wait();
+    assert!(window.shows("C-space") && window.shows("was lost"), "{:?}", window.harness.state().error());
 }
 
 #[test]
