@@ -5,6 +5,7 @@ use super::{
     ViewError,
     feel::Pace,
     files::Files,
+    gamepad::Gamepad,
     job::{Job, Outcome, Solver, Task},
     plots::Plots,
     scene::{SceneView, Shown},
@@ -56,6 +57,7 @@ const SPHERE: &str = include_str!("../../datasets/sphere.toml");
 pub struct Viewer {
     pub(super) context: Arc<Context>,
     pub(super) pace: Pace,
+    pub(super) gamepad: Gamepad,
     pub(super) session: Option<Session>,
     pub(super) scene: SceneView,
     pub(super) plots: Plots,
@@ -74,6 +76,7 @@ pub struct Viewer {
 pub struct Rescue {
     /// What is felt; its loop goes on.
     session: Option<Session>,
+    gamepad: Gamepad,
     /// What was being made.
     task: Option<Task>,
     solver: Solver,
@@ -101,6 +104,7 @@ impl Viewer {
             scene: SceneView::new(Arc::clone(&context), render, samples)?,
             context,
             pace,
+            gamepad: if pace == Pace::Clock { Gamepad::new() } else { Gamepad::default() },
             session: None,
             plots: Plots::default(),
             files: Files::new(folder),
@@ -128,6 +132,7 @@ impl Viewer {
     pub fn rescue(&mut self, egui: &egui::Context) -> Rescue {
         Rescue {
             session: self.session.take(),
+            gamepad: self.gamepad.clone(),
             task: self.job.take().map(|job| job.task.clone()),
             solver: self.solver.clone(),
             shown: self.scene.shown,
@@ -139,7 +144,8 @@ impl Viewer {
     /// again.
     pub fn resume(&mut self, rescue: Rescue, why: &str, egui: &egui::Context) {
         egui.set_theme(rescue.theme);
-        (self.session, self.solver, self.scene.shown) = (rescue.session, rescue.solver, rescue.shown);
+        (self.session, self.gamepad) = (rescue.session, rescue.gamepad);
+        (self.solver, self.scene.shown) = (rescue.solver, rescue.shown);
         if let Some(session) = &mut self.session {
             let egui = egui.clone();
             session.move_to(&self.context, move || egui.request_repaint());
@@ -200,7 +206,7 @@ impl Viewer {
             Outcome::Loaded(loaded) => {
                 let (loaded, body) = *loaded;
                 let egui = egui.clone();
-                match Session::new(loaded, &self.context, self.pace, move || egui.request_repaint()) {
+                match Session::new(loaded, &self.context, &self.gamepad, self.pace, move || egui.request_repaint()) {
                     Ok(mut session) => {
                         self.scene.open(&session.loaded, body);
                         if let Some(before) = &self.session {

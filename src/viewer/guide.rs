@@ -1,7 +1,7 @@
-//! Who leads the hand: the pointer, or one of the scene's motions, which plays, pauses and can be scrubbed.
+//! Who leads the hand: the pointer, keys, a gamepad, or one of the scene's motions, which plays, pauses and can be scrubbed.
 
-use super::loaded::Loaded;
-use crate::{JointVector, device::Motion};
+use super::{gamepad::Wish, loaded::Loaded};
+use crate::{JointVector, device::Motion, scene::Waypoint};
 
 /// The hand's leader. Time is told to it: it has no clock.
 #[derive(Clone, Debug)]
@@ -19,10 +19,21 @@ pub struct Guide {
     from: JointVector,
     /// Least and greatest coordinate of each joint [rad or m].
     limits: Vec<[f64; 2]>,
+    /// Where the hand is at first [rad or m].
+    home: JointVector,
+    /// The way back there, and the time in it [s], while the hand takes it.
+    way_home: Option<(Motion, f64)>,
 }
 
 /// Time in which the hand is led to the beginning of a motion [s].
 pub const LEAD_IN: f64 = 0.8;
+
+/// How far a key, or a stick pushed all the way, moves a joint in a second, as a share of its range [1/s]: all of it in four
+/// seconds, slowly enough to press with care.
+const SPEED: f64 = 0.25;
+
+/// Longest time that a joint is moved for at once [s]: who stood still meanwhile must not throw the arm.
+const LONGEST: f64 = 0.1;
 
 impl Guide {
     /// The hand rests at the beginning of the first motion.
@@ -37,6 +48,8 @@ impl Guide {
             goal: loaded.start(),
             from: loaded.start(),
             limits,
+            home: loaded.start(),
+            way_home: None,
         };
         guide.point(loaded.start());
         guide
@@ -77,6 +90,7 @@ impl Guide {
         if let Some((_, motion)) = self.motions.get(number) {
             let time = if motion.at(0.0).0 == self.goal { 0.0 } else { -LEAD_IN };
             (self.playing, self.running, self.time, self.from) = (Some(number), true, time, self.goal);
+            self.way_home = None;
         }
     }
 
@@ -99,11 +113,46 @@ impl Guide {
         for (goal, [least, greatest]) in goal.iter_mut().zip(&self.limits) {
             *goal = goal.max(*least).min(*greatest);
         }
-        (self.playing, self.running, self.goal) = (None, false, goal);
+        (self.playing, self.running, self.goal, self.way_home) = (None, false, goal, None);
+    }
+
+    /// The hand moves the first joints at `speeds`, from -1 to 1 each, for `elapsed` [s]; nobody takes the lead where all are 0.
+    pub fn steer(&mut self, speeds: &[f64], elapsed: f64) {
+        if speeds.iter().all(|speed| *speed == 0.0) {
+            return;
+        }
+        let mut goal = self.goal;
+        for ((goal, speed), [least, greatest]) in goal.iter_mut().zip(speeds).zip(&self.limits) {
+            *goal += speed * SPEED * (greatest - least) * elapsed.min(LONGEST);
+        }
+        self.point(goal);
+    }
+
+    /// The hand goes back to where it was at first, without a blow.
+    pub fn go_home(&mut self) {
+        self.point(self.goal);
+        let ends = [(0.0, self.goal), (LEAD_IN, self.home)].map(|(time, q)| Waypoint { time, q });
+        self.way_home = Motion::through(&ends, self.goal.len()).ok().map(|way| (way, 0.0));
+    }
+
+    /// Does what a gamepad asks for, and lets `elapsed` [s] go by; answers with where the hand is led now.
+    pub fn follow(&mut self, wish: &Wish, elapsed: f64) -> JointVector {
+        if wish.reset {
+            self.go_home();
+        }
+        self.steer(&wish.speeds, elapsed);
+        self.advance(elapsed)
     }
 
     /// `elapsed` [s] go by; answers with where the hand is led now.
-    pub fn advance(&mut self, elapsed: f64) -> JointVector {
+    fn advance(&mut self, elapsed: f64) -> JointVector {
+        if let Some((way, time)) = &mut self.way_home {
+            *time += elapsed;
+            self.goal = way.at(*time).0;
+            if *time >= way.duration() {
+                self.way_home = None;
+            }
+        }
         if let Some((_, motion)) = self.playing.and_then(|number| self.motions.get(number)) {
             if self.running {
                 self.time += elapsed;
@@ -121,5 +170,76 @@ impl Guide {
             }
         }
         self.goal
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::viewer::pad::JOINTS;
+
+    /// A hand at rest in the middle of two joints, of whose limits the second's are closer.
+    fn guide() -> Guide {
+        let [start, home] = [[0.0, 0.0], [0.5, 0.1]].map(|q| JointVector::from_slice(&q));
+        Guide {
+            motions: Vec::new(),
+            playing: None,
+            running: false,
+            time: 0.0,
+            goal: start,
+            from: start,
+            limits: vec![[-1.0, 1.0], [-0.2, 0.2]],
+            home,
+            way_home: None,
+        }
+    }
+
+    fn wish(speeds: [f64; 2]) -> Wish {
+        let mut wish = Wish::default();
+        wish.speeds[..2].copy_from_slice(&speeds);
+        wish
+    }
+
+    #[test]
+    fn a_gamepad_moves_joints_by_time_and_range_up_to_their_limits_and_no_further_once_it_is_let_go() {
+        let mut guide = guide();
+        for _ in 0..500 {
+            guide.follow(&wish([1.0, -0.5]), 2e-3);
+        }
+        let expected = [SPEED * 2.0, -0.5 * SPEED * 0.4];
+        assert!(guide.goal().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{:?}", guide.goal());
+        let held = guide.goal();
+        for _ in 0..500 {
+            assert_eq!(guide.follow(&Wish::default(), 2e-3), held, "it moves without a wish");
+        }
+        for _ in 0..5000 {
+            guide.follow(&wish([1.0, -1.0]), 2e-3);
+        }
+        assert_eq!(&guide.goal()[..], [1.0, -0.2]);
+        // A thread that stood still does not throw the arm.
+        guide.follow(&wish([-1.0, 0.0]), 1e6);
+        assert!((guide.goal()[0] - (1.0 - SPEED * 2.0 * LONGEST)).abs() < 1e-12, "{:?}", guide.goal());
+    }
+
+    #[test]
+    fn a_reset_leads_home_without_a_blow_unless_another_takes_the_lead() {
+        let reset = Wish { reset: true, speeds: [0.0; JOINTS] };
+        let mut guide = guide();
+        let mut before = guide.goal();
+        let mut fastest = 0.0_f64;
+        guide.follow(&reset, 0.0);
+        for _ in 0..500 {
+            let now = guide.follow(&Wish::default(), 2e-3);
+            fastest = fastest.max((now[0] - before[0]).abs() / 2e-3);
+            before = now;
+        }
+        assert_eq!(guide.goal(), guide.home);
+        // Minimum jerk: at most 15/8 of the mean speed.
+        assert!(fastest < 1.01 * 1.875 * 0.5 / LEAD_IN, "{fastest}");
+        guide.point(JointVector::from_slice(&[-0.5, 0.0]));
+        guide.follow(&reset, 0.0);
+        guide.follow(&Wish::default(), 0.5 * LEAD_IN);
+        let taken = guide.follow(&wish([1.0, 0.0]), 2e-3);
+        assert!(taken[0] < 0.1 && guide.follow(&Wish::default(), 1.0) == taken, "{taken:?}");
     }
 }

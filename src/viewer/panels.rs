@@ -3,6 +3,7 @@
 use super::{
     app::{Viewer, not_drawn},
     feel::Pace,
+    gamepad::{Found, Gamepad},
     guide::Guide,
     job::{Job, Task, short},
     number,
@@ -23,6 +24,7 @@ use std::path::Path;
 impl Viewer {
     /// The whole window.
     pub fn ui(&mut self, ui: &mut Ui) {
+        self.gamepad.hear(ui.input(|input| input.focused));
         let dropped = ui.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
         if let Some(path) = dropped {
             self.open_file(&path, &ui.ctx().clone());
@@ -148,6 +150,7 @@ impl Viewer {
             .size_range(CONTROLS_RANGE)
             .show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+                    gamepad(ui, &self.gamepad);
                     let (controls, loaded) = (&mut session.controls, &session.loaded);
                     bake = controls.show(ui, loaded, &session.exceeded, &mut self.scene.shown, &self.solvers);
                 });
@@ -224,6 +227,15 @@ impl Viewer {
             Ok(()) => self.files.remember(&file),
             Err(error) => self.error = Some(error.to_string()),
         }
+    }
+}
+
+/// What is known of a gamepad, where there is one.
+fn gamepad(ui: &mut Ui, gamepad: &Gamepad) {
+    match gamepad.found() {
+        Found::None => {}
+        Found::Connected(name) => drop(ui.label(RichText::new(format!("Gamepad: {name}")).weak().small())),
+        Found::Refused(why) => drop(ui.colored_label(ui.visuals().warn_fg_color, RichText::new(why).small())),
     }
 }
 

@@ -5,6 +5,7 @@ use super::{
     cloud::Cloud,
     controls::Controls,
     feel::{Feel, Pace},
+    gamepad::Gamepad,
     guide::Guide,
     history::History,
     loaded::Loaded,
@@ -25,6 +26,7 @@ pub struct Session {
     pub loaded: Loaded,
     pub feel: Feel,
     pub history: History,
+    gamepad: Gamepad,
     pace: Pace,
     /// The loop with the gains that the controls have, made in the background.
     retuning: Following<HapticsSpec, Result<Tuned, SetupError>>,
@@ -48,6 +50,7 @@ impl Session {
     pub fn new(
         loaded: Loaded,
         context: &Arc<Context>,
+        gamepad: &Gamepad,
         pace: Pace,
         wake: impl Fn() + Send + 'static,
     ) -> Result<Self, String> {
@@ -55,11 +58,24 @@ impl Session {
         let gains = controls.tuning.haptics.clone();
         let haptics = Arc::clone(&loaded.setup.haptics);
         let history = History::new(haptics.period()).ok_or("no memory for histograms; close other programs")?;
-        let feel = Feel::start(haptics, &gains, Guide::new(&loaded), pace)?;
+        let feel = Feel::start(haptics, &gains, Guide::new(&loaded), gamepad.clone(), pace)?;
         let (slices, cloud) = (Slices::new(&loaded.dataset), Cloud::new(&loaded.dataset));
         let exceeded = loaded.setup.exceeded.clone();
         let retuning = Following::new(Some(gains));
-        Ok(Self { loaded, feel, history, pace, retuning, slices, cloud, controls, exceeded, cloud_first: false })
+        let gamepad = gamepad.clone();
+        Ok(Self {
+            loaded,
+            feel,
+            history,
+            gamepad,
+            pace,
+            retuning,
+            slices,
+            cloud,
+            controls,
+            exceeded,
+            cloud_first: false,
+        })
     }
 
     /// Makes anew what belongs to a window and a device that are gone; the loop goes on. `context` is the new one, `wake` is called
@@ -127,7 +143,7 @@ impl Session {
         let (haptics, exceeded) = made.map_err(|error| error.to_string())?;
         let guide = self.feel.guide().clone();
         self.history.collect(&mut self.feel);
-        self.feel = Feel::start(haptics, &self.controls.tuning.haptics, guide, self.pace)?;
+        self.feel = Feel::start(haptics, &self.controls.tuning.haptics, guide, self.gamepad.clone(), self.pace)?;
         self.history.begin_anew();
         self.exceeded = exceeded;
         Ok(())
@@ -152,7 +168,7 @@ mod tests {
         let bake = Bake { scene: &scene, backend: BackendChoice::Cpu, date: "", stop: &stop, progress: &mut |_| () };
         let loaded = Loaded::new(bake.in_memory().unwrap().0, None, None).unwrap();
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-        let mut session = Session::new(loaded, &context, Pace::Steps, || ()).unwrap();
+        let mut session = Session::new(loaded, &context, &Gamepad::default(), Pace::Steps, || ()).unwrap();
         let (open, gate) = mpsc::channel::<()>();
         let other = HapticsSpec { interpolation: Interpolation::Potential, ..session.controls.tuning.haptics.clone() };
         session.controls.tuning.haptics = other.clone();

@@ -2,10 +2,7 @@
 //! it; keys move joints.
 
 use super::{camera::Camera, grip::Grip, guide::Guide};
-use crate::{
-    JointVector,
-    proxy::{Chain, Pose},
-};
+use crate::proxy::{Chain, Pose};
 use eframe::egui::{CursorIcon, Key, PointerButton, Pos2, Rect, Response, Ui};
 use glam::Vec2;
 
@@ -19,11 +16,12 @@ pub struct Steering {
 }
 
 /// What pointer and keys do over the scene, for the window's help.
-pub const HELP: [(&str, &str); 8] = [
+pub const HELP: [(&str, &str); 9] = [
     ("Drag a node of the arm", "move the device"),
     ("A, D", "turn its first joint"),
     ("W, S", "turn its second joint"),
     ("E, Q", "turn its third joint"),
+    ("Gamepad: sticks, triggers, bumpers", "turn the joints; A or × leads back to the start"),
     ("Drag elsewhere", "orbit"),
     ("Right-drag, Shift-drag", "pan"),
     ("Wheel, pinch", "zoom"),
@@ -33,13 +31,6 @@ pub const HELP: [(&str, &str); 8] = [
 /// Zoom for each point that the wheel turns, as a logarithm [1/point]: a notch, some 50 points, brings the eye nearer by a
 /// tenth.
 const ZOOM_PER_POINT: f32 = 0.002;
-
-/// How far a key moves a joint in a second, as a share of its range [1/s]: all of it in four seconds, slowly enough to
-/// press with care.
-const KEY_SPEED: f64 = 0.25;
-
-/// Longest time that a key held through one frame moves a joint for [s]: a window that stood still must not throw the arm.
-const LONGEST_KEY: f32 = 0.1;
 
 impl Steering {
     /// Looks from `home`.
@@ -93,7 +84,7 @@ impl Steering {
             self.camera.zoom((-ZOOM_PER_POINT * scroll).exp() / pinch);
         }
         if response.hovered() && ui.memory(|memory| memory.focused().is_none()) {
-            nudge(ui, chain, guide);
+            nudge(ui, guide);
         }
         if self.grip.is_some() {
             ui.ctx().set_cursor_icon(CursorIcon::Grabbing);
@@ -106,19 +97,15 @@ impl Steering {
 }
 
 /// Keys move joints: A and D the first, W and S the second, Q and E the third.
-fn nudge(ui: &Ui, chain: &Chain, guide: &mut Guide) {
+fn nudge(ui: &Ui, guide: &mut Guide) {
     use Key::{A, D, E, Q, S, W};
     let (pressed, elapsed) = ui.input(|input| {
         let way = |less, more| f64::from(i8::from(input.key_down(more)) - i8::from(input.key_down(less)));
-        ([way(A, D), way(S, W), way(Q, E)], f64::from(input.stable_dt.min(LONGEST_KEY)))
+        ([way(A, D), way(S, W), way(Q, E)], f64::from(input.stable_dt))
     });
     if pressed == [0.0; 3] {
         return;
     }
-    let mut goal: JointVector = guide.goal();
-    for ((goal, way), joint) in goal.iter_mut().zip(pressed).zip(&chain.joints) {
-        *goal += way * KEY_SPEED * (joint.limits[1] - joint.limits[0]) * elapsed;
-    }
-    guide.point(goal);
+    guide.steer(&pressed, elapsed);
     ui.ctx().request_repaint();
 }

@@ -1,0 +1,116 @@
+//! The gamepad that moves the device's joints, where there is one. A thread of its own looks for it, reads it, and looks again
+//! when it is gone, so that neither window nor hand ever waits for it.
+//!
+//! On Linux it is read from /dev/input. Elsewhere none is ever found.
+
+use super::pad::{JOINTS, Pad};
+use std::sync::{
+    Arc, Mutex, MutexGuard, PoisonError,
+    atomic::{AtomicBool, Ordering},
+};
+
+/// What the hand is asked to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wish {
+    /// How fast each joint is to move, as a share of the speed of keys.
+    pub speeds: [f64; JOINTS],
+    /// Whether the hand is to go back to where it was at first.
+    pub reset: bool,
+}
+
+/// Whether there is a gamepad.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Found {
+    /// There is none.
+    #[default]
+    None,
+    /// By its name.
+    Connected(String),
+    /// There is one, but the system does not let it be read: why, and what to do.
+    Refused(String),
+}
+
+/// The gamepad, shared by the thread that reads it, the hand, and the window.
+#[derive(Clone, Default)]
+pub struct Gamepad {
+    now: Arc<Mutex<(Wish, Found)>>,
+    /// Whether the window has the keyboard: only then the gamepad is meant for it.
+    heard: Arc<AtomicBool>,
+}
+
+impl Gamepad {
+    /// One that is looked for and read until the last of its clones is gone.
+    #[must_use]
+    pub fn new() -> Self {
+        let gamepad = Self::default();
+        #[cfg(target_os = "linux")]
+        super::gamepad_linux::read(&gamepad);
+        gamepad
+    }
+
+    /// Tells whether the window has the keyboard.
+    pub fn hear(&self, focused: bool) {
+        self.heard.store(focused, Ordering::Relaxed);
+    }
+
+    /// What the hand is asked to do now; a reset is told once.
+    #[must_use]
+    pub fn wish(&self) -> Wish {
+        let mut now = self.lock();
+        let reset = std::mem::take(&mut now.0.reset);
+        if self.heard.load(Ordering::Relaxed) { Wish { reset, ..now.0 } } else { Wish::default() }
+    }
+
+    /// Whether there is one.
+    #[must_use]
+    pub fn found(&self) -> Found {
+        self.lock().1.clone()
+    }
+
+    /// `found` is how it stands with gamepads now; nothing is asked of the hand any more.
+    pub(super) fn tell(&self, found: Found) {
+        *self.lock() = (Wish::default(), found);
+    }
+
+    /// The gamepad is held as `pad`; `reset`: its button was pressed.
+    pub(super) fn hold(&self, pad: &Pad, reset: bool) {
+        let mut now = self.lock();
+        now.0.speeds = pad.speeds();
+        now.0.reset |= reset;
+    }
+
+    /// Gives it, as long as somebody else has it.
+    #[cfg(target_os = "linux")]
+    pub(super) fn weak(&self) -> impl Fn() -> Option<Self> + Send + 'static {
+        let (now, heard) = (Arc::downgrade(&self.now), Arc::clone(&self.heard));
+        move || Some(Self { now: now.upgrade()?, heard: Arc::clone(&heard) })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, (Wish, Found)> {
+        // Plain values: a panic elsewhere leaves nothing half-written that would matter.
+        self.now.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gamepad_that_is_gone_or_not_meant_asks_for_nothing() {
+        let gamepad = Gamepad::default();
+        let mut pad = Pad::default();
+        pad.press(super::super::pad::Button::RightBumper, true);
+        gamepad.tell(Found::Connected("one".into()));
+        gamepad.hold(&pad, true);
+        assert_eq!(gamepad.wish(), Wish::default(), "heard without the keyboard");
+        gamepad.hear(true);
+        gamepad.hold(&pad, true);
+        let wish = gamepad.wish();
+        assert!(wish.reset && wish.speeds[5] == 1.0, "{wish:?}");
+        assert!(!gamepad.wish().reset && gamepad.wish().speeds[5] == 1.0, "a reset is told twice");
+        // It is pulled out while a bumper is held.
+        gamepad.tell(Found::None);
+        assert_eq!((gamepad.wish(), gamepad.found()), (Wish::default(), Found::None));
+    }
+}
