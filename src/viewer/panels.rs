@@ -213,7 +213,7 @@ impl Viewer {
                 let text = RichText::new(error).color(ui.visuals().error_fg_color);
                 ui.label(if error.contains('\n') { text.monospace() } else { text });
                 ui.add_space(GROUP_GAP);
-                dismissed = ui.add(Button::new("Dismiss").min_size(LONE_BUTTON)).clicked();
+                dismissed = ui.add_sized(LONE_BUTTON, Button::new("Dismiss")).clicked();
             });
         if dismissed {
             self.error = None;
@@ -279,7 +279,7 @@ fn motions(ui: &mut Ui, guide: &mut Guide) {
     }
     if let (Some((mut time, duration)), true) = (guide.time(), chosen.is_some()) {
         let text = if guide.is_running() { "Pause" } else { "Play" };
-        if ui.add(Button::new(text).min_size(vec2(PAUSE_WIDTH, 0.0))).clicked() {
+        if ui.add_sized(vec2(PAUSE_WIDTH, ui.spacing().interact_size.y), Button::new(text)).clicked() {
             guide.toggle();
         }
         ui.spacing_mut().slider_width = MOTION_WIDTH;

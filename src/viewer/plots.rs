@@ -15,7 +15,7 @@ use crate::{
     },
     report::{self, ReportError},
 };
-use eframe::egui::{self, Button, RichText, Ui, vec2};
+use eframe::egui::{self, Button, RichText, Ui, pos2, vec2};
 use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};
 use std::path::{Path, PathBuf};
 
@@ -102,15 +102,10 @@ impl Plots {
             if ui.toggle_value(&mut paused, "Freeze").on_hover_text("Stop the plots; the loop goes on").clicked() {
                 self.frozen = paused.then(|| history.clone());
             }
-            let label = ui.label("Last");
-            let span =
-                egui::ComboBox::from_id_salt("span").width(SPAN_WIDTH).selected_text(format!("{} s", self.seconds));
-            let choices = span.show_ui(ui, |ui| {
-                for seconds in SPANS {
-                    ui.selectable_value(&mut self.seconds, seconds, format!("{seconds} s"));
-                }
-            });
-            choices.response.labelled_by(label.id);
+            // Histograms have no time axis.
+            if self.tab != Tab::Timing {
+                self.span(ui);
+            }
             if ui.button("CSV").on_hover_text("Export all ticks kept, the last twenty seconds").clicked() {
                 self.note = Some(self.write_csv(loaded, history, folder));
             }
@@ -141,6 +136,18 @@ impl Plots {
             Tab::Timing => timing(ui, shown),
         }
         hold_still
+    }
+
+    /// How long the time axis is.
+    fn span(&mut self, ui: &mut Ui) {
+        let label = ui.label("Last");
+        let span = egui::ComboBox::from_id_salt("span").width(SPAN_WIDTH).selected_text(format!("{} s", self.seconds));
+        let choices = span.show_ui(ui, |ui| {
+            for seconds in SPANS {
+                ui.selectable_value(&mut self.seconds, seconds, format!("{seconds} s"));
+            }
+        });
+        choices.response.labelled_by(label.id);
     }
 
     fn torque(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
@@ -282,16 +289,22 @@ fn legend(ui: &mut Ui, label: &str, lines: &[(String, usize, bool, Get<'_>)]) {
         ui.label(RichText::new(label).small().weak());
         ui.add_space(GAP);
         for (name, number, thin, _) in lines {
-            let (rect, _) = ui.allocate_exact_size(SAMPLE, egui::Sense::hover());
+            // Sample and name are one thing, so that no line ends between them or within a name.
+            let text = ui.painter().layout_no_wrap(name.clone(), theme::small(), ui.visuals().text_color());
+            let size = vec2(SAMPLE.x + GAP + text.size().x, SAMPLE.y.max(text.size().y));
+            let (rect, response) = ui.allocate_exact_size(size, egui::Sense::hover());
+            response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, name));
+            let sample = rect.with_max_x(rect.left() + SAMPLE.x);
+            let corner = pos2(sample.right() + GAP, rect.center().y - 0.5 * text.size().y);
+            ui.painter().galley(corner, text, ui.visuals().text_color());
             let colour = palette::series(*number, dark);
-            let ends = [rect.left_center(), rect.right_center()];
+            let ends = [sample.left_center(), sample.right_center()];
             if *thin {
                 let stroke = egui::Stroke::new(FINE_CURVE, colour.gamma_multiply(BEHIND));
                 ui.painter().extend(egui::Shape::dashed_line(&ends, stroke, DASHES[0], DASHES[1]));
             } else {
                 ui.painter().line_segment(ends, egui::Stroke::new(CURVE, colour));
             }
-            ui.label(RichText::new(name).small());
             ui.add_space(FINE_GAP);
         }
     });
