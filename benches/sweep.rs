@@ -46,7 +46,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         match peer(root, &scene, processes) {
             Ok(theirs) => {
                 let rate = theirs.torque.len() as f64 / theirs.seconds;
-                let name = format!("NumPy {}, {processes} process(es)", theirs.numpy);
+                let name =
+                    format!("NumPy {}, {processes} process{}", theirs.numpy, if processes == 1 { "" } else { "es" });
                 let count = |wanted: &[u8]| theirs.status.iter().filter(|status| wanted.contains(status)).count();
                 println!("{name:<34} {rate:>16.1} {:>9} {:>10}", count(&[1, 2]), count(&[1]));
                 println!(

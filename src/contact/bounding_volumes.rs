@@ -218,3 +218,59 @@ fn build(positions: &[DVec3], triangles: &[[u32; 3]], order: &mut [u32], leaves:
     build(positions, triangles, left, leaves);
     build(positions, triangles, right, leaves);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::closest_point::{closest_point, point_at};
+    use crate::contact::surface;
+    use crate::random::sequence;
+
+    /// Trees of every height up to four, full and not: against all triangles tried one by one, for spheres of fixed size and for one
+    /// that shrinks to the nearest triangle.
+    #[test]
+    fn searches_visit_all_that_is_near_and_each_once() {
+        let mut next = sequence(11);
+        for count in [0_usize, 1, 7, 8, 9, 64, 65, 200, 512, 513, 700, 4097] {
+            let mut point = || DVec3::new(next(), next(), next());
+            let positions: Vec<DVec3> = (0..count)
+                .flat_map(|_| {
+                    let a = point();
+                    [a, a + point() * 0.1, a + point() * 0.1]
+                })
+                .collect();
+            let triangles: Vec<[u32; 3]> = (0..count as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+            let tree = BoundingVolumes::new(&positions, &triangles);
+            let mut order: Vec<u32> = tree.order().collect();
+            order.sort_unstable();
+            assert!(order.into_iter().eq(0..count as u32));
+            assert_eq!(tree.leaves.len(), count.div_ceil(LANES), "leaves are full");
+            for _ in 0..20 {
+                let x = point();
+                let square = |t: u32| {
+                    let corners = surface::corners(&positions, triangles[t as usize]);
+                    x.distance_squared(point_at(corners, closest_point(x, corners).weights))
+                };
+                let radius_squared = 0.3;
+                let mut found = Vec::new();
+                tree.search(x, radius_squared, |t| {
+                    found.push(t);
+                    radius_squared
+                });
+                found.sort_unstable();
+                let near: Vec<u32> = (0..count as u32).filter(|&t| square(t) <= radius_squared).collect();
+                assert_eq!(found, near, "of {count}");
+                let mut least = f64::MAX;
+                let mut visits = 0;
+                tree.search(x, least, |t| {
+                    visits += 1;
+                    least = least.min(square(t));
+                    least
+                });
+                let nearest = (0..count as u32).map(square).fold(f64::MAX, f64::min);
+                assert_eq!(least, nearest, "of {count}");
+                assert!(count < 200 || visits < count / 2, "{visits} visits of {count}");
+            }
+        }
+    }
+}

@@ -108,3 +108,23 @@ impl Deformation {
         place
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Wherever it stands, whatever is beside the last eight, and however many are no numbers.
+    #[test]
+    fn the_greatest_square_is_found() {
+        for count in 0..20 {
+            for place in 0..count {
+                let mut vectors = vec![[0.1, -0.2, 0.2]; count];
+                vectors[(place + 1) % count] = [f64::NAN, 9.0, 9.0];
+                vectors[place] = [2.0, -3.0, 6.0];
+                assert_eq!(GreatestSquare(vectors.as_flattened()).run(), 49.0, "{place} of {count}");
+                assert_eq!(widest(GreatestSquare(vectors.as_flattened())), 49.0);
+            }
+        }
+        assert_eq!(GreatestSquare(&[]).run(), 0.0);
+    }
+}

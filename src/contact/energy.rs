@@ -9,34 +9,26 @@
 //! valley, whose floor soft contact finds and stiffer contact only corrects. A stage's end never lies above the rest
 //! state in E at the final kc: E_s(u_s) <= E_s(0) bounds both its elastic energy and its depths by those at rest.
 //!
-//! What does not converge from the rest state, where balls may stand inside the object and be pressed out of it to any side, is
-//! approached from outside: the proxy is drawn out along the normal of its deepest contact and comes back in steps at full
-//! stiffness, each from the equilibrium before, as a hand would bring it there. On this way a step that E refuses gets a second
-//! chance: another step from where it led, where walls that it did not know of are seen and curved ones stand as they do there. If
-//! both together lower E by a fair share of the first promise, they are taken. Where this fails too, balls that have come to a kink of
-//! E are held there ([`super::pins`]).
-//!
-//! At last, or before if a ball is larger than the facets, the proxy comes in gently: with contact so soft that E is smooth over many
-//! facets, and each triangle a wall by itself, since the edges between walls push with the other sign, and of a surface crumpled by
-//! fine facets so many that E falls without end. At the end of the way contact stiffens in stages as from the rest state, and what
-//! is left to do between the walls as they are is little: stiff balls touch faces, hardly any edges between them.
+//! What does not converge from the rest state is approached from outside ([`outside`]).
 //!
 //! With the geometry frozen at rest (`linearised`) the same steps minimise the convex
 //! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`; each of its updates freezes the geometry anew at the
 //! displacement found and solves again.
+
+mod outside;
 
 use super::NodeForce;
 use super::blend::{self, strength, together};
 use super::depth::Contact;
 use super::detection::{Detection, Walls};
 use super::model::Model;
-use super::pins::{Pins, Release};
+use super::pins::Pins;
 use super::support::{Support, dot, root};
 use super::trust_region::{Care, Springs, Step, TrustRegion, add_contact_forces};
 use crate::tolerances::{
-    ACCEPTED_SHARE, APPROACH_STEPS, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING,
-    GENTLE_STIFFNESS, GIVE_UP_RADIUS, GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, KINK_ROUNDS, POOR_SHARE,
-    RESIDUAL_FLOOR, RETREATS, SHRINK, STAGE_TOLERANCE, STALLED_RADIUS, WIDEN,
+    ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GIVE_UP_RADIUS,
+    GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, SHRINK, STAGE_TOLERANCE,
+    STALLED_RADIUS, WIDEN,
 };
 use glam::DVec3;
 
@@ -160,28 +152,8 @@ impl EnergySearch {
         if outcome.converged || geometry == Geometry::Frozen {
             return outcome;
         }
-        self.take_care(Care::Thorough, detection);
-        // Balls that span several facets hardly ever come in otherwise than gently.
-        let gently_first = model.chain.nodes.iter().any(|node| node.radius > model.mean_edge);
-        let ways = if gently_first { [Walls::Each, Walls::All] } else { [Walls::All, Walls::Each] };
-        for walls in ways {
-            let before = outcome.iterations;
-            outcome = self.approach(model, detection, nodes, walls);
-            if !outcome.converged && model.blending == 0.0 {
-                self.rest_on_kinks(model, detection, &mut outcome);
-            }
-            outcome.iterations += before;
-            if outcome.converged {
-                break;
-            }
-        }
-        self.take_care(Care::Quick, detection);
+        self.search_from_outside(model, detection, nodes, &mut outcome);
         outcome
-    }
-
-    fn take_care(&mut self, care: Care, detection: &mut Detection) {
-        self.care = care;
-        detection.care = care;
     }
 
     /// Searches from the rest state.
@@ -239,116 +211,6 @@ impl EnergySearch {
         std::mem::swap(&mut self.state, &mut self.trial);
         for contact in &mut self.state.contacts {
             contact.multiplier = self.kc * contact.depth.max(0.0);
-        }
-    }
-
-    /// Finds contacts and energy of the state's forces anew.
-    fn renew(&mut self, model: &Model, detection: &mut Detection) {
-        self.trial.forces.clone_from(&self.state.forces);
-        self.take_trial(model, detection, Geometry::Deformed);
-    }
-
-    /// Searches along the way in from outside, with proxy nodes in the end at `nodes` [m]; gently, where each triangle is to be a wall.
-    /// An equilibrium that stores more than the rest state is none.
-    fn approach(&mut self, model: &Model, detection: &mut Detection, nodes: &[DVec3], walls: Walls) -> Outcome {
-        let gently = walls == Walls::Each;
-        self.last_kc = model.kc;
-        let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
-        self.start(model, detection, Geometry::Deformed);
-        let at_rest = contact_energy(&self.state.contacts, model.kc);
-        let deepest = self.state.contacts.iter().max_by(|a, b| a.depth.total_cmp(&b.depth));
-        let Some(&Contact { normal, .. }) = deepest else { return outcome };
-        let mut moved = nodes.to_vec();
-        let mut move_out = |detection: &mut Detection, way: f64| {
-            for (moved, node) in moved.iter_mut().zip(nodes) {
-                *moved = *node + normal * way;
-            }
-            detection.take_up(model, &moved);
-        };
-        let mut way = 0.0;
-        for _ in 0..RETREATS {
-            let gap = detection.gap(model);
-            if gap >= 0.0 {
-                break;
-            }
-            way -= gap;
-            move_out(detection, way);
-        }
-        self.start(model, detection, Geometry::Deformed);
-        self.walls = walls;
-        self.kc = if gently { model.kc.min(GENTLE_STIFFNESS / model.softest) } else { model.kc };
-        self.last_kc = self.kc;
-        let limits = |tolerance: f64| Limits { tolerance, iterations: model.contact.max_iterations };
-        for step in (0..APPROACH_STEPS).rev() {
-            move_out(detection, way * f64::from(step) / f64::from(APPROACH_STEPS));
-            std::mem::swap(&mut self.state.contacts, &mut self.trial.contacts);
-            let Self { state, trial, kc, .. } = self;
-            detection.deformed(model, &state.displacement, &state.positions, walls, &mut state.contacts);
-            foresee(&mut state.contacts, &trial.contacts, |before, _| *kc * before.depth);
-            let tolerance = if step == 0 && !gently { model.contact.tolerance } else { STAGE_TOLERANCE };
-            self.descend(model, detection, Geometry::Deformed, limits(tolerance), &mut outcome);
-        }
-        if gently {
-            self.last_kc = model.kc;
-            self.descend(model, detection, Geometry::Deformed, limits(STAGE_TOLERANCE), &mut outcome);
-            self.walls = Walls::All;
-            self.kc = model.kc;
-            self.renew(model, detection);
-            self.descend(model, detection, Geometry::Deformed, limits(model.contact.tolerance), &mut outcome);
-        }
-        outcome.converged &= self.state.energy <= at_rest;
-        outcome
-    }
-
-    /// Goes on from where a search has stalled, with balls held on the kinks that they have come to. An equilibrium that stores more
-    /// than the state it stalled at is none.
-    fn rest_on_kinks(&mut self, model: &Model, detection: &mut Detection, outcome: &mut Outcome) {
-        self.kc = model.kc;
-        let stalled = self.state.elastic + contact_energy(&self.state.contacts, self.kc);
-        let iterations = outcome.iterations + model.contact.max_iterations;
-        let limits = Limits { tolerance: model.contact.tolerance, iterations };
-        let mut proved = false;
-        for _ in 0..KINK_ROUNDS {
-            if !outcome.converged && !self.pins.find(model, detection.nodes(), &self.state) {
-                break;
-            }
-            self.renew(model, detection);
-            self.descend(model, detection, Geometry::Deformed, limits, outcome);
-            if !outcome.converged
-                || self.pins.take_over(model, detection.nodes(), &self.state.positions) > limits.tolerance
-            {
-                continue;
-            }
-            let releases = self.pins.prove(model, detection, &self.state);
-            proved = releases.is_empty();
-            if proved {
-                break;
-            }
-            for release in releases {
-                self.let_go(&release);
-            }
-        }
-        let mut pins = std::mem::take(&mut self.pins);
-        self.renew(model, detection);
-        if proved {
-            pins.settle(model, detection.nodes(), &mut self.state);
-        }
-        pins.clear();
-        self.pins = pins;
-        outcome.residual = self.balance(model);
-        outcome.converged = proved && outcome.residual <= limits.tolerance && self.state.energy <= stalled;
-        self.history.clear();
-        self.history.extend(outcome.converged.then_some(stalled));
-        self.history.push(self.state.energy);
-    }
-
-    /// Changes the forces on the object to those beside a kink.
-    fn let_go(&mut self, release: &Release) {
-        for (node, weight) in release.nodes.into_iter().zip(release.weights) {
-            let at = 3 * self.support.add(node);
-            self.state.forces.resize(self.support.order(), 0.0);
-            let parts = (release.force * weight).to_array();
-            self.state.forces[at..at + 3].iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
         }
     }
 

@@ -125,7 +125,6 @@ fn what_once_did_not_converge_is_balanced() {
 /// balances, but a mean of several. That it is the right one shows in the energy: the object goes on with a ball on its kink.
 #[test]
 fn balls_rest_on_kinks() {
-    let h = 2e-6;
     let object =
         world::sphere(world::Ball { rings: 10, springs: SpringKind::Axial, ground: 1e3, patch: false }).unwrap();
     let chain = floating_bar(BALL);
@@ -151,21 +150,12 @@ fn balls_rest_on_kinks() {
         };
         kinks += here.touches.iter().filter(|touch| rests(touch)).count();
         for joint in 0..q.len() {
-            let mut at = |step: f64| {
-                let mut q = q.clone();
-                q[joint] += step;
-                solver.solve(&q)
-            };
-            let (before, after) = (at(-h), at(h));
-            let facets =
-                |e: &Equilibrium| e.touches.iter().map(|touch| (touch.proxy_node, touched(touch))).collect::<Vec<_>>();
-            if [&before, &after].iter().any(|e| e.status != Status::Contact || facets(e) != facets(&here)) {
+            let ends = stencil(&mut solver, q, joint);
+            if ends.iter().any(|e| e.status != Status::Contact || facets(e) != facets(&here)) {
                 continue;
             }
             derivatives += 1;
-            let slope = (after.energy - before.energy) / (2.0 * h);
-            let scale = here.torque.norm().max(1e-3);
-            assert!((slope + here.torque[joint]).abs() < 1e-5 * scale, "{slope} against {:?}", here.torque);
+            check_gradient(&here, &ends, joint);
         }
     }
     assert!(kinks >= 8 && derivatives >= 40, "{kinks} {derivatives}");
@@ -199,11 +189,34 @@ fn touched(touch: &Touch) -> Vec<u32> {
     nodes
 }
 
+/// What each node touches.
+fn facets(equilibrium: &Equilibrium) -> Vec<(u32, Vec<u32>)> {
+    equilibrium.touches.iter().map(|touch| (touch.proxy_node, touched(touch))).collect()
+}
+
+/// Half the length of a stencil [rad or m].
+const STENCIL: f64 = 2e-6;
+
+/// Equilibria at the ends of a stencil about `q` along one joint.
+fn stencil(solver: &mut Solver, q: &[f64], joint: usize) -> [Equilibrium; 2] {
+    [-STENCIL, STENCIL].map(|step| {
+        let mut q = q.to_vec();
+        q[joint] += step;
+        solver.solve(&q)
+    })
+}
+
+/// tau = -dU/dq between the ends of a stencil about `here`.
+fn check_gradient(here: &Equilibrium, [before, after]: &[Equilibrium; 2], joint: usize) {
+    let slope = (after.energy - before.energy) / (2.0 * STENCIL);
+    let scale = here.torque.norm().max(1e-3);
+    assert!((slope + here.torque[joint]).abs() < 1e-5 * scale, "{slope} against {:?}", here.torque);
+}
+
 /// The envelope theorem: tau = -dU/dq at a minimum. A stencil whose ends touch other facets than its middle crosses a kink of U,
 /// where the derivative does not exist; those are counted and must be rare.
 #[test]
 fn torque_is_minus_the_gradient_of_stored_energy() {
-    let h = 2e-6;
     for (kind, radius) in [(SpringKind::Isotropic, 0.0), (SpringKind::Axial, 0.0), (SpringKind::Isotropic, 0.008)] {
         let chain = Chain::new(&arm(radius));
         let object = sphere(kind);
@@ -216,23 +229,13 @@ fn torque_is_minus_the_gradient_of_stored_energy() {
                 continue;
             }
             for joint in 0..q.len() {
-                let mut at = |step: f64| {
-                    let mut q = q.clone();
-                    q[joint] += step;
-                    solver.solve(&q)
-                };
-                let (before, after) = (at(-h), at(h));
-                let facets = |e: &Equilibrium| {
-                    e.touches.iter().map(|touch| (touch.proxy_node, touched(touch))).collect::<Vec<_>>()
-                };
+                let ends = stencil(&mut solver, &q, joint);
                 derivatives += 1;
-                if facets(&before) != facets(&here) || facets(&after) != facets(&here) {
+                if ends.iter().any(|e| facets(e) != facets(&here)) {
                     kinks += 1;
                     continue;
                 }
-                let slope = (after.energy - before.energy) / (2.0 * h);
-                let scale = here.torque.norm().max(1e-3);
-                assert!((slope + here.torque[joint]).abs() < 1e-5 * scale, "{slope} against {:?}", here.torque);
+                check_gradient(&here, &ends, joint);
             }
         }
         assert!(derivatives > 150, "{derivatives}");

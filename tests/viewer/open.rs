@@ -200,13 +200,18 @@ fn a_bake_can_be_cancelled_and_leaves_what_was_open() {
     assert!(window.shows("C-space"));
 }
 
+/// A viewer that works in `folder`, with a device of its own.
+fn to_be_lost(folder: &Path) -> (Arc<Context>, eframe::egui::Context, Viewer) {
+    let device = Arc::new(Context::open(AdapterChoice::Any).unwrap());
+    let render = viewer::render_state(&device).unwrap();
+    let viewer = Viewer::new(Arc::clone(&device), render, Pace::Steps, folder.to_owned()).unwrap();
+    (device, eframe::egui::Context::default(), viewer)
+}
+
 #[test]
 fn a_window_whose_device_is_lost_says_so_and_goes_on_on_another_one() {
     let folder = tempfile::tempdir().unwrap();
-    let lost = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-    let ctx = eframe::egui::Context::default();
-    let render = viewer::render_state(&lost).unwrap();
-    let mut viewer = Viewer::new(Arc::clone(&lost), render, Pace::Steps, folder.path().to_owned()).unwrap();
+    let (lost, ctx, mut viewer) = to_be_lost(folder.path());
     viewer.start(&Start::File(SPHERE.1.clone()), &ctx);
     viewer.wait(&ctx);
     viewer.play("press");
@@ -260,10 +265,7 @@ fn a_window_whose_device_is_lost_says_so_and_goes_on_on_another_one() {
 #[test]
 fn what_was_being_baked_when_the_device_was_lost_is_baked_again() {
     let folder = tempfile::tempdir().unwrap();
-    let lost = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-    let ctx = eframe::egui::Context::default();
-    let render = viewer::render_state(&lost).unwrap();
-    let mut viewer = Viewer::new(Arc::clone(&lost), render, Pace::Steps, folder.path().to_owned()).unwrap();
+    let (lost, ctx, mut viewer) = to_be_lost(folder.path());
     viewer.start(&Start::Sphere, &ctx);
     lost.shared().2.destroy();
     let why = std::iter::repeat_with(|| viewer.is_lost()).flatten().next().unwrap();

@@ -1,0 +1,165 @@
+//! What the search from the rest state leaves unbalanced, where balls may stand inside the object and be pressed out of it to any side.
+//!
+//! The proxy is drawn out along the normal of its deepest contact and comes back in steps at full stiffness, each from the
+//! equilibrium before, as a hand would bring it there. On this way a step that E refuses gets a second chance: another step from
+//! where it led, where walls that it did not know of are seen and curved ones stand as they do there. If both together lower E by a
+//! fair share of the first promise, they are taken. Where this fails too, balls that have come to a kink of E are held there
+//! ([`crate::contact::pins`]).
+//!
+//! At last, or before if a ball is larger than the facets, the proxy comes in gently: with contact so soft that E is smooth over many
+//! facets, and each triangle a wall by itself, since the edges between walls push with the other sign, and of a surface crumpled by
+//! fine facets so many that E falls without end. At the end of the way contact stiffens in stages as from the rest state, and what
+//! is left to do between the walls as they are is little: stiff balls touch faces, hardly any edges between them.
+
+use super::{EnergySearch, Geometry, Limits, Outcome, contact_energy, foresee};
+use crate::contact::depth::Contact;
+use crate::contact::detection::{Detection, Walls};
+use crate::contact::model::Model;
+use crate::contact::pins::Release;
+use crate::contact::trust_region::Care;
+use crate::tolerances::{APPROACH_STEPS, GENTLE_STIFFNESS, KINK_ROUNDS, RETREATS, STAGE_TOLERANCE};
+use glam::DVec3;
+
+impl EnergySearch {
+    /// Searches on each way in from outside until one ends balanced, with proxy nodes in the end at `nodes` [m]; `outcome` is that of
+    /// the search from the rest state.
+    pub(super) fn search_from_outside(
+        &mut self,
+        model: &Model,
+        detection: &mut Detection,
+        nodes: &[DVec3],
+        outcome: &mut Outcome,
+    ) {
+        self.take_care(Care::Thorough, detection);
+        // Balls that span several facets hardly ever come in otherwise than gently.
+        let gently_first = model.chain.nodes.iter().any(|node| node.radius > model.mean_edge);
+        let ways = if gently_first { [Walls::Each, Walls::All] } else { [Walls::All, Walls::Each] };
+        for walls in ways {
+            let before = outcome.iterations;
+            *outcome = self.approach(model, detection, nodes, walls);
+            if !outcome.converged && model.blending == 0.0 {
+                self.rest_on_kinks(model, detection, outcome);
+            }
+            outcome.iterations += before;
+            if outcome.converged {
+                break;
+            }
+        }
+        self.take_care(Care::Quick, detection);
+    }
+
+    fn take_care(&mut self, care: Care, detection: &mut Detection) {
+        self.care = care;
+        detection.care = care;
+    }
+
+    /// Finds contacts and energy of the state's forces anew.
+    fn renew(&mut self, model: &Model, detection: &mut Detection) {
+        self.trial.forces.clone_from(&self.state.forces);
+        self.take_trial(model, detection, Geometry::Deformed);
+    }
+
+    /// Searches along the way in from outside, with proxy nodes in the end at `nodes` [m]; gently, where each triangle is to be a wall.
+    /// An equilibrium that stores more than the rest state is none.
+    fn approach(&mut self, model: &Model, detection: &mut Detection, nodes: &[DVec3], walls: Walls) -> Outcome {
+        let gently = walls == Walls::Each;
+        self.last_kc = model.kc;
+        let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
+        self.start(model, detection, Geometry::Deformed);
+        let at_rest = contact_energy(&self.state.contacts, model.kc);
+        let deepest = self.state.contacts.iter().max_by(|a, b| a.depth.total_cmp(&b.depth));
+        let Some(&Contact { normal, .. }) = deepest else { return outcome };
+        let mut moved = nodes.to_vec();
+        let mut move_out = |detection: &mut Detection, way: f64| {
+            for (moved, node) in moved.iter_mut().zip(nodes) {
+                *moved = *node + normal * way;
+            }
+            detection.take_up(model, &moved);
+        };
+        let mut way = 0.0;
+        for _ in 0..RETREATS {
+            let gap = detection.gap(model);
+            if gap >= 0.0 {
+                break;
+            }
+            way -= gap;
+            move_out(detection, way);
+        }
+        self.start(model, detection, Geometry::Deformed);
+        self.walls = walls;
+        self.kc = if gently { model.kc.min(GENTLE_STIFFNESS / model.softest) } else { model.kc };
+        self.last_kc = self.kc;
+        let limits = |tolerance: f64| Limits { tolerance, iterations: model.contact.max_iterations };
+        for step in (0..APPROACH_STEPS).rev() {
+            move_out(detection, way * f64::from(step) / f64::from(APPROACH_STEPS));
+            std::mem::swap(&mut self.state.contacts, &mut self.trial.contacts);
+            let Self { state, trial, kc, .. } = self;
+            detection.deformed(model, &state.displacement, &state.positions, walls, &mut state.contacts);
+            foresee(&mut state.contacts, &trial.contacts, |before, _| *kc * before.depth);
+            let tolerance = if step == 0 && !gently { model.contact.tolerance } else { STAGE_TOLERANCE };
+            self.descend(model, detection, Geometry::Deformed, limits(tolerance), &mut outcome);
+        }
+        if gently {
+            self.last_kc = model.kc;
+            self.descend(model, detection, Geometry::Deformed, limits(STAGE_TOLERANCE), &mut outcome);
+            self.walls = Walls::All;
+            self.kc = model.kc;
+            self.renew(model, detection);
+            self.descend(model, detection, Geometry::Deformed, limits(model.contact.tolerance), &mut outcome);
+        }
+        outcome.converged &= self.state.energy <= at_rest;
+        outcome
+    }
+
+    /// Goes on from where a search has stalled, with balls held on the kinks that they have come to. An equilibrium that stores more
+    /// than the state it stalled at is none.
+    fn rest_on_kinks(&mut self, model: &Model, detection: &mut Detection, outcome: &mut Outcome) {
+        self.kc = model.kc;
+        let stalled = self.state.elastic + contact_energy(&self.state.contacts, self.kc);
+        let iterations = outcome.iterations + model.contact.max_iterations;
+        let limits = Limits { tolerance: model.contact.tolerance, iterations };
+        let mut proved = false;
+        for _ in 0..KINK_ROUNDS {
+            if !outcome.converged && !self.pins.find(model, detection.nodes(), &self.state) {
+                break;
+            }
+            self.renew(model, detection);
+            self.descend(model, detection, Geometry::Deformed, limits, outcome);
+            if !outcome.converged
+                || self.pins.take_over(model, detection.nodes(), &self.state.positions) > limits.tolerance
+            {
+                continue;
+            }
+            let releases = self.pins.prove(model, detection, &self.state);
+            proved = releases.is_empty();
+            if proved {
+                break;
+            }
+            for release in releases {
+                self.let_go(&release);
+            }
+        }
+        let mut pins = std::mem::take(&mut self.pins);
+        self.renew(model, detection);
+        if proved {
+            pins.settle(model, detection.nodes(), &mut self.state);
+        }
+        pins.clear();
+        self.pins = pins;
+        outcome.residual = self.balance(model);
+        outcome.converged = proved && outcome.residual <= limits.tolerance && self.state.energy <= stalled;
+        self.history.clear();
+        self.history.extend(outcome.converged.then_some(stalled));
+        self.history.push(self.state.energy);
+    }
+
+    /// Changes the forces on the object to those beside a kink.
+    fn let_go(&mut self, release: &Release) {
+        for (node, weight) in release.nodes.into_iter().zip(release.weights) {
+            let at = 3 * self.support.add(node);
+            self.state.forces.resize(self.support.order(), 0.0);
+            let parts = (release.force * weight).to_array();
+            self.state.forces[at..at + 3].iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
+        }
+    }
+}
