@@ -167,6 +167,9 @@ impl<'a> Model<'a> {
 
 /// Largest trace of a node's own block [m/N].
 fn softest(compliance: &Compliance) -> f64 {
-    let diagonal = |k: usize| compliance.entries[k * compliance.order + k];
-    (0..compliance.nodes.len()).map(|j| (3 * j..3 * j + 3).map(diagonal).sum()).fold(0.0, f64::max)
+    let trace = |j: usize| {
+        let own = compliance.block(j, j);
+        own.x_axis.x + own.y_axis.y + own.z_axis.z
+    };
+    (0..compliance.nodes.len()).map(trace).fold(0.0, f64::max)
 }

@@ -27,3 +27,85 @@ impl<'a, B: Iterator<Item = (&'a [f64], [f64; 3])>> Kernel for AddRows<'_, B> {
         }
     }
 }
+
+/// Sets `sums`, three numbers a node, to the sum of `loads`: of rows that begin at a place in `entries` and have a number for each node,
+/// times a vector.
+pub fn weigh(entries: &[f64], loads: impl Iterator<Item = (usize, [f64; 3])> + Clone, sums: &mut [f64]) {
+    widest(Weigh { entries, loads, sums });
+}
+
+struct Weigh<'s, L> {
+    entries: &'s [f64],
+    loads: L,
+    sums: &'s mut [f64],
+}
+
+/// Nodes whose sums are kept in registers, and numbers of so many vectors.
+const TOGETHER: usize = 4;
+const NUMBERS: usize = 3 * TOGETHER;
+
+impl<L: Iterator<Item = (usize, [f64; 3])> + Clone> Kernel for Weigh<'_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { entries, loads, sums } = self;
+        let (together, rest) = sums.as_chunks_mut::<NUMBERS>();
+        let done = TOGETHER * together.len();
+        for (k, together) in together.iter_mut().enumerate() {
+            let mut vectors = [[0.0; 4]; TOGETHER];
+            for (start, [a, b, c]) in loads.clone() {
+                let row = &entries[start + TOGETHER * k..][..TOGETHER];
+                for (sum, entry) in vectors.iter_mut().zip(row) {
+                    for (sum, scale) in sum.iter_mut().zip([a, b, c, 0.0]) {
+                        *sum += entry * scale;
+                    }
+                }
+            }
+            for (sum, vector) in together.as_chunks_mut::<3>().0.iter_mut().zip(vectors) {
+                sum.copy_from_slice(&vector[..3]);
+            }
+        }
+        for (k, sum) in rest.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            *sum = [0.0; 3];
+            for (start, vector) in loads.clone() {
+                for (sum, scale) in sum.iter_mut().zip(vector) {
+                    *sum += entries[start + done + k] * scale;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::sequence;
+
+    /// For every number of nodes and of rows, against sums over blocks c I, on every width.
+    #[test]
+    fn one_number_a_pair_is_a_block_of_it() {
+        let mut next = sequence(3);
+        for nodes in 0..11 {
+            for rows in 0..4 {
+                let entries: Vec<f64> = (0..rows * nodes).map(|_| next()).collect();
+                let loads: Vec<(usize, [f64; 3])> = (0..rows).map(|k| (k * nodes, [next(), next(), next()])).collect();
+                let mut expected = vec![0.0; 3 * nodes];
+                for (start, vector) in &loads {
+                    let mut blocks = vec![0.0; 9 * nodes];
+                    for j in 0..nodes {
+                        (0..3).for_each(|a| blocks[3 * nodes * a + 3 * j + a] = entries[start + j]);
+                    }
+                    add_rows(std::iter::once((&blocks[..], *vector)), &mut expected);
+                }
+                let loads = loads.iter().copied();
+                let mut sums = vec![f64::NAN; 3 * nodes];
+                Weigh { entries: &entries, loads: loads.clone(), sums: &mut sums }.run();
+                assert_eq!(sums, expected, "{rows} rows of {nodes}");
+                sums.fill(f64::NAN);
+                weigh(&entries, loads, &mut sums);
+                assert_eq!(sums, expected, "{rows} rows of {nodes}");
+            }
+        }
+    }
+}

@@ -3,7 +3,7 @@
 //! Forces live on A only (3 |A| numbers) and displacement is u = C f, so the stiffness itself is never touched and the
 //! size of a problem is the size of its contact, not of its object.
 
-use super::rows::add_rows;
+use super::rows::{add_rows, weigh};
 use crate::object::Compliance;
 
 /// Nodes in contact, each with a slot; C restricted to them.
@@ -12,12 +12,15 @@ pub struct Support {
     slots: Vec<u32>,
     /// Surface node of each slot.
     nodes: Vec<u32>,
-    /// C_AA, row-major, of order 3 |A| [m/N].
+    /// C_AA, row-major, as many rows per node as C has [m/N].
     compliance: Vec<f64>,
+    rows_per_node: usize,
     /// Nodes for which `compliance` was gathered.
     gathered: Vec<u32>,
     /// Their places in the compliance.
     places: Vec<Option<usize>>,
+    /// Where the rows of C begin at nodes that carry force, and that force.
+    loads: Vec<(usize, [f64; 3])>,
 }
 
 /// No slot.
@@ -31,8 +34,10 @@ impl Support {
             slots: vec![ABSENT; surface_nodes],
             nodes: Vec::new(),
             compliance: Vec::new(),
+            rows_per_node: 3,
             gathered: Vec::new(),
             places: Vec::new(),
+            loads: Vec::new(),
         }
     }
 
@@ -75,13 +80,14 @@ impl Support {
         self.gathered.clone_from(&self.nodes);
         self.places.clear();
         self.places.extend(self.nodes.iter().map(|&node| compliance.place(node)));
-        let order = self.order();
+        self.rows_per_node = compliance.rows_per_node;
+        let order = self.rows_per_node * self.nodes.len();
         self.compliance.resize(order * order, 0.0);
-        for (k, row) in self.compliance.chunks_exact_mut(order.max(1)).enumerate() {
-            let entries = self.places[k / 3].map_or(&[][..], |place| compliance.row(3 * place + k % 3).as_chunks().0);
-            for (block, column) in row.as_chunks_mut().0.iter_mut().zip(&self.places) {
-                *block = column.and_then(|column| entries.get(column)).copied().unwrap_or([0.0; 3]);
-            }
+        let Self { places, compliance: gathered, rows_per_node, .. } = self;
+        if *rows_per_node == 1 {
+            gather_blocks::<1>(compliance, places, gathered);
+        } else {
+            gather_blocks::<3>(compliance, places, gathered);
         }
     }
 
@@ -89,24 +95,34 @@ impl Support {
     pub fn multiply(&self, vector: &[f64], product: &mut [f64]) {
         let order = self.order();
         let product = &mut product[..order];
-        product.fill(0.0);
-        // C is symmetric: adding rows, scaled, runs through memory in order.
-        let scales = vector.as_chunks().0.iter().copied();
-        add_rows(self.compliance.chunks_exact((3 * order).max(1)).zip(scales), product);
+        // C is symmetric: its columns are its rows, which lie in order.
+        if self.rows_per_node == 1 {
+            let starts = (0..).step_by(self.nodes.len().max(1));
+            weigh(&self.compliance, starts.zip(vector.as_chunks().0.iter().copied()), product);
+        } else {
+            product.fill(0.0);
+            let scales = vector.as_chunks().0.iter().copied();
+            add_rows(self.compliance.chunks_exact((3 * order).max(1)).zip(scales), product);
+        }
     }
 
     /// `displacement = C forces` on all surface nodes that the compliance covers, zero on others; `forces` are on A.
-    pub fn displace(&self, compliance: &Compliance, forces: &[f64], displacement: &mut [f64]) {
-        let blocks = self.nodes.iter().zip(forces.as_chunks().0).filter_map(|(&node, &force)| {
-            if force == [0.0; 3] {
-                return None;
-            }
-            let rows = 3 * compliance.place(node)? * compliance.order;
-            Some((&compliance.entries[rows..rows + 3 * compliance.order], force))
+    pub fn displace(&mut self, compliance: &Compliance, forces: &[f64], displacement: &mut [f64]) {
+        let block = compliance.rows_per_node * compliance.order();
+        let loads = self.nodes.iter().zip(forces.as_chunks().0).filter_map(|(&node, &force)| {
+            let place = (force != [0.0; 3]).then(|| compliance.place(node)).flatten()?;
+            Some((place * block, force))
         });
-        let covered = &mut displacement[..compliance.order];
-        covered.fill(0.0);
-        add_rows(blocks, covered);
+        self.loads.clear();
+        self.loads.extend(loads);
+        let loads = self.loads.iter().copied();
+        let covered = &mut displacement[..3 * compliance.nodes.len()];
+        if compliance.rows_per_node == 1 {
+            weigh(&compliance.entries, loads, covered);
+        } else {
+            covered.fill(0.0);
+            add_rows(loads.map(|(start, force)| (&compliance.entries[start..start + block], force)), covered);
+        }
         if compliance.is_whole() {
             return;
         }
@@ -119,6 +135,20 @@ impl Support {
             end = at;
         }
         displacement[..end].fill(0.0);
+    }
+}
+
+/// Entries of `compliance`, N rows a node, between nodes in `places`; zero for nodes without one.
+fn gather_blocks<const N: usize>(compliance: &Compliance, places: &[Option<usize>], gathered: &mut [f64]) {
+    let order = N * places.len();
+    for (rows, place) in gathered.chunks_exact_mut((N * order).max(1)).zip(places) {
+        let all = place.map_or(&[][..], |place| compliance.rows(place));
+        for (a, row) in rows.chunks_exact_mut(order).enumerate() {
+            let entries = all.get(a * compliance.order()..).unwrap_or_default().as_chunks::<N>().0;
+            for (block, column) in row.as_chunks_mut::<N>().0.iter_mut().zip(places) {
+                *block = column.and_then(|column| entries.get(column)).copied().unwrap_or([0.0; N]);
+            }
+        }
     }
 }
 

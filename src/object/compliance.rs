@@ -3,22 +3,25 @@
 //! Contact acts on surface nodes only, and only on those that the proxy can reach, so the rows and columns of K^-1 at these
 //! nodes are all that it needs: leaving out the others is exact static condensation, not an approximation. K is fixed per
 //! object: one factorisation, then one solve a column, in blocks of columns on all cores.
+//!
+//! Where springs and ground are isotropic C = c (x) I: a force moves every node along itself, and one number a pair of nodes is all
+//! there is to store and to multiply with, a ninth of the blocks' nine.
 
 use super::{Factor, Object, ObjectError};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// Dense symmetric matrix over the coordinates of R covered surface nodes, row-major: entry (3i + a, 3j + b) is for coordinates
-/// a and b of the nodes in places i and j [m/N].
+/// Dense symmetric matrix over R covered surface nodes [m/N].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compliance {
     /// The covered surface nodes, ascending.
     pub nodes: Vec<u32>,
     /// Place in `nodes` of each surface node, or [`ABSENT`].
     places: Vec<u32>,
-    /// 3R.
-    pub order: usize,
-    /// `order * order` numbers [m/N].
+    /// Rows and columns per node: 3, or 1 where the object is isotropic and each stands for all three coordinates.
+    pub rows_per_node: usize,
+    /// Row-major, `rows_per_node` R numbers a row: entry (3i + a, 3j + b) is for coordinates a and b of the nodes in places i and j, or
+    /// (i, j) for each coordinate of both [m/N].
     pub entries: Vec<f64>,
 }
 
@@ -45,7 +48,7 @@ impl Compliance {
     /// # Errors
     /// When it would not fit in memory; nothing has been allocated then.
     pub fn on(object: &Object, nodes: Vec<u32>) -> Result<Self, ObjectError> {
-        let order = nodes.len().saturating_mul(3);
+        let order = nodes.len().saturating_mul(object.factor.rows_per_node());
         let bytes = order.saturating_mul(order).saturating_mul(size_of::<f64>());
         if bytes > MAX_BYTES {
             return Err(ObjectError::TooLarge { nodes: nodes.len(), bytes, limit: MAX_BYTES });
@@ -55,19 +58,20 @@ impl Compliance {
 
     /// The part of K^-1 at `covered` ones of the first `surface_nodes` of `nodes` nodes.
     fn of(factor: &Factor, nodes: usize, surface_nodes: usize, covered: Vec<u32>) -> Self {
-        let order = 3 * covered.len();
+        let rows_per_node = factor.rows_per_node();
+        let order = rows_per_node * covered.len();
         let mut places = vec![ABSENT; surface_nodes];
         covered.iter().zip(0..).for_each(|(&node, place)| places[node as usize] = place);
-        let row_of = |k: usize| 3 * covered[k / 3] as usize + k % 3;
+        let row_of = |k: usize| rows_per_node * covered[k / rows_per_node] as usize + k % rows_per_node;
         let mut entries = vec![0.0; order * order];
         entries.par_chunks_mut((COLUMNS_PER_SOLVE * order).max(1)).enumerate().for_each(|(chunk, rows)| {
             let width = rows.len() / order;
             let first = chunk * COLUMNS_PER_SOLVE;
-            let mut columns = faer::Mat::zeros(3 * nodes, width);
+            let mut columns = faer::Mat::zeros(rows_per_node * nodes, width);
             for k in 0..width {
                 columns[(row_of(first + k), k)] = 1.0;
             }
-            factor.solve_columns(columns.as_mut());
+            factor.solve_rows(columns.as_mut());
             for (k, row) in rows.chunks_exact_mut(order).enumerate() {
                 for (i, entry) in row.iter_mut().enumerate() {
                     *entry = columns[(row_of(i), k)];
@@ -75,7 +79,7 @@ impl Compliance {
             }
         });
         symmetrise(&mut entries, order);
-        Self { nodes: covered, places, order, entries }
+        Self { nodes: covered, places, rows_per_node, entries }
     }
 
     /// Whether all surface nodes are covered.
@@ -90,16 +94,27 @@ impl Compliance {
         self.places.get(node as usize).filter(|&&place| place != ABSENT).map(|&place| place as usize)
     }
 
-    /// Row 3i + a of coordinate a at the node in place i, one number per covered coordinate [m/N].
+    /// Rows and columns: `rows_per_node` R.
     #[must_use]
-    pub fn row(&self, row: usize) -> &[f64] {
-        &self.entries[row * self.order..(row + 1) * self.order]
+    pub fn order(&self) -> usize {
+        self.rows_per_node * self.nodes.len()
+    }
+
+    /// The `rows_per_node` rows of the node in place i, one after the other [m/N].
+    #[must_use]
+    pub fn rows(&self, i: usize) -> &[f64] {
+        let length = self.rows_per_node * self.order();
+        &self.entries[i * length..(i + 1) * length]
     }
 
     /// Displacement of the node in place i per force on the node in place j [m/N].
     #[must_use]
     pub fn block(&self, i: usize, j: usize) -> DMat3 {
-        let row = |a: usize| DVec3::from_slice(&self.row(3 * i + a)[3 * j..3 * j + 3]);
+        let rows = self.rows(i);
+        if self.rows_per_node == 1 {
+            return DMat3::from_diagonal(DVec3::splat(rows[j]));
+        }
+        let row = |a: usize| DVec3::from_slice(&rows[a * self.order() + 3 * j..][..3]);
         DMat3::from_cols(row(0), row(1), row(2)).transpose()
     }
 }
@@ -140,7 +155,7 @@ mod tests {
         let stiffness = stiffness();
         let factor = Factor::of(&stiffness, 1.0, &[0.0; 6]).unwrap();
         let compliance = Compliance::of(&factor, 6, 4, vec![0, 1, 2, 3]);
-        assert_eq!((compliance.order, compliance.entries.len()), (12, 144));
+        assert_eq!((compliance.order(), compliance.entries.len()), (12, 144));
         // The displacement that the whole object takes under a force on node 2 is, on the surface, C's column; and its
         // forces vanish everywhere else, interior nodes included.
         let mut displacement = [DVec3::ZERO; 6];

@@ -109,8 +109,13 @@ impl Factor {
         }
     }
 
+    /// Rows of the factorised matrix per node: 3, or 1 where it stands for each of the three coordinates.
+    pub(super) fn rows_per_node(&self) -> usize {
+        self.rows_per_node
+    }
+
     /// Solves for each column of a 3N x k matrix in place.
-    pub(super) fn solve_columns(&self, mut columns: MatMut<'_, f64>) {
+    fn solve_columns(&self, mut columns: MatMut<'_, f64>) {
         if self.rows_per_node == 3 {
             self.solve_rows(columns);
             return;
@@ -126,7 +131,7 @@ impl Factor {
     }
 
     /// Solves the factorised matrix for each column in place.
-    fn solve_rows(&self, columns: MatMut<'_, f64>) {
+    pub(super) fn solve_rows(&self, columns: MatMut<'_, f64>) {
         let mut scratch = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(columns.ncols(), PARALLELISM));
         let factor = LltRef::new(&self.symbolic, &self.values);
         factor.solve_in_place_with_conj(Conj::No, columns, PARALLELISM, MemStack::new(&mut scratch));
