@@ -218,10 +218,6 @@ pub const STAGE_TOLERANCE: f64 = 0.01;
 /// the next has a different energy and mostly gets past it.
 pub const STALLED_RADIUS: f64 = 1e-5;
 
-/// Relative change of forces and displacements at which the paper's iteration has stopped changing is the scene's
-/// tolerance; its inner solve of equation (2) must be better than that by this factor [1].
-pub const PAPER_INNER_SHARE: f64 = 1e-3;
-
 /// How far the surface of an object is expected to move, in depths of the deepest proxy node below it at rest [1]: in stiff
 /// contact it moves by that depth along the normal, and as much again leaves room for what neighbouring nodes drag along.
 pub const EXPECTED_MOTION: f64 = 2.0;

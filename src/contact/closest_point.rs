@@ -28,6 +28,7 @@ pub struct ClosestPoint {
 }
 
 /// Closest point of the triangle `corners` [m] to `x` [m].
+#[inline]
 #[must_use]
 pub fn closest_point(x: DVec3, corners: [DVec3; 3]) -> ClosestPoint {
     let [a, b, c] = corners;

@@ -63,6 +63,7 @@ pub struct Curvature {
 /// Depth of the node at `x` with `radius`, from the closest feature of the triangle `corners` with barycentric `weights`.
 ///
 /// `pseudonormal` decides the side, and stands in for N where x lies on the edge or vertex itself.
+#[inline]
 #[must_use]
 pub fn measure(
     x: DVec3,
@@ -147,6 +148,7 @@ pub fn stiffness_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3
 
 impl Contact {
     /// A spring of its own on the feature that [`measure`] found.
+    #[inline]
     #[must_use]
     pub fn new(proxy_node: u32, nodes: [u32; 3], weights: [f64; 3], measured: (DVec3, f64, Curvature)) -> Self {
         let (normal, depth, curvature) = measured;

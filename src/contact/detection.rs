@@ -37,6 +37,13 @@ struct Standing {
     last: u32,
 }
 
+impl Standing {
+    /// Signed distance to the surface at rest, negative inside, or a lower bound of it [m].
+    fn signed(&self) -> f64 {
+        if self.inside { -self.distance } else { self.distance }
+    }
+}
+
 /// The closest feature of the surface.
 #[derive(Clone, Copy)]
 pub struct Closest {
@@ -121,7 +128,7 @@ impl Detection {
 
     /// A lower bound of the signed distance of each proxy node to the surface at rest, in the configuration taken up [m].
     pub fn distances(&self) -> impl Iterator<Item = f64> {
-        self.standings.iter().map(|standing| if standing.inside { -standing.distance } else { standing.distance })
+        self.standings.iter().map(Standing::signed)
     }
 
     /// Depth at rest of the node with a radius that lies deepest, in radii; zero where there is none inside [1].
@@ -145,12 +152,13 @@ impl Detection {
         for i in std::iter::once(first).chain(0..nodes.len()) {
             let standing = &mut self.standings[i];
             let radius = model.chain.nodes[i].radius;
-            if standing.exact || (standing.distance > 0.0 && standing.distance - radius > gap) {
-                continue;
+            if !standing.exact {
+                if standing.distance > 0.0 && standing.distance - radius > gap {
+                    continue;
+                }
+                find_standing(model, self.nodes[i], standing);
             }
-            find_standing(model, self.nodes[i], standing);
-            let signed = if standing.inside { -standing.distance } else { standing.distance };
-            gap = gap.min(signed - radius);
+            gap = gap.min(standing.signed() - radius);
         }
         gap
     }
@@ -161,21 +169,25 @@ impl Detection {
         let (mut first, mut least) = (0, f64::INFINITY);
         for (i, &node) in nodes.iter().enumerate() {
             let x = node - model.centre;
-            self.nodes[i] = x;
             let standing = &mut self.standings[i];
             standing.spread = BLEND_SPREAD;
             standing.watched = false;
-            standing.exact = false;
-            standing.inside = false;
-            // Beyond the lattice of bounds the surface's box bounds the distance.
-            standing.distance = match model.distance_bounds.at(x) {
-                Some((bound, triangle)) => {
-                    standing.last = triangle;
-                    bound
-                }
-                None => model.bounds.distance_squared(x).sqrt(),
-            };
-            let clearance = standing.distance - model.chain.nodes[i].radius;
+            // Of a node that stands where it stood in the configuration before, as all do that hang on joints which have not moved, all
+            // is known.
+            if !(standing.exact && self.nodes[i] == x) {
+                self.nodes[i] = x;
+                standing.exact = false;
+                standing.inside = false;
+                // Beyond the lattice of bounds the surface's box bounds the distance.
+                standing.distance = match model.distance_bounds.at(x) {
+                    Some((bound, triangle)) => {
+                        standing.last = triangle;
+                        bound
+                    }
+                    None => model.bounds.distance_squared(x).sqrt(),
+                };
+            }
+            let clearance = standing.signed() - model.chain.nodes[i].radius;
             if clearance < least {
                 (first, least) = (i, clearance);
             }
@@ -189,15 +201,14 @@ impl Detection {
         let mut gap = f64::MAX;
         for i in 0..self.nodes.len() {
             let radius = model.chain.nodes[i].radius;
-            let signed = |standing: &Standing| if standing.inside { -standing.distance } else { standing.distance };
             let nearest = radius + model.bulge();
-            if signed(&self.standings[i]) - nearest >= gap {
+            if self.standings[i].signed() - nearest >= gap {
                 continue;
             }
             if !self.standings[i].exact {
                 find_standing(model, self.nodes[i], &mut self.standings[i]);
             }
-            let distance = signed(&self.standings[i]);
+            let distance = self.standings[i].signed();
             if distance - nearest < gap {
                 let smooth = model.blending > 0.0;
                 gap = gap.min(if smooth { -self.depth_at_rest(model, i) } else { distance - radius });
@@ -406,6 +417,7 @@ fn blended_at_rest(model: &Model, i: usize, x: DVec3, standing: &Standing, blend
 }
 
 /// The contact (or near miss, with depth <= 0) of proxy node `i` with a feature of `triangle`.
+#[inline(always)]
 fn contact_at(
     model: &Model,
     i: usize,

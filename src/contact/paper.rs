@@ -21,7 +21,7 @@ use super::energy::Outcome;
 use super::model::Model;
 use super::support::{Support, dot, root};
 use super::surface;
-use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MINIMUM_SQUARE, PAPER_INNER_SHARE, RESIDUAL_FLOOR};
+use crate::tolerances::RESIDUAL_FLOOR;
 use glam::DVec3;
 
 /// A proxy node tied to its three closest object nodes.
@@ -56,12 +56,13 @@ pub struct PaperIteration {
     pub displacement: Vec<f64>,
     positions: Vec<DVec3>,
     contacts: Vec<Contact>,
-    /// Of step 2: the diagonal D^-1 [m/N], the right-hand side [m], the forces [N] and the vectors of its solver.
-    softness: Vec<f64>,
-    wanted: Vec<f64>,
+    /// Of step 2: how many ties each node of A has, the matrix [m/N], and the right-hand side [m], which becomes the forces [N].
+    tie_counts: Vec<f64>,
+    matrix: Vec<f64>,
     tied_forces: Vec<f64>,
-    residual: Vec<f64>,
-    direction: Vec<f64>,
+    /// Outward normals of A.
+    normals: Vec<DVec3>,
+    change: Vec<f64>,
     image: Vec<f64>,
 }
 
@@ -80,11 +81,11 @@ impl PaperIteration {
             displacement: vec![0.0; 3 * model.rest.len()],
             positions: model.rest.clone(),
             contacts: Vec::new(),
-            softness: Vec::new(),
-            wanted: Vec::new(),
+            tie_counts: Vec::new(),
+            matrix: Vec::new(),
             tied_forces: Vec::new(),
-            residual: Vec::new(),
-            direction: Vec::new(),
+            normals: Vec::new(),
+            change: Vec::new(),
             image: Vec::new(),
         }
     }
@@ -138,40 +139,48 @@ impl PaperIteration {
 
     /// Step 2: n from equation (2), all ties being springs Kc.
     fn solve_tied(&mut self, model: &Model) {
-        let order = self.support.order();
-        // `softness` first counts ties, `wanted` first sums their targets.
-        self.softness.clear();
-        self.softness.resize(order, 0.0);
-        self.wanted.clear();
-        self.wanted.resize(order, 0.0);
-        for tie in &self.ties {
+        let Self { ties, support, tie_counts, matrix, tied_forces, .. } = self;
+        tie_counts.clear();
+        tie_counts.resize(support.nodes().len(), 0.0);
+        tied_forces.clear();
+        tied_forces.resize(support.order(), 0.0);
+        let targets = tied_forces.as_chunks_mut::<3>().0;
+        for tie in ties.iter() {
             for slot in tie.slots {
-                for (a, target) in tie.target.to_array().into_iter().enumerate() {
-                    self.softness[3 * slot + a] += 1.0;
-                    self.wanted[3 * slot + a] += target;
-                }
+                tie_counts[slot] += 1.0;
+                targets[slot] = (DVec3::from_array(targets[slot]) + tie.target).to_array();
             }
         }
-        for (slot, &node) in self.support.nodes().iter().enumerate() {
-            for (a, rest) in model.rest[node as usize].to_array().into_iter().enumerate() {
-                let k = 3 * slot + a;
-                self.wanted[k] = self.wanted[k] / self.softness[k] - rest;
-                self.softness[k] = 1.0 / (model.contact.stiffness * self.softness[k]);
-            }
+        for ((target, count), &node) in targets.iter_mut().zip(tie_counts.iter()).zip(support.nodes()) {
+            *target = (DVec3::from_array(*target) / *count - model.rest[node as usize]).to_array();
         }
-        self.conjugate_gradients(PAPER_INNER_SHARE * model.contact.tolerance);
+        let (compliance, rows_per_node) = support.compliance();
+        matrix.clear();
+        matrix.extend_from_slice(compliance);
+        let order = rows_per_node * tie_counts.len();
+        for row in 0..order {
+            matrix[row * order + row] += 1.0 / (model.contact.stiffness * tie_counts[row / rows_per_node]);
+        }
+        if rows_per_node == 1 {
+            solve_positive_definite(matrix, targets);
+        } else {
+            solve_positive_definite(matrix, tied_forces.as_chunks_mut::<1>().0);
+        }
         self.support.displace(&model.compliance, &self.tied_forces, &mut self.displacement);
         self.place(model);
     }
 
     /// Step 3: compressive tie forces, projected on the surface normal.
     fn project(&mut self, model: &Model) {
+        let Self { ties, support, positions, normals, .. } = self;
         let (triangles, topology) = (&model.object.triangles, &model.object.topology);
-        for tie in &mut self.ties {
-            for (force, &node) in tie.forces.iter_mut().zip(&tie.nodes) {
-                let pull = (tie.target - self.positions[node as usize]) * model.contact.stiffness;
-                let normal = surface::vertex_normal(&self.positions, triangles, topology, node);
-                *force = normal * pull.dot(normal).min(0.0);
+        normals.clear();
+        let normal = |&node: &u32| surface::vertex_normal(positions, triangles, topology, node);
+        normals.extend(support.nodes().iter().map(normal));
+        for tie in ties {
+            for ((force, &node), slot) in tie.forces.iter_mut().zip(&tie.nodes).zip(tie.slots) {
+                let pull = (tie.target - positions[node as usize]) * model.contact.stiffness;
+                *force = normals[slot] * pull.dot(normals[slot]).min(0.0);
             }
         }
     }
@@ -196,11 +205,11 @@ impl PaperIteration {
             return 1.0;
         }
         let order = self.support.order();
-        self.residual.clear();
-        self.residual.extend(self.forces.iter().zip(&self.previous_forces).map(|(f, previous)| f - previous));
+        self.change.clear();
+        self.change.extend(self.forces.iter().zip(&self.previous_forces).map(|(f, previous)| f - previous));
         self.image.resize(order, 0.0);
-        self.support.multiply(&self.residual, &mut self.image);
-        let change = dot(&self.residual, &self.image);
+        self.support.multiply(&self.change, &mut self.image);
+        let change = dot(&self.change, &self.image);
         self.support.multiply(&self.forces, &mut self.image);
         let scale = dot(&self.forces, &self.image);
         root(change) / root(scale).max(RESIDUAL_FLOOR)
@@ -225,40 +234,35 @@ impl PaperIteration {
             *position = *rest + DVec3::from_array(*u);
         }
     }
+}
 
-    /// `tied_forces` with (C_AA + D^-1) tied_forces = wanted, by conjugate gradients to a residual `tolerance` times the
-    /// right-hand side.
-    fn conjugate_gradients(&mut self, tolerance: f64) {
-        let order = self.support.order();
-        let Self { support, softness, wanted, tied_forces, residual, direction, image, .. } = self;
-        tied_forces.clear();
-        tied_forces.resize(order, 0.0);
-        residual.clear();
-        residual.extend_from_slice(wanted);
-        direction.clear();
-        direction.extend_from_slice(wanted);
-        image.resize(order, 0.0);
-        let mut square = dot(residual, residual);
-        let stop = (tolerance * tolerance * square).max(MINIMUM_SQUARE);
-        for _ in 0..INNER_ITERATIONS_PER_UNKNOWN * order {
-            if square <= stop {
-                break;
-            }
-            support.multiply(direction, image);
-            for k in 0..order {
-                image[k] += softness[k] * direction[k];
-            }
-            let share = square / dot(direction, image);
-            for k in 0..order {
-                tied_forces[k] += share * direction[k];
-                residual[k] -= share * image[k];
-            }
-            let next = dot(residual, residual);
-            let ratio = next / square;
-            square = next;
-            for k in 0..order {
-                direction[k] = residual[k] + ratio * direction[k];
-            }
+/// Solves for N right-hand sides side by side, one row of `right` a row of the symmetric positive definite `matrix`, in place by its
+/// Cholesky factor, which takes the lower half of the matrix.
+fn solve_positive_definite<const N: usize>(matrix: &mut [f64], right: &mut [[f64; N]]) {
+    let order = right.len();
+    for i in 0..order {
+        let (above, below) = matrix.split_at_mut(i * order);
+        let row = &mut below[..=i];
+        let mut square = row[i];
+        for (j, other) in above.chunks_exact(order).enumerate() {
+            let entry = (row[j] - dot(&row[..j], &other[..j])) * other[j];
+            row[j] = entry;
+            square -= entry * entry;
+        }
+        // Of the diagonal the reciprocal is kept.
+        row[i] = 1.0 / square.sqrt();
+        let (known, unknown) = right.split_at_mut(i);
+        for (entry, known) in row.iter().zip(known.iter()) {
+            (0..N).for_each(|k| unknown[0][k] -= entry * known[k]);
+        }
+        (0..N).for_each(|k| unknown[0][k] *= row[i]);
+    }
+    for i in (0..order).rev() {
+        let row = &matrix[i * order..=i * order + i];
+        let (unknown, known) = right.split_at_mut(i);
+        (0..N).for_each(|k| known[0][k] *= row[i]);
+        for (entry, unknown) in row.iter().zip(unknown) {
+            (0..N).for_each(|k| unknown[k] -= entry * known[0][k]);
         }
     }
 }
@@ -300,4 +304,33 @@ pub fn three_closest(x: DVec3, positions: &[DVec3]) -> [u32; 3] {
         consider((position.distance_squared(x), (4 * fours.len() + lane) as u32));
     }
     nodes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::sequence;
+
+    /// Random matrices B B^T + I, of every order up to that of four ties, against the product with what is found.
+    #[test]
+    fn systems_of_all_orders_are_solved() {
+        let mut next = sequence(5);
+        for order in 0..37 {
+            let random: Vec<f64> = (0..order * order).map(|_| next()).collect();
+            let row = |i: usize| &random[i * order..(i + 1) * order];
+            let unit = |i: usize, j: usize| f64::from(u8::from(i == j));
+            let entry = |i: usize, j: usize| dot(row(i), row(j)) + unit(i, j);
+            let mut matrix: Vec<f64> =
+                (0..order).flat_map(|i| (0..order).map(move |j| (i, j))).map(|(i, j)| entry(i, j)).collect();
+            let wanted: Vec<[f64; 3]> = (0..order).map(|_| [next(), next(), next()]).collect();
+            let mut found = wanted.clone();
+            solve_positive_definite(&mut matrix, &mut found);
+            for (i, wanted) in wanted.iter().enumerate() {
+                for k in 0..3 {
+                    let product: f64 = (0..order).map(|j| entry(i, j) * found[j][k]).sum();
+                    assert!((product - wanted[k]).abs() < 1e-12, "order {order}: {product} {}", wanted[k]);
+                }
+            }
+        }
+    }
 }

@@ -91,6 +91,12 @@ impl Support {
         }
     }
 
+    /// C_AA, row-major, and its rows per node: 3, or 1 where each stands for all three coordinates [m/N].
+    #[must_use]
+    pub fn compliance(&self) -> (&[f64], usize) {
+        (&self.compliance, self.rows_per_node)
+    }
+
     /// `product = C_AA vector`.
     pub fn multiply(&self, vector: &[f64], product: &mut [f64]) {
         let order = self.order();
