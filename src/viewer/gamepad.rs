@@ -4,10 +4,7 @@
 //! On Linux it is read from /dev/input. Elsewhere none is ever found.
 
 use super::pad::{JOINTS, Pad};
-use std::sync::{
-    Arc, Mutex, MutexGuard, PoisonError,
-    atomic::{AtomicBool, Ordering},
-};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What the hand is asked to do.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,12 +27,11 @@ pub enum Found {
     Refused(String),
 }
 
-/// The gamepad, shared by the thread that reads it, the hand, and the window.
+/// The gamepad, shared by the thread that reads it, the hand, and the window. Whether it is meant for the window is not known
+/// here.
 #[derive(Clone, Default)]
 pub struct Gamepad {
     now: Arc<Mutex<(Wish, Found)>>,
-    /// Whether the window has the keyboard: only then the gamepad is meant for it.
-    heard: Arc<AtomicBool>,
 }
 
 impl Gamepad {
@@ -48,17 +44,12 @@ impl Gamepad {
         gamepad
     }
 
-    /// Tells whether the window has the keyboard.
-    pub fn hear(&self, focused: bool) {
-        self.heard.store(focused, Ordering::Relaxed);
-    }
-
     /// What the hand is asked to do now; a reset is told once.
     #[must_use]
     pub fn wish(&self) -> Wish {
         let mut now = self.lock();
         let reset = std::mem::take(&mut now.0.reset);
-        if self.heard.load(Ordering::Relaxed) { Wish { reset, ..now.0 } } else { Wish::default() }
+        Wish { reset, ..now.0 }
     }
 
     /// Whether there is one.
@@ -82,8 +73,8 @@ impl Gamepad {
     /// Gives it, as long as somebody else has it.
     #[cfg(target_os = "linux")]
     pub(super) fn weak(&self) -> impl Fn() -> Option<Self> + Send + 'static {
-        let (now, heard) = (Arc::downgrade(&self.now), Arc::clone(&self.heard));
-        move || Some(Self { now: now.upgrade()?, heard: Arc::clone(&heard) })
+        let now = Arc::downgrade(&self.now);
+        move || Some(Self { now: now.upgrade()? })
     }
 
     fn lock(&self) -> MutexGuard<'_, (Wish, Found)> {
@@ -97,14 +88,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_gamepad_that_is_gone_or_not_meant_asks_for_nothing() {
+    fn a_gamepad_that_is_gone_asks_for_nothing_and_one_that_is_there_for_one_reset() {
         let gamepad = Gamepad::default();
         let mut pad = Pad::default();
         pad.press(super::super::pad::Button::RightBumper, true);
         gamepad.tell(Found::Connected("one".into()));
-        gamepad.hold(&pad, true);
-        assert_eq!(gamepad.wish(), Wish::default(), "heard without the keyboard");
-        gamepad.hear(true);
         gamepad.hold(&pad, true);
         let wish = gamepad.wish();
         assert!(wish.reset && wish.speeds[5] == 1.0, "{wish:?}");

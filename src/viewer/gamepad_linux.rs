@@ -257,7 +257,6 @@ mod tests {
     fn one_that_is_pulled_out_in_mid_motion_moves_nothing_any_more() {
         let (reader, mut writer) = io::pipe().unwrap();
         let gamepad = Gamepad::default();
-        gamepad.hear(true);
         let listening = gamepad.clone();
         let entry = tempfile::tempdir().unwrap();
         let thread = std::thread::spawn({

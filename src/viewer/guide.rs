@@ -1,6 +1,6 @@
 //! Who leads the hand: the pointer, keys, a gamepad, or one of the scene's motions, which plays, pauses and can be scrubbed.
 
-use super::{gamepad::Wish, loaded::Loaded};
+use super::{gamepad::Wish, loaded::Loaded, pad::JOINTS};
 use crate::{JointVector, device::Motion, scene::Waypoint};
 
 /// The hand's leader. Time is told to it: it has no clock.
@@ -23,6 +23,10 @@ pub struct Guide {
     home: JointVector,
     /// The way back there, and the time in it [s], while the hand takes it.
     way_home: Option<(Motion, f64)>,
+    /// Speeds that keys ask for, as in a [`Wish`]; none while the window has not the keyboard.
+    keys: Option<[f64; JOINTS]>,
+    /// Since the window last said so [s].
+    silence: f64,
 }
 
 /// Time in which the hand is led to the beginning of a motion [s].
@@ -34,6 +38,10 @@ const SPEED: f64 = 0.25;
 
 /// Longest time that a joint is moved for at once [s]: who stood still meanwhile must not throw the arm.
 const LONGEST: f64 = 0.1;
+
+/// Longest time that a window says nothing and still has the keyboard [s]: one that is hidden or hangs must not hold a key
+/// down, while a slow rasteriser's draws a frame in a fifth of that.
+const LONGEST_SILENCE: f64 = 1.0;
 
 impl Guide {
     /// The hand rests at the beginning of the first motion.
@@ -50,6 +58,8 @@ impl Guide {
             limits,
             home: loaded.start(),
             way_home: None,
+            keys: None,
+            silence: 0.0,
         };
         guide.point(loaded.start());
         guide
@@ -116,8 +126,14 @@ impl Guide {
         (self.playing, self.running, self.goal, self.way_home) = (None, false, goal, None);
     }
 
+    /// The window says which speeds keys ask for, until it says otherwise; none: it has not the keyboard, and neither keys nor
+    /// a gamepad are meant for it.
+    pub fn hear(&mut self, keys: Option<[f64; JOINTS]>) {
+        (self.keys, self.silence) = (keys, 0.0);
+    }
+
     /// The hand moves the first joints at `speeds`, from -1 to 1 each, for `elapsed` [s]; nobody takes the lead where all are 0.
-    pub fn steer(&mut self, speeds: &[f64], elapsed: f64) {
+    fn steer(&mut self, speeds: &[f64], elapsed: f64) {
         if speeds.iter().all(|speed| *speed == 0.0) {
             return;
         }
@@ -129,18 +145,23 @@ impl Guide {
     }
 
     /// The hand goes back to where it was at first, without a blow.
-    pub fn go_home(&mut self) {
+    fn go_home(&mut self) {
         self.point(self.goal);
         let ends = [(0.0, self.goal), (LEAD_IN, self.home)].map(|(time, q)| Waypoint { time, q });
         self.way_home = Motion::through(&ends, self.goal.len()).ok().map(|way| (way, 0.0));
     }
 
-    /// Does what a gamepad asks for, and lets `elapsed` [s] go by; answers with where the hand is led now.
+    /// Does what keys and the gamepad's `wish` ask for, and lets `elapsed` [s] go by; answers with where the hand is led now.
     pub fn follow(&mut self, wish: &Wish, elapsed: f64) -> JointVector {
-        if wish.reset {
-            self.go_home();
+        self.silence += elapsed;
+        if let Some(keys) = self.keys.filter(|_| self.silence < LONGEST_SILENCE) {
+            if wish.reset {
+                self.go_home();
+            }
+            let speeds: [f64; JOINTS] =
+                std::array::from_fn(|joint| (keys[joint] + wish.speeds[joint]).clamp(-1.0, 1.0));
+            self.steer(&speeds, elapsed);
         }
-        self.steer(&wish.speeds, elapsed);
         self.advance(elapsed)
     }
 
@@ -176,9 +197,9 @@ impl Guide {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::viewer::pad::JOINTS;
 
-    /// A hand at rest in the middle of two joints, of whose limits the second's are closer.
+    /// A hand at rest in the middle of two joints, of whose limits the second's are closer; the window has the keyboard and
+    /// says so.
     fn guide() -> Guide {
         let [start, home] = [[0.0, 0.0], [0.5, 0.1]].map(|q| JointVector::from_slice(&q));
         Guide {
@@ -191,13 +212,17 @@ mod tests {
             limits: vec![[-1.0, 1.0], [-0.2, 0.2]],
             home,
             way_home: None,
+            keys: Some([0.0; JOINTS]),
+            silence: f64::NEG_INFINITY,
         }
     }
 
-    fn wish(speeds: [f64; 2]) -> Wish {
-        let mut wish = Wish::default();
-        wish.speeds[..2].copy_from_slice(&speeds);
-        wish
+    fn speeds(first: [f64; 2]) -> [f64; JOINTS] {
+        std::array::from_fn(|joint| first.get(joint).copied().unwrap_or_default())
+    }
+
+    fn wish(first: [f64; 2]) -> Wish {
+        Wish { speeds: speeds(first), reset: false }
     }
 
     #[test]
@@ -219,6 +244,52 @@ mod tests {
         // A thread that stood still does not throw the arm.
         guide.follow(&wish([-1.0, 0.0]), 1e6);
         assert!((guide.goal()[0] - (1.0 - SPEED * 2.0 * LONGEST)).abs() < 1e-12, "{:?}", guide.goal());
+    }
+
+    #[test]
+    fn keys_move_joints_as_a_gamepad_does_however_seldom_a_frame_is_drawn() {
+        let [mut keys, mut gamepad] = [guide(), guide()];
+        keys.hear(Some(speeds([1.0, -1.0])));
+        for step in 0..100 {
+            let before = keys.goal();
+            let now = keys.follow(&Wish::default(), 2e-3);
+            assert!((now[0] - before[0] - SPEED * 2.0 * 2e-3).abs() < 1e-12, "step {step}: {before:?} to {now:?}");
+            assert_eq!(now, gamepad.follow(&wish([1.0, -1.0]), 2e-3));
+        }
+        // Both together are no faster than one, and one against the other is none.
+        for (stick, share) in [(1.0, 1.0), (-1.0, 0.0), (-0.25, 0.75)] {
+            let before = keys.goal();
+            let moved = keys.follow(&wish([stick, 0.0]), 2e-3)[0] - before[0];
+            assert!((moved - share * SPEED * 2.0 * 2e-3).abs() < 1e-12, "{stick}: {moved}");
+        }
+        keys.hear(Some([0.0; JOINTS]));
+        assert_eq!(keys.goal(), keys.follow(&Wish::default(), 2e-3), "it is let go");
+    }
+
+    #[test]
+    fn a_window_that_loses_the_keyboard_or_falls_silent_moves_nothing() {
+        let asked = Wish { reset: true, ..wish([1.0, 0.0]) };
+        let mut guide = guide();
+        guide.hear(None);
+        let start = guide.goal();
+        assert_eq!(guide.follow(&asked, 2e-3), start, "a gamepad is heard without the keyboard");
+        guide.hear(Some(speeds([1.0, 0.0])));
+        let held = guide.follow(&Wish::default(), 2e-3);
+        assert!(held[0] > start[0], "{held:?}");
+        guide.hear(None);
+        assert_eq!(guide.follow(&Wish::default(), 2e-3), held, "a key stays down");
+        // It says nothing any more.
+        guide.hear(Some(speeds([1.0, 0.0])));
+        for _ in 0..1000 {
+            guide.follow(&Wish::default(), 2e-3);
+        }
+        let gone = guide.goal()[0] - held[0];
+        assert!((gone - SPEED * 2.0 * LONGEST_SILENCE).abs() < SPEED * 2.0 * 4e-3, "{gone}");
+        let stopped = guide.goal();
+        assert_eq!(guide.follow(&asked, 2e-3), stopped);
+        // It is back.
+        guide.hear(Some([0.0; JOINTS]));
+        assert!(guide.follow(&wish([1.0, 0.0]), 2e-3)[0] > stopped[0]);
     }
 
     #[test]

@@ -24,7 +24,6 @@ use std::path::Path;
 impl Viewer {
     /// The whole window.
     pub fn ui(&mut self, ui: &mut Ui) {
-        self.gamepad.hear(ui.input(|input| input.focused));
         let dropped = ui.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
         if let Some(path) = dropped {
             self.open_file(&path, &ui.ctx().clone());
@@ -164,8 +163,7 @@ impl Viewer {
             plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
         }
         CentralPanel::no_frame().show(ui, |ui| {
-            let mut guide = session.feel.guide();
-            if let Err(error) = self.scene.show(ui, &session.loaded, &mut guide) {
+            if let Err(error) = self.scene.show(ui, &session.loaded, &session.feel) {
                 self.error = Some(not_drawn(error));
             }
         });

@@ -5,7 +5,7 @@ use super::{
     background::Following,
     body::Body,
     camera::Camera,
-    guide::Guide,
+    feel::Feel,
     loaded::Loaded,
     overlay,
     palette::{self, Palette},
@@ -175,14 +175,15 @@ impl SceneView {
         Some(rect.center() + 0.5 * vec2(shown.x * rect.width(), -shown.y * rect.height()))
     }
 
-    /// Shows the scene in all of `ui`, and lets the pointer lead `guide`.
+    /// Shows the scene in all of `ui`, and lets pointer and keys lead the hand of `feel`.
     ///
     /// # Errors
     /// When the device fails.
-    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, guide: &mut Guide) -> Result<(), ViewError> {
+    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, feel: &Feel) -> Result<(), ViewError> {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "3-D scene"));
-        self.steering.steer(ui, &response, rect, &loaded.setup.chain, &self.pose, guide);
+        // Not longer than that: the hand's thread waits for its guide, and to draw takes long.
+        self.steering.steer(ui, &response, rect, &loaded.setup.chain, &self.pose, &mut feel.guide());
         let palette = palette::of(ui.visuals());
         let texture = self.draw(rect, ui.ctx().pixels_per_point(), &palette)?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));

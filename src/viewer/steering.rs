@@ -1,9 +1,9 @@
 //! Whence the 3-D scene is seen, and the hand in it: orbit, pan, zoom, reset; the pointer takes the proxy by a node and drags
 //! it; keys move joints.
 
-use super::{camera::Camera, grip::Grip, guide::Guide};
+use super::{camera::Camera, grip::Grip, guide::Guide, pad::JOINTS};
 use crate::proxy::{Chain, Pose};
-use eframe::egui::{CursorIcon, Key, PointerButton, Pos2, Rect, Response, Ui};
+use eframe::egui::{CursorIcon, InputState, Key, PointerButton, Pos2, Rect, Response, Ui};
 use glam::Vec2;
 
 /// Camera and grip.
@@ -83,9 +83,9 @@ impl Steering {
             let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
             self.camera.zoom((-ZOOM_PER_POINT * scroll).exp() / pinch);
         }
-        if response.hovered() && ui.memory(|memory| memory.focused().is_none()) {
-            nudge(ui, guide);
-        }
+        let meant = response.hovered() && ui.memory(|memory| memory.focused().is_none());
+        let held = |input: &InputState| if meant { held(input) } else { [0.0; JOINTS] };
+        guide.hear(ui.input(|input| input.focused.then(|| held(input))));
         if self.grip.is_some() {
             ui.ctx().set_cursor_icon(CursorIcon::Grabbing);
         } else if let Some(pointer) = response.hover_pos()
@@ -96,16 +96,9 @@ impl Steering {
     }
 }
 
-/// Keys move joints: A and D the first, W and S the second, Q and E the third.
-fn nudge(ui: &Ui, guide: &mut Guide) {
+/// How fast keys ask each joint to move, as a share of their speed: A and D the first, W and S the second, Q and E the third.
+fn held(input: &InputState) -> [f64; JOINTS] {
     use Key::{A, D, E, Q, S, W};
-    let (pressed, elapsed) = ui.input(|input| {
-        let way = |less, more| f64::from(i8::from(input.key_down(more)) - i8::from(input.key_down(less)));
-        ([way(A, D), way(S, W), way(Q, E)], f64::from(input.stable_dt))
-    });
-    if pressed == [0.0; 3] {
-        return;
-    }
-    guide.steer(&pressed, elapsed);
-    ui.ctx().request_repaint();
+    let way = |less, more| f64::from(i8::from(input.key_down(more)) - i8::from(input.key_down(less)));
+    [way(A, D), way(S, W), way(Q, E), 0.0, 0.0, 0.0]
 }

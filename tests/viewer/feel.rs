@@ -78,6 +78,32 @@ fn keys_press_the_arm_onto_the_object_and_off_it() {
         window.harness.step();
         assert_eq!(window.torque() > 0.05, touches, "{key:?}: {} N m", window.torque());
     }
+    // A key stays down for the time between two frames, not only for the frame; not for ever where no other one is drawn.
+    let tip = |window: &Window| window.harness.state().tip_in(scene).unwrap();
+    let goes_on = |window: &mut Window, seconds: f64| {
+        let before = tip(window);
+        window.advance(seconds);
+        (tip(window) - before).length() > 0.5
+    };
+    window.harness.key_down(Key::W);
+    window.harness.step();
+    for _ in 0..4 {
+        assert!(goes_on(&mut window, 0.2), "the arm stands between two frames");
+    }
+    window.advance(1.0);
+    assert!(!goes_on(&mut window, 0.2), "the arm goes on in a window that draws no frames");
+    // Nor where the window loses the keyboard meanwhile, and is never told that the key is let go.
+    window.harness.key_up(Key::W);
+    window.harness.key_down(Key::S);
+    window.harness.step();
+    assert!(goes_on(&mut window, 0.2));
+    window.harness.input_mut().focused = false;
+    window.harness.step();
+    window.advance(0.5);
+    assert!(!goes_on(&mut window, 0.2), "the arm goes on without the keyboard");
+    window.harness.input_mut().focused = true;
+    window.harness.key_up(Key::S);
+    window.harness.step();
     // Elsewhere, keys are not meant for the arm.
     window.pass(0.5);
     let tip = window.harness.state().tip_in(scene);
