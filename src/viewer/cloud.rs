@@ -133,7 +133,7 @@ impl Cloud {
         let note = pitch.into_iter().chain(filled).collect::<Vec<String>>().join("\n");
         let at = rect.left_top() + vec2(GAP, GAP);
         painter.text(at, Align2::LEFT_TOP, note, theme::small(), ui.visuals().weak_text_color());
-        let unit = grid.axes.first().map_or("N m", |axis| axis.effort_unit());
+        let unit = theme::units(grid.axes.iter().map(|axis| axis.effort_unit().to_owned()));
         let bar = Rect::from_min_size(rect.right_top() + BAR_AT, vec2(BAR_WIDTH, COLOUR_BAR));
         gradient(&painter, bar, map, true);
         let (text, small) = (ui.visuals().text_color(), theme::small());

@@ -13,6 +13,7 @@
 //! | `steering`, `grip`, `camera` | whence it is seen, and the pointer's grip on the proxy |
 //! | `stage`, `pipelines`, `shapes`, `pixels` | the renderer of that panel |
 //! | `slices`, `column`, `cloud`, `plots`, `controls`, `gains`, `files` | the other panels |
+//! | `legend` | a sample and its name |
 //! | `prices` | what effects and interpolations cost |
 //!
 //! One device computes and draws: the object's nodes go from the frame update to the screen without a read-back. The
@@ -35,6 +36,7 @@ mod grip;
 mod guide;
 mod history;
 mod job;
+mod legend;
 mod loaded;
 mod offscreen;
 mod overlay;

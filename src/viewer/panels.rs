@@ -6,18 +6,21 @@ use super::{
     gamepad::{Found, Gamepad},
     guide::Guide,
     job::{Job, Task, short},
+    loaded::Loaded,
     number,
     plots::{self, Plots},
     session::Session,
     steering,
     theme::{
-        BAR_MARGIN, CONTROLS_RANGE, CONTROLS_WIDTH, GAP, GROUP_GAP, LONE_BUTTON, MESSAGE_WIDTH, MOTION_WIDTH, NARROW,
-        PANEL_MARGIN, PAUSE_WIDTH, PLOTS_RANGE, PROGRESS, PROGRESS_HEIGHT, SIDE_SHARE, SPACE_RANGE, WIDE_PROGRESS,
+        self, BAR_MARGIN, CONTROLS_RANGE, CONTROLS_WIDTH, GAP, GROUP_GAP, LEAST_MOTION, LONE_BUTTON, MESSAGE_WIDTH,
+        MOTION_WIDTH, NAME_SHARE, NARROW, PANEL_MARGIN, PAUSE_WIDTH, PLOTS_RANGE, PROGRESS, PROGRESS_HEIGHT,
+        SIDE_SHARE, SPACE_RANGE, TIME_WIDTH, WIDE_PROGRESS,
     },
 };
 use crate::{gpu::ADAPTER_VARIABLE, render::trace::Tick};
 use eframe::egui::{
-    self, Align, Button, CentralPanel, Frame, Grid, Layout, Panel, ProgressBar, RichText, ScrollArea, Slider, Ui, vec2,
+    self, Align, Button, CentralPanel, Color32, Frame, Grid, Label, Layout, Panel, ProgressBar, RichText, ScrollArea,
+    Slider, TextStyle, Ui, vec2,
 };
 use std::path::Path;
 
@@ -41,28 +44,10 @@ impl Viewer {
         self.complaint(ui);
     }
 
-    /// Title, opening, motions, theme.
+    /// Title, opening, motions, theme. In a narrow window the name and the motion's slider make room for all that is beside them.
     fn bar(&mut self, ui: &mut Ui) {
+        let name_width = NAME_SHARE * ui.available_width();
         ui.horizontal(|ui| {
-            ui.heading("haptize");
-            if let Some(session) = &self.session {
-                let name = ui.label(RichText::new(&session.loaded.name).weak());
-                if let Some(file) = &session.loaded.file {
-                    name.on_hover_text(file.display().to_string());
-                }
-            }
-            ui.add_space(GAP);
-            if ui.button("Open…").clicked() {
-                self.files.toggle();
-            }
-            let computed = self.session.as_ref().is_some_and(|session| session.loaded.report.is_some());
-            if computed && ui.button("Save dataset").on_hover_text("Into the folder that Open… shows").clicked() {
-                self.save();
-            }
-            ui.separator();
-            if let Some(session) = &self.session {
-                motions(ui, &mut session.feel.guide());
-            }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let dark = ui.visuals().dark_mode;
                 if ui.button(if dark { "Light" } else { "Dark" }).on_hover_text("Colours of the window").clicked() {
@@ -72,8 +57,28 @@ impl Viewer {
                     self.scene.reset_view();
                 }
                 ui.menu_button("Help", help).response.on_hover_text("What pointer and keys do");
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.opening_and_motions(ui, name_width));
             });
         });
+    }
+
+    fn opening_and_motions(&mut self, ui: &mut Ui, name_width: f32) {
+        ui.heading("haptize");
+        if let Some(session) = &self.session {
+            name(ui, &session.loaded, name_width);
+        }
+        ui.add_space(GAP);
+        if ui.button("Open…").clicked() {
+            self.files.toggle();
+        }
+        let computed = self.session.as_ref().is_some_and(|session| session.loaded.report.is_some());
+        if computed && ui.button("Save dataset").on_hover_text("Into the folder that Open… shows").clicked() {
+            self.save();
+        }
+        ui.separator();
+        if let Some(session) = &self.session {
+            motions(ui, &mut session.feel.guide());
+        }
     }
 
     /// What computes, and how the loop fares.
@@ -92,7 +97,9 @@ impl Viewer {
                 let contact = contact(tick, session.loaded.knows_nodes());
                 ui.label(RichText::new(contact).small());
                 ui.separator();
-                ui.label(RichText::new(format!("torque {} N m", number(tick.contact_torque.norm()))).small());
+                let unit =
+                    theme::units(session.loaded.dataset.grid.axes.iter().map(|axis| axis.effort_unit().to_owned()));
+                ui.label(RichText::new(format!("torque {} {unit}", number(tick.contact_torque.norm()))).small());
                 if let Some(fault) = tick.fault {
                     ui.separator();
                     ui.colored_label(ui.visuals().error_fg_color, RichText::new(fault.to_string()).small());
@@ -228,6 +235,18 @@ impl Viewer {
     }
 }
 
+/// Name of what is open, in at most `width` points, and its file.
+fn name(ui: &mut Ui, loaded: &Loaded, width: f32) {
+    let text = RichText::new(&loaded.name).weak();
+    let whole =
+        ui.painter().layout_no_wrap(loaded.name.clone(), TextStyle::Body.resolve(ui.style()), Color32::PLACEHOLDER);
+    let size = vec2(whole.size().x.min(width), whole.size().y);
+    let shown = ui.add_sized(size, Label::new(text).truncate());
+    if let Some(file) = &loaded.file {
+        shown.on_hover_text(file.display().to_string());
+    }
+}
+
 /// What is known of a gamepad, where there is one.
 fn gamepad(ui: &mut Ui, gamepad: &Gamepad) {
     match gamepad.found() {
@@ -280,7 +299,7 @@ fn motions(ui: &mut Ui, guide: &mut Guide) {
         if ui.add_sized(vec2(PAUSE_WIDTH, ui.spacing().interact_size.y), Button::new(text)).clicked() {
             guide.toggle();
         }
-        ui.spacing_mut().slider_width = MOTION_WIDTH;
+        ui.spacing_mut().slider_width = (ui.available_width() - TIME_WIDTH).clamp(LEAST_MOTION, MOTION_WIDTH);
         let slider = Slider::new(&mut time, 0.0..=duration).show_value(false);
         let response = ui.add(slider);
         response.widget_info(|| egui::WidgetInfo::slider(true, time, "Time in the motion"));

@@ -3,6 +3,7 @@
 
 use super::{
     history::History,
+    legend,
     loaded::Loaded,
     number, palette,
     theme::{self, CURVE, DASHES, FINE_CURVE, FINE_GAP, GAP, GROUP_GAP, HAIRLINE, SAMPLE, SPAN_WIDTH},
@@ -15,7 +16,7 @@ use crate::{
     },
     report::{self, ReportError},
 };
-use eframe::egui::{self, Button, RichText, Ui, pos2, vec2};
+use eframe::egui::{self, Button, RichText, Ui, vec2};
 use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};
 use std::path::{Path, PathBuf};
 
@@ -221,7 +222,7 @@ impl Plots {
 
     fn lines(&self, ui: &mut Ui, history: &History, label: &str, lines: Vec<(String, usize, bool, Get<'_>)>) {
         let dark = ui.visuals().dark_mode;
-        legend(ui, label, &lines);
+        names(ui, label, &lines);
         let end = history.last().map_or(0.0, |tick| tick.time);
         let ticks: Vec<&Tick> = history.recent(self.seconds, POINTS).collect();
         let paused = self.frozen.is_some();
@@ -282,21 +283,14 @@ fn absent(ui: &mut Ui, what: &str) {
 type Get<'a> = Box<dyn Fn(&Tick) -> f64 + 'a>;
 
 /// What is plotted and the names of the lines, above their plot: beside it, a short plot leaves no room for its axis' name.
-fn legend(ui: &mut Ui, label: &str, lines: &[(String, usize, bool, Get<'_>)]) {
+fn names(ui: &mut Ui, label: &str, lines: &[(String, usize, bool, Get<'_>)]) {
     let dark = ui.visuals().dark_mode;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = GAP;
         ui.label(RichText::new(label).small().weak());
         ui.add_space(GAP);
         for (name, number, thin, _) in lines {
-            // Sample and name are one thing, so that no line ends between them or within a name.
-            let text = ui.painter().layout_no_wrap(name.clone(), theme::small(), ui.visuals().text_color());
-            let size = vec2(SAMPLE.x + GAP + text.size().x, SAMPLE.y.max(text.size().y));
-            let (rect, response) = ui.allocate_exact_size(size, egui::Sense::hover());
-            response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, name));
-            let sample = rect.with_max_x(rect.left() + SAMPLE.x);
-            let corner = pos2(sample.right() + GAP, rect.center().y - 0.5 * text.size().y);
-            ui.painter().galley(corner, text, ui.visuals().text_color());
+            let sample = legend::entry(ui, SAMPLE, name);
             let colour = palette::series(*number, dark);
             let ends = [sample.left_center(), sample.right_center()];
             if *thin {

@@ -10,7 +10,7 @@ use super::{
     history::History,
     loaded::Loaded,
     slices::Slices,
-    theme::{FINE_GAP, GAP, PLANE_WIDGETS, ROOM_FOR_BOTH},
+    theme::{FINE_GAP, GAP, PLANE_SHARE, ROOM_FOR_BOTH},
 };
 use crate::{
     JointVector,
@@ -96,8 +96,7 @@ impl Session {
             }
         });
         if both || !self.cloud_first {
-            let room = ui.available_height() - PLANE_WIDGETS;
-            let height = if both { 0.5 * room } else { room };
+            let height = if both { PLANE_SHARE * ui.available_height() } else { ui.available_height() };
             self.slices.show(ui, &self.loaded, q, &self.history, height);
             ui.add_space(GAP);
         }

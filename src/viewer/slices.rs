@@ -4,10 +4,14 @@
 use super::{
     column::{Column, status_colour},
     history::History,
+    legend,
     loaded::Loaded,
     number,
     palette::{self, Palette},
-    theme::{self, COLOUR_BAR, COLUMN_WIDTH, CROSS, FINE_CURVE, FINE_GAP, JOINT_WIDTH, SWATCH},
+    theme::{
+        self, COLOUR_BAR, COLUMN_WIDTH, CROSS, FINE_CURVE, FINE_GAP, HAIRLINE, JOINT_WIDTH, KEY_HEIGHT, LEAST_MAP,
+        SWATCH,
+    },
 };
 use crate::{
     JointVector,
@@ -16,7 +20,8 @@ use crate::{
     report::colour::ColourMap,
 };
 use eframe::egui::{
-    self, ColorImage, ComboBox, Painter, Rect, RichText, Slider, TextureHandle, TextureOptions, Ui, pos2, vec2,
+    self, ColorImage, ComboBox, Painter, Rect, RichText, ScrollArea, Slider, Stroke, StrokeKind, TextureHandle,
+    TextureOptions, Ui, pos2, vec2,
 };
 use egui_plot::{HoverPosition, Line, MarkerShape, Plot, PlotImage, PlotPoint, Points};
 
@@ -66,8 +71,15 @@ impl Slices {
         self.drawn = None;
     }
 
-    /// The panel, `height` points of it for the heat map.
+    /// The panel, `height` points of it. The heat map has what the sliders of many joints leave of that; where it would be too low
+    /// one scrolls.
     pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, q: &JointVector, history: &History, height: f32) {
+        let scrolled = ScrollArea::vertical().id_salt("plane").max_height(height).min_scrolled_height(height);
+        scrolled.show(ui, |ui| self.widgets(ui, loaded, q, history, height));
+    }
+
+    fn widgets(&mut self, ui: &mut Ui, loaded: &Loaded, q: &JointVector, history: &History, height: f32) {
+        let end = ui.cursor().top() + height;
         let grid = &loaded.dataset.grid;
         self.choices(ui, &loaded.dataset);
         if self.follow {
@@ -77,6 +89,7 @@ impl Slices {
         }
         self.others(ui, grid);
         let map = self.refresh(ui, &loaded.dataset);
+        let height = (end - KEY_HEIGHT - ui.cursor().top()).max(LEAST_MAP);
         self.plot(ui, loaded, q, history, height);
         self.key(ui, &loaded.dataset, map);
     }
@@ -244,9 +257,10 @@ impl Slices {
                     Status::Overflow,
                     Status::Outside,
                 ] {
-                    let (rect, _) = ui.allocate_exact_size(vec2(SWATCH, SWATCH), egui::Sense::hover());
-                    ui.painter().rect_filled(rect, FINE_GAP, status_colour(status, &palette));
-                    ui.label(RichText::new(format!("{status:?}").to_lowercase()).small());
+                    let rect = legend::entry(ui, vec2(SWATCH, SWATCH), &format!("{status:?}").to_lowercase());
+                    // Some colours are nearly that of the ground.
+                    let rim = Stroke::new(HAIRLINE, palette.axis);
+                    ui.painter().rect(rect, FINE_GAP, status_colour(status, &palette), rim, StrokeKind::Inside);
                 }
             });
             return;

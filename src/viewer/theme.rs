@@ -85,10 +85,16 @@ pub const CHOICE_WIDTH: f32 = 92.0;
 pub const COLUMN_WIDTH: f32 = 150.0;
 /// See [`JOINT_WIDTH`].
 pub const SPAN_WIDTH: f32 = 56.0;
-/// Width of the slider of a motion, and of the button that pauses it, whatever it says.
+/// Width of the slider of a motion, where there is room and at least, and of the button that pauses it, whatever it says.
 pub const MOTION_WIDTH: f32 = 120.0;
 /// See [`MOTION_WIDTH`].
+pub const LEAST_MOTION: f32 = 40.0;
+/// See [`MOTION_WIDTH`].
 pub const PAUSE_WIDTH: f32 = 52.0;
+/// Width of the time in a motion, as words.
+pub const TIME_WIDTH: f32 = 66.0;
+/// Most of the bar's width that the name of what is open takes [1].
+pub const NAME_SHARE: f32 = 0.11;
 /// A button that is alone.
 pub const LONE_BUTTON: egui::Vec2 = vec2(90.0, 24.0);
 /// A progress bar in the middle of the window, and in its status bar.
@@ -118,8 +124,12 @@ pub const PLOTS_RANGE: [f32; 2] = [165.0, 320.0];
 pub const SPACE_RANGE: [f32; 2] = [240.0, 420.0];
 /// Height from which on plane and cloud of C-space find room, one below the other.
 pub const ROOM_FOR_BOTH: f32 = 470.0;
-/// Height of everything about a plane but its heat map.
-pub const PLANE_WIDGETS: f32 = 150.0;
+/// Share of it that the plane has then [1].
+pub const PLANE_SHARE: f32 = 0.58;
+/// Height of what explains the heat map below it, two lines; least height of the map itself, with its axes.
+pub const KEY_HEIGHT: f32 = 52.0;
+/// See [`KEY_HEIGHT`].
+pub const LEAST_MAP: f32 = 80.0;
 /// Width of a message, and of the chooser of files; its height, that of its list, and the width of its field.
 pub const MESSAGE_WIDTH: f32 = 560.0;
 /// See [`MESSAGE_WIDTH`].

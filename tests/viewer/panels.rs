@@ -1,8 +1,9 @@
 //! That every panel is there and answers.
 
-use super::window::{DEVICE_NAME, Window};
-use eframe::egui::{Event, Rect, accesskit::Role, pos2, vec2};
+use super::window::{DEVICE_NAME, Window, small_scene};
+use eframe::egui::{Event, Rect, Theme, accesskit::Role, pos2, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
+use haptize::viewer::{LEAST_WINDOW, Start};
 
 #[test]
 fn every_panel_is_there_and_answers() {
@@ -27,6 +28,49 @@ fn every_panel_is_there_and_answers() {
     for column in ["energy U [mJ]", "gap [mm]", "status", "log10 of residual", "yaw torque [N m]"] {
         window.choose("Show", column);
     }
+}
+
+#[test]
+fn nothing_overlaps_in_the_least_window_however_long_the_name_and_however_many_the_joints() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("long.toml");
+    let joint = |name: &str| {
+        format!(
+            "[[proxy.joint]]\nname = \"{name}\"\nkind = \"revolute\"\naxis = [1.0, 0.0, 0.0]\nlimits = [-1.0, 1.0]\n\
+             mass = 0.1\nrotor_inertia = 1e-3\n\n"
+        )
+    };
+    let text = small_scene().replacen("name = \"sphere\"", "name = \"a sphere with quite a long name\"", 1);
+    let joints = [joint("turntable"), joint("column"), joint("bracket")].concat();
+    let text = text.replacen("[[proxy.joint]]", &format!("{joints}[[proxy.joint]]"), 1);
+    let lines = "    { start = 0.0, step = 0.001, count = 2 },\n".repeat(3);
+    let text = text.replacen("axes = [\n", &format!("axes = [\n{lines}"), 1).replace("q = [", "q = [0.0, 0.0, 0.0, ");
+    std::fs::write(&file, text).unwrap();
+    let mut window = Window::open(&Start::File(file), LEAST_WINDOW, Theme::Light);
+    assert_eq!(window.harness.state().error(), None);
+    window.click("Press");
+    window.pass(1.0);
+    let screen = Rect::from_min_size(pos2(0.0, 0.0), LEAST_WINDOW.into());
+    let apart = |window: &Window, labels: &[&str], within: Rect| {
+        let rects: Vec<Rect> = labels.iter().map(|label| window.harness.get_by_label_contains(label).rect()).collect();
+        for (number, rect) in rects.iter().enumerate() {
+            assert!(within.contains_rect(*rect), "{} at {rect}", labels[number]);
+            for (other, label) in rects.iter().zip(labels).skip(number + 1) {
+                assert!(!rect.shrink(0.5).intersects(*other), "{} overlaps {label}", labels[number]);
+            }
+        }
+    };
+    let bar =
+        ["haptize", "Open…", "Save dataset", "Pointer", "Press", "Scrape", "Pause", "Time in the motion", " of 4.5 s"];
+    apart(&window, &[&bar[..], &["Help", "Reset view", "Dark"]].concat(), screen);
+    window.choose("Show", "status");
+    window.harness.get_by_label("outside").scroll_to_me();
+    window.harness.run_ok();
+    let panel = screen.with_min_x(window.harness.get_by_label("3-D scene").rect().max.x);
+    apart(&window, &["Plane of C-space", "unconverged", "overflow", "outside"], panel);
+    window.click("Torque");
+    let plots = screen.with_min_y(window.harness.get_by_label("3-D scene").rect().max.y);
+    apart(&window, &["turntable contact", "column device", "elbow device"], plots);
 }
 
 #[test]

@@ -133,6 +133,9 @@ impl Window {
     pub fn choose(&mut self, label: &str, choice: &str) {
         self.harness.get_by_role_and_label(Role::ComboBox, label).click();
         self.harness.run_ok();
+        // A long list has to be scrolled.
+        self.harness.get_by_role_and_label(Role::Button, choice).scroll_to_me();
+        self.harness.run_ok();
         self.harness.get_by_role_and_label(Role::Button, choice).click();
         self.harness.run_ok();
         let chosen = self.harness.get_by_role_and_label(Role::ComboBox, label);
