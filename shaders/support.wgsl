@@ -15,12 +15,14 @@ override SUPPORT: u32 = 64u;
 override CONTACTS: u32 = 32u;
 // Whether the compliance leaves out surface nodes: then they do not give way, and none may carry force.
 override PARTIAL: bool = false;
+// Whether forces move nodes along themselves only: then the compliance has one number for a pair of nodes.
+override ISOTROPIC: bool = false;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
 // Surface nodes at rest; then the bounding sphere (centre, radius) of each triangle; then each proxy node's radius in x.
 @group(0) @binding(1) var<storage, read> rest: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> mesh: array<u32>;
-// C over the coordinates of the surface nodes that it covers, row-major [m/N].
+// C over the surface nodes that it covers, row-major: 3 x 3 numbers for each pair, or one [m/N].
 @group(0) @binding(3) var<storage, read> compliance: array<f32>;
 // Proxy nodes of all configurations of the chunk; w is the gap at rest.
 @group(0) @binding(4) var<storage, read> positions: array<vec4<f32>>;
@@ -112,39 +114,37 @@ fn support_add(node: u32) -> u32 {
     return support_count - 1u;
 }
 
+// Displacement of the node in `place` by a vector v on the support: its row of C times v.
+fn response(vector: u32, place: u32) -> vec3<f32> {
+    var u = vec3<f32>(0.0);
+    for (var slot = 0u; slot < support_count; slot += 1u) {
+        let v = vectors[at(vector, slot)];
+        // C is symmetric: along a row of the other node, neighbouring invocations read neighbouring entries.
+        let row = place_of(support_nodes[slot]) * parameters.covered;
+        if ISOTROPIC {
+            u += compliance[row + place] * v;
+        } else {
+            let first = 9u * row + 3u * place;
+            let second = first + 3u * parameters.covered;
+            let third = second + 3u * parameters.covered;
+            u += vec3<f32>(compliance[first], compliance[first + 1u], compliance[first + 2u]) * v.x;
+            u += vec3<f32>(compliance[second], compliance[second + 1u], compliance[second + 2u]) * v.y;
+            u += vec3<f32>(compliance[third], compliance[third + 1u], compliance[third + 2u]) * v.z;
+        }
+    }
+    return u;
+}
+
 // Entry `slot` of C_AA times a vector.
 fn multiply(vector: u32, slot: u32) -> vec3<f32> {
-    let order = 3u * parameters.covered;
-    let row = 3u * place_of(support_nodes[slot]) * order;
-    var sum = vec3<f32>(0.0);
-    for (var other = 0u; other < support_count; other += 1u) {
-        let v = vectors[at(vector, other)];
-        let first = row + 3u * place_of(support_nodes[other]);
-        let second = first + order;
-        let third = second + order;
-        sum += vec3<f32>(compliance[first], compliance[second], compliance[third]) * v.x
-            + vec3<f32>(compliance[first + 1u], compliance[second + 1u], compliance[third + 1u]) * v.y
-            + vec3<f32>(compliance[first + 2u], compliance[second + 2u], compliance[third + 2u]) * v.z;
-    }
-    return sum;
+    return response(vector, place_of(support_nodes[slot]));
 }
 
 // Displacement C v of all covered nodes, v a vector on the support; returns its greatest length.
 fn displace(vector: u32, local: u32) -> f32 {
-    let order = 3u * parameters.covered;
     var most = 0.0;
     for (var place = local; place < parameters.covered; place += WORKGROUP) {
-        var u = vec3<f32>(0.0);
-        for (var slot = 0u; slot < support_count; slot += 1u) {
-            // C is symmetric: along a row, neighbouring invocations read neighbouring entries.
-            let row = 3u * place_of(support_nodes[slot]) * order + 3u * place;
-            let v = vectors[at(vector, slot)];
-            u += vec3<f32>(compliance[row], compliance[row + 1u], compliance[row + 2u]) * v.x;
-            let second = row + order;
-            u += vec3<f32>(compliance[second], compliance[second + 1u], compliance[second + 2u]) * v.y;
-            let third = second + order;
-            u += vec3<f32>(compliance[third], compliance[third + 1u], compliance[third + 2u]) * v.z;
-        }
+        let u = response(vector, place);
         displacement[displacement_base + place] = vec4<f32>(u, 0.0);
         most = max(most, length(u));
     }

@@ -10,7 +10,9 @@ use haptize::haptize::Backend;
 use haptize::object::{Compliance, Object};
 use haptize::proxy::Chain;
 use haptize::render::graphics::ObjectMotion;
-use haptize::scene::{Algorithm, Blending, GraphicsEffects, Scene, StiffeningSpec};
+use haptize::scene::{
+    Algorithm, Blending, ElasticSpec, GraphicsEffects, Material, Scene, SpringKind, SpringSpec, StiffeningSpec,
+};
 use std::sync::{Arc, OnceLock};
 
 /// One device for all tests of this process: opening one costs a second, and drivers dislike many.
@@ -23,11 +25,21 @@ fn context() -> Arc<Context> {
 
 /// Scene, object and proxy of a file in `datasets/`.
 fn load(name: &str) -> (Scene, Object, Chain) {
-    let scene = Scene::load(format!("{}/datasets/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    load_of(name, None)
+}
+
+/// The same of another material.
+fn load_of(name: &str, material: Option<Material>) -> (Scene, Object, Chain) {
+    let mut scene = Scene::load(format!("{}/datasets/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    scene.object.material = material.unwrap_or(scene.object.material);
     let object = Object::build(&scene.object).unwrap();
     let chain = Chain::new(&scene.proxy);
     (scene, object, chain)
 }
+
+/// Springs along their rest direction, and a solid: of both, unlike isotropic springs, the compliance has blocks of nine numbers.
+const AXIAL: Material = Material::Springs(SpringSpec { kind: SpringKind::Axial, stiffness: 300.0 });
+const SOLID: Material = Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.01) });
 
 /// Every `stride`-th configuration of the scene's grid, from number `first` on.
 fn configurations(scene: &Scene, first: usize, stride: usize) -> Vec<JointVector> {
@@ -139,10 +151,11 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
 }
 
 /// Solves a part of a scene on both sides; asserts agreement and, of the energy form, its laws.
-fn check_scene(name: &str, algorithm: Algorithm, stride: usize) {
-    let (scene, object, chain) = load(name);
+fn check_scene(name: &str, material: Option<Material>, algorithm: Algorithm, stride: usize) {
+    let (scene, object, chain) = load_of(name, material);
     let configurations = configurations(&scene, 11, stride);
     let model = Model::new(&object, &chain, haptize::scene::ContactSpec { algorithm, ..scene.contact });
+    assert_eq!(model.compliance.rows_per_node, if material.is_some() { 3 } else { 1 });
     let mut cpu = Solver::new(&model);
     let mut gpu = GpuSolver::new(context(), &model).unwrap();
     let results = gpu.solve(&configurations).unwrap();
@@ -171,22 +184,31 @@ fn check_scene(name: &str, algorithm: Algorithm, stride: usize) {
 
 #[test]
 fn the_sphere_has_the_same_equilibria_on_gpu_and_cpu() {
-    check_scene("sphere.toml", Algorithm::Energy, 131);
-    check_scene("sphere.toml", Algorithm::Linearised, 131);
-    check_scene("sphere.toml", Algorithm::Paper, 131);
+    check_scene("sphere.toml", None, Algorithm::Energy, 131);
+    check_scene("sphere.toml", None, Algorithm::Linearised, 131);
+    check_scene("sphere.toml", None, Algorithm::Paper, 131);
 }
 
 #[test]
 fn the_mesh_has_the_same_equilibria_on_gpu_and_cpu() {
-    check_scene("mesh.toml", Algorithm::Energy, 101);
-    check_scene("mesh.toml", Algorithm::Linearised, 101);
-    check_scene("mesh.toml", Algorithm::Paper, 101);
+    check_scene("mesh.toml", None, Algorithm::Energy, 101);
+    check_scene("mesh.toml", None, Algorithm::Linearised, 101);
+    check_scene("mesh.toml", None, Algorithm::Paper, 101);
+}
+
+#[test]
+fn objects_that_are_not_isotropic_have_the_same_equilibria_on_gpu_and_cpu() {
+    for material in [AXIAL, SOLID] {
+        check_scene("sphere.toml", Some(material), Algorithm::Energy, 131);
+        check_scene("sphere.toml", Some(material), Algorithm::Linearised, 131);
+        check_scene("sphere.toml", Some(material), Algorithm::Paper, 37);
+    }
 }
 
 /// Between blended facets, points and balls: the CPU's gaps, energies and torques, and, where nodes touch, others than between
 /// facets as they are.
-fn check_blended(name: &str, algorithm: Algorithm, blending: Blending, stride: usize) {
-    let (scene, object, chain) = load(name);
+fn check_blended(name: &str, material: Option<Material>, algorithm: Algorithm, blending: Blending, stride: usize) {
+    let (scene, object, chain) = load_of(name, material);
     let configurations = configurations(&scene, 11, stride);
     let contact = haptize::scene::ContactSpec { algorithm, ..scene.contact };
     let sharp = Model::new(&object, &chain, contact);
@@ -211,31 +233,35 @@ fn check_blended(name: &str, algorithm: Algorithm, blending: Blending, stride: u
 
 #[test]
 fn blended_facets_have_the_same_equilibria_on_gpu_and_cpu() {
-    check_blended("sphere.toml", Algorithm::Energy, Blending::Mesh, 131);
-    check_blended("sphere.toml", Algorithm::Linearised, Blending::Mesh, 131);
-    check_blended("mesh.toml", Algorithm::Energy, Blending::Mesh, 101);
-    check_blended("mesh.toml", Algorithm::Linearised, Blending::Mesh, 101);
-    check_blended("mesh.toml", Algorithm::Energy, Blending::Width(0.01), 149);
+    check_blended("sphere.toml", None, Algorithm::Energy, Blending::Mesh, 131);
+    check_blended("sphere.toml", None, Algorithm::Linearised, Blending::Mesh, 131);
+    check_blended("mesh.toml", None, Algorithm::Energy, Blending::Mesh, 101);
+    check_blended("mesh.toml", None, Algorithm::Linearised, Blending::Mesh, 101);
+    check_blended("mesh.toml", None, Algorithm::Energy, Blending::Width(0.01), 149);
+    check_blended("sphere.toml", Some(AXIAL), Algorithm::Energy, Blending::Mesh, 131);
+}
+
+/// The model of the sphere that covers the nodes about its top.
+fn part<'a>((scene, object, chain): &'a (Scene, Object, Chain), algorithm: Algorithm, blending: Blending) -> Model<'a> {
+    let contact = haptize::scene::ContactSpec { algorithm, blending, ..scene.contact };
+    let mut model = Model::new(object, chain, contact);
+    let reached = |node: &u32| model.rest[*node as usize].dot(DVec3::new(-0.3, 0.0, 1.0)) > 0.015;
+    model.compliance = Compliance::on(object, (0..object.surface_nodes as u32).filter(reached).collect()).unwrap();
+    model
 }
 
 /// Of a large object only the compliance within reach is formed: equilibria are the CPU's, and so is what reaches beyond.
 #[test]
 fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
-    let (scene, object, chain) = load("sphere.toml");
-    let configurations = configurations(&scene, 11, 131);
-    let part = |algorithm, blending| {
-        let contact = haptize::scene::ContactSpec { algorithm, blending, ..scene.contact };
-        let mut model = Model::new(&object, &chain, contact);
-        let reached = |node: &u32| model.rest[*node as usize].dot(DVec3::new(-0.3, 0.0, 1.0)) > 0.015;
-        model.compliance = Compliance::on(&object, (0..object.surface_nodes as u32).filter(reached).collect()).unwrap();
-        model
-    };
-    for (algorithm, blending) in [
-        (Algorithm::Energy, Blending::Width(0.0)),
-        (Algorithm::Linearised, Blending::Width(0.0)),
-        (Algorithm::Energy, Blending::Mesh),
+    let [isotropic, axial] = [None, Some(AXIAL)].map(|material| load_of("sphere.toml", material));
+    let configurations = configurations(&isotropic.0, 11, 131);
+    for (algorithm, blending, of) in [
+        (Algorithm::Energy, Blending::Width(0.0), &isotropic),
+        (Algorithm::Energy, Blending::Width(0.0), &axial),
+        (Algorithm::Linearised, Blending::Width(0.0), &isotropic),
+        (Algorithm::Energy, Blending::Mesh, &isotropic),
     ] {
-        let model = part(algorithm, blending);
+        let model = part(of, algorithm, blending);
         let mut cpu = Solver::new(&model);
         let results = GpuSolver::new(context(), &model).unwrap().solve(&configurations).unwrap();
         let (mut touching, mut beyond) = (0, 0);
@@ -248,7 +274,7 @@ fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
         println!("{algorithm:?}, {blending:?}: {touching} touch, {beyond} reach beyond");
         assert!(touching >= 3 && beyond >= 3, "{algorithm:?}, {blending:?}: {touching}, {beyond}");
     }
-    let refusal = GpuSolver::new(context(), &part(Algorithm::Paper, Blending::Width(0.0))).err().unwrap();
+    let refusal = GpuSolver::new(context(), &part(&isotropic, Algorithm::Paper, Blending::Width(0.0))).err().unwrap();
     assert!(matches!(refusal, GpuError::TooManyNodes { .. }), "{refusal}");
 }
 

@@ -22,7 +22,7 @@ use crate::{
     object::Object,
     proxy::Chain,
     random::sequence,
-    scene::{JointKind, Scene},
+    scene::{JointKind, Material, Scene, SpringKind, SpringSpec},
 };
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -509,6 +509,19 @@ fn a_lost_device_is_opened_anew() {
     own.device.destroy();
     assert_eq!(format!("{:?}", solver.solve(&[q]).unwrap()), format!("{before:?}"));
     assert_eq!(Arc::strong_count(&own), 1, "the solver has let go of the lost device");
+}
+
+#[test]
+fn one_number_for_a_pair_of_nodes_holds_the_compliance_of_isotropic_objects() {
+    let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
+    for (kind, numbers) in [(SpringKind::Isotropic, 1), (SpringKind::Axial, 9)] {
+        scene.object.material = Material::Springs(SpringSpec { kind, stiffness: 150.0 });
+        let object = Object::build(&scene.object).unwrap();
+        let chain = Chain::new(&scene.proxy);
+        let model = Model::new(&object, &chain, scene.contact);
+        let device = DeviceModel::new(&context(), &model).unwrap();
+        assert_eq!(device.compliance.size(), 4 * numbers * (object.surface_nodes as u64).pow(2), "{kind:?}");
+    }
 }
 
 #[test]

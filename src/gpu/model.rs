@@ -10,9 +10,7 @@ use super::{
     shaders::CLUSTER,
 };
 use crate::{
-    JointVector, contact,
-    object::Compliance,
-    proxy,
+    JointVector, contact, proxy,
     scene::{Algorithm, JointKind},
     tolerances,
 };
@@ -57,7 +55,7 @@ impl DeviceModel {
         let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
         let longest_edge = object.triangles.iter().map(|t| edge(corners(t))).fold(0.0, f64::max);
         let clusters: Vec<u32> = model.bounds.order().collect();
-        let entries = full(compliance);
+        let entries: Vec<f32> = compliance.entries.iter().map(|&entry| entry as f32).collect();
         Ok(Self {
             parameters: Parameters {
                 joints: chain.joints.len() as u32,
@@ -116,15 +114,6 @@ impl DeviceModel {
 
 fn padded(v: DVec3) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]
-}
-
-/// The entries of all 3 x 3 blocks, row-major.
-fn full(compliance: &Compliance) -> Vec<f32> {
-    let places = 0..compliance.nodes.len();
-    let rows = places.clone().flat_map(|i| [0, 1, 2].map(|a| (i, a)));
-    rows.flat_map(|(i, a)| places.clone().flat_map(move |j| compliance.block(i, j).row(a).to_array()))
-        .map(|entry| entry as f32)
-        .collect()
 }
 
 /// The first joint's origin carries the shift to the centre; all others are relative to their parents anyway.

@@ -180,6 +180,9 @@ impl Pipeline {
         if !model.compliance.is_whole() {
             overrides.push(("PARTIAL", 1.0));
         }
+        if model.compliance.rows_per_node == 1 {
+            overrides.push(("ISOTROPIC", 1.0));
+        }
         if let Some(Blended { support, facets }) = blended {
             overrides.extend([("SUPPORT", support as f64), ("FACETS", facets as f64)]);
             accesses.extend([Write, Write]);

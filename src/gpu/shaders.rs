@@ -69,6 +69,9 @@ pub(super) const CLUSTER: usize = 16;
 /// The compliance covers a part of a large object.
 const PARTIAL: &[(&str, f64)] = &[("PARTIAL", 1.0)];
 
+/// The compliance has one number for a pair of nodes.
+const ISOTROPIC: &[(&str, f64)] = &[("ISOTROPIC", 1.0)];
+
 /// Least room for contacts and support that the engine uses: tests of the overflow path.
 const CRAMPED: &[(&str, f64)] = &[("CONTACTS", 2.0)];
 
@@ -77,7 +80,7 @@ pub static ENERGY: Shader = Shader {
     name: "energy",
     entry: "main",
     parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, SUPPORT, SPRINGS, TRUST_REGION, ENERGY_SEARCH],
-    overrides: &[&[], &[("FROZEN", 1.0)], PARTIAL, CRAMPED],
+    overrides: &[&[], &[("FROZEN", 1.0)], PARTIAL, ISOTROPIC, CRAMPED],
 };
 
 /// The same between facets that pass into each other.
@@ -85,7 +88,7 @@ pub static ENERGY_BLENDED: Shader = Shader {
     name: "energy_blended",
     entry: "main",
     parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, FACET_DEPTH, SUPPORT, BLEND, TRUST_REGION, ENERGY_SEARCH],
-    overrides: &[&[], &[("FROZEN", 1.0)], PARTIAL, CRAMPED],
+    overrides: &[&[], &[("FROZEN", 1.0)], PARTIAL, ISOTROPIC, CRAMPED],
 };
 
 /// Equilibrium by the paper's iteration.
@@ -93,7 +96,7 @@ pub static PAPER: Shader = Shader {
     name: "paper",
     entry: "main",
     parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, SUPPORT, SPRINGS, include_str!("../../shaders/paper.wgsl")],
-    overrides: &[&[], CRAMPED],
+    overrides: &[&[], ISOTROPIC, CRAMPED],
 };
 
 /// Graphics with dynamics, and without.
