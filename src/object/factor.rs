@@ -9,7 +9,10 @@
 //! of inverse iteration then bound its smallest eigenvalue, so that a mechanism which rounding has made barely positive is
 //! found as well, and named by the node that it moves most.
 
-use super::{ObjectError, Stiffness, substitution::substitute};
+use super::{
+    ObjectError, Stiffness,
+    substitution::{Partition, substitute},
+};
 use crate::tolerances::{MECHANISM_SHIFT, MIN_RECIPROCAL_CONDITION};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::solvers::LltError;
@@ -41,9 +44,10 @@ pub struct Factor {
     rows_per_node: usize,
     symbolic: Arc<SymbolicCholesky<usize>>,
     values: Arc<[f64]>,
+    partition: Arc<Partition>,
 }
 
-/// One thread a factorisation or solve: many solves run side by side instead, which scales better.
+/// One thread a factorisation or solve of many columns: many of them run side by side instead, which scales better.
 const PARALLELISM: Par = Par::Seq;
 
 impl Factor {
@@ -77,7 +81,18 @@ impl Factor {
             Default::default(),
         );
         match outcome.map(|_| ()) {
-            Ok(()) => Ok(Self { rows_per_node, symbolic: Arc::new(symbolic), values: values.into() }),
+            Ok(()) => {
+                let partition = match symbolic.raw() {
+                    SymbolicCholeskyRaw::Supernodal(symbolic) => Partition::new(symbolic),
+                    SymbolicCholeskyRaw::Simplicial(_) => Partition::default(),
+                };
+                Ok(Self {
+                    rows_per_node,
+                    symbolic: Arc::new(symbolic),
+                    values: values.into(),
+                    partition: Arc::new(partition),
+                })
+            }
             Err(LltError::NonPositivePivot { .. }) => Err(FactorError::NotPositiveDefinite),
         }
     }
@@ -90,11 +105,11 @@ impl Factor {
                 let order = order.arrays().0;
                 if self.rows_per_node == 1 {
                     let mut right: Vec<DVec3> = order.iter().map(|&node| vectors[node]).collect();
-                    substitute(factor, &mut right);
+                    substitute(factor, &self.partition, &mut right);
                     order.iter().zip(right).for_each(|(&node, solved)| vectors[node] = solved);
                 } else {
                     let mut right: Vec<f64> = order.iter().map(|&row| vectors[row / 3][row % 3]).collect();
-                    substitute(factor, &mut right);
+                    substitute(factor, &self.partition, &mut right);
                     order.iter().zip(right).for_each(|(&row, solved)| vectors[row / 3][row % 3] = solved);
                 }
             }
@@ -135,6 +150,12 @@ impl Factor {
         let mut scratch = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(columns.ncols(), PARALLELISM));
         let factor = LltRef::new(&self.symbolic, &self.values);
         factor.solve_in_place_with_conj(Conj::No, columns, PARALLELISM, MemStack::new(&mut scratch));
+    }
+
+    /// Whether [`Factor::solve`] shares its work out among rayon's threads.
+    #[must_use]
+    pub fn is_shared(&self) -> bool {
+        self.partition.is_shared()
     }
 
     /// Memory of the factor [B].
@@ -300,13 +321,20 @@ mod tests {
         let mut general = cube(10);
         let skewed = DVec3::new(0.6, -0.8, 0.3);
         general.add(200, 200, 50.0 * DMat3::from_cols(skewed * 0.6, skewed * -0.8, skewed * 0.3));
-        for stiffness in [&isotropic, &general] {
+        for (stiffness, shared) in [(&isotropic, true), (&general, false)] {
             let nodes = stiffness.nodes();
             let factor = Factor::of(stiffness, 1.0, &vec![3.0; nodes]).unwrap();
+            assert_eq!(factor.is_shared(), shared, "{} B", factor.bytes());
             assert!(matches!(factor.symbolic.raw(), SymbolicCholeskyRaw::Supernodal(_)), "{nodes} nodes are too few");
             let forces: Vec<DVec3> = (0..nodes).map(|i| DVec3::new((i % 9) as f64, -2.0, (i % 5) as f64)).collect();
             let mut one = forces.clone();
             factor.solve(&mut one);
+            for threads in [1, 3] {
+                let threads = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let mut again = forces.clone();
+                threads.install(|| factor.solve(&mut again));
+                assert!(again == one, "threads leave a trace");
+            }
             let mut many = Mat::from_fn(3 * nodes, 3, |row, column| forces[row / 3][row % 3] * (column + 1) as f64);
             factor.solve_columns(many.as_mut());
             for (node, u) in one.iter().enumerate() {

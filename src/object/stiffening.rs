@@ -66,16 +66,24 @@ impl Stiffening {
     /// By how much K1 u exceeds the springs' force grad W(u), added to `force` [N].
     pub fn relieve(&self, displacement: &[DVec3], force: &mut [DVec3]) {
         for (node, force) in force.iter_mut().enumerate() {
-            for entry in self.bound.offsets[node]..self.bound.offsets[node + 1] {
-                if self.reach[entry] > 0.0 {
-                    let other = displacement[self.bound.columns[entry] as usize];
-                    let pull = self.bound.blocks[entry] * (other - displacement[node]);
-                    let strain = pull.length() / self.reach[entry];
-                    let sigma = 1.0 + (self.factor - 1.0) * strain / (strain.hypot(self.strain) + self.strain);
-                    *force += (1.0 - sigma / self.factor) * pull;
-                }
+            *force += self.relief_on(node, displacement);
+        }
+    }
+
+    /// The same for one node [N].
+    #[must_use]
+    pub fn relief_on(&self, node: usize, displacement: &[DVec3]) -> DVec3 {
+        let mut relief = DVec3::ZERO;
+        for entry in self.bound.offsets[node]..self.bound.offsets[node + 1] {
+            if self.reach[entry] > 0.0 {
+                let other = displacement[self.bound.columns[entry] as usize];
+                let pull = self.bound.blocks[entry] * (other - displacement[node]);
+                let strain = pull.length() / self.reach[entry];
+                let sigma = 1.0 + (self.factor - 1.0) * strain / (strain.hypot(self.strain) + self.strain);
+                relief += (1.0 - sigma / self.factor) * pull;
             }
         }
+        relief
     }
 
     /// Elastic energy W of the object [J].

@@ -46,6 +46,12 @@ impl Stiffness {
         self.blocks.iter().all(|block| *block == DMat3::from_diagonal(DVec3::splat(block.x_axis.x)))
     }
 
+    /// What each block multiplies the identity with, if every one does: a ninth of the numbers, for products frame after frame [N/m].
+    #[must_use]
+    pub fn scales(&self) -> Option<Vec<f64>> {
+        self.is_isotropic().then(|| self.blocks.iter().map(|block| block.x_axis.x).collect())
+    }
+
     /// Column and block of each stored entry of row `node`, ascending.
     pub fn row(&self, node: usize) -> impl Iterator<Item = (usize, &DMat3)> {
         let range = self.offsets[node]..self.offsets[node + 1];
@@ -65,15 +71,28 @@ impl Stiffness {
     /// entry per node.
     pub fn apply(&self, displacement: &[DVec3], force: &mut [DVec3]) {
         for (node, out) in force.iter_mut().enumerate() {
-            *out = self.row(node).map(|(column, block)| *block * displacement[column]).sum();
+            *out = self.force_on(node, displacement);
         }
+    }
+
+    /// The same for one node [N].
+    #[must_use]
+    pub fn force_on(&self, node: usize, displacement: &[DVec3]) -> DVec3 {
+        self.row(node).map(|(column, block)| *block * displacement[column]).sum()
+    }
+
+    /// The same by the matrix's [`Stiffness::scales`] [N].
+    #[must_use]
+    pub fn force_by_scales(&self, scales: &[f64], node: usize, displacement: &[DVec3]) -> DVec3 {
+        let range = self.offsets[node]..self.offsets[node + 1];
+        let columns = self.columns[range.clone()].iter().map(|&column| displacement[column as usize]);
+        columns.zip(&scales[range]).map(|(u, scale)| u * *scale).sum()
     }
 
     /// Energy stored at `displacement` u, 1/2 u^T K u [J].
     #[must_use]
     pub fn energy(&self, displacement: &[DVec3]) -> f64 {
-        let force = |node: usize| self.row(node).map(|(column, block)| *block * displacement[column]).sum::<DVec3>();
-        0.5 * displacement.iter().enumerate().map(|(node, u)| u.dot(force(node))).sum::<f64>()
+        0.5 * displacement.iter().enumerate().map(|(node, u)| u.dot(self.force_on(node, displacement))).sum::<f64>()
     }
 
     /// Largest sum of absolute values in a row: a bound on the largest eigenvalue (Gershgorin) [N/m].

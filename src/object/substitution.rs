@@ -4,32 +4,201 @@
 //! algorithms, 1993). Those of a surface are a few columns wide, and a frame has one right-hand side: routines for dense blocks
 //! then spend most of their time on being called. Plain loops over the columns read L once in each direction and do little else.
 //! A right-hand side is of numbers, or of vectors where one matrix stands for all three coordinates.
+//!
+//! What takes time is that L comes from memory. So subtrees of the elimination tree, which do not touch each other's rows, are solved
+//! side by side, before the rest forward and after it backward; what they leave in the rest's rows is added up in their order, so
+//! that the result is the same for any number of threads (Liu, The role of elimination trees in sparse factorization, 1990).
 
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
-use std::ops::{AddAssign, Mul, SubAssign};
+use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
+use rayon::prelude::*;
+use std::ops::{AddAssign, Mul, Range, SubAssign};
 
 /// What a right-hand side is made of.
-pub(super) trait Entry: Copy + Default + AddAssign + SubAssign + Mul<f64, Output = Self> {}
+pub(super) trait Entry: Copy + Default + Send + Sync + AddAssign + SubAssign + Mul<f64, Output = Self> {}
 
-impl<T: Copy + Default + AddAssign + SubAssign + Mul<f64, Output = T>> Entry for T {}
+impl<T: Copy + Default + Send + Sync + AddAssign + SubAssign + Mul<f64, Output = T>> Entry for T {}
 
-/// Solves `L L^T x = right` in place, both in the order of elimination.
-pub(super) fn substitute<T: Entry>(factor: SupernodalLltRef<'_, usize, f64>, right: &mut [T]) {
-    let symbolic = factor.symbolic();
-    let values = |s: usize| &factor.values()[symbolic.col_ptr_for_val()[s]..symbolic.col_ptr_for_val()[s + 1]];
-    let supernode = |s: usize| {
-        let range = symbolic.supernode_begin()[s]..symbolic.supernode_end()[s];
-        let pattern = symbolic.supernode(s).pattern();
-        (range.clone(), pattern, values(s).chunks_exact((range.len() + pattern.len()).max(1)))
-    };
-    let mut below: Vec<T> = Vec::new();
-    for s in 0..symbolic.n_supernodes() {
-        let (range, pattern, columns) = supernode(s);
-        let width = range.len();
+/// Entries of a factor from which on a substitution is shared out among threads: 8 MB, beyond what one core's caches hold, take
+/// some milliseconds to read; waking threads takes hundredths of one.
+const LEAST_FACTOR_TO_SHARE: usize = 1 << 20;
+
+/// A subtree that one thread solves has at most one in so many of the factor's entries. What is left to the rest, which one thread
+/// solves, grows with it: of a surface of 100,000 nodes a quarter.
+const LEAST_SUBTREES: usize = 8;
+
+/// Which supernodes are solved side by side.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Partition {
+    /// Ascending, none touching another.
+    subtrees: Vec<Subtree>,
+    /// The other supernodes, ascending.
+    rest: Vec<usize>,
+}
+
+/// A subtree of the elimination tree whose supernodes follow each other.
+#[derive(Clone, Debug)]
+struct Subtree {
+    supernodes: Range<usize>,
+    rows: Range<usize>,
+    /// The rest's rows that it touches, ascending.
+    border: Vec<usize>,
+    /// For supernode after supernode and each of its rows in the border: its place there.
+    places: Vec<u32>,
+    /// Where the places of each supernode begin.
+    starts: Vec<usize>,
+}
+
+/// A dense trapezoid of L.
+struct Supernode<'f> {
+    columns: Range<usize>,
+    /// Rows below, ascending.
+    pattern: &'f [usize],
+    values: &'f [f64],
+}
+
+fn supernode<'f>(symbolic: &'f SymbolicSupernodalCholesky<usize>, values: &'f [f64], s: usize) -> Supernode<'f> {
+    Supernode {
+        columns: symbolic.supernode_begin()[s]..symbolic.supernode_end()[s],
+        pattern: symbolic.supernode(s).pattern(),
+        values: &values[symbolic.col_ptr_for_val()[s]..symbolic.col_ptr_for_val()[s + 1]],
+    }
+}
+
+impl Partition {
+    /// Of a factor large enough to be worth it; else all is the rest.
+    pub fn new(symbolic: &SymbolicSupernodalCholesky<usize>) -> Self {
+        let count = symbolic.n_supernodes();
+        let entries = symbolic.len_val();
+        if entries < LEAST_FACTOR_TO_SHARE {
+            return Self { subtrees: Vec::new(), rest: (0..count).collect() };
+        }
+        // Of the subtree below each supernode: its entries, its first supernode, and how many there are.
+        let sizes = symbolic.col_ptr_for_val().windows(2).map(|ends| ends[1] - ends[0]);
+        let mut below: Vec<(usize, usize, usize)> = sizes.enumerate().map(|(s, size)| (size, s, 1)).collect();
+        for s in 0..count {
+            let (size, first, members) = below[s];
+            if let Some(row) = symbolic.supernode(s).pattern().first() {
+                let parent = &mut below[symbolic.supernode_end().partition_point(|end| end <= row)];
+                *parent = (parent.0 + size, parent.1.min(first), parent.2 + members);
+            }
+        }
+        let most = entries / LEAST_SUBTREES;
+        let mut partition = Self::default();
+        let mut s = count;
+        while s > 0 {
+            s -= 1;
+            let (size, first, members) = below[s];
+            if size <= most && members == s + 1 - first {
+                partition.subtrees.push(Subtree::new(symbolic, first..s + 1));
+                s = first;
+            } else {
+                partition.rest.push(s);
+            }
+        }
+        partition.subtrees.reverse();
+        partition.rest.reverse();
+        partition
+    }
+
+    /// Whether anything is solved side by side.
+    pub fn is_shared(&self) -> bool {
+        !self.subtrees.is_empty()
+    }
+}
+
+impl Subtree {
+    fn new(symbolic: &SymbolicSupernodalCholesky<usize>, supernodes: Range<usize>) -> Self {
+        let rows = symbolic.supernode_begin()[supernodes.start]..symbolic.supernode_end()[supernodes.end - 1];
+        let beyond = |s: usize| symbolic.supernode(s).pattern().iter().copied().filter(|&row| row >= rows.end);
+        let mut border: Vec<usize> = supernodes.clone().flat_map(beyond).collect();
+        border.sort_unstable();
+        border.dedup();
+        let (mut places, mut starts) = (Vec::new(), Vec::new());
+        for s in supernodes.clone() {
+            starts.push(places.len());
+            places.extend(beyond(s).map(|row| border.partition_point(|&other| other < row) as u32));
+        }
+        Self { supernodes, rows, border, places, starts }
+    }
+
+    /// The parts of `pattern` among its own rows, counted from the first of them, and in the border.
+    fn split<'a>(&'a self, s: usize, pattern: &'a [usize]) -> (impl Iterator<Item = usize> + 'a, &'a [u32]) {
+        let own = pattern.partition_point(|&row| row < self.rows.end);
+        let start = self.starts[s - self.supernodes.start];
+        (pattern[..own].iter().map(|row| row - self.rows.start), &self.places[start..start + pattern.len() - own])
+    }
+}
+
+/// Solves `L L^T x = right` in place, both in the order of elimination; on rayon's threads where the partition shares it out.
+pub(super) fn substitute<T: Entry>(factor: SupernodalLltRef<'_, usize, f64>, partition: &Partition, right: &mut [T]) {
+    let (symbolic, values) = (factor.symbolic(), factor.values());
+    let Partition { subtrees, rest } = partition;
+    let borders: Vec<Vec<T>> = apart(subtrees, right)
+        .into_par_iter()
+        .map(|(subtree, own)| {
+            let mut border = vec![T::default(); subtree.border.len()];
+            let mut below = Vec::new();
+            for s in subtree.supernodes.clone() {
+                let supernode = supernode(symbolic, values, s);
+                supernode.forward(subtree.rows.start, own, &mut below);
+                let (rows, places) = subtree.split(s, supernode.pattern);
+                let mut entries = below.iter();
+                rows.zip(&mut entries).for_each(|(row, &entry)| own[row] -= entry);
+                places.iter().zip(entries).for_each(|(&place, &entry)| border[place as usize] += entry);
+            }
+            border
+        })
+        .collect();
+    for (subtree, border) in subtrees.iter().zip(borders) {
+        subtree.border.iter().zip(border).for_each(|(&row, entry)| right[row] -= entry);
+    }
+    let mut below = Vec::new();
+    for &s in rest {
+        let supernode = supernode(symbolic, values, s);
+        supernode.forward(0, right, &mut below);
+        supernode.pattern.iter().zip(&below).for_each(|(&row, &entry)| right[row] -= entry);
+    }
+    for &s in rest.iter().rev() {
+        let supernode = supernode(symbolic, values, s);
         below.clear();
-        below.resize(pattern.len(), T::default());
-        let own = &mut right[range];
-        for (c, column) in columns.enumerate() {
+        below.extend(supernode.pattern.iter().map(|&row| right[row]));
+        supernode.backward(0, right, &below);
+    }
+    let borders: Vec<Vec<T>> =
+        subtrees.iter().map(|subtree| subtree.border.iter().map(|&row| right[row]).collect()).collect();
+    apart(subtrees, right).into_par_iter().zip(borders).for_each(|((subtree, own), border)| {
+        let mut below = Vec::new();
+        for s in subtree.supernodes.clone().rev() {
+            let supernode = supernode(symbolic, values, s);
+            let (rows, places) = subtree.split(s, supernode.pattern);
+            below.clear();
+            below.extend(rows.map(|row| own[row]));
+            below.extend(places.iter().map(|&place| border[place as usize]));
+            supernode.backward(subtree.rows.start, own, &below);
+        }
+    });
+}
+
+/// Each subtree with its rows.
+fn apart<'a, T>(subtrees: &'a [Subtree], mut right: &'a mut [T]) -> Vec<(&'a Subtree, &'a mut [T])> {
+    let mut taken = 0;
+    let mut all = Vec::with_capacity(subtrees.len());
+    for subtree in subtrees {
+        let (own, after) = right.split_at_mut(subtree.rows.end - taken);
+        all.push((subtree, &mut own[subtree.rows.start - taken..]));
+        (right, taken) = (after, subtree.rows.end);
+    }
+    all
+}
+
+impl Supernode<'_> {
+    /// Solves for its rows of `right`, of which the first is row `first`; `below` takes what they leave in the rows of its pattern.
+    fn forward<T: Entry>(&self, first: usize, right: &mut [T], below: &mut Vec<T>) {
+        let width = self.columns.len();
+        let own = &mut right[self.columns.start - first..self.columns.end - first];
+        below.clear();
+        below.resize(self.pattern.len(), T::default());
+        for (c, column) in self.values.chunks_exact(width + self.pattern.len()).enumerate() {
             let (diagonal, rest) = column.split_at(width);
             let solved = own[c] * diagonal[c].recip();
             own[c] = solved;
@@ -40,21 +209,17 @@ pub(super) fn substitute<T: Entry>(factor: SupernodalLltRef<'_, usize, f64>, rig
                 *entry += solved * l;
             }
         }
-        for (&row, &entry) in pattern.iter().zip(&below) {
-            right[row] -= entry;
-        }
     }
-    for s in (0..symbolic.n_supernodes()).rev() {
-        let (range, pattern, columns) = supernode(s);
-        let width = range.len();
-        below.clear();
-        below.extend(pattern.iter().map(|&row| right[row]));
-        let own = &mut right[range];
-        for (c, column) in columns.enumerate().rev() {
+
+    /// Solves for its rows of `right`, of which the first is row `first`, those of its pattern being `below`.
+    fn backward<T: Entry>(&self, first: usize, right: &mut [T], below: &[T]) {
+        let width = self.columns.len();
+        let own = &mut right[self.columns.start - first..self.columns.end - first];
+        for (c, column) in self.values.chunks_exact(width + self.pattern.len()).enumerate().rev() {
             let (diagonal, rest) = column.split_at(width);
             let mut entry = own[c];
             entry -= dot(&diagonal[c + 1..], &own[c + 1..]);
-            entry -= dot(rest, &below);
+            entry -= dot(rest, below);
             own[c] = entry * diagonal[c].recip();
         }
     }

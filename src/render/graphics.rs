@@ -46,6 +46,9 @@ pub enum GraphicsError {
     /// The time between frames is not a positive number.
     #[error("the time between frames is {0} s; it must be a positive number")]
     Period(f64),
+    /// The system has no threads for the frames of a large object.
+    #[error("no threads can be had for the object's frames: {0}")]
+    Threads(String),
     /// The object's matrix cannot be factorised.
     #[error(transparent)]
     Factor(#[from] FactorError),

@@ -9,6 +9,9 @@
 //! its potential to the energy. Stiffening puts K1 in the place of K on the left and grad W(u) in that of K u on the right,
 //! which keeps the step passive (see [`Stiffening`]). Quasi-static graphics has `u = K^-1 f` and neither M, B nor v.
 //!
+//! A frame of an object so large that its factor does not fit a core's caches is shared out among threads of its own, so that it
+//! waits for nothing else; the result is the same for any number of them.
+//!
 //! `ObjectMotion::load` and `ObjectMotion::advance` are the twins of the entry points in `shaders/frame.wgsl`.
 
 use super::graphics::GraphicsError;
@@ -17,6 +20,7 @@ use crate::{
     scene::GraphicsEffects,
 };
 use glam::DVec3;
+use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
 
 /// Displacements of all nodes, and their velocities where there are dynamics.
 pub struct ObjectMotion<'object> {
@@ -31,12 +35,19 @@ pub struct ObjectMotion<'object> {
     displacement: Vec<DVec3>,
     /// Right-hand side, then v_hat [m/s]; in quasi-static graphics u.
     right: Vec<DVec3>,
+    /// Where a frame is shared out.
+    threads: Option<ThreadPool>,
 }
+
+/// Nodes that one thread takes at least: some microseconds of work.
+const NODES_TOGETHER: usize = 1024;
 
 /// What moves with inertia.
 struct Dynamics {
     /// Of 2M/T + B + (T/2) K.
     factor: Factor,
+    /// Of K, if it has any [N/m].
+    scales: Option<Vec<f64>>,
     /// v [m/s].
     velocity: Vec<DVec3>,
 }
@@ -45,7 +56,7 @@ impl<'object> ObjectMotion<'object> {
     /// `object` in equilibrium under no forces but its weight, where there is one, to be moved by `period` T [s] at a time.
     ///
     /// # Errors
-    /// When `period` is not positive, or there is no memory for the factor.
+    /// When `period` is not positive, or there is no memory for the factor or no threads for a large one.
     pub fn new(object: &'object Object, period: f64, effects: &GraphicsEffects) -> Result<Self, GraphicsError> {
         if !(period > 0.0 && period.is_finite()) {
             return Err(GraphicsError::Period(period));
@@ -58,14 +69,19 @@ impl<'object> ObjectMotion<'object> {
             let inertia = object.mass.iter().zip(&object.damping);
             let diagonal: Vec<f64> = inertia.map(|(m, b)| 2.0 * m / period + b).collect();
             let stiffness = stiffening.as_ref().map_or(&object.stiffness, Stiffening::bound);
-            Some(Dynamics { factor: Factor::of(stiffness, 0.5 * period, &diagonal)?, velocity: zero.clone() })
+            let factor = Factor::of(stiffness, 0.5 * period, &diagonal)?;
+            Some(Dynamics { factor, scales: stiffness.scales(), velocity: zero.clone() })
         };
         let weight: Option<Vec<DVec3>> = effects.gravity.map(|g| object.mass.iter().map(|m| *m * g).collect());
         let displacement = match &weight {
             Some(weight) => settled(object, weight, stiffening.as_ref())?,
             None => zero.clone(),
         };
-        Ok(Self { object, period, dynamics, stiffening, weight, displacement, right: zero })
+        let factor = dynamics.as_ref().map_or(&object.factor, |dynamics| &dynamics.factor);
+        let threads =
+            factor.is_shared().then(|| ThreadPoolBuilder::new().thread_name(|k| format!("frame {k}")).build());
+        let threads = threads.transpose().map_err(|error| GraphicsError::Threads(error.to_string()))?;
+        Ok(Self { object, period, dynamics, stiffening, weight, displacement, right: zero, threads })
     }
 
     /// T [s].
@@ -115,7 +131,9 @@ impl<'object> ObjectMotion<'object> {
     pub fn bytes(&self) -> usize {
         let weight = self.weight.as_ref().map_or(0, Vec::len);
         let vectors = self.displacement.len() + self.right.len() + self.velocity().len() + weight;
-        let factor = self.dynamics.as_ref().map_or(0, |dynamics| dynamics.factor.bytes());
+        let factor = self.dynamics.as_ref().map_or(0, |dynamics| {
+            dynamics.factor.bytes() + dynamics.scales.as_ref().map_or(0, |scales| size_of_val(&**scales))
+        });
         let stiffening = self
             .stiffening
             .as_ref()
@@ -125,34 +143,54 @@ impl<'object> ObjectMotion<'object> {
 
     /// One frame under `forces`, one per node [N]. Returns v_hat [m/s]; in quasi-static graphics the displacements.
     pub fn step(&mut self, forces: &[DVec3]) -> &[DVec3] {
-        self.load(forces);
-        self.advance();
+        match self.threads.take() {
+            None => self.frame(forces, false),
+            Some(threads) => {
+                threads.install(|| self.frame(forces, true));
+                self.threads = Some(threads);
+            }
+        }
         &self.right
     }
 
+    fn frame(&mut self, forces: &[DVec3], shared: bool) {
+        let mut right = std::mem::take(&mut self.right);
+        self.load(forces, &mut right, shared);
+        self.right = right;
+        self.advance();
+    }
+
     /// Right-hand side (2M/T) v - grad W(u) + f; in quasi-static graphics f.
-    fn load(&mut self, forces: &[DVec3]) {
-        match &self.dynamics {
-            None => self.right.copy_from_slice(forces),
-            Some(Dynamics { velocity, .. }) => {
-                let stiffness = self.stiffening.as_ref().map_or(&self.object.stiffness, Stiffening::bound);
-                stiffness.apply(&self.displacement, &mut self.right);
-                for (node, right) in self.right.iter_mut().enumerate() {
-                    *right = forces[node] + (2.0 * self.object.mass[node] / self.period) * velocity[node] - *right;
-                }
+    fn load(&self, forces: &[DVec3], right: &mut [DVec3], shared: bool) {
+        let Self { object, dynamics, stiffening, weight, displacement, .. } = self;
+        let stiffness = stiffening.as_ref().map_or(&object.stiffness, Stiffening::bound);
+        let of_node = |(node, right): (usize, &mut DVec3)| {
+            *right = forces[node];
+            if let Some(Dynamics { velocity, scales, .. }) = dynamics {
+                let momentum = (2.0 * object.mass[node] / self.period) * velocity[node];
+                let held = match scales {
+                    Some(scales) => stiffness.force_by_scales(scales, node, displacement),
+                    None => stiffness.force_on(node, displacement),
+                };
+                *right += momentum - held;
             }
-        }
-        if let Some(stiffening) = &self.stiffening {
-            stiffening.relieve(&self.displacement, &mut self.right);
-        }
-        for (right, weight) in self.right.iter_mut().zip(self.weight.iter().flatten()) {
-            *right += *weight;
+            if let Some(stiffening) = stiffening {
+                *right += stiffening.relief_on(node, displacement);
+            }
+            if let Some(weight) = weight {
+                *right += weight[node];
+            }
+        };
+        if shared {
+            right.par_iter_mut().with_min_len(NODES_TOGETHER).enumerate().for_each(of_node);
+        } else {
+            right.iter_mut().enumerate().for_each(of_node);
         }
     }
 
     /// v_hat from the right-hand side, and the new state.
     fn advance(&mut self) {
-        let Some(Dynamics { factor, velocity }) = &mut self.dynamics else {
+        let Some(Dynamics { factor, velocity, .. }) = &mut self.dynamics else {
             self.object.factor.solve(&mut self.right);
             self.displacement.copy_from_slice(&self.right);
             return;
