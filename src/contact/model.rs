@@ -81,7 +81,7 @@ impl<'a> Model<'a> {
         Ok(model)
     }
 
-    /// Surface nodes up to which all of the compliance is formed: 0.3 GB, in some seconds.
+    /// Surface nodes up to which all of the compliance is formed: at most 0.3 GB, in some seconds.
     pub const WHOLE: usize = 2048;
 
     fn with_compliance(object: &'a Object, chain: &'a Chain, contact: ContactSpec, compliance: Compliance) -> Self {
