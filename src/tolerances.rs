@@ -166,6 +166,11 @@ pub const APPROACH_STEPS: u32 = 8;
 /// times as 3 to 4 to 5, and 11 if they come in rigid.
 pub const GENTLE_STIFFNESS: f64 = 100.0;
 
+/// Depth to which a ball may sink in on a gentle approach, in radii [1]: contact stiffens beyond it. A ball whose centre passes the
+/// surface pushes it out to the wrong side, and an object held at a few nodes only may be far stiffer where it is touched than at its
+/// softest node ([`GENTLE_STIFFNESS`]).
+pub const GENTLE_DEPTH: f64 = 0.1;
+
 /// Distance of a ball's centre from features on which it is said to lie, in radii [1]: a search that stalls at a kink has come within
 /// 1e-6, and the nearest facets that are none of the kink's are a good part of an edge away.
 pub const KINK_REACH: f64 = 1e-4;

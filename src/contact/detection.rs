@@ -85,7 +85,8 @@ pub enum Walls {
     /// All that it feels: within its radius (see [`super::features`]), or where facets are blended what is near it (see
     /// [`super::blend`]).
     All,
-    /// The same, but where facets are sharp each triangle pushes by itself, however they join.
+    /// The same, but where facets are sharp each triangle pushes by itself, however they join and to whichever side it faces: E is
+    /// continuous however they fold, as long as no centre is inside.
     Each,
 }
 
@@ -317,23 +318,25 @@ impl Detection {
             let outer = felt.iter().filter(touched).any(|felt| felt.outer);
             let beyond = felt.iter().any(|felt| felt.outer && felt.share > 0);
             let wall = |felt: &Felt| {
-                let contact = contact_at(model, i, x, radius, positions, felt.triangle, felt.point)?;
-                Some(Contact { share: felt.share.into(), ..contact })
+                let nodes = triangles[felt.triangle as usize];
+                let ClosestPoint { weights, feature } = felt.point;
+                let measured = measure(x, radius, surface::corners(positions, nodes), weights, feature, felt.normal);
+                Contact { share: felt.share.into(), ..Contact::new(i as u32, nodes, weights, measured) }
             };
+            let inside = || surface::winding_number(positions, triangles, x) > 0.5;
+            if walls == Walls::Each && contact.depth > radius && inside() {
+                contacts.push(contact);
+                continue;
+            }
             match inner {
                 // Between two walls, one of them seen from inside: the closer one need not be the one that decides.
-                Some(inner) if outer && surface::winding_number(positions, triangles, x) > 0.5 => {
-                    contacts.extend(wall(inner));
-                }
+                Some(inner) if outer && inside() => contacts.push(wall(inner)),
                 _ if outer || (beyond && contact.depth <= 0.0) => {}
                 // Where deformation has folded the surface over itself, the closest feature need not know the side.
-                _ if self.care == Care::Thorough
-                    && feels
-                    && contact.depth > radius
-                    && surface::winding_number(positions, triangles, x) < 0.5 => {}
+                _ if self.care == Care::Thorough && feels && contact.depth > radius && !inside() => {}
                 _ => contacts.push(contact),
             }
-            contacts.extend(felt.iter().filter(|felt| felt.outer).filter_map(wall));
+            contacts.extend(felt.iter().filter(|felt| felt.outer).map(wall));
         }
     }
 

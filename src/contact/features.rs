@@ -31,6 +31,8 @@ pub struct Felt {
     pub point: ClosestPoint,
     /// How often it counts: one for a wall, minus one for an edge between two.
     pub share: i32,
+    /// Its pseudonormal, turned towards the node where sides make no difference.
+    pub normal: DVec3,
     /// Whether the node lies on its outer side.
     pub outer: bool,
     /// Distance of the node [m].
@@ -59,7 +61,7 @@ impl Features {
     }
 
     /// The features, with what they count, that the node at `x` with `radius` feels through the triangles taken in, which
-    /// must be all within reach; not `joined`, each triangle counts by itself.
+    /// must be all within reach; not `joined`, each triangle counts by itself, seen from either side.
     pub fn gather(
         &mut self,
         x: DVec3,
@@ -99,7 +101,8 @@ impl Features {
             let t = felt.triangle as usize;
             let offset = x - point_at(surface::corners(positions, triangles[t]), felt.point.weights);
             let normal = surface::pseudonormal(positions, triangles, topology, t, felt.point.feature);
-            felt.outer = offset.dot(normal) > 0.0;
+            felt.normal = if !joined && offset.dot(normal) <= 0.0 { -normal } else { normal };
+            felt.outer = offset.dot(felt.normal) > 0.0;
             felt.distance = offset.length();
         }
         felt
@@ -119,7 +122,7 @@ fn add(felt: &mut Vec<Felt>, triangles: &[[u32; 3]], t: u32, point: ClosestPoint
     };
     match felt.iter_mut().find(|felt| felt.key == key) {
         Some(felt) => felt.share += share,
-        None => felt.push(Felt { triangle: t, point, share, outer: false, distance: 0.0, key }),
+        None => felt.push(Felt { triangle: t, point, share, normal: DVec3::ZERO, outer: false, distance: 0.0, key }),
     }
 }
 

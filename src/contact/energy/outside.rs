@@ -1,28 +1,31 @@
 //! What the search from the rest state leaves unbalanced, where balls may stand inside the object and be pressed out of it to any side.
 //!
-//! The proxy is drawn out along the normal of its deepest contact and comes back in steps at full stiffness, each from the
+//! The proxy is drawn out, along the normal of its deepest contact, and comes back in steps at full stiffness, each from the
 //! equilibrium before, as a hand would bring it there. On this way a step that E refuses gets a second chance: another step from
 //! where it led, where walls that it did not know of are seen and curved ones stand as they do there. If both together lower E by a
 //! fair share of the first promise, they are taken. Where this fails too, balls that have come to a kink of E are held there
 //! ([`crate::contact::pins`]).
 //!
-//! At last, or before if a ball is larger than the facets, the proxy comes in gently: with contact so soft that E is smooth over many
-//! facets, and each triangle a wall by itself, since the edges between walls push with the other sign, and of a surface crumpled by
-//! fine facets so many that E falls without end. At the end of the way contact stiffens in stages as from the rest state, and what
-//! is left to do between the walls as they are is little: stiff balls touch faces, hardly any edges between them.
+//! At last, or at once if a ball is larger than the facets, the proxy comes in gently, from the side on which most of it is: with contact
+//! so soft that E is smooth over many facets, but no softer than keeps balls out of the object, and with each triangle a wall by
+//! itself, whichever side it shows, so that E has no jumps where the surface crumples. A step that stalls on the way is left for the
+//! next, whose E is another. At the end of the way contact stiffens in stages as from the rest state, and what is left to do between
+//! the walls as they are is little: stiff balls touch faces, hardly any edges between them.
 
 use super::{EnergySearch, Geometry, Limits, Outcome, contact_energy, foresee};
-use crate::contact::depth::Contact;
 use crate::contact::detection::{Detection, Walls};
 use crate::contact::model::Model;
 use crate::contact::pins::Release;
+use crate::contact::surface;
 use crate::contact::trust_region::Care;
-use crate::tolerances::{APPROACH_STEPS, GENTLE_STIFFNESS, KINK_ROUNDS, RETREATS, STAGE_TOLERANCE};
+use crate::tolerances::{
+    APPROACH_STEPS, CONTINUATION_FACTOR, GENTLE_DEPTH, GENTLE_STIFFNESS, KINK_ROUNDS, RETREATS, STAGE_TOLERANCE,
+};
 use glam::DVec3;
 
 impl EnergySearch {
     /// Searches on each way in from outside until one ends balanced, with proxy nodes in the end at `nodes` [m]; `outcome` is that of
-    /// the search from the rest state.
+    /// the search from the rest state. An equilibrium that stores more than the rest state is none.
     pub(super) fn search_from_outside(
         &mut self,
         model: &Model,
@@ -31,15 +34,24 @@ impl EnergySearch {
         outcome: &mut Outcome,
     ) {
         self.take_care(Care::Thorough, detection);
+        self.start(model, detection, Geometry::Deformed);
+        let at_rest = contact_energy(&self.state.contacts, model.kc);
+        let deepest = self.state.contacts.iter().max_by(|a, b| a.depth.total_cmp(&b.depth));
+        let normal = deepest.map_or(DVec3::ZERO, |contact| contact.normal);
+        let outward = surface::unit_or_zero(detection.nodes().iter().sum());
         // Balls that span several facets hardly ever come in otherwise than gently.
-        let gently_first = model.chain.nodes.iter().any(|node| node.radius > model.mean_edge);
-        let ways = if gently_first { [Walls::Each, Walls::All] } else { [Walls::All, Walls::Each] };
-        for walls in ways {
+        let ways = if model.chain.nodes.iter().any(|node| node.radius > model.mean_edge) {
+            [(Walls::Each, outward), (Walls::Each, normal)]
+        } else {
+            [(Walls::All, normal), (Walls::Each, outward)]
+        };
+        for (walls, direction) in ways {
             let before = outcome.iterations;
-            *outcome = self.approach(model, detection, nodes, walls);
+            *outcome = self.approach(model, detection, nodes, walls, direction);
             if !outcome.converged && model.blending == 0.0 {
                 self.rest_on_kinks(model, detection, outcome);
             }
+            outcome.converged &= self.state.energy <= at_rest;
             outcome.iterations += before;
             if outcome.converged {
                 break;
@@ -59,20 +71,23 @@ impl EnergySearch {
         self.take_trial(model, detection, Geometry::Deformed);
     }
 
-    /// Searches along the way in from outside, with proxy nodes in the end at `nodes` [m]; gently, where each triangle is to be a wall.
-    /// An equilibrium that stores more than the rest state is none.
-    fn approach(&mut self, model: &Model, detection: &mut Detection, nodes: &[DVec3], walls: Walls) -> Outcome {
+    /// Searches along the way in from outside, out along `direction`, with proxy nodes in the end at `nodes` [m]; gently, where each
+    /// triangle is to be a wall.
+    fn approach(
+        &mut self,
+        model: &Model,
+        detection: &mut Detection,
+        nodes: &[DVec3],
+        walls: Walls,
+        direction: DVec3,
+    ) -> Outcome {
         let gently = walls == Walls::Each;
-        self.last_kc = model.kc;
         let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
-        self.start(model, detection, Geometry::Deformed);
-        let at_rest = contact_energy(&self.state.contacts, model.kc);
-        let deepest = self.state.contacts.iter().max_by(|a, b| a.depth.total_cmp(&b.depth));
-        let Some(&Contact { normal, .. }) = deepest else { return outcome };
+        detection.take_up(model, nodes);
         let mut moved = nodes.to_vec();
         let mut move_out = |detection: &mut Detection, way: f64| {
             for (moved, node) in moved.iter_mut().zip(nodes) {
-                *moved = *node + normal * way;
+                *moved = *node + direction * way;
             }
             detection.take_up(model, &moved);
         };
@@ -89,15 +104,29 @@ impl EnergySearch {
         self.walls = walls;
         self.kc = if gently { model.kc.min(GENTLE_STIFFNESS / model.softest) } else { model.kc };
         self.last_kc = self.kc;
-        let limits = |tolerance: f64| Limits { tolerance, iterations: model.contact.max_iterations };
+        let iterations = model.contact.max_iterations;
+        let limits = |tolerance: f64| Limits { tolerance, iterations };
+        let in_passing = |outcome: &Outcome| Limits {
+            tolerance: STAGE_TOLERANCE,
+            iterations: iterations.min(outcome.iterations + iterations / (2 * APPROACH_STEPS)),
+        };
         for step in (0..APPROACH_STEPS).rev() {
             move_out(detection, way * f64::from(step) / f64::from(APPROACH_STEPS));
             std::mem::swap(&mut self.state.contacts, &mut self.trial.contacts);
             let Self { state, trial, kc, .. } = self;
             detection.deformed(model, &state.displacement, &state.positions, walls, &mut state.contacts);
             foresee(&mut state.contacts, &trial.contacts, |before, _| *kc * before.depth);
-            let tolerance = if step == 0 && !gently { model.contact.tolerance } else { STAGE_TOLERANCE };
-            self.descend(model, detection, Geometry::Deformed, limits(tolerance), &mut outcome);
+            if gently {
+                self.descend(model, detection, Geometry::Deformed, in_passing(&outcome), &mut outcome);
+                while self.kc < model.kc && self.is_sunk(model) {
+                    self.kc = model.kc.min(CONTINUATION_FACTOR * self.kc);
+                    self.last_kc = self.kc;
+                    self.descend(model, detection, Geometry::Deformed, in_passing(&outcome), &mut outcome);
+                }
+            } else {
+                let tolerance = if step == 0 { model.contact.tolerance } else { STAGE_TOLERANCE };
+                self.descend(model, detection, Geometry::Deformed, limits(tolerance), &mut outcome);
+            }
         }
         if gently {
             self.last_kc = model.kc;
@@ -107,8 +136,15 @@ impl EnergySearch {
             self.renew(model, detection);
             self.descend(model, detection, Geometry::Deformed, limits(model.contact.tolerance), &mut outcome);
         }
-        outcome.converged &= self.state.energy <= at_rest;
         outcome
+    }
+
+    /// Whether a ball has sunk in farther than a gentle approach lets it.
+    fn is_sunk(&self, model: &Model) -> bool {
+        self.state.contacts.iter().any(|contact| {
+            let radius = model.chain.nodes[contact.proxy_node as usize].radius;
+            radius > 0.0 && contact.depth > GENTLE_DEPTH * radius
+        })
     }
 
     /// Goes on from where a search has stalled, with balls held on the kinks that they have come to. An equilibrium that stores more
