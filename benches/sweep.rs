@@ -18,13 +18,21 @@ use haptize::{
     scene::{Algorithm, JointKind, Scene, Shape},
 };
 use serde_json::json;
-use std::{collections::BTreeMap, error::Error, path::Path, process::Command, time::Instant};
+use std::{
+    collections::BTreeMap,
+    error::Error,
+    path::Path,
+    process::Command,
+    time::{Duration, Instant},
+};
 
 /// The peer solves every so many-th configuration: enough to know its rate to some percent.
 const PEER_STRIDE: usize = 16;
 
-/// Everything is timed so many times, the peer as well, and the fastest counts: a busy machine slows some down.
+/// Everything is timed so many times, the peer as well, and the fastest counts: a busy machine slows some down. Sweeps are timed for
+/// as long as the peer's turns take, since machines that lend their cores change their speed within seconds.
 const TURNS: usize = 7;
+const SWEEPS_LAST: Duration = Duration::from_secs(2);
 
 /// Torques agree if they differ by less than this share of the greatest.
 const AGREEMENT: f64 = 1e-6;
@@ -72,8 +80,9 @@ struct Sweep {
 }
 
 fn fastest(scene: &Scene) -> Result<Sweep, Box<dyn Error>> {
+    let began = Instant::now();
     let mut fastest = rate(scene)?;
-    for _ in 1..TURNS {
+    while began.elapsed() < SWEEPS_LAST {
         let sweep = rate(scene)?;
         if sweep.rate > fastest.rate {
             fastest = sweep;
