@@ -158,7 +158,9 @@ fn what_is_not_named_takes_no_memory() {
     assert_eq!(stiffening - none, object.stiffness.blocks.len() * (size_of::<glam::DMat3>() + size_of::<f64>()));
     // Without dynamics neither velocities nor a second factor.
     assert_eq!(bytes(&GraphicsEffects { quasi_static: true, ..NONE }), vectors(2));
-    assert_eq!(none, vectors(3) + object.factor.bytes());
+    // Isotropic springs are multiplied with one number a block.
+    let scales = object.stiffness.blocks.len() * size_of::<f64>();
+    assert_eq!(none, vectors(3) + object.factor.bytes() + scales);
     // Smoothing lives where the forces are made, and nowhere else.
     assert_eq!(bytes(&GraphicsEffects { smoothing: Some(0.1), ..NONE }), none);
 }

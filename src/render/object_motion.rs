@@ -172,7 +172,7 @@ impl<'object> ObjectMotion<'object> {
                     Some(scales) => stiffness.force_by_scales(scales, node, displacement),
                     None => stiffness.force_on(node, displacement),
                 };
-                *right += momentum - held;
+                *right = *right + momentum - held;
             }
             if let Some(stiffening) = stiffening {
                 *right += stiffening.relief_on(node, displacement);
