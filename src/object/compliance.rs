@@ -5,7 +5,7 @@
 //! object: one factorisation, then one solve a column, in blocks of columns on all cores.
 //!
 //! Where springs and ground are isotropic C = c (x) I: a force moves every node along itself, and one number a pair of nodes is all
-//! there is to store and to multiply with, a ninth of the blocks' nine.
+//! there is to store and to multiply with, instead of nine.
 
 use super::{Factor, Object, ObjectError};
 use glam::{DMat3, DVec3};
