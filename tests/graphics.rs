@@ -82,6 +82,35 @@ fn energy_never_rises_beyond_the_work_done_for_stiff_springs_and_any_frame_time(
     }
 }
 
+/// Objects so large that their frames are shared out among threads: each step solves the equation of the integrator.
+#[test]
+fn frames_that_threads_share_solve_their_equation() {
+    let period = 1.0 / 60.0;
+    for (kind, rings) in [(SpringKind::Isotropic, 150), (SpringKind::Axial, 60)] {
+        let object = sphere(kind, 300.0, rings);
+        assert!(object.factor.is_shared(), "{kind:?}: {} B are too few", object.factor.bytes());
+        let nodes = object.rest.len();
+        let gravity = GraphicsEffects { gravity: Some(GRAVITY), ..NONE };
+        let mut motion = ObjectMotion::new(&object, period, &gravity).unwrap();
+        for frame in 0..3 {
+            let (u, v) = (motion.displacement().to_vec(), motion.velocity().to_vec());
+            let forces = push(nodes, frame, 1e-3);
+            let v_hat = motion.step(&forces);
+            let [mut held, mut bent] = [vec![DVec3::ZERO; nodes], vec![DVec3::ZERO; nodes]];
+            object.stiffness.apply(&u, &mut held);
+            object.stiffness.apply(v_hat, &mut bent);
+            let (mut left, mut size) = (0.0f64, 0.0f64);
+            for k in 0..nodes {
+                let mass = object.mass[k];
+                let given = (2.0 * mass / period) * v[k] - held[k] + forces[k] + mass * GRAVITY;
+                let taken = (2.0 * mass / period + object.damping[k]) * v_hat[k] + 0.5 * period * bent[k];
+                (left, size) = (left.max((given - taken).length()), size.max(given.length()));
+            }
+            assert!(size > 1e-3 && left < 1e-10 * size, "{kind:?}, frame {frame}: {left} of {size}");
+        }
+    }
+}
+
 #[test]
 fn under_gravity_the_object_hangs_by_its_compliance_and_stays_there() {
     let object = sphere(SpringKind::Isotropic, 300.0, 8);
