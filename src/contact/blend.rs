@@ -228,10 +228,11 @@ pub fn reach(model: &Model, distance: f64, spread: f64) -> f64 {
     (distance * distance + spread * model.blending * model.blending).sqrt()
 }
 
-/// Whether two neighbours in a list of contacts are rows of one depth.
+/// Whether two neighbours in a list of contacts are rows of one depth, or walls of one ball.
 #[must_use]
 pub fn together(a: &Contact, b: &Contact) -> bool {
-    a.part.is_some() && b.part.is_some() && a.proxy_node == b.proxy_node
+    let alike = (a.part.is_some() && b.part.is_some()) || (a.wall.is_some() && b.wall.is_some());
+    alike && a.proxy_node == b.proxy_node
 }
 
 /// How often the spring of a depth counts.
@@ -362,6 +363,9 @@ pub fn freeze(rows: &mut [Contact]) {
     for row in rows {
         // The gradients belong to the first derivative too, where there is stretch.
         row.curvature = Curvature { gradients: row.curvature.gradients, ..Curvature::default() };
+        if let Some(wall) = &mut row.wall {
+            wall.freeze();
+        }
         match &mut row.part {
             Some(part) => part.scale = 0.0,
             None => row.curvature = Curvature::default(),

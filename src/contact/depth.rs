@@ -30,12 +30,11 @@ pub struct Contact {
     pub nodes: [u32; 3],
     /// Barycentric weights of p; exactly zero for nodes that the feature does not touch.
     pub weights: [f64; 3],
-    /// Outward unit direction N.
+    /// Outward direction N, of length one, but of walls as their rounding has it.
     pub normal: DVec3,
     /// r + s, or the smooth depth of [`super::blend`]; positive in contact [m].
     pub depth: f64,
-    /// How often the spring counts: one, or what [`super::features`] says of nodes with a radius, or what a smooth depth changes
-    /// by with the row's own distance.
+    /// How often the spring counts: one, or what a smooth depth changes by with the row's own distance.
     pub share: f64,
     /// What a smooth depth changes by with the logarithm of the triangle's area, else zero; see [`super::blend`] [m].
     pub stretch: f64,
@@ -45,6 +44,8 @@ pub struct Contact {
     pub multiplier: f64,
     /// Second derivative of s.
     pub curvature: Curvature,
+    /// How it bends and what it bears, where it is one of a ball's walls; see [`super::walls`].
+    pub wall: Option<super::walls::Wall>,
 }
 
 /// How s bends under displacements of the object's nodes; see the file's head.
@@ -118,6 +119,9 @@ pub fn face_gradients(corners: [DVec3; 3]) -> [DVec3; 3] {
 #[must_use]
 pub fn second_variation(contact: &Contact, v: [DVec3; 3]) -> [DVec3; 3] {
     let Contact { weights, normal, curvature, .. } = contact;
+    if let Some(wall) = &contact.wall {
+        return wall.second_variation(*weights, *normal, v);
+    }
     let mut dp = DVec3::ZERO;
     let mut turn = DVec3::ZERO;
     for j in 0..3 {
@@ -147,6 +151,13 @@ pub fn stiffness_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3
 }
 
 impl Contact {
+    /// What it bears, over kc: the depth, or of a wall its part of the ball's [m].
+    #[inline]
+    #[must_use]
+    pub fn bears(&self) -> f64 {
+        self.wall.as_ref().map_or(self.depth.max(0.0), |wall| wall.push)
+    }
+
     /// A spring of its own on the feature that [`measure`] found.
     #[inline]
     #[must_use]
@@ -163,6 +174,7 @@ impl Contact {
             part: None,
             multiplier: 0.0,
             curvature,
+            wall: None,
         }
     }
 

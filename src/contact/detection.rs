@@ -11,11 +11,12 @@ use super::blend::{self, Blend};
 use super::closest_point::{ClosestPoint, Feature, closest_point, point_at};
 use super::deformation::Deformation;
 use super::depth::{Contact, measure};
-use super::features::{Features, Felt};
 use super::model::Model;
+use super::series::share_out;
 use super::surface;
 use super::trust_region::Care;
-use crate::tolerances::{BLEND_SPREAD, KNOWN_WALLS};
+use super::walls::{WallSearch, wall};
+use crate::tolerances::{BLEND_SPREAD, FACET_ROUNDING, KNOWN_WALLS, WALL_COMPLIANCE};
 use glam::DVec3;
 
 /// Where a proxy node stands at rest, and what is known of it since.
@@ -82,12 +83,24 @@ impl Closest {
 pub enum Walls {
     /// The closest one.
     Closest,
-    /// All that it feels: within its radius (see [`super::features`]), or where facets are blended what is near it (see
+    /// All that it feels: within its radius (see [`super::walls`]), or where facets are blended what is near it (see
     /// [`super::blend`]).
     All,
-    /// The same, but where facets are sharp each triangle pushes by itself, however they join and to whichever side it faces: E is
-    /// continuous however they fold, as long as no centre is inside.
-    Each,
+}
+
+/// What a ball feels whose centre is inside the object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Inner {
+    /// The nearest wall alone: E jumps where the centre passes the surface near an edge, but nothing holds the ball inside.
+    Alone,
+    /// The nearest among the others, which it feels as from outside: E is continuous, and has minima more than there need be.
+    Among,
+}
+
+/// Distance within which walls of a ball matter whose nearest is at `least`: those that may bear (see [`super::series`]), and those that
+/// may be the next that do [m].
+fn reach(radius: f64, least: f64) -> f64 {
+    least + WALL_COMPLIANCE * (radius - least).max(0.0) + KNOWN_WALLS * radius
 }
 
 /// Detection for one thread: node positions of the current configuration and reusable lists.
@@ -96,10 +109,13 @@ pub struct Detection {
     nodes: Vec<DVec3>,
     standings: Vec<Standing>,
     deformation: Deformation,
-    /// Whether walls that a ball does not touch yet are listed, and its side is made sure of.
+    /// Whether a ball's side is made sure of.
     pub care: Care,
+    /// What balls feel whose centres are inside.
+    pub inner: Inner,
     /// Of the node at hand.
-    features: Features,
+    walls: WallSearch,
+    pushes: Vec<f64>,
     blend: Blend,
     /// Of a point at rest.
     rows: Vec<Contact>,
@@ -115,7 +131,9 @@ impl Detection {
             standings: vec![Standing::default(); count],
             deformation: Deformation::new(model),
             care: Care::Quick,
-            features: Features::default(),
+            inner: Inner::Among,
+            walls: WallSearch::default(),
+            pushes: Vec::new(),
             blend: Blend::default(),
             rows: Vec::new(),
         }
@@ -263,18 +281,27 @@ impl Detection {
                 closest.consider(x, positions, triangles, likely);
             }
             let feels = walls != Walls::Closest && radius > 0.0 && !smooth;
-            let known = if self.care == Care::Thorough { KNOWN_WALLS * radius } else { radius };
-            let felt = if feels { known * known } else { 0.0 };
-            self.features.clear();
+            // Squared distance within which triangles are looked for.
+            let within = |closest: &Closest| {
+                if feels {
+                    let least = (closest.distance_squared * (1.0 + FACET_ROUNDING)).sqrt();
+                    reach(radius, least).powi(2)
+                } else {
+                    closest.distance_squared
+                }
+            };
+            self.walls.clear();
             if feels || moved != 0.0 {
-                self.deformation.search(model, positions, x, closest.distance_squared.max(felt), |triangle| {
+                self.deformation.search(model, positions, x, within(&closest), |triangle| {
                     if feels || triangle != likely {
-                        let (point, distance_squared) = closest.consider(x, positions, triangles, triangle);
-                        if distance_squared < felt {
-                            self.features.push(triangle, point);
+                        let (_, distance_squared) = closest.consider(x, positions, triangles, triangle);
+                        let within = within(&closest);
+                        if feels && distance_squared <= within {
+                            self.walls.push(triangle);
                         }
+                        return within;
                     }
-                    closest.distance_squared.max(felt)
+                    within(&closest)
                 });
             }
             standing.last = closest.triangle;
@@ -310,33 +337,22 @@ impl Detection {
             if !standing.watched {
                 continue;
             }
-            let topology = &model.object.topology;
-            let felt = self.features.gather(x, known, positions, triangles, topology, walls == Walls::All);
-            let touched = |felt: &&Felt| felt.share > 0 && felt.distance < radius;
-            let inner = felt.iter().filter(touched).filter(|felt| !felt.outer);
-            let inner = inner.min_by(|a, b| a.distance.total_cmp(&b.distance));
-            let outer = felt.iter().filter(touched).any(|felt| felt.outer);
-            let beyond = felt.iter().any(|felt| felt.outer && felt.share > 0);
-            let wall = |felt: &Felt| {
-                let nodes = triangles[felt.triangle as usize];
-                let ClosestPoint { weights, feature } = felt.point;
-                let measured = measure(x, radius, surface::corners(positions, nodes), weights, feature, felt.normal);
-                Contact { share: felt.share.into(), ..Contact::new(i as u32, nodes, weights, measured) }
-            };
-            let inside = || surface::winding_number(positions, triangles, x) > 0.5;
-            if walls == Walls::Each && contact.depth > radius && inside() {
+            if !feels {
                 contacts.push(contact);
                 continue;
             }
-            match inner {
-                // Between two walls, one of them seen from inside: the closer one need not be the one that decides.
-                Some(inner) if outer && inside() => contacts.push(wall(inner)),
-                _ if outer || (beyond && contact.depth <= 0.0) => {}
-                // Where deformation has folded the surface over itself, the closest feature need not know the side.
-                _ if self.care == Care::Thorough && feels && contact.depth > radius && !inside() => {}
-                _ => contacts.push(contact),
+            let (facets, nearest) = self.walls.find(x, |least| reach(radius, least), positions, triangles);
+            // Where deformation has folded the surface over itself, the closest feature need not know the side.
+            let inside = contact.depth > radius
+                && (self.care == Care::Quick || surface::winding_number(positions, triangles, x) > 0.5);
+            let first = contacts.len();
+            let alone = inside && self.inner == Inner::Alone;
+            for (k, facet) in facets.iter().enumerate().filter(|&(k, _)| !alone || k == nearest) {
+                let nodes = triangles[facet.triangle as usize];
+                let place = (nodes, surface::corners(positions, nodes));
+                contacts.push(wall((i as u32, x, radius), place, facet.point, inside && k == nearest, contact.normal));
             }
-            contacts.extend(felt.iter().filter(|felt| felt.outer).map(wall));
+            share_out(&mut contacts[first..], &mut self.pushes);
         }
     }
 

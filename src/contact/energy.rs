@@ -20,9 +20,9 @@ mod outside;
 use super::NodeForce;
 use super::blend::{self, strength, together};
 use super::depth::Contact;
-use super::detection::{Detection, Walls};
+use super::detection::{Detection, Inner, Walls};
 use super::model::Model;
-use super::pins::Pins;
+use super::series::share_out;
 use super::support::{Support, dot, root};
 use super::trust_region::{Care, Springs, Step, TrustRegion, add_contact_forces};
 use crate::tolerances::{
@@ -100,10 +100,6 @@ pub struct EnergySearch {
     /// Contact stiffness of the current stage, and of the last [N/m].
     kc: f64,
     last_kc: f64,
-    /// Walls that balls feel on a deformed surface.
-    walls: Walls,
-    /// Balls held on kinks.
-    pins: Pins,
     slots: Vec<[usize; 3]>,
     contact_forces: Vec<f64>,
     /// r = c - f [N], and C r [m].
@@ -134,8 +130,6 @@ impl EnergySearch {
             slots: Vec::new(),
             kc: 0.0,
             last_kc: 0.0,
-            walls: Walls::All,
-            pins: Pins::default(),
             contact_forces: Vec::new(),
             residual: Vec::new(),
             product: Vec::new(),
@@ -148,11 +142,48 @@ impl EnergySearch {
 
     /// The equilibrium of the configuration that `detection` has taken up, with proxy nodes at `nodes` [m] in the world.
     pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry, nodes: &[DVec3]) -> Outcome {
+        detection.inner = Inner::Alone;
         let mut outcome = self.search_from_rest(model, detection, geometry);
-        if outcome.converged || geometry == Geometry::Frozen {
+        detection.inner = Inner::Among;
+        if geometry == Geometry::Frozen || (outcome.converged && !self.is_inside(model)) {
+            return outcome;
+        }
+        if Self::has_balls(model) {
+            outcome = self.go_on(model, detection, outcome);
+        }
+        if outcome.converged {
             return outcome;
         }
         self.search_from_outside(model, detection, nodes, &mut outcome);
+        outcome
+    }
+
+    /// Whether the proxy has balls.
+    fn has_balls(model: &Model) -> bool {
+        model.chain.nodes.iter().any(|node| node.radius > 0.0)
+    }
+
+    /// Whether a ball's centre is inside the object.
+    fn is_inside(&self, model: &Model) -> bool {
+        let radius = |row: &Contact| model.chain.nodes[row.proxy_node as usize].radius;
+        self.state.contacts.iter().any(|row| row.wall.is_some() && row.depth > radius(row))
+    }
+
+    /// Goes on where balls have felt the nearest wall alone inside: from the equilibrium found, or if there is none or no way on, from the
+    /// rest state.
+    fn go_on(&mut self, model: &Model, detection: &mut Detection, mut outcome: Outcome) -> Outcome {
+        if outcome.converged {
+            self.trial.forces.clone_from(&self.state.forces);
+            self.take_trial(model, detection, Geometry::Deformed);
+            let iterations = outcome.iterations + model.contact.max_iterations;
+            let limits = Limits { tolerance: model.contact.tolerance, iterations };
+            self.descend(model, detection, Geometry::Deformed, limits, &mut outcome);
+        }
+        if !outcome.converged {
+            let before = outcome.iterations;
+            outcome = self.search_from_rest(model, detection, Geometry::Deformed);
+            outcome.iterations += before;
+        }
         outcome
     }
 
@@ -210,7 +241,7 @@ impl EnergySearch {
         self.evaluate(model, detection, geometry);
         std::mem::swap(&mut self.state, &mut self.trial);
         for contact in &mut self.state.contacts {
-            contact.multiplier = self.kc * contact.depth.max(0.0);
+            contact.multiplier = self.kc * contact.bears();
         }
     }
 
@@ -301,7 +332,7 @@ impl EnergySearch {
         blend::freeze(frozen);
         // Depths at rest, by the slopes here.
         let here: Vec<f64> = frozen
-            .chunk_by(together)
+            .chunk_by(one_depth)
             .flat_map(|rows| {
                 let change = linear_change(rows, &state.displacement);
                 rows.iter().map(move |row| row.depth - change)
@@ -389,8 +420,8 @@ impl EnergySearch {
         trial.forces.extend(state.forces.iter().zip(&trust_region.force).map(|(f, df)| f + df));
         self.evaluate(model, detection, geometry);
         let Self { state, trial, trust_region, .. } = self;
-        let deepening = &trust_region.deepening;
-        foresee(&mut trial.contacts, &state.contacts, |before, k| self.kc * (before.depth + deepening[k]));
+        let bears = &trust_region.bears;
+        foresee(&mut trial.contacts, &state.contacts, |_, k| self.kc * bears[k]);
     }
 
     /// Displacement, contacts and energy that the trial's forces lead to.
@@ -400,8 +431,7 @@ impl EnergySearch {
         match geometry {
             Geometry::Deformed => {
                 trial.place(model);
-                detection.deformed(model, &trial.displacement, &trial.positions, self.walls, &mut trial.contacts);
-                self.pins.hold(model, self.kc, detection.nodes(), &trial.positions, &mut trial.contacts);
+                detection.deformed(model, &trial.displacement, &trial.positions, Walls::All, &mut trial.contacts);
             }
             Geometry::Frozen => frozen_contacts(&self.frozen, &trial.displacement, &mut trial.contacts),
         }
@@ -418,15 +448,14 @@ impl EnergySearch {
     fn energy_rounding(&self, nodes: &[DVec3]) -> f64 {
         let mut size = self.state.energy;
         for contact in &self.state.contacts {
-            size +=
-                self.kc * contact.share.abs() * contact.depth.max(0.0) * nodes[contact.proxy_node as usize].length();
+            size += self.kc * contact.share.abs() * contact.bears() * nodes[contact.proxy_node as usize].length();
         }
         ENERGY_ROUNDING * size
     }
 }
 
-/// Multipliers as `force` foretells them from the contacts before, by contact and place in the list: of the wall that faces the same
-/// way; zero for a node that was not known. Both lists ascend by proxy node [N].
+/// Multipliers as `force` foretells them from the contacts before, by contact and place in the list: of the same wall, or
+/// the one that faces the same way; zero for a node that was not known. Both lists ascend by proxy node [N].
 fn foresee(contacts: &mut [Contact], before: &[Contact], force: impl Fn(&Contact, usize) -> f64) {
     let mut first = 0;
     for contact in contacts {
@@ -439,7 +468,8 @@ fn foresee(contacts: &mut [Contact], before: &[Contact], force: impl Fn(&Contact
             if before.proxy_node != contact.proxy_node {
                 break;
             }
-            let alike = before.normal.dot(contact.normal);
+            let same = contact.wall.is_some() && before.nodes == contact.nodes;
+            let alike = if same { 2.0 } else { before.normal.dot(contact.normal) };
             if alike > likest {
                 likest = alike;
                 contact.multiplier = force(before, k).max(0.0);
@@ -448,13 +478,16 @@ fn foresee(contacts: &mut [Contact], before: &[Contact], force: impl Fn(&Contact
     }
 }
 
-/// 1/2 kc sum_i depth_i^2 [J].
+/// 1/2 kc sum_i depth_i^2, or of a ball that touches walls what [`super::series`] says [J].
 #[must_use]
 pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
     let mut sum = 0.0;
     for rows in contacts.chunk_by(together) {
-        let depth = rows[0].depth.max(0.0);
-        sum += strength(rows) * depth * depth;
+        sum += if rows[0].wall.is_some() {
+            rows.iter().map(|row| row.bears() * row.depth).sum()
+        } else {
+            strength(rows) * rows[0].bears() * rows[0].bears()
+        };
     }
     0.5 * kc * sum
 }
@@ -462,10 +495,16 @@ pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
 /// Rows of the frozen problem with their depths at `displacement`.
 fn frozen_contacts(rows: &[Contact], displacement: &[f64], contacts: &mut Vec<Contact>) {
     contacts.clear();
-    for rows in rows.chunk_by(together) {
+    for rows in rows.chunk_by(one_depth) {
         let depth = rows[0].depth + linear_change(rows, displacement);
         contacts.extend(rows.iter().map(|row| Contact { depth, ..*row }));
     }
+    share_out(contacts, &mut Vec::new());
+}
+
+/// Whether two neighbours in a list of contacts are rows of one depth.
+fn one_depth(a: &Contact, b: &Contact) -> bool {
+    a.wall.is_none() && together(a, b)
 }
 
 /// By how much `displacement` deepens the frozen rows of one depth [m].

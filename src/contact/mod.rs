@@ -14,18 +14,18 @@ pub(crate) mod detection;
 mod distance_bounds;
 pub(crate) mod energy;
 mod facet_depth;
-mod features;
 mod model;
 mod packet;
 mod paper;
-mod pins;
 mod proximity;
 mod reach;
 mod rows;
+mod series;
 mod solver;
 pub(crate) mod support;
 pub(crate) mod surface;
 mod trust_region;
+pub(crate) mod walls;
 mod wide;
 
 pub use model::Model;
@@ -104,8 +104,8 @@ pub struct NodeForce {
 
 /// One proxy node in contact with one feature of the surface: pushed by `force` at x_i, pushing back on three object nodes.
 ///
-/// Where facets are sharp, a point node has at most one; a node with a radius has one for each wall that it touches, and in a crease
-/// one of opposite sign for the edge between two (`features.rs`). Where they are blended (`blend.rs`), a node has one or two for each
+/// Where facets are sharp, a point node has at most one; a node with a radius has one for each facet that bears it (`walls.rs`,
+/// `series.rs`). Where they are blended (`blend.rs`), a node has one or two for each
 /// triangle near it, and stretches those besides, without a net force. The node's force is their sum.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {

@@ -163,11 +163,11 @@ impl<'a> Solver<'a> {
         let state = &self.energy.state;
         self.displacement.copy_from_slice(&state.displacement);
         equilibrium.energy = state.energy;
-        equilibrium.touches.extend(state.contacts.iter().filter(|c| c.depth > 0.0).map(|contact| Touch {
+        equilibrium.touches.extend(state.contacts.iter().filter(|c| c.bears() > 0.0).map(|contact| Touch {
             proxy_node: contact.proxy_node,
             nodes: contact.nodes,
             weights: contact.weights,
-            force: contact.normal * (self.model.kc * contact.share * contact.depth),
+            force: contact.normal * (self.model.kc * contact.share * contact.bears()),
         }));
         for touch in &equilibrium.touches {
             for (&node, weight) in touch.nodes.iter().zip(touch.weights) {

@@ -21,9 +21,12 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::blend::{RowChange, deepening, strength, together, vary};
-use super::depth::{Contact, stiffness_product};
+use super::depth::{Contact, second_variation, stiffness_product};
+use super::series::{bear, common_change};
 use super::support::{Support, dot, root};
-use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES, STEP_BACK_HALVINGS, THOROUGH_MODEL_PASSES};
+use crate::tolerances::{
+    INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES, STEP_BACK_HALVINGS, THOROUGH_MODEL_PASSES, WALL_COMPLIANCE,
+};
 use glam::DVec3;
 
 /// Contacts, where their nodes are on the support, and their stiffness.
@@ -63,8 +66,10 @@ pub struct Step {
 pub struct TrustRegion {
     /// The step df [N].
     pub force: Vec<f64>,
+    /// What each contact bears after the step, to first order, over kc [m].
+    pub bears: Vec<f64>,
     /// What the step deepens each contact by, to first order [m].
-    pub deepening: Vec<f64>,
+    deepening: Vec<f64>,
     /// The step du = C df on the support [m].
     displacement: Vec<f64>,
     /// The step of the pass before.
@@ -81,11 +86,14 @@ pub struct TrustRegion {
     own: Vec<RowChange>,
     /// Of each depth on the way back: kc times its change, where it starts, and its change.
     springs_on_the_way: Vec<[f64; 3]>,
+    /// Of each wall: where its depth starts, and its change; and how many walls each ball has.
+    walls_on_the_way: Vec<[f64; 2]>,
+    walls: Vec<usize>,
 }
 
 impl TrustRegion {
     /// Step for the residual force r = c(u) - f, given with C r, within `radius`, solved to `tolerance` relative to it in the
-    /// energy norm. The step is left in `self.force`, its effect on the contacts in `self.deepening`.
+    /// energy norm. The step is left in `self.force`, what contacts bear after it in `self.bears`.
     pub fn step(
         &mut self,
         support: &Support,
@@ -152,7 +160,9 @@ impl TrustRegion {
         self.deepening.clear();
         self.deepening.resize(contacts.len(), 0.0);
         self.touching.clear();
-        self.touching.extend(contacts.iter().map(|contact| contact.depth > 0.0));
+        self.touching.extend(contacts.iter().map(|contact| contact.bears() > 0.0));
+        self.bears.clear();
+        self.bears.resize(contacts.len(), 0.0);
     }
 
     /// Goes on from the current step for the contacts that touch, until the residual's squared energy norm is at most
@@ -212,12 +222,34 @@ impl TrustRegion {
     /// solution [J].
     fn assess(&mut self, springs: Springs, residual: &[f64]) -> f64 {
         let mut decrease = dot(&self.displacement, residual) - 0.5 * dot(&self.displacement, &self.force);
-        let Self { deepening: all, displacement, own, .. } = self;
+        let Self { deepening: all, bears, displacement, own, .. } = self;
         springs.for_each_depth(|first, rows| {
             let v = |k: usize| nodes_of(displacement, springs.slots[first + k]);
+            if rows[0].wall.is_some() {
+                let changes = &mut all[first..first + rows.len()];
+                let bears = &mut bears[first..first + rows.len()];
+                for (k, row) in rows.iter().enumerate() {
+                    changes[k] = row.deepening(v(k));
+                    if row.multiplier != 0.0 {
+                        decrease -= 0.5 * row.multiplier * inner(v(k), second_variation(row, v(k)));
+                    }
+                }
+                bear(|k| rows[k].depth + changes[k], bears);
+                let same = rows.iter().zip(&*bears).all(|(row, bears)| (row.bears() > 0.0) == (*bears > 0.0));
+                let stretch = |((row, bears), change): ((&Contact, &f64), &f64)| {
+                    if same {
+                        (bears - row.bears()) * change
+                    } else {
+                        bears * (row.depth + change) - row.bears() * (row.depth + 2.0 * change)
+                    }
+                };
+                decrease -= 0.5 * springs.kc * rows.iter().zip(&*bears).zip(&*changes).map(stretch).sum::<f64>();
+                return;
+            }
             let Contact { depth, multiplier, .. } = rows[0];
             let deepening = deepening(rows, v, own);
             all[first..first + rows.len()].fill(deepening);
+            bears[first..first + rows.len()].fill((depth + deepening).max(0.0));
             let before = depth.max(0.0);
             let after = (depth + deepening).max(0.0);
             // The part of 1/2 kc depth^2 that is of first order is in the residual.
@@ -238,6 +270,9 @@ impl TrustRegion {
     fn step_back(&mut self, springs: Springs, residual: &[f64]) {
         let Self { force, displacement, previous_force, previous_displacement, direction_force, .. } = self;
         let (direction, own, springs_on_the_way) = (&mut self.direction, &mut self.own, &mut self.springs_on_the_way);
+        let (walls_on_the_way, walls, pushes) = (&mut self.walls_on_the_way, &mut self.walls, &mut self.bears);
+        walls_on_the_way.clear();
+        walls.clear();
         for k in 0..force.len() {
             direction_force[k] = force[k] - previous_force[k];
             direction[k] = displacement[k] - previous_displacement[k];
@@ -249,6 +284,20 @@ impl TrustRegion {
         springs.for_each_depth(|first, rows| {
             let before = |k: usize| nodes_of(previous_displacement, springs.slots[first + k]);
             let along = |k: usize| nodes_of(direction, springs.slots[first + k]);
+            if rows[0].wall.is_some() {
+                walls.push(rows.len());
+                for (k, row) in rows.iter().enumerate() {
+                    let change = row.deepening(along(k));
+                    slope += springs.kc * row.bears() * change;
+                    if row.multiplier != 0.0 {
+                        let turned = second_variation(row, along(k));
+                        slope -= row.multiplier * inner(before(k), turned);
+                        bend += row.multiplier * inner(along(k), turned);
+                    }
+                    walls_on_the_way.push([row.depth + row.deepening(before(k)), change]);
+                }
+                return;
+            }
             let Contact { depth, multiplier, .. } = rows[0];
             let start = depth + deepening(rows, before, own);
             vary(rows, before, own, |k, part| slope -= multiplier * inner(along(k), part));
@@ -258,10 +307,18 @@ impl TrustRegion {
             slope += weight * depth.max(0.0);
             springs_on_the_way.push([weight, start, change]);
         });
-        let falls = |t: f64| {
-            let pushes =
-                springs_on_the_way.iter().map(|[weight, start, change]| weight * (start + t * change).max(0.0));
-            slope - bend * t > pushes.sum()
+        let mut falls = |t: f64| {
+            let own = springs_on_the_way.iter().map(|[weight, start, change]| weight * (start + t * change).max(0.0));
+            let mut sum: f64 = own.sum();
+            let mut rest = &walls_on_the_way[..];
+            for &count in walls.iter() {
+                let (walls, others) = rest.split_at(count);
+                rest = others;
+                bear(|k| walls[k][0] + t * walls[k][1], &mut pushes[..count]);
+                let work = walls.iter().zip(&*pushes).map(|([_, change], push)| change * push);
+                sum += springs.kc * work.sum::<f64>();
+            }
+            slope - bend * t > sum
         };
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..STEP_BACK_HALVINGS {
@@ -281,8 +338,8 @@ impl TrustRegion {
     /// Notes which contacts touch at the step; true when that has changed.
     fn retouch(&mut self, contacts: &[Contact]) -> bool {
         let mut changed = false;
-        for (k, contact) in contacts.iter().enumerate() {
-            let touches = contact.depth + self.deepening[k] > 0.0;
+        for k in 0..contacts.len() {
+            let touches = self.bears[k] > 0.0;
             changed |= touches != self.touching[k];
             self.touching[k] = touches;
         }
@@ -294,9 +351,16 @@ impl TrustRegion {
         for k in 0..residual.len() {
             self.residual[k] = residual[k] - self.force[k];
         }
-        let Self { displacement, own, residual, .. } = self;
+        let Self { displacement, own, residual, bears, .. } = self;
         springs.for_each_depth(|first, rows| {
             let v = |k: usize| nodes_of(displacement, springs.slots[first + k]);
+            if rows[0].wall.is_some() {
+                for (k, row) in rows.iter().enumerate() {
+                    let push = springs.kc * (bears[first + k] - row.bears());
+                    add_on_nodes(wall_forces(row, push, v(k)).map(|force| -force), springs.slots[first + k], residual);
+                }
+                return;
+            }
             let Contact { depth, multiplier, .. } = rows[0];
             let push = springs.kc * ((depth + deepening(rows, v, own)).max(0.0) - depth.max(0.0));
             vary(rows, v, own, |k, bend| {
@@ -323,6 +387,19 @@ impl<'a> Springs<'a> {
 fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], own: &mut Vec<RowChange>, product: &mut [f64]) {
     springs.for_each_depth(|first, rows| {
         let multiplier = rows[0].multiplier;
+        if rows[0].wall.is_some() {
+            let v = |k: usize| nodes_of(p, springs.slots[first + k]);
+            let bearing = rows.iter().enumerate().filter(|&(k, _)| touching[first + k]);
+            let common = common_change(bearing.map(|(k, row)| row.deepening(v(k))));
+            for (k, row) in rows.iter().enumerate() {
+                let touches = touching[first + k];
+                if touches || row.multiplier != 0.0 {
+                    let change = if touches { (row.deepening(v(k)) - common) / WALL_COMPLIANCE } else { 0.0 };
+                    add_on_nodes(wall_forces(row, springs.kc * change, v(k)), springs.slots[first + k], product);
+                }
+            }
+            return;
+        }
         if !touching[first] && multiplier == 0.0 {
             return;
         }
@@ -342,10 +419,20 @@ fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], own: &mut
     });
 }
 
+/// What a wall that bears `push` more, bent by displacements `v` of its nodes, resists with at each of them [N].
+fn wall_forces(row: &Contact, push: f64, v: [DVec3; 3]) -> [DVec3; 3] {
+    let straight = row.spread(push);
+    if row.multiplier == 0.0 {
+        return straight;
+    }
+    let bent = second_variation(row, v);
+    [0, 1, 2].map(|j| straight[j] + bent[j] * row.multiplier)
+}
+
 /// Adds the forces of the contact springs on the object's nodes, -kc depth_i w_ij N_i, to `forces` on the support.
 pub fn add_contact_forces(springs: Springs, forces: &mut [f64]) {
     for (contact, &slots) in springs.contacts.iter().zip(springs.slots) {
-        add_on_nodes(contact.spread(-springs.kc * contact.depth.max(0.0)), slots, forces);
+        add_on_nodes(contact.spread(-springs.kc * contact.bears()), slots, forces);
     }
 }
 

@@ -17,11 +17,12 @@ use super::layout::Touch;
 use crate::{
     contact::{
         Model,
-        closest_point::{Feature, closest_point},
+        closest_point::{Feature, closest_point, point_at, rounded},
         depth::{Contact, measure},
         detection::{Detection, Walls},
         support::{Support, dot, root},
         surface::{area_vector, unit_or_zero},
+        walls::wall,
     },
     proxy::Pose,
     tolerances::{GPU_REFINED_RESIDUAL, REFINED, REFINEMENT_PASSES, RESIDUAL_FLOOR},
@@ -173,13 +174,23 @@ impl Refinement {
             let x = pose.nodes[row.proxy_node as usize] - model.centre;
             let corners = [0, 1, 2]
                 .map(|j| model.rest[row.nodes[j] as usize] + DVec3::from_slice(&self.displacement[3 * row.slots[j]..]));
+            let radius = model.chain.nodes[row.proxy_node as usize].radius;
+            if radius > 0.0 {
+                // The kernel has found the side.
+                let (point, _) = rounded(x, corners);
+                let inside = row.normal.dot(x - point_at(corners, point.weights)) < 0.0;
+                let felt = wall((row.proxy_node, x, radius), (row.nodes, corners), point, inside, row.normal);
+                row.normal = felt.normal;
+                row.weights = felt.weights;
+                missing[(k, 0)] = felt.depth - row.force / model.kc;
+                continue;
+            }
             let point = closest_point(x, corners);
             let outward = match point.feature {
                 Feature::Face => unit_or_zero(area_vector(corners)),
                 // The kernel has found the side.
                 Feature::Edge(_) | Feature::Vertex(_) => row.normal,
             };
-            let radius = model.chain.nodes[row.proxy_node as usize].radius;
             let (normal, depth, _) = measure(x, radius, corners, point.weights, point.feature, outward);
             row.normal = normal;
             row.weights = point.weights;
@@ -229,10 +240,9 @@ impl Refinement {
         }
         detection.take_up(model, &pose.nodes);
         detection.deformed(model, &self.surface, &self.positions, Walls::All, &mut self.contacts);
-        let mut touching = self.contacts.iter().filter(|contact| contact.depth > 0.0);
-        let same = self.rows.iter().all(|row| {
-            touching.next().is_some_and(|contact| contact.proxy_node == row.proxy_node && contact.share == 1.0)
-        });
+        let mut touching = self.contacts.iter().filter(|contact| contact.bears() > 0.0);
+        let same =
+            self.rows.iter().all(|row| touching.next().is_some_and(|contact| contact.proxy_node == row.proxy_node));
         same && touching.next().is_none()
     }
 }

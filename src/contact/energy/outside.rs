@@ -3,23 +3,19 @@
 //! The proxy is drawn out, along the normal of its deepest contact, and comes back in steps at full stiffness, each from the
 //! equilibrium before, as a hand would bring it there. On this way a step that E refuses gets a second chance: another step from
 //! where it led, where walls that it did not know of are seen and curved ones stand as they do there. If both together lower E by a
-//! fair share of the first promise, they are taken. Where this fails too, balls that have come to a kink of E are held there
-//! ([`crate::contact::pins`]).
+//! fair share of the first promise, they are taken.
 //!
 //! At last, or at once if a ball is larger than the facets, the proxy comes in gently, from the side on which most of it is: with contact
-//! so soft that E is smooth over many facets, but no softer than keeps balls out of the object, and with each triangle a wall by
-//! itself, whichever side it shows, so that E has no jumps where the surface crumples. A step that stalls on the way is left for the
-//! next, whose E is another. At the end of the way contact stiffens in stages as from the rest state, and what is left to do between
-//! the walls as they are is little: stiff balls touch faces, hardly any edges between them.
+//! so soft that E is smooth over many facets, but no softer than keeps balls out of the object. A step that stalls on the way is left
+//! for the next, whose E is another. At the end of the way contact stiffens in stages as from the rest state.
 
 use super::{EnergySearch, Geometry, Limits, Outcome, contact_energy, foresee};
 use crate::contact::detection::{Detection, Walls};
 use crate::contact::model::Model;
-use crate::contact::pins::Release;
 use crate::contact::surface;
 use crate::contact::trust_region::Care;
 use crate::tolerances::{
-    APPROACH_STEPS, CONTINUATION_FACTOR, GENTLE_DEPTH, GENTLE_STIFFNESS, KINK_ROUNDS, RETREATS, STAGE_TOLERANCE,
+    APPROACH_STEPS, CONTINUATION_FACTOR, GENTLE_DEPTH, GENTLE_STIFFNESS, RETREATS, STAGE_TOLERANCE,
 };
 use glam::DVec3;
 
@@ -41,16 +37,13 @@ impl EnergySearch {
         let outward = surface::unit_or_zero(detection.nodes().iter().sum());
         // Balls that span several facets hardly ever come in otherwise than gently.
         let ways = if model.chain.nodes.iter().any(|node| node.radius > model.mean_edge) {
-            [(Walls::Each, outward), (Walls::Each, normal)]
+            [(true, outward), (true, normal)]
         } else {
-            [(Walls::All, normal), (Walls::Each, outward)]
+            [(false, normal), (true, outward)]
         };
-        for (walls, direction) in ways {
+        for (gently, direction) in ways {
             let before = outcome.iterations;
-            *outcome = self.approach(model, detection, nodes, walls, direction);
-            if !outcome.converged && model.blending == 0.0 {
-                self.rest_on_kinks(model, detection, outcome);
-            }
+            *outcome = self.approach(model, detection, nodes, gently, direction);
             outcome.converged &= self.state.energy <= at_rest;
             outcome.iterations += before;
             if outcome.converged {
@@ -65,23 +58,16 @@ impl EnergySearch {
         detection.care = care;
     }
 
-    /// Finds contacts and energy of the state's forces anew.
-    fn renew(&mut self, model: &Model, detection: &mut Detection) {
-        self.trial.forces.clone_from(&self.state.forces);
-        self.take_trial(model, detection, Geometry::Deformed);
-    }
-
-    /// Searches along the way in from outside, out along `direction`, with proxy nodes in the end at `nodes` [m]; gently, where each
-    /// triangle is to be a wall.
+    /// Searches along the way in from outside, out along `direction`, with proxy nodes in the end at `nodes` [m]; `gently` or at full
+    /// stiffness.
     fn approach(
         &mut self,
         model: &Model,
         detection: &mut Detection,
         nodes: &[DVec3],
-        walls: Walls,
+        gently: bool,
         direction: DVec3,
     ) -> Outcome {
-        let gently = walls == Walls::Each;
         let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
         detection.take_up(model, nodes);
         let mut moved = nodes.to_vec();
@@ -101,7 +87,6 @@ impl EnergySearch {
             move_out(detection, way);
         }
         self.start(model, detection, Geometry::Deformed);
-        self.walls = walls;
         self.kc = if gently { model.kc.min(GENTLE_STIFFNESS / model.softest) } else { model.kc };
         self.last_kc = self.kc;
         let iterations = model.contact.max_iterations;
@@ -114,8 +99,8 @@ impl EnergySearch {
             move_out(detection, way * f64::from(step) / f64::from(APPROACH_STEPS));
             std::mem::swap(&mut self.state.contacts, &mut self.trial.contacts);
             let Self { state, trial, kc, .. } = self;
-            detection.deformed(model, &state.displacement, &state.positions, walls, &mut state.contacts);
-            foresee(&mut state.contacts, &trial.contacts, |before, _| *kc * before.depth);
+            detection.deformed(model, &state.displacement, &state.positions, Walls::All, &mut state.contacts);
+            foresee(&mut state.contacts, &trial.contacts, |before, _| *kc * before.bears());
             if gently {
                 self.descend(model, detection, Geometry::Deformed, in_passing(&outcome), &mut outcome);
                 while self.kc < model.kc && self.is_sunk(model) {
@@ -130,10 +115,6 @@ impl EnergySearch {
         }
         if gently {
             self.last_kc = model.kc;
-            self.descend(model, detection, Geometry::Deformed, limits(STAGE_TOLERANCE), &mut outcome);
-            self.walls = Walls::All;
-            self.kc = model.kc;
-            self.renew(model, detection);
             self.descend(model, detection, Geometry::Deformed, limits(model.contact.tolerance), &mut outcome);
         }
         outcome
@@ -145,57 +126,5 @@ impl EnergySearch {
             let radius = model.chain.nodes[contact.proxy_node as usize].radius;
             radius > 0.0 && contact.depth > GENTLE_DEPTH * radius
         })
-    }
-
-    /// Goes on from where a search has stalled, with balls held on the kinks that they have come to. An equilibrium that stores more
-    /// than the state it stalled at is none.
-    fn rest_on_kinks(&mut self, model: &Model, detection: &mut Detection, outcome: &mut Outcome) {
-        self.kc = model.kc;
-        let stalled = self.state.elastic + contact_energy(&self.state.contacts, self.kc);
-        let iterations = outcome.iterations + model.contact.max_iterations;
-        let limits = Limits { tolerance: model.contact.tolerance, iterations };
-        let mut proved = false;
-        for _ in 0..KINK_ROUNDS {
-            if !outcome.converged && !self.pins.find(model, detection.nodes(), &self.state) {
-                break;
-            }
-            self.renew(model, detection);
-            self.descend(model, detection, Geometry::Deformed, limits, outcome);
-            if !outcome.converged
-                || self.pins.take_over(model, detection.nodes(), &self.state.positions) > limits.tolerance
-            {
-                continue;
-            }
-            let releases = self.pins.prove(model, detection, &self.state);
-            proved = releases.is_empty();
-            if proved {
-                break;
-            }
-            for release in releases {
-                self.let_go(&release);
-            }
-        }
-        let mut pins = std::mem::take(&mut self.pins);
-        self.renew(model, detection);
-        if proved {
-            pins.settle(model, detection.nodes(), &mut self.state);
-        }
-        pins.clear();
-        self.pins = pins;
-        outcome.residual = self.balance(model);
-        outcome.converged = proved && outcome.residual <= limits.tolerance && self.state.energy <= stalled;
-        self.history.clear();
-        self.history.extend(outcome.converged.then_some(stalled));
-        self.history.push(self.state.energy);
-    }
-
-    /// Changes the forces on the object to those beside a kink.
-    fn let_go(&mut self, release: &Release) {
-        for (node, weight) in release.nodes.into_iter().zip(release.weights) {
-            let at = 3 * self.support.add(node);
-            self.state.forces.resize(self.support.order(), 0.0);
-            let parts = (release.force * weight).to_array();
-            self.state.forces[at..at + 3].iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
-        }
     }
 }
