@@ -83,7 +83,7 @@ impl Closest {
 pub enum Walls {
     /// The closest one.
     Closest,
-    /// All that it feels: within its radius (see [`super::walls`]), or where facets are blended what is near it (see
+    /// All that it feels: about as near as the nearest (see [`super::walls`]), or where facets are blended what is near it (see
     /// [`super::blend`]).
     All,
 }
@@ -113,6 +113,8 @@ pub struct Detection {
     pub care: Care,
     /// What balls feel whose centres are inside.
     pub inner: Inner,
+    /// Whether [`Inner::Alone`] has left out a wall, since this was last set to false.
+    pub left_out: bool,
     /// Of the node at hand.
     walls: WallSearch,
     pushes: Vec<f64>,
@@ -132,6 +134,7 @@ impl Detection {
             deformation: Deformation::new(model),
             care: Care::Quick,
             inner: Inner::Among,
+            left_out: false,
             walls: WallSearch::default(),
             pushes: Vec::new(),
             blend: Blend::default(),
@@ -347,6 +350,7 @@ impl Detection {
                 && (self.care == Care::Quick || surface::winding_number(positions, triangles, x) > 0.5);
             let first = contacts.len();
             let alone = inside && self.inner == Inner::Alone;
+            self.left_out |= alone && facets.len() > 1;
             for (k, facet) in facets.iter().enumerate().filter(|&(k, _)| !alone || k == nearest) {
                 let nodes = triangles[facet.triangle as usize];
                 let place = (nodes, surface::corners(positions, nodes));

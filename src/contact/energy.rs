@@ -142,25 +142,19 @@ impl EnergySearch {
 
     /// The equilibrium of the configuration that `detection` has taken up, with proxy nodes at `nodes` [m] in the world.
     pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry, nodes: &[DVec3]) -> Outcome {
-        detection.inner = Inner::Alone;
+        (detection.inner, detection.left_out) = (Inner::Alone, false);
         let mut outcome = self.search_from_rest(model, detection, geometry);
         detection.inner = Inner::Among;
-        if geometry == Geometry::Frozen || (outcome.converged && !self.is_inside(model)) {
+        if geometry == Geometry::Frozen {
             return outcome;
         }
-        if Self::has_balls(model) {
+        if detection.left_out && (!outcome.converged || self.is_inside(model)) {
             outcome = self.go_on(model, detection, outcome);
         }
-        if outcome.converged {
-            return outcome;
+        if !outcome.converged {
+            self.search_from_outside(model, detection, nodes, &mut outcome);
         }
-        self.search_from_outside(model, detection, nodes, &mut outcome);
         outcome
-    }
-
-    /// Whether the proxy has balls.
-    fn has_balls(model: &Model) -> bool {
-        model.chain.nodes.iter().any(|node| node.radius > 0.0)
     }
 
     /// Whether a ball's centre is inside the object.

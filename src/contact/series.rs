@@ -42,6 +42,9 @@ pub fn bear(depth: impl Fn(usize) -> f64, pushes: &mut [f64]) {
 /// Sets what all walls of `contacts` bear at their depths; `pushes` is room for it.
 pub fn share_out(contacts: &mut [Contact], pushes: &mut Vec<f64>) {
     for rows in contacts.chunk_by_mut(together) {
+        if rows[0].wall.is_none() {
+            continue;
+        }
         pushes.clear();
         pushes.resize(rows.len(), 0.0);
         bear(|k| rows[k].depth, pushes);

@@ -45,8 +45,8 @@ pub struct Springs<'a> {
 pub enum Care {
     /// What nearly all configurations converge with.
     Quick,
-    /// What the others need: walls that a ball does not touch yet are known, passes go on to the model's minimum, and a step that
-    /// E refuses gets a second chance.
+    /// What the others need: a ball's side is made sure of, passes go on to the model's minimum, and a step that E refuses gets a
+    /// second chance.
     Thorough,
 }
 
