@@ -4,7 +4,7 @@
 //! 2005, section 5.1.5). The point is returned as barycentric weights, p = sum_k w_k corner_k, because contact spreads
 //! its force by them; weights of corners that the feature does not touch are exactly zero.
 
-use crate::tolerances::{FACET_ROUNDING, MINIMUM_SQUARE, ROUNDING_PASSES};
+use crate::tolerances::{MINIMUM_SQUARE, ROUNDING_PASSES};
 use glam::DVec3;
 
 /// Part of a triangle. Edge k joins corners k and (k + 1) % 3.
@@ -78,18 +78,18 @@ fn closest_lifted(x: DVec3, corners: [DVec3; 3], square: f64) -> ClosestPoint {
     ClosestPoint { weights: [1.0 - weight_b - weight_c, weight_b, weight_c], feature: Feature::Face }
 }
 
-/// The point with the weights w for which |x - p| sqrt(1 + k |w|^2) is least, k = [`FACET_ROUNDING`], and that least value [m]: the
+/// The point with the weights w for which |x - p| sqrt(1 + k |w|^2) is least, k being `rounding`, and that least value [m]: the
 /// closest point lifted by the root of `k |x - p|^2 / (1 + k |w|^2)`, taken at the point itself.
 #[must_use]
-pub fn rounded(x: DVec3, corners: [DVec3; 3]) -> (ClosestPoint, f64) {
+pub fn rounded(x: DVec3, corners: [DVec3; 3], rounding: f64) -> (ClosestPoint, f64) {
     let measure = |point: &ClosestPoint| {
         let [a, b, c] = point.weights;
-        (x.distance_squared(point_at(corners, point.weights)), 1.0 + FACET_ROUNDING * (a * a + b * b + c * c))
+        (x.distance_squared(point_at(corners, point.weights)), 1.0 + rounding * (a * a + b * b + c * c))
     };
     let mut point = closest_point(x, corners);
     for _ in 0..ROUNDING_PASSES {
         let (square, rise) = measure(&point);
-        point = closest_lifted(x, corners, FACET_ROUNDING * square / rise);
+        point = closest_lifted(x, corners, rounding * square / rise);
     }
     let (square, rise) = measure(&point);
     (point, (square * rise).sqrt())

@@ -113,6 +113,8 @@ pub struct Detection {
     pub care: Care,
     /// What balls feel whose centres are inside.
     pub inner: Inner,
+    /// How much facets are rounded for balls [1].
+    pub rounding: f64,
     /// Whether [`Inner::Alone`] has left out a wall, since this was last set to false.
     pub left_out: bool,
     /// Of the node at hand.
@@ -134,6 +136,7 @@ impl Detection {
             deformation: Deformation::new(model),
             care: Care::Quick,
             inner: Inner::Among,
+            rounding: FACET_ROUNDING,
             left_out: false,
             walls: WallSearch::default(),
             pushes: Vec::new(),
@@ -283,11 +286,12 @@ impl Detection {
             if (likely as usize) < triangles.len() {
                 closest.consider(x, positions, triangles, likely);
             }
+            let rounding = self.rounding;
             let feels = walls != Walls::Closest && radius > 0.0 && !smooth;
             // Squared distance within which triangles are looked for.
             let within = |closest: &Closest| {
                 if feels {
-                    let least = (closest.distance_squared * (1.0 + FACET_ROUNDING)).sqrt();
+                    let least = (closest.distance_squared * (1.0 + rounding)).sqrt();
                     reach(radius, least).powi(2)
                 } else {
                     closest.distance_squared
@@ -344,7 +348,7 @@ impl Detection {
                 contacts.push(contact);
                 continue;
             }
-            let (facets, nearest) = self.walls.find(x, |least| reach(radius, least), positions, triangles);
+            let (facets, nearest) = self.walls.find(x, rounding, |least| reach(radius, least), positions, triangles);
             // Where deformation has folded the surface over itself, the closest feature need not know the side.
             let inside = contact.depth > radius
                 && (self.care == Care::Quick || surface::winding_number(positions, triangles, x) > 0.5);
@@ -354,7 +358,8 @@ impl Detection {
             for (k, facet) in facets.iter().enumerate().filter(|&(k, _)| !alone || k == nearest) {
                 let nodes = triangles[facet.triangle as usize];
                 let place = (nodes, surface::corners(positions, nodes));
-                contacts.push(wall((i as u32, x, radius), place, facet.point, inside && k == nearest, contact.normal));
+                let inside = inside && k == nearest;
+                contacts.push(wall((i as u32, x, radius), place, facet.point, inside, contact.normal, rounding));
             }
             share_out(&mut contacts[first..], &mut self.pushes);
         }

@@ -167,11 +167,7 @@ impl EnergySearch {
     /// rest state.
     fn go_on(&mut self, model: &Model, detection: &mut Detection, mut outcome: Outcome) -> Outcome {
         if outcome.converged {
-            self.trial.forces.clone_from(&self.state.forces);
-            self.take_trial(model, detection, Geometry::Deformed);
-            let iterations = outcome.iterations + model.contact.max_iterations;
-            let limits = Limits { tolerance: model.contact.tolerance, iterations };
-            self.descend(model, detection, Geometry::Deformed, limits, &mut outcome);
+            self.descend_anew(model, detection, &mut outcome);
         }
         if !outcome.converged {
             let before = outcome.iterations;
@@ -179,6 +175,15 @@ impl EnergySearch {
             outcome.iterations += before;
         }
         outcome
+    }
+
+    /// Descends from the current state by an E that detection measures otherwise than before.
+    fn descend_anew(&mut self, model: &Model, detection: &mut Detection, outcome: &mut Outcome) {
+        self.trial.forces.clone_from(&self.state.forces);
+        self.take_trial(model, detection, Geometry::Deformed);
+        let iterations = outcome.iterations + model.contact.max_iterations;
+        let limits = Limits { tolerance: model.contact.tolerance, iterations };
+        self.descend(model, detection, Geometry::Deformed, limits, outcome);
     }
 
     /// Searches from the rest state.

@@ -25,7 +25,7 @@ use crate::{
         walls::wall,
     },
     proxy::Pose,
-    tolerances::{GPU_REFINED_RESIDUAL, REFINED, REFINEMENT_PASSES, RESIDUAL_FLOOR},
+    tolerances::{FACET_ROUNDING, GPU_REFINED_RESIDUAL, REFINED, REFINEMENT_PASSES, RESIDUAL_FLOOR},
 };
 use faer::{Mat, Side, prelude::Solve};
 use glam::DVec3;
@@ -177,9 +177,10 @@ impl Refinement {
             let radius = model.chain.nodes[row.proxy_node as usize].radius;
             if radius > 0.0 {
                 // The kernel has found the side.
-                let (point, _) = rounded(x, corners);
+                let (point, _) = rounded(x, corners, FACET_ROUNDING);
                 let inside = row.normal.dot(x - point_at(corners, point.weights)) < 0.0;
-                let felt = wall((row.proxy_node, x, radius), (row.nodes, corners), point, inside, row.normal);
+                let felt =
+                    wall((row.proxy_node, x, radius), (row.nodes, corners), point, inside, row.normal, FACET_ROUNDING);
                 row.normal = felt.normal;
                 row.weights = felt.weights;
                 missing[(k, 0)] = felt.depth - row.force / model.kc;

@@ -7,7 +7,9 @@
 //!
 //! At last, or at once if a ball is larger than the facets, the proxy comes in gently, from the side on which most of it is: with contact
 //! so soft that E is smooth over many facets, but no softer than keeps balls out of the object. A step that stalls on the way is left
-//! for the next, whose E is another. At the end of the way contact stiffens in stages as from the rest state.
+//! for the next, whose E is another. At the end of the way contact stiffens in stages as from the rest state. All along, facets are
+//! rounded more, so that they turn under a ball slowly where they are pressed to slivers; in the end they are as they should be, and a
+//! last descent finds the equilibrium beside.
 
 use super::{EnergySearch, Geometry, Limits, Outcome, contact_energy, foresee};
 use crate::contact::detection::{Detection, Walls};
@@ -15,7 +17,8 @@ use crate::contact::model::Model;
 use crate::contact::surface;
 use crate::contact::trust_region::Care;
 use crate::tolerances::{
-    APPROACH_STEPS, CONTINUATION_FACTOR, GENTLE_DEPTH, GENTLE_STIFFNESS, RETREATS, STAGE_TOLERANCE,
+    APPROACH_STEPS, CONTINUATION_FACTOR, FACET_ROUNDING, GENTLE_DEPTH, GENTLE_ROUNDING, GENTLE_STIFFNESS, RETREATS,
+    STAGE_TOLERANCE,
 };
 use glam::DVec3;
 
@@ -86,6 +89,7 @@ impl EnergySearch {
             way -= gap;
             move_out(detection, way);
         }
+        detection.rounding = if gently { GENTLE_ROUNDING } else { FACET_ROUNDING };
         self.start(model, detection, Geometry::Deformed);
         self.kc = if gently { model.kc.min(GENTLE_STIFFNESS / model.softest) } else { model.kc };
         self.last_kc = self.kc;
@@ -116,6 +120,8 @@ impl EnergySearch {
         if gently {
             self.last_kc = model.kc;
             self.descend(model, detection, Geometry::Deformed, limits(model.contact.tolerance), &mut outcome);
+            detection.rounding = FACET_ROUNDING;
+            self.descend_anew(model, detection, &mut outcome);
         }
         outcome
     }
