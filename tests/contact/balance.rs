@@ -96,7 +96,7 @@ fn balance_and_contact_law_hold_for_nodes_with_a_radius() {
 /// Configurations that once did not converge, and are now approached from outside: rigid balls that start inside the object and
 /// were pressed out of it to different sides, which folded the surface, to E below zero in one; stiff ones that rattled between
 /// facets of which they knew only those that they touched; points whose steps a curved valley of E refused; rigid balls that crumpled
-/// facets finer than themselves, so that some turned over.
+/// facets finer than themselves, so that some turned over, or pressed them to slivers that turn under them too fast.
 #[test]
 fn what_once_did_not_converge_is_balanced() {
     let (isotropic, axial) = (SpringKind::Isotropic, SpringKind::Axial);
@@ -110,6 +110,8 @@ fn what_once_did_not_converge_is_balanced() {
         (20, isotropic, 100.0, false, BALL, f64::INFINITY, [0.2, 0.5], vec![5, 14]),
         (25, axial, 100.0, true, BALL, f64::INFINITY, [0.2, 0.5], vec![2, 5]),
         (25, isotropic, 1e4, false, BALL, 1e6, [0.2, 0.5], vec![5]),
+        (25, isotropic, 1e4, true, BALL, 1e6, [0.2, 0.5], vec![28]),
+        (25, axial, 1e4, false, BALL, 1e6, [0.2, 0.5], vec![27]),
     ] {
         let object = world::sphere(world::Ball { rings, springs, ground, patch }).unwrap();
         let chain = floating_bar(radius);
