@@ -236,7 +236,6 @@ fn torque_is_minus_the_gradient_of_stored_energy() {
             }
         }
         assert!(derivatives.iter().all(|&count| count > 80), "{derivatives:?}");
-        println!("{kinks:?} of {derivatives:?}");
         let rare = if radius == 0.0 { [0.02, 0.02] } else { [0.0, 0.15] };
         let few = (0..2).all(|deep| kinks[deep] as f64 <= rare[deep] * f64::from(derivatives[deep]));
         assert!(few, "{kinks:?} of {derivatives:?} stencils cross a kink");
