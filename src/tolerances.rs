@@ -152,9 +152,9 @@ pub const THOROUGH_MODEL_PASSES: usize = 30;
 /// Halvings in the search for the least energy along a pass [1]: all digits of a share between zero and one.
 pub const STEP_BACK_HALVINGS: u32 = 53;
 
-/// Part e of a ball's compliance 1/kc that lies at each wall it touches [1]: on an edge, where it touches two facets at once, its spring is 5
-/// per cent stiffer than on one, on a vertex of six 9, and never more than 11. Of 29 of the hardest balls on 2,027 nodes 28 converge with 0.1 and
-/// 0.2, 29 with 0.3; with 0.02 the walls' springs are so stiff that conjugate gradients take ten times as long.
+/// Part e of a ball's compliance 1/kc that lies at each wall it touches [1]: on an edge, where it touches two facets at once, its
+/// spring is 5 per cent stiffer than on one, on a vertex of six 9, and never more than 11. Of 29 of the hardest balls on 2,027 nodes
+/// 28 converge with 0.1 and 0.2, 29 with 0.3; with 0.02 the walls' springs are so stiff that conjugate gradients take ten times as long.
 pub const WALL_COMPLIANCE: f64 = 0.1;
 
 /// How much facets are rounded for balls, k in `|x - p| sqrt(1 + k |w|^2)` [1]: a ball of radius r is smaller by k r / 6 (its closest point
@@ -162,12 +162,12 @@ pub const WALL_COMPLIANCE: f64 = 0.1;
 /// 23, 26, 28, 29 and 29 converge with 0, 1e-5, 1e-4, 1e-3 and 1e-2 (and [`WALL_COMPLIANCE`] 0.3).
 pub const FACET_ROUNDING: f64 = 3e-4;
 
-/// Passes in which a rounded closest point is found [1]: each lessens its error by [`FACET_ROUNDING`], and the distance is least there, so
-/// that it feels the square of what is left.
+/// Passes in which a rounded closest point is found [1]: each lessens its error by the rounding, [`GENTLE_ROUNDING`] at most, and the
+/// distance is least there, so that it feels the square of what is left: 1e-12.
 pub const ROUNDING_PASSES: u32 = 3;
 
-/// How far beyond the walls that may bear it a ball knows of others, in radii [1]: they may be the next that do. Without, a rigid ball rattles
-/// between facets: of 100 configurations on 102 nodes (axial springs, Kg 1e4 N/m on a patch, to half a radius deep) 96 converged, with
+/// How far beyond the walls that may bear it a ball knows of others, in radii [1]: they may be the next that do. Without, a rigid ball
+/// rattles between facets: of 100 configurations on 102 nodes (axial springs, Kg 1e4 N/m on a patch, to half a radius deep) 96 converged, with
 /// 0.3 98, while every wall within the radius pushed by itself.
 pub const KNOWN_WALLS: f64 = 0.3;
 
@@ -185,8 +185,9 @@ pub const GENTLE_STIFFNESS: f64 = 100.0;
 /// softest node ([`GENTLE_STIFFNESS`]).
 pub const GENTLE_DEPTH: f64 = 0.1;
 
-/// How much facets are rounded on a gentle approach, [`FACET_ROUNDING`] in the end [1]: of 16 rigid balls on 2,027 nodes (Kg 1e4 N/m, up to
-/// half the object's radius deep) none converges where they are rounded by 3e-4 all along, 13 with 1e-2. With 3e-2 fewer do.
+/// How much facets are rounded on a gentle approach, [`FACET_ROUNDING`] in the end [1]: of 16 balls on 2,027 nodes (Kc 1e6 N/m and
+/// rigid, Kg 1e4 N/m, up to half the object's radius deep) none converges where they are rounded by 3e-4 all along, 13 with 1e-2. Of 80 on
+/// softer ground (Kg 100 N/m) all do with 3e-4 and 1e-2, 79 with 3e-2.
 pub const GENTLE_ROUNDING: f64 = 1e-2;
 
 /// Attempts to find the place outside from which a configuration is approached [1]: each goes on by what is missing to the

@@ -3,9 +3,9 @@
 //! [`super::series`]). So a hollow has several walls and no kink, and crumpled facets push like others.
 //!
 //! Facets are rounded a little: the distance is the least of `|x - p(w)| sqrt(1 + k |w|^2)` over barycentric weights w, with
-//! k = [`crate::tolerances::FACET_ROUNDING`]; while a ball comes in gently, more. Where a facet is pressed to no area, its closest point can be told by many w, and the force may go to any of
-//! its nodes: the distance's derivative in their positions would jump there, and stiff balls come to rest just on such places.
-//! Rounded, it is continuous.
+//! k = [`crate::tolerances::FACET_ROUNDING`]; while a ball comes in gently, more. Where a facet is pressed to no area, its closest point
+//! can be told by many w, and the force may go to any of its nodes: the distance's derivative in their positions would jump there, and
+//! stiff balls come to rest just on such places. Rounded, it is continuous.
 //!
 //! Inside the object the nearest wall is felt from its far side, the depth being r plus the distance.
 

@@ -125,8 +125,8 @@ fn what_once_did_not_converge_is_balanced() {
     }
 }
 
-/// Balls about as soft as the object, pressed in by half their radius and more, near edges and vertices of their own dents, where a depth below
-/// the nearest facet alone has kinks.
+/// Balls about as soft as the object, pressed in by half their radius and more, near edges and vertices of their own dents, where a
+/// depth below the nearest facet alone has kinks.
 #[test]
 fn soft_balls_rest_deep_in_their_dents() {
     let object =

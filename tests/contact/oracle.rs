@@ -222,7 +222,8 @@ pub fn check_account(object: &Object, chain: &Chain, q: &[f64], equilibrium: &Eq
 
 /// Balance and contact law: with u = K^-1 (stored forces), every proxy node's force is kc times its depth below the
 /// displaced surface along the normal there, and the object's nodes carry it by the weights of the closest point. A node with a radius
-/// is a spring in series with one to each facet ([`walls`]). `tolerance` is relative to the largest force; a wall's own spring is stiffer than kc by 1 / WALL_COMPLIANCE.
+/// is a spring in series with one to each facet ([`walls`]). `tolerance` is relative to the largest force; a wall's own spring is
+/// stiffer than kc by 1 / WALL_COMPLIANCE.
 pub fn check_contact_law(
     object: &Object,
     chain: &Chain,
