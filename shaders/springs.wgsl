@@ -1,5 +1,5 @@
 // Contact with facets as they are: the closest one pushes, a spring a contact (twins: src/contact/detection.rs and
-// trust_region.rs). Invocation k keeps contact k. Vectors on the support are in the workgroup's memory.
+// springs.rs). Invocation k keeps contact k. Vectors on the support are in the workgroup's memory.
 
 // A contact as its invocation keeps it.
 alias Spring = Contact;

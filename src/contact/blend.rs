@@ -235,12 +235,6 @@ pub fn together(a: &Contact, b: &Contact) -> bool {
     alike && a.proxy_node == b.proxy_node
 }
 
-/// How often the spring of a depth counts.
-#[must_use]
-pub fn strength(rows: &[Contact]) -> f64 {
-    if rows[0].part.is_some() { 1.0 } else { rows[0].share }
-}
-
 /// What displacements do to one row.
 #[derive(Clone, Copy, Debug)]
 pub struct RowChange {

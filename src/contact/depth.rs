@@ -150,6 +150,17 @@ pub fn stiffness_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3
     [0, 1, 2].map(|j| push * weights[j] + product[j] * bend)
 }
 
+/// What displacements deepen the node by, to first order, `rows` being those of its depth and `v` the displacements of each row's
+/// three nodes [m].
+#[inline]
+#[must_use]
+pub fn first_order(rows: &[Contact], v: impl Fn(usize) -> [DVec3; 3]) -> f64 {
+    match rows {
+        [row] if row.part.is_none() => row.deepening(v(0)),
+        _ => rows.iter().enumerate().map(|(k, row)| row.first_order(v(k))).sum(),
+    }
+}
+
 impl Contact {
     /// What it bears, over kc: the depth, or of a wall its part of the ball's [m].
     #[inline]

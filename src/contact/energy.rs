@@ -1,7 +1,7 @@
 //! The energy form: the minimum of `E(u; q) = 1/2 u^T K u + 1/2 kc sum_i depth_i(u, q)^2` over the displacement u.
 //!
-//! State: the surface forces f on the support A, with u = C f, so that the elastic energy is 1/2 f . u_A. A Newton step on
-//! the trust region ([`super::trust_region`]) is tried, contact is detected anew at the trial, and the step is taken if E
+//! State: the surface forces f on the support A, with u = C f, so that the elastic energy is 1/2 f . u_A. A damped
+//! Newton step ([`super::newton`]) is tried, contact is detected anew at the trial, and the step is taken if E
 //! decreases by a fair share of what the model promised: E never increases. Converged when the contact forces c(u)
 //! balance f: sqrt(r . C r) <= tolerance sqrt(c . C c), r = c - f.
 //!
@@ -18,17 +18,17 @@
 mod outside;
 
 use super::NodeForce;
-use super::blend::{self, strength, together};
-use super::depth::Contact;
+use super::blend::{self, together};
+use super::depth::{Contact, first_order};
 use super::detection::{Detection, Inner, Walls};
 use super::model::Model;
+use super::newton::{Care, Damping, Newton, Step};
 use super::series::share_out;
+use super::springs::{Springs, add_contact_forces};
 use super::support::{Support, dot, root};
-use super::trust_region::{Care, Springs, Step, TrustRegion, add_contact_forces};
 use crate::tolerances::{
-    ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GIVE_UP_RADIUS,
-    GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, SHRINK, STAGE_TOLERANCE,
-    STALLED_RADIUS, WIDEN,
+    ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GIVE_UP_LENGTH,
+    GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, STAGE_TOLERANCE, STALLED_LENGTH,
 };
 use glam::DVec3;
 
@@ -105,7 +105,8 @@ pub struct EnergySearch {
     /// r = c - f [N], and C r [m].
     residual: Vec<f64>,
     product: Vec<f64>,
-    trust_region: TrustRegion,
+    newton: Newton,
+    damping: Damping,
     care: Care,
     /// Rows of the frozen problem, with their depths at rest.
     frozen: Vec<Contact>,
@@ -133,7 +134,8 @@ impl EnergySearch {
             contact_forces: Vec::new(),
             residual: Vec::new(),
             product: Vec::new(),
-            trust_region: TrustRegion::default(),
+            newton: Newton::default(),
+            damping: Damping::default(),
             care: Care::Quick,
             frozen: Vec::new(),
             history: Vec::new(),
@@ -253,16 +255,16 @@ impl EnergySearch {
         limits: Limits,
         outcome: &mut Outcome,
     ) {
-        let mut first_radius = self.begin_stage(model, outcome);
-        let mut radius = first_radius;
+        let mut greatest = self.begin_stage(model, outcome);
+        // Length of the last step, if it was poor.
+        let mut length = greatest;
         while outcome.residual.is_finite() {
-            // An energy below zero, as of a surface turned inside out, has no radius.
-            let stuck = radius.is_nan() || radius < GIVE_UP_RADIUS * first_radius;
-            let stalled = radius < STALLED_RADIUS * first_radius;
+            let stuck = length.is_nan() || length < GIVE_UP_LENGTH * greatest;
+            let stalled = length < STALLED_LENGTH * greatest;
             if self.kc < self.last_kc && (outcome.residual <= STAGE_TOLERANCE || stalled) {
                 self.kc = self.last_kc.min(CONTINUATION_FACTOR * self.kc);
-                first_radius = self.begin_stage(model, outcome);
-                radius = first_radius;
+                greatest = self.begin_stage(model, outcome);
+                length = greatest;
                 continue;
             }
             outcome.converged = self.kc == self.last_kc && outcome.residual <= limits.tolerance;
@@ -270,7 +272,7 @@ impl EnergySearch {
                 break;
             }
             outcome.iterations += 1;
-            let step = self.step(outcome.residual, radius);
+            let step = self.step(outcome.residual);
             self.try_step(model, detection, geometry);
             // Near the solution both decreases drown in rounding, which must not refuse a good step.
             let rounding = self.energy_rounding(detection.nodes());
@@ -283,13 +285,15 @@ impl EnergySearch {
             let on_probation = self.care == Care::Thorough && ratio < ACCEPTED_SHARE && promised > 0.0;
             if on_probation {
                 outcome.iterations += 1;
-                self.correct(model, detection, geometry, step.length);
+                self.correct(model, detection, geometry);
                 ratio = share(&self.trial);
             }
-            if ratio < POOR_SHARE || ratio.is_nan() {
-                radius = SHRINK * step.length;
-            } else if ratio > GOOD_SHARE && step.at_boundary {
-                radius *= WIDEN;
+            if ratio >= POOR_SHARE {
+                self.damping.decrease(ratio > GOOD_SHARE);
+                length = greatest;
+            } else {
+                self.damping.increase();
+                length = step.length;
             }
             if ratio >= ACCEPTED_SHARE {
                 std::mem::swap(&mut self.state, &mut self.trial);
@@ -301,24 +305,26 @@ impl EnergySearch {
         }
     }
 
-    /// The trust region's step from the current state, whose relative residual is `residual`.
-    fn step(&mut self, residual: f64, radius: f64) -> Step {
-        self.trust_region.step(
+    /// The step from the current state, whose relative residual is `residual`.
+    fn step(&mut self, residual: f64) -> Step {
+        let step = self.newton.step(
             &self.support,
             Springs { contacts: &self.state.contacts, slots: &self.slots, kc: self.kc },
             (&self.residual, &self.product),
-            radius,
+            self.damping.multiple,
             residual.clamp(INNER_TOLERANCE_FLOOR, INNER_TOLERANCE),
             self.care,
-        )
+        );
+        self.damping.multiple = step.damping;
+        step
     }
 
     /// Puts in the trial's place what another step leads to from there. The state stays as it is, its balance does not.
-    fn correct(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry, radius: f64) {
+    fn correct(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
         std::mem::swap(&mut self.before, &mut self.state);
         std::mem::swap(&mut self.state, &mut self.trial);
         let residual = self.balance(model);
-        self.step(residual, radius);
+        self.step(residual);
         self.try_step(model, detection, geometry);
         std::mem::swap(&mut self.state, &mut self.before);
     }
@@ -343,12 +349,13 @@ impl EnergySearch {
         frozen_contacts(frozen, &state.displacement, &mut state.contacts);
     }
 
-    /// Takes up a new contact stiffness at the current state; returns the first radius: 1/2 |u|^2 in the energy norm
-    /// never exceeds E, so no iterate leaves a ball of this radius.
+    /// Takes up a new contact stiffness at the current state; returns how far from rest any iterate can be in the energy norm:
+    /// 1/2 |u|^2 never exceeds E.
     fn begin_stage(&mut self, model: &Model, outcome: &mut Outcome) -> f64 {
         self.state.energy = self.state.elastic + contact_energy(&self.state.contacts, self.kc);
         self.history.clear();
         self.history.push(self.state.energy);
+        self.damping = Damping::default();
         outcome.residual = self.balance(model);
         (2.0 * self.state.energy).sqrt()
     }
@@ -412,14 +419,14 @@ impl EnergySearch {
         root(out_of_balance) / root(scale).max(floor).max(RESIDUAL_FLOOR)
     }
 
-    /// The state that the last trust-region step leads to.
+    /// The state that the last Newton step leads to.
     fn try_step(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
-        let Self { state, trial, trust_region, .. } = self;
+        let Self { state, trial, newton, .. } = self;
         trial.forces.clear();
-        trial.forces.extend(state.forces.iter().zip(&trust_region.force).map(|(f, df)| f + df));
+        trial.forces.extend(state.forces.iter().zip(&newton.force).map(|(f, df)| f + df));
         self.evaluate(model, detection, geometry);
-        let Self { state, trial, trust_region, .. } = self;
-        let bears = &trust_region.bears;
+        let Self { state, trial, newton, .. } = self;
+        let bears = &newton.bears;
         foresee(&mut trial.contacts, &state.contacts, |_, k| self.kc * bears[k]);
     }
 
@@ -485,7 +492,7 @@ pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
         sum += if rows[0].wall.is_some() {
             rows.iter().map(|row| row.bears() * row.depth).sum()
         } else {
-            strength(rows) * rows[0].bears() * rows[0].bears()
+            rows[0].bears() * rows[0].bears()
         };
     }
     0.5 * kc * sum
@@ -508,9 +515,5 @@ fn one_depth(a: &Contact, b: &Contact) -> bool {
 
 /// By how much `displacement` deepens the frozen rows of one depth [m].
 fn linear_change(rows: &[Contact], displacement: &[f64]) -> f64 {
-    let moves = |row: &Contact| row.nodes.map(|node| DVec3::from_slice(&displacement[3 * node as usize..]));
-    match rows {
-        [row] if row.part.is_none() => row.deepening(moves(row)),
-        _ => rows.iter().map(|row| row.first_order(moves(row))).sum(),
-    }
+    first_order(rows, |k| rows[k].nodes.map(|node| DVec3::from_slice(&displacement[3 * node as usize..])))
 }

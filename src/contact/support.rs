@@ -112,6 +112,18 @@ impl Support {
         }
     }
 
+    /// What forces on the nodes in some slots displace the support by [m].
+    pub fn respond(&self, forces: &[(usize, [f64; 3])], displacement: &mut [f64]) {
+        let block = self.rows_per_node * self.rows_per_node * self.nodes.len();
+        let loads = forces.iter().map(|&(slot, force)| (slot * block, force));
+        if self.rows_per_node == 1 {
+            weigh(&self.compliance, loads, displacement);
+        } else {
+            displacement.fill(0.0);
+            add_rows(loads.map(|(start, force)| (&self.compliance[start..start + block], force)), displacement);
+        }
+    }
+
     /// `displacement = C forces` on all surface nodes that the compliance covers, zero on others; `forces` are on A.
     pub fn displace(&mut self, compliance: &Compliance, forces: &[f64], displacement: &mut [f64]) {
         let block = compliance.rows_per_node * compliance.order();

@@ -202,7 +202,7 @@ fn constants() -> String {
         ("CONTINUATION_START", tolerances::CONTINUATION_START as f32),
         ("CONTINUATION_FACTOR", tolerances::CONTINUATION_FACTOR as f32),
         ("STAGE_TOLERANCE", tolerances::STAGE_TOLERANCE as f32),
-        ("STALLED_RADIUS", tolerances::STALLED_RADIUS as f32),
+        ("STALLED_RADIUS", tolerances::STALLED_LENGTH as f32),
         ("ENERGY_ROUNDING", tolerances::GPU_ENERGY_ROUNDING),
         ("GIVE_UP_RADIUS", tolerances::GPU_GIVE_UP_RADIUS),
         ("PAPER_INNER_TOLERANCE", tolerances::GPU_PAPER_INNER_TOLERANCE),

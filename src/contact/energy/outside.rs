@@ -14,8 +14,8 @@
 use super::{EnergySearch, Geometry, Limits, Outcome, contact_energy, foresee};
 use crate::contact::detection::{Detection, Walls};
 use crate::contact::model::Model;
+use crate::contact::newton::Care;
 use crate::contact::surface;
-use crate::contact::trust_region::Care;
 use crate::tolerances::{
     APPROACH_STEPS, CONTINUATION_FACTOR, FACET_ROUNDING, GENTLE_DEPTH, GENTLE_ROUNDING, GENTLE_STIFFNESS, RETREATS,
     STAGE_TOLERANCE,

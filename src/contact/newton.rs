@@ -1,9 +1,9 @@
-//! One trust-region Newton step of the energy form, by truncated conjugate gradients (Steihaug 1983, Toint 1981).
+//! One damped Newton step of the energy form (Levenberg 1944, Marquardt 1963), by conjugate gradients.
 //!
 //! The energy along a displacement du = C df of the object, f being the forces that hold the displacement u = C f:
-//! `m(df) = u . df + 1/2 df . C df + 1/2 kc sum_i max(0, depth_i + g_i . du)^2 + 1/2 sum_i lambda_i d2s_i(du, du)`,
-//! on the ball df . C df <= radius^2, with g_i the depth's gradient. Two things make it a better model than the plain second
-//! derivative of the energy, and neither costs a detection:
+//! `m(df) = u . df + 1/2 (1 + mu) df . C df + 1/2 kc sum_i max(0, depth_i + g_i . du)^2 + 1/2 sum_i lambda_i d2s_i(du, du)`,
+//! with g_i the depth's gradient and mu the damping, a multiple of the object's own stiffness: so stiff springs are met first, however
+//! short the step. Two things make it a better model than the plain second derivative of the energy, and neither costs a detection:
 //! - the maximum is kept, so contacts may come and go within a step: a pass of conjugate gradients for the contacts that
 //!   touch is followed by another where the step has changed which do; with [`Care::Thorough`] one that leads uphill is followed
 //!   back to the least energy on its way, so that the passes end at the minimum for any number of contacts;
@@ -11,34 +11,26 @@
 //!   is far too large until the depth has settled (as in sequential quadratic programming). Both agree in the end,
 //!   so convergence stays quadratic.
 //!
-//! Conjugate gradients on H = K + B, B the Hessian of the contact terms, preconditioned by C, keep each search direction
-//! twice, as a force pi and as the displacement p = C pi, so that H p = pi + B p needs no K. One product with C_AA is
-//! spent per iteration, that of the preconditioner; p = z + beta p follows from pi = r + beta pi. B has a rank of at most five per
-//! contact, so few iterations are needed whatever the object's size. Negative curvature and long steps go to the
-//! ball's boundary.
+//! Conjugate gradients on H = (1 + mu) K + B, B the Hessian of the contact terms, preconditioned by what the springs leave of C
+//! ([`super::relief`]), keep each search direction twice, as a force pi and as the displacement p = C pi, so that
+//! H p = (1 + mu) pi + B p needs no K. One product with C_AA is spent per iteration, that of the preconditioner. What it does not know
+//! of B has a rank of at most four per contact and is no stiffer than the object, so few iterations are needed whatever the object's
+//! size and the springs' stiffness. Negative curvature asks for more damping.
 
 // Indexed loops as in the kernel of the same name.
 #![allow(clippy::needless_range_loop)]
 
-use super::blend::{RowChange, deepening, strength, together, vary};
-use super::depth::{Contact, second_variation, stiffness_product};
-use super::series::{bear, common_change};
+use super::blend::{RowChange, deepening, vary};
+use super::depth::{Contact, second_variation};
+use super::relief::Relief;
+use super::series::bear;
+use super::springs::{Springs, add_contact_hessian, add_on_nodes, nodes_of, wall_forces};
 use super::support::{Support, dot, root};
 use crate::tolerances::{
-    INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES, STEP_BACK_HALVINGS, THOROUGH_MODEL_PASSES, WALL_COMPLIANCE,
+    CURVATURE_MARGIN, DAMPING_ATTEMPTS, DAMPING_DECAY, DAMPING_GROWTH, INNER_ITERATIONS_PER_UNKNOWN, LEAST_DAMPING,
+    MODEL_PASSES, STEP_BACK_HALVINGS, THOROUGH_MODEL_PASSES,
 };
 use glam::DVec3;
-
-/// Contacts, where their nodes are on the support, and their stiffness.
-#[derive(Clone, Copy)]
-pub struct Springs<'a> {
-    /// The contacts and near misses.
-    pub contacts: &'a [Contact],
-    /// Slots of each contact's three nodes.
-    pub slots: &'a [[usize; 3]],
-    /// kc [N/m].
-    pub kc: f64,
-}
 
 /// How much is done for a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,20 +42,54 @@ pub enum Care {
     Thorough,
 }
 
+/// How much the model is damped: more from step to step where E refuses them, less where it keeps what they promise (Nielsen 1999).
+#[derive(Clone, Copy, Debug)]
+pub struct Damping {
+    /// mu, zero or [`LEAST_DAMPING`] and more [1].
+    pub multiple: f64,
+    /// What the next refusal multiplies it by.
+    growth: f64,
+}
+
+impl Default for Damping {
+    fn default() -> Self {
+        Self { multiple: 0.0, growth: DAMPING_GROWTH }
+    }
+}
+
+impl Damping {
+    /// After a step that E refused, or that kept too little of its promise.
+    pub fn increase(&mut self) {
+        self.multiple = self.growth * self.multiple.max(LEAST_DAMPING);
+        self.growth *= 2.0;
+    }
+
+    /// After a step that E took; `good` if it kept most of its promise.
+    pub fn decrease(&mut self, good: bool) {
+        self.growth = DAMPING_GROWTH;
+        if good {
+            self.multiple *= DAMPING_DECAY;
+        }
+        if self.multiple < LEAST_DAMPING {
+            self.multiple = 0.0;
+        }
+    }
+}
+
 /// What a step promises.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// Decrease of the energy by the model [J].
+    /// Decrease of the energy by the model without damping; not a number where no damping was enough [J].
     pub predicted: f64,
     /// Length in the energy norm, sqrt(df . C df) [sqrt(J)].
     pub length: f64,
-    /// Whether the ball's boundary stopped it.
-    pub at_boundary: bool,
+    /// The damping mu with which the model is convex [1].
+    pub damping: f64,
 }
 
 /// Vectors on the support, reused from step to step.
 #[derive(Default)]
-pub struct TrustRegion {
+pub struct Newton {
     /// The step df [N].
     pub force: Vec<f64>,
     /// What each contact bears after the step, to first order, over kc [m].
@@ -77,8 +103,15 @@ pub struct TrustRegion {
     previous_displacement: Vec<f64>,
     /// Which contacts touch, in this pass.
     touching: Vec<bool>,
+    /// Times K, what the object resists with: 1 + mu [1].
+    stiffening: f64,
     residual: Vec<f64>,
-    preconditioned: Vec<f64>,
+    /// C times the residual.
+    product: Vec<f64>,
+    relief: Relief,
+    /// The residual preconditioned, as force and as displacement.
+    relieved_force: Vec<f64>,
+    relieved: Vec<f64>,
     direction_force: Vec<f64>,
     direction: Vec<f64>,
     image: Vec<f64>,
@@ -91,35 +124,61 @@ pub struct TrustRegion {
     walls: Vec<usize>,
 }
 
-impl TrustRegion {
-    /// Step for the residual force r = c(u) - f, given with C r, within `radius`, solved to `tolerance` relative to it in the
-    /// energy norm. The step is left in `self.force`, what contacts bear after it in `self.bears`.
+impl Newton {
+    /// Step for the residual force r = c(u) - f, given with C r, damped by `damping` or as much more as makes the model convex, and
+    /// solved to `tolerance` relative to the residual, in the norm of the preconditioner. The step is left in `self.force`, what
+    /// contacts bear after it in `self.bears`.
     pub fn step(
         &mut self,
         support: &Support,
         springs: Springs,
-        (residual, preconditioned): (&[f64], &[f64]),
-        radius: f64,
+        residual: (&[f64], &[f64]),
+        mut damping: f64,
         tolerance: f64,
         care: Care,
     ) -> Step {
+        for _ in 0..DAMPING_ATTEMPTS {
+            self.stiffening = 1.0 + damping;
+            match self.minimise(support, springs, residual, tolerance, care) {
+                Ok(decrease) => {
+                    let square = dot(&self.force, &self.displacement);
+                    return Step { predicted: decrease + 0.5 * damping * square, length: root(square), damping };
+                }
+                Err(lacking) => damping += (lacking + CURVATURE_MARGIN).max(damping),
+            }
+        }
+        Step { predicted: f64::NAN, length: 0.0, damping }
+    }
+
+    /// The least of the damped model, and by how much it is less than at the start [J]; or what damping lacks where it is not convex.
+    fn minimise(
+        &mut self,
+        support: &Support,
+        springs: Springs,
+        (residual, product): (&[f64], &[f64]),
+        tolerance: f64,
+        care: Care,
+    ) -> Result<f64, f64> {
         self.reset(support.order(), springs.contacts);
         self.residual.copy_from_slice(residual);
-        self.preconditioned.copy_from_slice(preconditioned);
-        let stop = tolerance * tolerance * dot(&self.residual, &self.preconditioned);
+        self.product.copy_from_slice(product);
+        let mut stop = 0.0;
         let mut predicted = 0.0;
-        let mut at_boundary = false;
         let mut left = INNER_ITERATIONS_PER_UNKNOWN * support.order();
         let passes = if care == Care::Thorough { THOROUGH_MODEL_PASSES } else { MODEL_PASSES };
         for pass in 0..passes {
             self.previous_force.copy_from_slice(&self.force);
             self.previous_displacement.copy_from_slice(&self.displacement);
-            let mut stopped = self.conjugate_gradients(support, springs, radius, stop, &mut left);
+            self.relief.set_up(support, springs, &self.touching, self.stiffening);
+            self.relieve(springs);
+            if pass == 0 {
+                stop = tolerance * tolerance * dot(&self.residual, &self.relieved);
+            }
+            self.conjugate_gradients(support, springs, stop, &mut left)?;
             let mut decrease = self.assess(springs, residual);
             if care == Care::Thorough && decrease <= predicted {
                 self.step_back(springs, residual);
                 decrease = self.assess(springs, residual);
-                stopped = false;
             }
             if pass > 0 && (decrease <= predicted || decrease.is_nan()) {
                 // Contacts came and went to no avail: the pass before was better.
@@ -129,15 +188,13 @@ impl TrustRegion {
                 break;
             }
             predicted = decrease;
-            at_boundary = stopped;
             if !self.retouch(springs.contacts) {
                 break;
             }
             self.balance(springs, residual);
-            support.multiply(&self.residual, &mut self.preconditioned);
+            support.multiply(&self.residual, &mut self.product);
         }
-        let length = root(dot(&self.force, &self.displacement));
-        Step { predicted, length, at_boundary }
+        Ok(predicted)
     }
 
     /// The zero step, and room for the rest.
@@ -150,7 +207,9 @@ impl TrustRegion {
             &mut self.previous_force,
             &mut self.previous_displacement,
             &mut self.residual,
-            &mut self.preconditioned,
+            &mut self.product,
+            &mut self.relieved_force,
+            &mut self.relieved,
             &mut self.direction_force,
             &mut self.direction,
             &mut self.image,
@@ -165,63 +224,54 @@ impl TrustRegion {
         self.bears.resize(contacts.len(), 0.0);
     }
 
-    /// Goes on from the current step for the contacts that touch, until the residual's squared energy norm is at most
-    /// `stop` or no iterations are `left`; true when the boundary stopped it.
+    /// Goes on from the current step for the contacts that touch, until the preconditioned residual's square is at most `stop` or no
+    /// iterations are `left`; where the model is not convex, ends with what damping lacks, by the direction that shows it.
     fn conjugate_gradients(
         &mut self,
         support: &Support,
         springs: Springs,
-        radius: f64,
         stop: f64,
         left: &mut usize,
-    ) -> bool {
-        self.direction_force.copy_from_slice(&self.residual);
-        self.direction.copy_from_slice(&self.preconditioned);
-        let mut square = dot(&self.residual, &self.preconditioned);
+    ) -> Result<(), f64> {
+        self.direction_force.copy_from_slice(&self.relieved_force);
+        self.direction.copy_from_slice(&self.relieved);
+        let mut square = dot(&self.residual, &self.relieved);
         while *left > 0 && square > stop {
             *left -= 1;
-            self.image.copy_from_slice(&self.direction_force);
+            for k in 0..self.image.len() {
+                self.image[k] = self.stiffening * self.direction_force[k];
+            }
             add_contact_hessian(springs, &self.touching, &self.direction, &mut self.own, &mut self.image);
             let curvature = dot(&self.direction, &self.image);
-            let to_boundary = self.share_to_boundary(radius);
+            if curvature <= 0.0 {
+                return Err(-curvature / dot(&self.direction, &self.direction_force));
+            }
             let share = square / curvature;
-            let inside = curvature > 0.0 && share < to_boundary;
-            let share = if inside { share } else { to_boundary };
             add_scaled(share, &self.direction_force, &mut self.force);
             add_scaled(share, &self.direction, &mut self.displacement);
             add_scaled(-share, &self.image, &mut self.residual);
-            if !inside {
-                return true;
-            }
-            support.multiply(&self.residual, &mut self.preconditioned);
-            let next = dot(&self.residual, &self.preconditioned);
+            support.multiply(&self.residual, &mut self.product);
+            self.relieve(springs);
+            let next = dot(&self.residual, &self.relieved);
             let ratio = next / square;
             square = next;
-            turn(ratio, &self.residual, &mut self.direction_force);
-            turn(ratio, &self.preconditioned, &mut self.direction);
+            turn(ratio, &self.relieved_force, &mut self.direction_force);
+            turn(ratio, &self.relieved, &mut self.direction);
         }
-        false
+        Ok(())
     }
 
-    /// The share of the direction that leads from the current step to the boundary: the positive root t of
-    /// |step + t direction|^2 = radius^2 in the energy norm.
-    fn share_to_boundary(&self, radius: f64) -> f64 {
-        let step_square = dot(&self.force, &self.displacement);
-        let mixed = dot(&self.force, &self.direction);
-        let direction_square = dot(&self.direction_force, &self.direction);
-        if direction_square <= 0.0 {
-            return 0.0;
-        }
-        let left = (radius * radius - step_square).max(0.0);
-        // The form of the root that does not cancel when `mixed` is positive.
-        let root = (mixed * mixed + direction_square * left).sqrt();
-        if mixed > 0.0 { left / (mixed + root) } else { (root - mixed) / direction_square }
+    /// Preconditions the residual.
+    fn relieve(&mut self, springs: Springs) {
+        let Self { relief, residual, product, relieved_force, relieved, .. } = self;
+        relief.apply(springs, (residual, product), relieved_force, relieved);
     }
 
     /// What the step deepens each contact by, g_i . du; returns m(0) - m(df), in differences that do not cancel near the
     /// solution [J].
     fn assess(&mut self, springs: Springs, residual: &[f64]) -> f64 {
-        let mut decrease = dot(&self.displacement, residual) - 0.5 * dot(&self.displacement, &self.force);
+        let own = 0.5 * self.stiffening * dot(&self.displacement, &self.force);
+        let mut decrease = dot(&self.displacement, residual) - own;
         let Self { deepening: all, bears, displacement, own, .. } = self;
         springs.for_each_depth(|first, rows| {
             let v = |k: usize| nodes_of(displacement, springs.slots[first + k]);
@@ -260,15 +310,14 @@ impl TrustRegion {
             };
             let mut bending = 0.0;
             vary(rows, v, own, |k, bend| bending += inner(v(k), bend));
-            let share = strength(rows);
-            decrease -= 0.5 * (share * springs.kc * stretch + multiplier * bending);
+            decrease -= 0.5 * (springs.kc * stretch + multiplier * bending);
         });
         decrease
     }
 
     /// Goes back along the last pass to where the model's energy, quadratic piece by piece on the way, is least.
     fn step_back(&mut self, springs: Springs, residual: &[f64]) {
-        let Self { force, displacement, previous_force, previous_displacement, direction_force, .. } = self;
+        let Self { force, displacement, previous_force, previous_displacement, direction_force, stiffening, .. } = self;
         let (direction, own, springs_on_the_way) = (&mut self.direction, &mut self.own, &mut self.springs_on_the_way);
         let (walls_on_the_way, walls, pushes) = (&mut self.walls_on_the_way, &mut self.walls, &mut self.bears);
         walls_on_the_way.clear();
@@ -278,8 +327,8 @@ impl TrustRegion {
             direction[k] = displacement[k] - previous_displacement[k];
         }
         // The energy falls, at the share t of the way, by slope - bend t - sum_i weight_i max(0, depth_i + change_i t).
-        let mut slope = dot(direction, residual) - dot(direction, previous_force);
-        let mut bend = dot(direction, direction_force);
+        let mut slope = dot(direction, residual) - *stiffening * dot(direction, previous_force);
+        let mut bend = *stiffening * dot(direction, direction_force);
         springs_on_the_way.clear();
         springs.for_each_depth(|first, rows| {
             let before = |k: usize| nodes_of(previous_displacement, springs.slots[first + k]);
@@ -303,7 +352,7 @@ impl TrustRegion {
             vary(rows, before, own, |k, part| slope -= multiplier * inner(along(k), part));
             let change = deepening(rows, along, own);
             vary(rows, along, own, |k, part| bend += multiplier * inner(along(k), part));
-            let weight = springs.kc * strength(rows) * change;
+            let weight = springs.kc * change;
             slope += weight * depth.max(0.0);
             springs_on_the_way.push([weight, start, change]);
         });
@@ -349,7 +398,7 @@ impl TrustRegion {
     /// Residual force of the model at the step.
     fn balance(&mut self, springs: Springs, residual: &[f64]) {
         for k in 0..residual.len() {
-            self.residual[k] = residual[k] - self.force[k];
+            self.residual[k] = residual[k] - self.stiffening * self.force[k];
         }
         let Self { displacement, own, residual, bears, .. } = self;
         springs.for_each_depth(|first, rows| {
@@ -372,77 +421,6 @@ impl TrustRegion {
     }
 }
 
-impl<'a> Springs<'a> {
-    /// Visits the rows of each depth, with the place of the first.
-    fn for_each_depth(self, mut visit: impl FnMut(usize, &'a [Contact])) {
-        let mut first = 0;
-        for rows in self.contacts.chunk_by(together) {
-            visit(first, rows);
-            first += rows.len();
-        }
-    }
-}
-
-/// Adds B p, the product of the Hessian of the contact terms with the displacement `p` on the support, to `product`.
-fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], own: &mut Vec<RowChange>, product: &mut [f64]) {
-    springs.for_each_depth(|first, rows| {
-        let multiplier = rows[0].multiplier;
-        if rows[0].wall.is_some() {
-            let v = |k: usize| nodes_of(p, springs.slots[first + k]);
-            let bearing = rows.iter().enumerate().filter(|&(k, _)| touching[first + k]);
-            let common = common_change(bearing.map(|(k, row)| row.deepening(v(k))));
-            for (k, row) in rows.iter().enumerate() {
-                let touches = touching[first + k];
-                if touches || row.multiplier != 0.0 {
-                    let change = if touches { (row.deepening(v(k)) - common) / WALL_COMPLIANCE } else { 0.0 };
-                    add_on_nodes(wall_forces(row, springs.kc * change, v(k)), springs.slots[first + k], product);
-                }
-            }
-            return;
-        }
-        if !touching[first] && multiplier == 0.0 {
-            return;
-        }
-        let kc = if touching[first] { springs.kc } else { 0.0 };
-        if let [contact] = rows
-            && contact.part.is_none()
-        {
-            let slots = springs.slots[first];
-            return add_on_nodes(stiffness_product(contact, kc, nodes_of(p, slots)), slots, product);
-        }
-        let v = |k: usize| nodes_of(p, springs.slots[first + k]);
-        let push = kc * deepening(rows, v, own);
-        vary(rows, v, own, |k, bend| {
-            let spread = rows[k].spread(push);
-            add_on_nodes([0, 1, 2].map(|j| spread[j] + bend[j] * multiplier), springs.slots[first + k], product);
-        });
-    });
-}
-
-/// What a wall that bears `push` more, bent by displacements `v` of its nodes, resists with at each of them [N].
-fn wall_forces(row: &Contact, push: f64, v: [DVec3; 3]) -> [DVec3; 3] {
-    let straight = row.spread(push);
-    if row.multiplier == 0.0 {
-        return straight;
-    }
-    let bent = second_variation(row, v);
-    [0, 1, 2].map(|j| straight[j] + bent[j] * row.multiplier)
-}
-
-/// Adds the forces of the contact springs on the object's nodes, -kc depth_i w_ij N_i, to `forces` on the support.
-pub fn add_contact_forces(springs: Springs, forces: &mut [f64]) {
-    for (contact, &slots) in springs.contacts.iter().zip(springs.slots) {
-        add_on_nodes(contact.spread(-springs.kc * contact.bears()), slots, forces);
-    }
-}
-
-/// The three nodes' parts of a vector on the support.
-#[inline]
-fn nodes_of(vector: &[f64], [a, b, c]: [usize; 3]) -> [DVec3; 3] {
-    let (nodes, _) = vector.as_chunks();
-    [DVec3::from_array(nodes[a]), DVec3::from_array(nodes[b]), DVec3::from_array(nodes[c])]
-}
-
 /// sum += share * direction.
 fn add_scaled(share: f64, direction: &[f64], sum: &mut [f64]) {
     for (sum, direction) in sum.iter_mut().zip(direction) {
@@ -461,12 +439,87 @@ fn inner(a: [DVec3; 3], b: [DVec3; 3]) -> f64 {
     a[0].dot(b[0]) + a[1].dot(b[1]) + a[2].dot(b[2])
 }
 
-/// Adds one vector for each of three nodes to a vector on the support.
-#[inline]
-fn add_on_nodes(parts: [DVec3; 3], slots: [usize; 3], vector: &mut [f64]) {
-    let (nodes, _) = vector.as_chunks_mut();
-    for (part, slot) in parts.into_iter().zip(slots) {
-        let node: &mut [f64; 3] = &mut nodes[slot];
-        *node = (DVec3::from_array(*node) + part).to_array();
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::springs::add_contact_forces;
+    use crate::contact::springs::samples::{Sample, ball, sample};
+    use crate::scene::SpringKind;
+
+    /// The contact forces at rest, and the step that they lead to with `damping`.
+    fn step(sample: &Sample, kc: f64, damping: f64) -> (Vec<f64>, Vec<f64>, Step) {
+        let order = sample.support().order();
+        let (mut residual, mut product) = (vec![0.0; order], vec![0.0; order]);
+        add_contact_forces(sample.springs(kc), &mut residual);
+        sample.support().multiply(&residual, &mut product);
+        let mut newton = Newton::default();
+        let springs = sample.springs(kc);
+        let step = newton.step(sample.support(), springs, (&residual, &product), damping, 1e-12, Care::Quick);
+        (residual, newton.force, step)
+    }
+
+    fn off(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    /// As long as no spring comes or goes, a step solves (1 + mu) K du + B du = r, curvature included.
+    #[test]
+    fn a_step_solves_the_damped_newton_equation() {
+        for kind in [SpringKind::Isotropic, SpringKind::Axial] {
+            let object = ball(kind);
+            let kc = 30.0;
+            for damping in [0.0, 1.0, 50.0] {
+                let mut sample = sample(&object, kc, 5);
+                sample.bend(0.1);
+                let (residual, force, step) = step(&sample, kc, damping);
+                assert_eq!(step.damping, damping);
+                let size = residual.iter().fold(0.0_f64, |size, entry| size.max(entry.abs()));
+                assert!(off(&sample.resist(kc, 1.0 + damping, &force), &residual) < 1e-9 * size, "{damping}");
+                assert!(off(&sample.resist(kc, 1.01 + damping, &force), &residual) > 1e-6 * size, "{damping}");
+            }
+        }
+    }
+
+    /// Where curvature outweighs the object's stiffness, damping makes up for it, and the step leads downhill.
+    #[test]
+    fn negative_curvature_asks_for_damping() {
+        let object = ball(SpringKind::Isotropic);
+        let kc = 30.0;
+        let mut sample = sample(&object, kc, 5);
+        sample.bend(1e3);
+        let (residual, force, step) = step(&sample, kc, 0.0);
+        assert!(step.damping > 1.0 && step.predicted > 0.0 && step.length > 0.0, "{step:?}");
+        let mut displacement = vec![0.0; force.len()];
+        sample.support().multiply(&force, &mut displacement);
+        assert!(dot(&residual, &displacement) > 0.0);
+    }
+
+    /// However damped, a step meets stiff springs nearly in full.
+    #[test]
+    fn damped_steps_meet_stiff_springs_first() {
+        let object = ball(SpringKind::Isotropic);
+        let kc = 1e7;
+        let mut sample = sample(&object, kc, 5);
+        sample.bend(0.0);
+        let lengths = [0.0, 10.0, 100.0].map(|damping| step(&sample, kc, damping).2);
+        let [one, .., other] = lengths;
+        assert!(other.predicted > 0.99 * one.predicted, "{lengths:?}");
+    }
+
+    #[test]
+    fn damping_grows_faster_from_refusal_to_refusal_and_fades() {
+        let mut damping = Damping::default();
+        damping.increase();
+        damping.increase();
+        let after_two = damping.multiple;
+        assert_eq!(after_two, LEAST_DAMPING * DAMPING_GROWTH * (2.0 * DAMPING_GROWTH));
+        damping.decrease(false);
+        assert_eq!(damping.multiple, after_two);
+        damping.increase();
+        assert_eq!(damping.multiple, after_two * DAMPING_GROWTH);
+        for _ in 0..20 {
+            damping.decrease(true);
+        }
+        assert_eq!(damping.multiple, 0.0);
     }
 }

@@ -1,0 +1,182 @@
+//! What the contact springs that touch leave of a force: the preconditioner of a Newton step.
+//!
+//! Stiff springs are what conjugate gradients take longest for. With g_a the gradient of the depth of spring a, W the stiffness of the
+//! springs and the object stiffened by 1 + mu, Woodbury's identity
+//! `P = ((1 + mu) K + G^T W G)^-1 = (C - C G^T ((1 + mu) W^-1 + G C G^T)^-1 G C) / (1 + mu)`
+//! takes them out, at the price of a dense system with as many unknowns as springs touch. What is left to the iterations is how contacts
+//! bend. P r is kept twice like all directions: as the force (r - G^T y) / (1 + mu), y being the push of the springs, and as the
+//! displacement C of it.
+//!
+//! The walls of a ball are springs in series ([`super::series`]), whose compliance is simple: (1 - e) / kc in common, and e / kc each.
+
+use super::blend::together;
+use super::depth::{Contact, first_order};
+use super::rows::add_rows;
+use super::springs::{Springs, add_on_nodes, nodes_of};
+use super::support::{Support, dot};
+use crate::tolerances::WALL_COMPLIANCE;
+use std::ops::Range;
+
+/// Springs of a block for [`add_rows`].
+const TOGETHER: usize = 3;
+
+/// The preconditioner for the springs that touch; its vectors are reused.
+#[derive(Default)]
+pub struct Relief {
+    /// Places of each spring's rows in the list of contacts.
+    taken: Vec<Range<usize>>,
+    /// g_a of one spring: slots and forces [1].
+    forces: Vec<(usize, [f64; 3])>,
+    /// C g_a on the support for each spring, filled up with zeros to whole blocks [m/N].
+    columns: Vec<f64>,
+    order: usize,
+    /// 1 + mu [1].
+    stiffening: f64,
+    /// Lower Cholesky factor of (1 + mu) W^-1 + G C G^T, row after row.
+    factor: Vec<f64>,
+    /// y, filled up with zeros [N].
+    pushes: Vec<f64>,
+}
+
+impl Relief {
+    /// Takes up the springs for which `touching` is true, on an object stiffened by the factor `stiffening`.
+    pub fn set_up(&mut self, support: &Support, springs: Springs, touching: &[bool], stiffening: f64) {
+        let Self { taken, forces, columns, order, factor, pushes, .. } = self;
+        taken.clear();
+        springs.for_each_depth(|first, rows| {
+            if rows[0].wall.is_some() {
+                taken.extend((first..first + rows.len()).filter(|&row| touching[row]).map(|row| row..row + 1));
+            } else if touching[first] {
+                taken.push(first..first + rows.len());
+            }
+        });
+        let count = taken.len();
+        self.stiffening = stiffening;
+        *order = support.order();
+        pushes.clear();
+        pushes.resize(count.next_multiple_of(TOGETHER), 0.0);
+        columns.clear();
+        columns.resize(pushes.len() * *order, 0.0);
+        factor.resize(count * count, 0.0);
+        for (a, spring) in taken.iter().enumerate() {
+            let column = &mut columns[a * *order..][..*order];
+            forces.clear();
+            for row in spring.clone() {
+                let spread = springs.contacts[row].spread(1.0).map(|force| force.to_array());
+                forces.extend(springs.slots[row].into_iter().zip(spread));
+            }
+            support.respond(forces, column);
+            for (b, other) in taken[..=a].iter().enumerate() {
+                let given = compliance(springs, spring, other) / springs.kc;
+                factor[a * count + b] = change(springs, other, column) + stiffening * given;
+            }
+        }
+        factorize(factor, count);
+    }
+
+    /// P r as `force` and `displacement`, from r and C r.
+    pub fn apply(
+        &mut self,
+        springs: Springs,
+        (residual, product): (&[f64], &[f64]),
+        force: &mut [f64],
+        displacement: &mut [f64],
+    ) {
+        force.copy_from_slice(residual);
+        displacement.copy_from_slice(product);
+        let Self { taken, columns, order, stiffening, factor, pushes, .. } = self;
+        let count = taken.len();
+        for (push, spring) in pushes.iter_mut().zip(&*taken) {
+            *push = -change(springs, spring, product);
+        }
+        for a in 0..count {
+            let row = &factor[a * count..][..=a];
+            pushes[a] = (pushes[a] - dot(&row[..a], &pushes[..a])) / row[a];
+        }
+        for a in (0..count).rev() {
+            let row = &factor[a * count..][..=a];
+            pushes[a] /= row[a];
+            let (before, rest) = pushes.split_at_mut(a);
+            before.iter_mut().zip(row).for_each(|(push, entry)| *push -= entry * rest[0]);
+        }
+        for (spring, &push) in taken.iter().zip(&*pushes) {
+            for row in spring.clone() {
+                add_on_nodes(springs.contacts[row].spread(push), springs.slots[row], force);
+            }
+        }
+        let blocks = columns.chunks_exact((TOGETHER * *order).max(1));
+        add_rows(blocks.zip(pushes.as_chunks::<TOGETHER>().0.iter().copied()), displacement);
+        if *stiffening > 1.0 {
+            force.iter_mut().chain(displacement).for_each(|entry| *entry /= *stiffening);
+        }
+    }
+}
+
+/// What `displacement` on the support deepens a spring by, to first order [m].
+fn change(springs: Springs, spring: &Range<usize>, displacement: &[f64]) -> f64 {
+    let rows = &springs.contacts[spring.clone()];
+    first_order(rows, |k| nodes_of(displacement, springs.slots[spring.start + k]))
+}
+
+/// What one spring gives way by under what another bears, times kc [1].
+fn compliance(springs: Springs, one: &Range<usize>, other: &Range<usize>) -> f64 {
+    let (a, b): (&Contact, &Contact) = (&springs.contacts[one.start], &springs.contacts[other.start]);
+    match (one == other, a.wall.is_some() && together(a, b)) {
+        (true, _) => 1.0,
+        (false, true) => 1.0 - WALL_COMPLIANCE,
+        (false, false) => 0.0,
+    }
+}
+
+/// Replaces the lower triangle of the matrix of order `count` in `entries`, row after row, by its Cholesky factor. What rounding leaves of
+/// a pivot is not believed below its own rounding.
+fn factorize(entries: &mut [f64], count: usize) {
+    for a in 0..count {
+        let (above, row) = entries.split_at_mut(a * count);
+        let row = &mut row[..=a];
+        for b in 0..a {
+            let other = &above[b * count..][..=b];
+            row[b] = (row[b] - dot(&row[..b], &other[..b])) / other[b];
+        }
+        let least = f64::EPSILON * row[a];
+        row[a] = (row[a] - dot(&row[..a], &row[..a])).max(least).sqrt();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::springs::samples::{ball, sample};
+    use crate::random::sequence;
+    use crate::scene::SpringKind;
+
+    /// What is relieved, resisted by the object and straight springs, is what it was before.
+    #[test]
+    fn relief_is_the_inverse_of_object_and_springs() {
+        for kind in [SpringKind::Isotropic, SpringKind::Axial] {
+            let object = ball(kind);
+            for (kc, stiffening) in [(1.0, 1.0), (1e3, 3.0), (1e6, 1.0), (1e6, 1e3)] {
+                let mut sample = sample(&object, kc, 5);
+                sample.bend(0.0);
+                assert_eq!(sample.touching().iter().filter(|&&touches| touches).count(), 11);
+                let order = sample.support().order();
+                let mut next = sequence(3);
+                let residual: Vec<f64> = (0..order).map(|_| next()).collect();
+                let mut product = vec![0.0; order];
+                sample.support().multiply(&residual, &mut product);
+                let (mut force, mut displacement) = (vec![0.0; order], vec![0.0; order]);
+                let mut relief = Relief::default();
+                relief.set_up(sample.support(), sample.springs(kc), &sample.touching(), stiffening);
+                relief.apply(sample.springs(kc), (&residual, &product), &mut force, &mut displacement);
+                sample.support().multiply(&force, &mut product);
+                let off = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                let size = displacement.iter().fold(0.0_f64, |size, entry| size.max(entry.abs()));
+                assert!(off(&displacement, &product) < 1e-12 * size, "{kc} {stiffening}");
+                // Rounding of a spring's deepening, of about 1e-2 m, times kc.
+                let rounding = 1e-13 * kc.max(1.0);
+                assert!(off(&sample.resist(kc, stiffening, &force), &residual) < rounding, "{kc} {stiffening}");
+                assert!(off(&sample.resist(kc, 1.01 * stiffening, &force), &residual) > 1e-3 * 1e3 * rounding);
+            }
+        }
+    }
+}
