@@ -7,6 +7,7 @@ use glam::DVec3;
 
 pub(crate) mod blend;
 mod bounding_volumes;
+mod cholesky;
 pub(crate) mod closest_point;
 mod deformation;
 pub(crate) mod depth;

@@ -14,8 +14,8 @@
 //! Conjugate gradients on H = (1 + mu) K + B, B the Hessian of the contact terms, preconditioned by what the springs leave of C
 //! ([`super::relief`]), keep each search direction twice, as a force pi and as the displacement p = C pi, so that
 //! H p = (1 + mu) pi + B p needs no K. One product with C_AA is spent per iteration, that of the preconditioner. What it does not know
-//! of B has a rank of at most four per contact and is no stiffer than the object, so few iterations are needed whatever the object's
-//! size and the springs' stiffness. Negative curvature asks for more damping.
+//! of B, how contacts bend, has a rank of at most four per contact, so few iterations are needed whatever the object's size and the
+//! springs' stiffness. Negative curvature asks for more damping.
 
 // Indexed loops as in the kernel of the same name.
 #![allow(clippy::needless_range_loop)]

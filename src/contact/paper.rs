@@ -15,6 +15,7 @@
 //! repeats an earlier one to the last bit (Brent 1980: compared with the pass of the last power of two). A node with a radius, which the paper does not have, acts through its deepest
 //! point x_i - r_i N_i.
 
+use super::cholesky;
 use super::depth::Contact;
 use super::detection::{Detection, Walls};
 use super::energy::Outcome;
@@ -161,10 +162,11 @@ impl PaperIteration {
         for row in 0..order {
             matrix[row * order + row] += 1.0 / (model.contact.stiffness * tie_counts[row / rows_per_node]);
         }
+        cholesky::factorize(matrix, order);
         if rows_per_node == 1 {
-            solve_positive_definite(matrix, targets);
+            cholesky::solve(matrix, targets);
         } else {
-            solve_positive_definite(matrix, tied_forces.as_chunks_mut::<1>().0);
+            cholesky::solve(matrix, tied_forces.as_chunks_mut::<1>().0);
         }
         self.support.displace(&model.compliance, &self.tied_forces, &mut self.displacement);
         self.place(model);
@@ -236,37 +238,6 @@ impl PaperIteration {
     }
 }
 
-/// Solves for N right-hand sides side by side, one row of `right` a row of the symmetric positive definite `matrix`, in place by its
-/// Cholesky factor, which takes the lower half of the matrix.
-fn solve_positive_definite<const N: usize>(matrix: &mut [f64], right: &mut [[f64; N]]) {
-    let order = right.len();
-    for i in 0..order {
-        let (above, below) = matrix.split_at_mut(i * order);
-        let row = &mut below[..=i];
-        let mut square = row[i];
-        for (j, other) in above.chunks_exact(order).enumerate() {
-            let entry = (row[j] - dot(&row[..j], &other[..j])) * other[j];
-            row[j] = entry;
-            square -= entry * entry;
-        }
-        // Of the diagonal the reciprocal is kept.
-        row[i] = 1.0 / square.sqrt();
-        let (known, unknown) = right.split_at_mut(i);
-        for (entry, known) in row.iter().zip(known.iter()) {
-            (0..N).for_each(|k| unknown[0][k] -= entry * known[k]);
-        }
-        (0..N).for_each(|k| unknown[0][k] *= row[i]);
-    }
-    for i in (0..order).rev() {
-        let row = &matrix[i * order..=i * order + i];
-        let (unknown, known) = right.split_at_mut(i);
-        (0..N).for_each(|k| known[0][k] *= row[i]);
-        for (entry, unknown) in row.iter().zip(unknown) {
-            (0..N).for_each(|k| unknown[k] -= entry * known[0][k]);
-        }
-    }
-}
-
 /// Whether two passes tie the same nodes, i.e. have the same S.
 fn same_selection(a: &[Tie], b: &[Tie]) -> bool {
     let same = |(a, b): (&Tie, &Tie)| a.proxy_node == b.proxy_node && a.nodes == b.nodes;
@@ -304,33 +275,4 @@ pub fn three_closest(x: DVec3, positions: &[DVec3]) -> [u32; 3] {
         consider((position.distance_squared(x), (4 * fours.len() + lane) as u32));
     }
     nodes
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::random::sequence;
-
-    /// Random matrices B B^T + I, of every order up to that of four ties, against the product with what is found.
-    #[test]
-    fn systems_of_all_orders_are_solved() {
-        let mut next = sequence(5);
-        for order in 0..37 {
-            let random: Vec<f64> = (0..order * order).map(|_| next()).collect();
-            let row = |i: usize| &random[i * order..(i + 1) * order];
-            let unit = |i: usize, j: usize| f64::from(u8::from(i == j));
-            let entry = |i: usize, j: usize| dot(row(i), row(j)) + unit(i, j);
-            let mut matrix: Vec<f64> =
-                (0..order).flat_map(|i| (0..order).map(move |j| (i, j))).map(|(i, j)| entry(i, j)).collect();
-            let wanted: Vec<[f64; 3]> = (0..order).map(|_| [next(), next(), next()]).collect();
-            let mut found = wanted.clone();
-            solve_positive_definite(&mut matrix, &mut found);
-            for (i, wanted) in wanted.iter().enumerate() {
-                for k in 0..3 {
-                    let product: f64 = (0..order).map(|j| entry(i, j) * found[j][k]).sum();
-                    assert!((product - wanted[k]).abs() < 1e-12, "order {order}: {product} {}", wanted[k]);
-                }
-            }
-        }
-    }
 }

@@ -10,10 +10,11 @@
 //! The walls of a ball are springs in series ([`super::series`]), whose compliance is simple: (1 - e) / kc in common, and e / kc each.
 
 use super::blend::together;
+use super::cholesky;
 use super::depth::{Contact, first_order};
 use super::rows::add_rows;
 use super::springs::{Springs, add_on_nodes, nodes_of};
-use super::support::{Support, dot};
+use super::support::Support;
 use crate::tolerances::WALL_COMPLIANCE;
 use std::ops::Range;
 
@@ -32,7 +33,7 @@ pub struct Relief {
     order: usize,
     /// 1 + mu [1].
     stiffening: f64,
-    /// Lower Cholesky factor of (1 + mu) W^-1 + G C G^T, row after row.
+    /// That of (1 + mu) W^-1 + G C G^T; see [`super::cholesky`].
     factor: Vec<f64>,
     /// y, filled up with zeros [N].
     pushes: Vec<f64>,
@@ -71,7 +72,7 @@ impl Relief {
                 factor[a * count + b] = change(springs, other, column) + stiffening * given;
             }
         }
-        factorize(factor, count);
+        cholesky::factorize(factor, count);
     }
 
     /// P r as `force` and `displacement`, from r and C r.
@@ -89,16 +90,7 @@ impl Relief {
         for (push, spring) in pushes.iter_mut().zip(&*taken) {
             *push = -change(springs, spring, product);
         }
-        for a in 0..count {
-            let row = &factor[a * count..][..=a];
-            pushes[a] = (pushes[a] - dot(&row[..a], &pushes[..a])) / row[a];
-        }
-        for a in (0..count).rev() {
-            let row = &factor[a * count..][..=a];
-            pushes[a] /= row[a];
-            let (before, rest) = pushes.split_at_mut(a);
-            before.iter_mut().zip(row).for_each(|(push, entry)| *push -= entry * rest[0]);
-        }
+        cholesky::solve(factor, pushes[..count].as_chunks_mut::<1>().0);
         for (spring, &push) in taken.iter().zip(&*pushes) {
             for row in spring.clone() {
                 add_on_nodes(springs.contacts[row].spread(push), springs.slots[row], force);
@@ -125,21 +117,6 @@ fn compliance(springs: Springs, one: &Range<usize>, other: &Range<usize>) -> f64
         (true, _) => 1.0,
         (false, true) => 1.0 - WALL_COMPLIANCE,
         (false, false) => 0.0,
-    }
-}
-
-/// Replaces the lower triangle of the matrix of order `count` in `entries`, row after row, by its Cholesky factor. What rounding leaves of
-/// a pivot is not believed below its own rounding.
-fn factorize(entries: &mut [f64], count: usize) {
-    for a in 0..count {
-        let (above, row) = entries.split_at_mut(a * count);
-        let row = &mut row[..=a];
-        for b in 0..a {
-            let other = &above[b * count..][..=b];
-            row[b] = (row[b] - dot(&row[..b], &other[..b])) / other[b];
-        }
-        let least = f64::EPSILON * row[a];
-        row[a] = (row[a] - dot(&row[..a], &row[..a])).max(least).sqrt();
     }
 }
 
