@@ -17,7 +17,7 @@
 //! of B, how contacts bend, has a rank of at most four per contact, so few iterations are needed whatever the object's size and the
 //! springs' stiffness. Negative curvature asks for more damping.
 
-// Indexed loops as in the kernel of the same name.
+// Indexed loops as in shaders/trust_region.wgsl.
 #![allow(clippy::needless_range_loop)]
 
 use super::blend::{RowChange, deepening, vary};
@@ -443,23 +443,19 @@ fn inner(a: [DVec3; 3], b: [DVec3; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::contact::springs::add_contact_forces;
-    use crate::contact::springs::samples::{Sample, ball, sample};
+    use crate::contact::springs::samples::{Sample, ball, off, sample};
     use crate::scene::SpringKind;
 
     /// The contact forces at rest, and the step that they lead to with `damping`.
-    fn step(sample: &Sample, kc: f64, damping: f64) -> (Vec<f64>, Vec<f64>, Step) {
+    fn step(sample: &Sample, damping: f64) -> (Vec<f64>, Vec<f64>, Step) {
         let order = sample.support().order();
         let (mut residual, mut product) = (vec![0.0; order], vec![0.0; order]);
-        add_contact_forces(sample.springs(kc), &mut residual);
+        add_contact_forces(sample.springs(), &mut residual);
         sample.support().multiply(&residual, &mut product);
         let mut newton = Newton::default();
-        let springs = sample.springs(kc);
+        let springs = sample.springs();
         let step = newton.step(sample.support(), springs, (&residual, &product), damping, 1e-12, Care::Quick);
         (residual, newton.force, step)
-    }
-
-    fn off(a: &[f64], b: &[f64]) -> f64 {
-        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 
     /// As long as no spring comes or goes, a step solves (1 + mu) K du + B du = r, curvature included.
@@ -467,15 +463,13 @@ mod tests {
     fn a_step_solves_the_damped_newton_equation() {
         for kind in [SpringKind::Isotropic, SpringKind::Axial] {
             let object = ball(kind);
-            let kc = 30.0;
             for damping in [0.0, 1.0, 50.0] {
-                let mut sample = sample(&object, kc, 5);
-                sample.bend(0.1);
-                let (residual, force, step) = step(&sample, kc, damping);
+                let sample = sample(&object, 30.0, 0.1);
+                let (residual, force, step) = step(&sample, damping);
                 assert_eq!(step.damping, damping);
                 let size = residual.iter().fold(0.0_f64, |size, entry| size.max(entry.abs()));
-                assert!(off(&sample.resist(kc, 1.0 + damping, &force), &residual) < 1e-9 * size, "{damping}");
-                assert!(off(&sample.resist(kc, 1.01 + damping, &force), &residual) > 1e-6 * size, "{damping}");
+                assert!(off(&sample.resist(1.0 + damping, &force), &residual) < 1e-9 * size, "{damping}");
+                assert!(off(&sample.resist(1.01 + damping, &force), &residual) > 1e-6 * size, "{damping}");
             }
         }
     }
@@ -484,10 +478,8 @@ mod tests {
     #[test]
     fn negative_curvature_asks_for_damping() {
         let object = ball(SpringKind::Isotropic);
-        let kc = 30.0;
-        let mut sample = sample(&object, kc, 5);
-        sample.bend(1e3);
-        let (residual, force, step) = step(&sample, kc, 0.0);
+        let sample = sample(&object, 30.0, 1e3);
+        let (residual, force, step) = step(&sample, 0.0);
         assert!(step.damping > 1.0 && step.predicted > 0.0 && step.length > 0.0, "{step:?}");
         let mut displacement = vec![0.0; force.len()];
         sample.support().multiply(&force, &mut displacement);
@@ -498,12 +490,9 @@ mod tests {
     #[test]
     fn damped_steps_meet_stiff_springs_first() {
         let object = ball(SpringKind::Isotropic);
-        let kc = 1e7;
-        let mut sample = sample(&object, kc, 5);
-        sample.bend(0.0);
-        let lengths = [0.0, 10.0, 100.0].map(|damping| step(&sample, kc, damping).2);
-        let [one, .., other] = lengths;
-        assert!(other.predicted > 0.99 * one.predicted, "{lengths:?}");
+        let sample = sample(&object, 1e7, 0.0);
+        let steps = [0.0, 100.0].map(|damping| step(&sample, damping).2);
+        assert!(steps[1].predicted > 0.99 * steps[0].predicted, "{steps:?}");
     }
 
     #[test]

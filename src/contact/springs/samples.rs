@@ -1,0 +1,94 @@
+//! Contact springs to test with: points and balls pressed into the sphere.
+
+use super::{Springs, add_contact_hessian};
+use crate::contact::closest_point::{closest_point, rounded};
+use crate::contact::depth::{Contact, measure};
+use crate::contact::series::share_out;
+use crate::contact::support::Support;
+use crate::contact::{surface, walls::wall};
+use crate::object::{Compliance, Object};
+use crate::random::Random;
+use crate::report::stability::contact::world::{Ball, PAPER, sphere};
+use crate::scene::SpringKind;
+use crate::tolerances::FACET_ROUNDING;
+use glam::DVec3;
+
+/// Springs on a support.
+pub struct Sample {
+    support: Support,
+    contacts: Vec<Contact>,
+    slots: Vec<[usize; 3]>,
+    kc: f64,
+}
+
+/// The sphere of 102 nodes.
+pub fn ball(springs: SpringKind) -> Object {
+    sphere(Ball { springs, ..PAPER }).unwrap()
+}
+
+/// Five points and two balls on three facets each, all pressed in, and a point that is near, of stiffness `kc`; bent by `bending` times
+/// their forces.
+pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
+    let mut random = Random::new(5);
+    let mut contacts = Vec::new();
+    let corners = |t: usize| surface::corners(&object.rest, object.triangles[t]);
+    for i in 0..6 {
+        let t = random.between(0.0, object.triangles.len() as f64) as usize;
+        let middle = corners(t).iter().sum::<DVec3>() / 3.0;
+        let x = middle * random.between(0.7, 0.9) + random.vector() * 1e-3;
+        let point = closest_point(x, corners(t));
+        let measured = measure(x, 0.0, corners(t), point.weights, point.feature, middle.normalize());
+        contacts.push(Contact::new(i, object.triangles[t], point.weights, measured));
+    }
+    contacts[5].depth = -1e-3;
+    for i in 6..8 {
+        let t = random.between(0.0, object.triangles.len() as f64) as usize;
+        let x = corners(t)[0] * 1.02;
+        let shared = object.triangles[t][0];
+        let around = (0..object.triangles.len()).filter(|&near| object.triangles[near].contains(&shared));
+        for near in around.take(3) {
+            let (point, _) = rounded(x, corners(near), FACET_ROUNDING);
+            let nodes = (object.triangles[near], corners(near));
+            contacts.push(wall((i, x, 0.008), nodes, point, false, DVec3::X, FACET_ROUNDING));
+        }
+    }
+    share_out(&mut contacts, &mut Vec::new());
+    for contact in &mut contacts {
+        contact.multiplier = bending * kc * contact.bears();
+    }
+    let mut support = Support::new(object.surface_nodes);
+    let slots = contacts.iter().map(|contact| contact.nodes.map(|node| support.add(node))).collect();
+    support.gather(&Compliance::new(object));
+    Sample { support, contacts, slots, kc }
+}
+
+impl Sample {
+    /// The object's part.
+    pub fn support(&self) -> &Support {
+        &self.support
+    }
+
+    /// The springs.
+    pub fn springs(&self) -> Springs<'_> {
+        Springs { contacts: &self.contacts, slots: &self.slots, kc: self.kc }
+    }
+
+    /// Which of them touch.
+    pub fn touching(&self) -> Vec<bool> {
+        self.contacts.iter().map(|contact| contact.bears() > 0.0).collect()
+    }
+
+    /// `((1 + mu) K + B) C force`, `stiffening` being 1 + mu [N].
+    pub fn resist(&self, stiffening: f64, force: &[f64]) -> Vec<f64> {
+        let mut displacement = vec![0.0; force.len()];
+        self.support.multiply(force, &mut displacement);
+        let mut product: Vec<f64> = force.iter().map(|force| stiffening * force).collect();
+        add_contact_hessian(self.springs(), &self.touching(), &displacement, &mut Vec::new(), &mut product);
+        product
+    }
+}
+
+/// The greatest difference of two entries.
+pub fn off(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
