@@ -24,7 +24,7 @@ use super::detection::{Detection, Inner, Walls};
 use super::model::Model;
 use super::newton::{Care, Damping, Newton, Step};
 use super::series::share_out;
-use super::springs::{Springs, add_contact_forces};
+use super::springs::{Bending, Springs, add_contact_forces};
 use super::support::{Support, dot, root};
 use crate::tolerances::{
     ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GIVE_UP_LENGTH,
@@ -309,7 +309,7 @@ impl EnergySearch {
     fn step(&mut self, residual: f64) -> Step {
         let step = self.newton.step(
             &self.support,
-            Springs { contacts: &self.state.contacts, slots: &self.slots, kc: self.kc },
+            Springs { contacts: &self.state.contacts, slots: &self.slots, kc: self.kc, bending: Bending::Exact },
             (&self.residual, &self.product),
             self.damping.multiple,
             residual.clamp(INNER_TOLERANCE_FLOOR, INNER_TOLERANCE),
@@ -405,7 +405,10 @@ impl EnergySearch {
         state.forces.resize(order, 0.0);
         contact_forces.clear();
         contact_forces.resize(order, 0.0);
-        add_contact_forces(Springs { contacts: &state.contacts, slots, kc: *kc }, contact_forces);
+        add_contact_forces(
+            Springs { contacts: &state.contacts, slots, kc: *kc, bending: Bending::Exact },
+            contact_forces,
+        );
         residual.clear();
         residual.extend(contact_forces.iter().zip(&state.forces).map(|(c, f)| c - f));
         product.resize(order, 0.0);

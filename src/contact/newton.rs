@@ -15,20 +15,21 @@
 //! ([`super::relief`]), keep each search direction twice, as a force pi and as the displacement p = C pi, so that
 //! H p = (1 + mu) pi + B p needs no K. One product with C_AA is spent per iteration, that of the preconditioner. What it does not know
 //! of B, how contacts bend, has a rank of at most four per contact, so few iterations are needed whatever the object's size and the
-//! springs' stiffness. Negative curvature asks for more damping.
+//! springs' stiffness. Negative curvature asks for more damping, and where much would be needed, for a model without it: a wall's
+//! second variation is the difference of two squares, of which the positive one is kept.
 
 // Indexed loops as in shaders/trust_region.wgsl.
 #![allow(clippy::needless_range_loop)]
 
 use super::blend::{RowChange, deepening, vary};
-use super::depth::{Contact, second_variation};
+use super::depth::Contact;
 use super::relief::Relief;
 use super::series::bear;
-use super::springs::{Springs, add_contact_hessian, add_on_nodes, nodes_of, wall_forces};
+use super::springs::{Bending, Springs, add_contact_hessian, add_on_nodes, nodes_of};
 use super::support::{Support, dot, root};
 use crate::tolerances::{
-    CURVATURE_MARGIN, DAMPING_ATTEMPTS, DAMPING_DECAY, DAMPING_GROWTH, INNER_ITERATIONS_PER_UNKNOWN, LEAST_DAMPING,
-    MODEL_PASSES, STEP_BACK_HALVINGS, THOROUGH_MODEL_PASSES,
+    CONVEX_TOLERANCE, CURVATURE_MARGIN, DAMPING_ATTEMPTS, DAMPING_DECAY, DAMPING_GROWTH, EXACT_ATTEMPTS,
+    INNER_ITERATIONS_PER_UNKNOWN, LEAST_DAMPING, MODEL_PASSES, STEP_BACK_HALVINGS, THOROUGH_MODEL_PASSES,
 };
 use glam::DVec3;
 
@@ -37,8 +38,8 @@ use glam::DVec3;
 pub enum Care {
     /// What nearly all configurations converge with.
     Quick,
-    /// What the others need: a ball's side is made sure of, passes go on to the model's minimum, and a step that E refuses gets a
-    /// second chance.
+    /// What the others need: a ball's side is made sure of, passes go on to the model's minimum, a step that E refuses gets a
+    /// second chance, and walls whose curvature asks for much damping bend without it.
     Thorough,
 }
 
@@ -133,21 +134,30 @@ impl Newton {
         support: &Support,
         springs: Springs,
         residual: (&[f64], &[f64]),
-        mut damping: f64,
-        tolerance: f64,
+        damping: f64,
+        mut tolerance: f64,
         care: Care,
     ) -> Step {
-        for _ in 0..DAMPING_ATTEMPTS {
-            self.stiffening = 1.0 + damping;
-            match self.minimise(support, springs, residual, tolerance, care) {
+        let mut model = springs;
+        let mut raised = damping;
+        for attempt in 0..DAMPING_ATTEMPTS {
+            if care == Care::Thorough && attempt == EXACT_ATTEMPTS && springs.have_walls() {
+                model.bending = Bending::Convex;
+                raised = damping;
+                tolerance = tolerance.max(CONVEX_TOLERANCE);
+            }
+            self.stiffening = 1.0 + raised;
+            match self.minimise(support, model, residual, tolerance, care) {
                 Ok(decrease) => {
+                    let decrease =
+                        if model.bending == springs.bending { decrease } else { self.assess(springs, residual.0) };
                     let square = dot(&self.force, &self.displacement);
-                    return Step { predicted: decrease + 0.5 * damping * square, length: root(square), damping };
+                    return Step { predicted: decrease + 0.5 * raised * square, length: root(square), damping: raised };
                 }
-                Err(lacking) => damping += (lacking + CURVATURE_MARGIN).max(damping),
+                Err(lacking) => raised += (lacking + CURVATURE_MARGIN).max(raised),
             }
         }
-        Step { predicted: f64::NAN, length: 0.0, damping }
+        Step { predicted: f64::NAN, length: 0.0, damping: raised }
     }
 
     /// The least of the damped model, and by how much it is less than at the start [J]; or what damping lacks where it is not convex.
@@ -281,7 +291,7 @@ impl Newton {
                 for (k, row) in rows.iter().enumerate() {
                     changes[k] = row.deepening(v(k));
                     if row.multiplier != 0.0 {
-                        decrease -= 0.5 * row.multiplier * inner(v(k), second_variation(row, v(k)));
+                        decrease -= 0.5 * inner(v(k), springs.bent(row, v(k)));
                     }
                 }
                 bear(|k| rows[k].depth + changes[k], bears);
@@ -339,9 +349,9 @@ impl Newton {
                     let change = row.deepening(along(k));
                     slope += springs.kc * row.bears() * change;
                     if row.multiplier != 0.0 {
-                        let turned = second_variation(row, along(k));
-                        slope -= row.multiplier * inner(before(k), turned);
-                        bend += row.multiplier * inner(along(k), turned);
+                        let turned = springs.bent(row, along(k));
+                        slope -= inner(before(k), turned);
+                        bend += inner(along(k), turned);
                     }
                     walls_on_the_way.push([row.depth + row.deepening(before(k)), change]);
                 }
@@ -406,7 +416,11 @@ impl Newton {
             if rows[0].wall.is_some() {
                 for (k, row) in rows.iter().enumerate() {
                     let push = springs.kc * (bears[first + k] - row.bears());
-                    add_on_nodes(wall_forces(row, push, v(k)).map(|force| -force), springs.slots[first + k], residual);
+                    add_on_nodes(
+                        springs.wall_forces(row, push, v(k)).map(|force| -force),
+                        springs.slots[first + k],
+                        residual,
+                    );
                 }
                 return;
             }
@@ -446,15 +460,19 @@ mod tests {
     use crate::contact::springs::samples::{Sample, ball, off, sample};
     use crate::scene::SpringKind;
 
-    /// The contact forces at rest, and the step that they lead to with `damping`.
+    /// The contact forces at rest, and the quick step that they lead to with `damping`.
     fn step(sample: &Sample, damping: f64) -> (Vec<f64>, Vec<f64>, Step) {
+        step_with(sample, damping, Care::Quick)
+    }
+
+    fn step_with(sample: &Sample, damping: f64, care: Care) -> (Vec<f64>, Vec<f64>, Step) {
         let order = sample.support().order();
         let (mut residual, mut product) = (vec![0.0; order], vec![0.0; order]);
         add_contact_forces(sample.springs(), &mut residual);
         sample.support().multiply(&residual, &mut product);
         let mut newton = Newton::default();
         let springs = sample.springs();
-        let step = newton.step(sample.support(), springs, (&residual, &product), damping, 1e-12, Care::Quick);
+        let step = newton.step(sample.support(), springs, (&residual, &product), damping, 1e-12, care);
         (residual, newton.force, step)
     }
 
@@ -484,6 +502,19 @@ mod tests {
         let mut displacement = vec![0.0; force.len()];
         sample.support().multiply(&force, &mut displacement);
         assert!(dot(&residual, &displacement) > 0.0);
+    }
+
+    /// Where walls curve so much that damping would have to be raised often, a thorough step does without, and leads downhill all the same.
+    #[test]
+    fn a_thorough_step_leaves_out_curvature_that_asks_for_much_damping() {
+        let object = ball(SpringKind::Isotropic);
+        let sample = sample(&object, 30.0, 1e3).of_balls();
+        let quick = step(&sample, 0.0).2;
+        let (residual, force, thorough) = step_with(&sample, 0.0, Care::Thorough);
+        assert!(quick.damping > 1.0 && thorough.damping == 0.0, "{quick:?} {thorough:?}");
+        let mut displacement = vec![0.0; force.len()];
+        sample.support().multiply(&force, &mut displacement);
+        assert!(dot(&residual, &displacement) > 0.0 && thorough.predicted > 0.0, "{thorough:?}");
     }
 
     /// However damped, a step meets stiff springs nearly in full.

@@ -15,6 +15,17 @@ pub struct Springs<'a> {
     pub slots: &'a [[usize; 3]],
     /// kc [N/m].
     pub kc: f64,
+    /// How walls bend.
+    pub bending: Bending,
+}
+
+/// How much of a wall's curvature counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bending {
+    /// All of it.
+    Exact,
+    /// What makes the energy convex.
+    Convex,
 }
 
 impl<'a> Springs<'a> {
@@ -25,6 +36,30 @@ impl<'a> Springs<'a> {
             visit(first, rows);
             first += rows.len();
         }
+    }
+
+    /// Whether any of them is a ball's wall.
+    pub fn have_walls(self) -> bool {
+        self.contacts.iter().any(|row| row.wall.is_some())
+    }
+
+    /// What a wall that bears `push` more, bent by displacements `v` of its nodes, resists with at each of them [N].
+    pub fn wall_forces(self, row: &Contact, push: f64, v: [DVec3; 3]) -> [DVec3; 3] {
+        let straight = row.spread(push);
+        if row.multiplier == 0.0 {
+            return straight;
+        }
+        let bent = self.bent(row, v);
+        [0, 1, 2].map(|j| straight[j] + bent[j])
+    }
+
+    /// The same of its bending alone: its multiplier times the second variation of its depth [N].
+    pub fn bent(self, row: &Contact, v: [DVec3; 3]) -> [DVec3; 3] {
+        let varied = match (&row.wall, self.bending) {
+            (Some(wall), Bending::Convex) => wall.convex_variation(row.weights, row.normal, v),
+            _ => second_variation(row, v),
+        };
+        varied.map(|part| part * row.multiplier)
     }
 }
 
@@ -46,7 +81,11 @@ pub fn add_contact_hessian(
                 let touches = touching[first + k];
                 if touches || row.multiplier != 0.0 {
                     let change = if touches { (row.deepening(v(k)) - common) / WALL_COMPLIANCE } else { 0.0 };
-                    add_on_nodes(wall_forces(row, springs.kc * change, v(k)), springs.slots[first + k], product);
+                    add_on_nodes(
+                        springs.wall_forces(row, springs.kc * change, v(k)),
+                        springs.slots[first + k],
+                        product,
+                    );
                 }
             }
             return;
@@ -68,16 +107,6 @@ pub fn add_contact_hessian(
             add_on_nodes([0, 1, 2].map(|j| spread[j] + bend[j] * multiplier), springs.slots[first + k], product);
         });
     });
-}
-
-/// What a wall that bears `push` more, bent by displacements `v` of its nodes, resists with at each of them [N].
-pub fn wall_forces(row: &Contact, push: f64, v: [DVec3; 3]) -> [DVec3; 3] {
-    let straight = row.spread(push);
-    if row.multiplier == 0.0 {
-        return straight;
-    }
-    let bent = second_variation(row, v);
-    [0, 1, 2].map(|j| straight[j] + bent[j] * row.multiplier)
 }
 
 /// Adds the forces of the contact springs on the object's nodes, -kc depth_i w_ij N_i, to `forces` on the support.

@@ -35,11 +35,35 @@ impl Wall {
     #[inline]
     #[must_use]
     pub fn second_variation(&self, weights: [f64; 3], normal: DVec3, v: [DVec3; 3]) -> [DVec3; 3] {
+        let straight = self.straight(weights, normal, v);
+        let slid = self.slid(v);
+        [0, 1, 2].map(|j| straight * weights[j] + slid[j])
+    }
+
+    /// Of the two squares that the second variation is the difference of, the positive one [m]: what the point slides by from outside,
+    /// what it moves by from inside.
+    #[must_use]
+    pub fn convex_variation(&self, weights: [f64; 3], normal: DVec3, v: [DVec3; 3]) -> [DVec3; 3] {
+        if self.scale < 0.0 {
+            return self.slid(v);
+        }
+        let straight = self.straight(weights, normal, v);
+        weights.map(|weight| straight * weight)
+    }
+
+    /// The part of F_vv.
+    #[inline]
+    fn straight(&self, weights: [f64; 3], normal: DVec3, v: [DVec3; 3]) -> DVec3 {
         let moved = v[0] * weights[0] + v[1] * weights[1] + v[2] * weights[2];
+        moved * self.direct - normal * (self.scale * normal.dot(moved))
+    }
+
+    /// The part of F_vw F_ww^-1 F_wv.
+    #[inline]
+    fn slid(&self, v: [DVec3; 3]) -> [DVec3; 3] {
         let [one, other] =
             self.slides.map(|slide| self.scale * (slide[0].dot(v[0]) + slide[1].dot(v[1]) + slide[2].dot(v[2])));
-        let straight = moved * self.direct - normal * (self.scale * normal.dot(moved));
-        [0, 1, 2].map(|j| straight * weights[j] - self.slides[0][j] * one - self.slides[1][j] * other)
+        [0, 1, 2].map(|j| -self.slides[0][j] * one - self.slides[1][j] * other)
     }
 
     /// The wall does not bend any more.
@@ -204,6 +228,10 @@ mod tests {
             let bend: f64 = bent.iter().zip(w).map(|(part, w)| part.dot(w)).sum();
             let found = (after.deepening(w) - before.deepening(w)) / (2.0 * h);
             assert!((bend - found).abs() < 1e-4 * (0.1 + found.abs()), "{turn}: {bend} {found}");
+            let inner = |parts: [DVec3; 3]| parts.iter().zip(v).map(|(part, v)| part.dot(v)).sum::<f64>();
+            let exact = inner(bent);
+            let convex = inner(here.wall.unwrap().convex_variation(here.weights, here.normal, v));
+            assert!(convex >= 0.0 && convex >= exact - 1e-9 * exact.abs(), "{turn}: {convex} {exact}");
         }
         assert!(seen.iter().all(|&count| count > 30), "{seen:?}");
     }

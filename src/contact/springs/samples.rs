@@ -1,6 +1,6 @@
 //! Contact springs to test with: points and balls pressed into the sphere.
 
-use super::{Springs, add_contact_hessian};
+use super::{Bending, Springs, add_contact_hessian};
 use crate::contact::closest_point::{closest_point, rounded};
 use crate::contact::depth::{Contact, measure};
 use crate::contact::series::share_out;
@@ -63,6 +63,14 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
 }
 
 impl Sample {
+    /// The same without the points.
+    pub fn of_balls(mut self) -> Self {
+        let mut contacts = self.contacts.iter();
+        self.slots.retain(|_| contacts.next().is_some_and(|contact| contact.wall.is_some()));
+        self.contacts.retain(|contact| contact.wall.is_some());
+        self
+    }
+
     /// The object's part.
     pub fn support(&self) -> &Support {
         &self.support
@@ -70,7 +78,7 @@ impl Sample {
 
     /// The springs.
     pub fn springs(&self) -> Springs<'_> {
-        Springs { contacts: &self.contacts, slots: &self.slots, kc: self.kc }
+        Springs { contacts: &self.contacts, slots: &self.slots, kc: self.kc, bending: Bending::Exact }
     }
 
     /// Which of them touch.
