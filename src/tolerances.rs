@@ -146,13 +146,8 @@ pub const CURVATURE_MARGIN: f64 = 5.0;
 /// is 1e9, a thousand times what rigid contact is stiffer than the object ([`RIGID_STIFFNESS`]).
 pub const DAMPING_ATTEMPTS: u32 = 30;
 
-/// Attempts with all of the curvature, each more damped, before a thorough step leaves out what is negative of it [1]: four balls on 2,027
-/// nodes (axial springs, Kg 1e4 N/m on a patch) ask for a damping of 100 at most steps, and slide so slowly that none converges within
-/// the cap. With 0, 1, 2, 3 and 5 attempts 4, 4, 4, 4 and 1 do, and eight others take 110, 70, 67, 62 and 46 s, 44 without this.
-pub const EXACT_ATTEMPTS: u32 = 3;
-
 /// Least relative residual at which conjugate gradients stop where negative curvature is left out [1]: the model is then too rough to be
-/// solved well. The twelve of [`EXACT_ATTEMPTS`] take 150 s with [`INNER_TOLERANCE`], 99 with 0.1 and 103 with 0.3.
+/// solved well. Twelve hard balls on 2,027 nodes take 150 s with [`INNER_TOLERANCE`], 99 with 0.1 and 103 with 0.3.
 pub const CONVEX_TOLERANCE: f64 = 0.1;
 
 /// Length of a refused step, relative to the greatest there can be, at which a configuration is given up [1]: the energy of a step scales with

@@ -282,7 +282,7 @@ impl EnergySearch {
             let share =
                 |trial: &State| if promised > 0.0 { (energy - trial.energy + rounding) / promised } else { 0.0 };
             let mut ratio = share(&self.trial);
-            let on_probation = self.care == Care::Thorough && ratio < ACCEPTED_SHARE && promised > 0.0;
+            let on_probation = self.care.is_thorough() && ratio < ACCEPTED_SHARE && promised > 0.0;
             if on_probation {
                 outcome.iterations += 1;
                 self.correct(model, detection, geometry);

@@ -15,8 +15,8 @@
 //! ([`super::relief`]), keep each search direction twice, as a force pi and as the displacement p = C pi, so that
 //! H p = (1 + mu) pi + B p needs no K. One product with C_AA is spent per iteration, that of the preconditioner. What it does not know
 //! of B, how contacts bend, has a rank of at most four per contact, so few iterations are needed whatever the object's size and the
-//! springs' stiffness. Negative curvature asks for more damping, and where much would be needed, for a model without it: a wall's
-//! second variation is the difference of two squares, of which the positive one is kept.
+//! springs' stiffness. Negative curvature asks for more damping, or with [`Care::Convex`] for a model without it: a wall's second
+//! variation is the difference of two squares, of which the positive one is kept.
 
 // Indexed loops as in shaders/trust_region.wgsl.
 #![allow(clippy::needless_range_loop)]
@@ -28,8 +28,8 @@ use super::series::bear;
 use super::springs::{Bending, Springs, add_contact_hessian, add_on_nodes, nodes_of};
 use super::support::{Support, dot, root};
 use crate::tolerances::{
-    CONVEX_TOLERANCE, CURVATURE_MARGIN, DAMPING_ATTEMPTS, DAMPING_DECAY, DAMPING_GROWTH, EXACT_ATTEMPTS,
-    INNER_ITERATIONS_PER_UNKNOWN, LEAST_DAMPING, MODEL_PASSES, STEP_BACK_HALVINGS, THOROUGH_MODEL_PASSES,
+    CONVEX_TOLERANCE, CURVATURE_MARGIN, DAMPING_ATTEMPTS, DAMPING_DECAY, DAMPING_GROWTH, INNER_ITERATIONS_PER_UNKNOWN,
+    LEAST_DAMPING, MODEL_PASSES, STEP_BACK_HALVINGS, THOROUGH_MODEL_PASSES,
 };
 use glam::DVec3;
 
@@ -38,9 +38,18 @@ use glam::DVec3;
 pub enum Care {
     /// What nearly all configurations converge with.
     Quick,
-    /// What the others need: a ball's side is made sure of, passes go on to the model's minimum, a step that E refuses gets a
-    /// second chance, and walls whose curvature asks for much damping bend without it.
+    /// What the others need: a ball's side is made sure of, passes go on to the model's minimum, and a step that E refuses gets a
+    /// second chance.
     Thorough,
+    /// As thorough, and where the model is not convex, the negative part of the walls' curvature is left out instead of damped.
+    Convex,
+}
+
+impl Care {
+    /// Whether more is done than is quick.
+    pub fn is_thorough(self) -> bool {
+        self != Self::Quick
+    }
 }
 
 /// How much the model is damped: more from step to step where E refuses them, less where it keeps what they promise (Nielsen 1999).
@@ -134,30 +143,28 @@ impl Newton {
         support: &Support,
         springs: Springs,
         residual: (&[f64], &[f64]),
-        damping: f64,
+        mut damping: f64,
         mut tolerance: f64,
         care: Care,
     ) -> Step {
         let mut model = springs;
-        let mut raised = damping;
-        for attempt in 0..DAMPING_ATTEMPTS {
-            if care == Care::Thorough && attempt == EXACT_ATTEMPTS && springs.have_walls() {
-                model.bending = Bending::Convex;
-                raised = damping;
-                tolerance = tolerance.max(CONVEX_TOLERANCE);
-            }
-            self.stiffening = 1.0 + raised;
+        for _ in 0..DAMPING_ATTEMPTS {
+            self.stiffening = 1.0 + damping;
             match self.minimise(support, model, residual, tolerance, care) {
                 Ok(decrease) => {
                     let decrease =
-                        if model.bending == springs.bending { decrease } else { self.assess(springs, residual.0) };
+                        if model.bending == Bending::Exact { decrease } else { self.assess(springs, residual.0) };
                     let square = dot(&self.force, &self.displacement);
-                    return Step { predicted: decrease + 0.5 * raised * square, length: root(square), damping: raised };
+                    return Step { predicted: decrease + 0.5 * damping * square, length: root(square), damping };
                 }
-                Err(lacking) => raised += (lacking + CURVATURE_MARGIN).max(raised),
+                Err(_) if care == Care::Convex && model.bending == Bending::Exact => {
+                    model.bending = Bending::Convex;
+                    tolerance = tolerance.max(CONVEX_TOLERANCE);
+                }
+                Err(lacking) => damping += (lacking + CURVATURE_MARGIN).max(damping),
             }
         }
-        Step { predicted: f64::NAN, length: 0.0, damping: raised }
+        Step { predicted: f64::NAN, length: 0.0, damping }
     }
 
     /// The least of the damped model, and by how much it is less than at the start [J]; or what damping lacks where it is not convex.
@@ -175,7 +182,7 @@ impl Newton {
         let mut stop = 0.0;
         let mut predicted = 0.0;
         let mut left = INNER_ITERATIONS_PER_UNKNOWN * support.order();
-        let passes = if care == Care::Thorough { THOROUGH_MODEL_PASSES } else { MODEL_PASSES };
+        let passes = if care.is_thorough() { THOROUGH_MODEL_PASSES } else { MODEL_PASSES };
         for pass in 0..passes {
             self.previous_force.copy_from_slice(&self.force);
             self.previous_displacement.copy_from_slice(&self.displacement);
@@ -186,7 +193,7 @@ impl Newton {
             }
             self.conjugate_gradients(support, springs, stop, &mut left)?;
             let mut decrease = self.assess(springs, residual);
-            if care == Care::Thorough && decrease <= predicted {
+            if care.is_thorough() && decrease <= predicted {
                 self.step_back(springs, residual);
                 decrease = self.assess(springs, residual);
             }
@@ -504,17 +511,17 @@ mod tests {
         assert!(dot(&residual, &displacement) > 0.0);
     }
 
-    /// Where walls curve so much that damping would have to be raised often, a thorough step does without, and leads downhill all the same.
+    /// Where walls curve so that the model is not convex, a step that leaves that out needs no damping, and leads downhill all the same.
     #[test]
-    fn a_thorough_step_leaves_out_curvature_that_asks_for_much_damping() {
+    fn a_convex_step_needs_no_damping_of_balls() {
         let object = ball(SpringKind::Isotropic);
         let sample = sample(&object, 30.0, 1e3).of_balls();
         let quick = step(&sample, 0.0).2;
-        let (residual, force, thorough) = step_with(&sample, 0.0, Care::Thorough);
-        assert!(quick.damping > 1.0 && thorough.damping == 0.0, "{quick:?} {thorough:?}");
+        let (residual, force, convex) = step_with(&sample, 0.0, Care::Convex);
+        assert!(quick.damping > 1.0 && convex.damping == 0.0, "{quick:?} {convex:?}");
         let mut displacement = vec![0.0; force.len()];
         sample.support().multiply(&force, &mut displacement);
-        assert!(dot(&residual, &displacement) > 0.0 && thorough.predicted > 0.0, "{thorough:?}");
+        assert!(dot(&residual, &displacement) > 0.0 && convex.predicted > 0.0, "{convex:?}");
     }
 
     /// However damped, a step meets stiff springs nearly in full.

@@ -38,11 +38,6 @@ impl<'a> Springs<'a> {
         }
     }
 
-    /// Whether any of them is a ball's wall.
-    pub fn have_walls(self) -> bool {
-        self.contacts.iter().any(|row| row.wall.is_some())
-    }
-
     /// What a wall that bears `push` more, bent by displacements `v` of its nodes, resists with at each of them [N].
     pub fn wall_forces(self, row: &Contact, push: f64, v: [DVec3; 3]) -> [DVec3; 3] {
         let straight = row.spread(push);

@@ -9,7 +9,8 @@
 //! so soft that E is smooth over many facets, but no softer than keeps balls out of the object. A step that stalls on the way is left
 //! for the next, whose E is another. At the end of the way contact stiffens in stages as from the rest state. All along, facets are
 //! rounded more, so that they turn under a ball slowly where they are pressed to slivers; in the end they are as they should be, and a
-//! last descent finds the equilibrium beside.
+//! last descent finds the equilibrium beside. Where a surface that is soft along itself slides under a ball, curvature asks for so
+//! much damping that steps creep; so the last of its ways in is gone with a convex model instead.
 
 use super::{EnergySearch, Geometry, Limits, Outcome, contact_energy, foresee};
 use crate::contact::detection::{Detection, Walls};
@@ -39,12 +40,13 @@ impl EnergySearch {
         let normal = deepest.map_or(DVec3::ZERO, |contact| contact.normal);
         let outward = surface::unit_or_zero(detection.nodes().iter().sum());
         // Balls that span several facets hardly ever come in otherwise than gently.
-        let ways = if model.chain.nodes.iter().any(|node| node.radius > model.mean_edge) {
-            [(true, outward), (true, normal)]
+        let ways: &[(Care, bool, DVec3)] = if model.chain.nodes.iter().any(|node| node.radius > model.mean_edge) {
+            &[(Care::Thorough, true, outward), (Care::Thorough, true, normal), (Care::Convex, true, outward)]
         } else {
-            [(false, normal), (true, outward)]
+            &[(Care::Thorough, false, normal), (Care::Thorough, true, outward)]
         };
-        for (gently, direction) in ways {
+        for &(care, gently, direction) in ways {
+            self.take_care(care, detection);
             let before = outcome.iterations;
             *outcome = self.approach(model, detection, nodes, gently, direction);
             outcome.converged &= self.state.energy <= at_rest;
