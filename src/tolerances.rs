@@ -29,8 +29,8 @@ pub const GPU_LEAST_DIVISOR: f32 = 1e-36;
 /// hundred products to a few 1e-6, so 1e-5 is what can be told from zero.
 pub const GPU_LEAST_TOLERANCE: f64 = 1e-5;
 
-/// Largest relative residual of an f32 result that is passed on as converged [1]; of the energy form's see
-/// [`GPU_REFINED_RESIDUAL`]. What has more is solved in f64.
+/// Largest relative residual of an f32 result of the paper's iteration that is passed on as converged [1]; of the others see
+/// [`GPU_SETTLED_RESIDUAL`]. What has more is solved in f64.
 pub const GPU_RESOLVED_RESIDUAL: f64 = 1e-4;
 
 /// Distance of a node to an edge or vertex, relative to the object's extent, below which f32 does not resolve the
@@ -63,17 +63,18 @@ pub const GPU_INNER_TOLERANCE_FLOOR: f32 = 1e-4;
 /// that goes on holds up its whole batch, and what is not converged is solved in f64 with all the scene's iterations.
 pub const GPU_MAX_ITERATIONS: u32 = 100;
 
-/// Passes in f64 over a result of the f32 kernel at most [1]. Changes shrink from pass to pass by the ratio of the surface's
-/// curvature to contact's stiffness, some tenths; where ten passes do not do, the search itself is needed.
-pub const REFINEMENT_PASSES: usize = 10;
+/// Steps in f64 from a result of the f32 kernel at most [1]. They converge quadratically: where f32 found an equilibrium, one leads from
+/// its 1e-5 to 1e-8. Four let contacts within rounding of none come and go; what needs more was not near one, and may end at another.
+pub const SETTLING_STEPS: u32 = 4;
 
-/// What the contact forces of a result of the energy form may lack after these passes, relative, in the energy norm [1]: f32
-/// is asked for 1e-5, so a result that has more was not found.
-pub const GPU_REFINED_RESIDUAL: f64 = 1e-5;
+/// Greatest contact stiffness of the energy form in f32, in units of the stiffness of the object's softest node [1]: a depth is known to
+/// about 1e-6 of the object's displacement, a force to this many times that. What is stiffer is stiffened from there in f64, where nothing
+/// moves by more than a thousandth of its displacement.
+pub const GPU_STIFFNESS: f64 = 1e3;
 
-/// Relative change of the contact forces, in the energy norm, at which passes in f64 end [1]: the default tolerance of the
-/// CPU's solver.
-pub const REFINED: f64 = 1e-8;
+/// What the contact forces of a result of the energy form may lack after these steps, relative, in the energy norm [1]: soft directions
+/// of a deep dent raise it a hundredfold in the torque, which is to agree to 1e-5 with the CPU's.
+pub const GPU_SETTLED_RESIDUAL: f64 = 1e-7;
 
 /// Relative residual of the paper's step 2 in f32 [1]: ten times better than the least tolerance of the iteration.
 pub const GPU_PAPER_INNER_TOLERANCE: f32 = 1e-6;

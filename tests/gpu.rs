@@ -13,7 +13,7 @@ use haptize::render::graphics::ObjectMotion;
 use haptize::scene::{
     Algorithm, Blending, ElasticSpec, GraphicsEffects, Material, Scene, SpringKind, SpringSpec, StiffeningSpec,
 };
-use haptize::tolerances::{FACET_ROUNDING, WALL_COMPLIANCE};
+use haptize::tolerances::{FACET_ROUNDING, GPU_SETTLED_RESIDUAL, WALL_COMPLIANCE};
 use std::sync::{Arc, OnceLock};
 
 /// One device for all tests of this process: opening one costs a second, and drivers dislike many.
@@ -61,18 +61,17 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Relative agreement of U that f32 owes f64: U is stationary in the displacement, so it differs by the rounding of proxy
-/// positions (1e-8 m of a depth of a millimetre or more) and of sums (a hundred terms of 6e-8).
-const ENERGY_AGREEMENT: f64 = 1e-4;
-
-/// Relative agreement of the torque: ten times the residual of 1e-5 that f32 is asked for.
-const TORQUE_AGREEMENT: f64 = 1e-4;
+/// Relative agreement of U and of the torque, a hundred times the residual to which results are settled in f64 (soft directions), or
+/// ten times the residual of 1e-5 that the paper's iteration is asked for in f32.
+fn agreement(algorithm: Algorithm) -> f64 {
+    if algorithm == Algorithm::Paper { 1e-4 } else { 100.0 * GPU_SETTLED_RESIDUAL }
+}
 
 /// Agreement of gaps [m]: coordinates of about 0.2 m rounded a few times by 6e-8.
 const GAP_AGREEMENT: f64 = 1e-7;
 
-/// What differs between an f64 and an f32 result beyond rounding, or `None`.
-fn difference(cpu: &Equilibrium, gpu: &Equilibrium) -> Option<String> {
+/// What differs between the CPU's and the GPU's result by `algorithm` beyond what they owe each other, or `None`.
+fn difference(algorithm: Algorithm, cpu: &Equilibrium, gpu: &Equilibrium) -> Option<String> {
     let gap = (cpu.gap - gpu.gap).abs();
     if cpu.status != gpu.status || gap > GAP_AGREEMENT {
         return Some(format!("status {:?}, {:?}; gap {gap:.1e} m", cpu.status, gpu.status));
@@ -82,7 +81,8 @@ fn difference(cpu: &Equilibrium, gpu: &Equilibrium) -> Option<String> {
     }
     let energy = (cpu.energy - gpu.energy).abs() / cpu.energy;
     let torque = distance(&cpu.torque, &gpu.torque) / cpu.torque.norm();
-    (!(energy <= ENERGY_AGREEMENT && torque <= TORQUE_AGREEMENT)).then(|| format!("U {energy:.1e}, tau {torque:.1e}"))
+    let owed = agreement(algorithm);
+    (!(energy <= owed && torque <= owed)).then(|| format!("U {energy:.1e}, tau {torque:.1e}"))
 }
 
 /// Share by which f32 may miss an invariant that is recomputed in f64 [1].
@@ -177,7 +177,7 @@ fn check_scene(name: &str, material: Option<Material>, algorithm: Algorithm, str
                 assert_eq!(broken_law(&model, q, result), None, "{name}, {algorithm:?}, {q:?}");
             }
         }
-        unlike.extend(difference(&reference, result).map(|difference| format!("{q:?}: {difference}")));
+        unlike.extend(difference(algorithm, &reference, result).map(|difference| format!("{q:?}: {difference}")));
     }
     // The paper's iteration converges for few of those in contact.
     let expected = if algorithm == Algorithm::Paper { 5 } else { 15 };
@@ -185,9 +185,9 @@ fn check_scene(name: &str, material: Option<Material>, algorithm: Algorithm, str
     // The paper's iteration is chaotic where it does not settle at once: rounding decides now and then whether it does.
     let allowed = if algorithm == Algorithm::Paper { configurations.len() / 50 } else { 0 };
     assert!(unlike.len() <= allowed, "{name}, {algorithm:?}: {unlike:#?}");
-    // Left to the CPU: what lies within rounding of no contact, about 1e-6 of all, and what the passes in f64 do not bring to
-    // 1e-5, a quarter of those that touch.
-    assert!(gpu.solved_on_cpu() * 2 <= touching, "{name}, {algorithm:?}: {} left to the CPU", gpu.solved_on_cpu());
+    // Left to the CPU: what lies within rounding of no contact, about 1e-6 of all, and what does not settle: about one in twenty.
+    println!("{name}, {algorithm:?}: {touching} touch, {} by the CPU", gpu.left_to_cpu());
+    assert!(gpu.left_to_cpu() * 5 <= touching, "{name}, {algorithm:?}: {} left to the CPU", gpu.left_to_cpu());
 }
 
 #[test]
@@ -226,13 +226,13 @@ fn check_blended(name: &str, material: Option<Material>, algorithm: Algorithm, b
     let (mut touching, mut told_apart, mut unlike) = (0, 0, Vec::new());
     for (q, result) in configurations.iter().zip(&gpu.solve(&configurations).unwrap()) {
         let reference = cpu.solve(q);
-        unlike.extend(difference(&reference, result).map(|difference| format!("{q:?}: {difference}")));
+        unlike.extend(difference(algorithm, &reference, result).map(|difference| format!("{q:?}: {difference}")));
         if reference.status == Status::Contact {
             touching += 1;
-            told_apart += usize::from(difference(&sharp.solve(q), result).is_some());
+            told_apart += usize::from(difference(algorithm, &sharp.solve(q), result).is_some());
         }
     }
-    let left = gpu.solved_on_cpu();
+    let left = gpu.left_to_cpu();
     println!("{name}, {algorithm:?}, {blending:?}: {touching} touch, {told_apart} told apart, {left} by the CPU");
     assert!(touching >= 15 && told_apart == touching, "{told_apart} of {touching}");
     assert!(unlike.is_empty(), "{unlike:#?}");
@@ -275,7 +275,7 @@ fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
         let (mut touching, mut beyond) = (0, 0);
         for (q, result) in configurations.iter().zip(&results) {
             let reference = cpu.solve(q);
-            assert_eq!(difference(&reference, result), None, "{algorithm:?}, {blending:?}, {q:?}");
+            assert_eq!(difference(algorithm, &reference, result), None, "{algorithm:?}, {blending:?}, {q:?}");
             touching += usize::from(reference.status == Status::Contact);
             beyond += usize::from(reference.status == Status::Overflow);
         }
@@ -304,7 +304,7 @@ fn facets_beyond_the_kernels_room_are_solved_on_the_cpu() {
             assert_eq!(format!("{result:?}"), format!("{reference:?}"), "the f64 result itself");
         }
     }
-    assert!(crowded > 10 && gpu.solved_on_cpu() >= crowded, "{crowded}, {}", gpu.solved_on_cpu());
+    assert!(crowded > 10 && gpu.left_to_cpu() >= crowded, "{crowded}, {}", gpu.left_to_cpu());
 }
 
 #[test]
@@ -317,17 +317,24 @@ fn the_comparators_reject_perturbed_results() {
         .map(|q| (q, cpu.solve(&q)))
         .find(|(_, result)| result.touches.len() >= 2)
         .unwrap();
-    assert_eq!(difference(&good, &good), None);
+    assert_eq!(difference(Algorithm::Energy, &good, &good), None);
     assert_eq!(broken_law(&model, &q, &good), None);
     let perturbed = |change: &dyn Fn(&mut Equilibrium)| {
         let mut bad = good.clone();
         change(&mut bad);
         bad
     };
-    assert!(difference(&good, &perturbed(&|bad| bad.torque.iter_mut().for_each(|tau| *tau *= 1.0 + 3e-4))).is_some());
-    assert!(difference(&good, &perturbed(&|bad| bad.energy *= 1.0 + 3e-4)).is_some());
-    assert!(difference(&good, &perturbed(&|bad| bad.gap += 1e-6)).is_some());
-    assert!(difference(&good, &perturbed(&|bad| bad.status = Status::Unconverged)).is_some());
+    assert!(
+        difference(
+            Algorithm::Energy,
+            &good,
+            &perturbed(&|bad| bad.torque.iter_mut().for_each(|tau| *tau *= 1.0 + 3e-5))
+        )
+        .is_some()
+    );
+    assert!(difference(Algorithm::Energy, &good, &perturbed(&|bad| bad.energy *= 1.0 + 3e-5)).is_some());
+    assert!(difference(Algorithm::Energy, &good, &perturbed(&|bad| bad.gap += 1e-6)).is_some());
+    assert!(difference(Algorithm::Energy, &good, &perturbed(&|bad| bad.status = Status::Unconverged)).is_some());
     assert!(
         broken_law(&model, &q, &perturbed(&|bad| bad.torque.iter_mut().for_each(|tau| *tau *= 1.0 + 1e-9))).is_some()
     );
@@ -371,7 +378,7 @@ fn contacts_beyond_the_kernels_room_are_solved_on_the_cpu() {
             }
         }
         assert!(crowded > 1, "{algorithm:?}: only {crowded}");
-        assert!(gpu.solved_on_cpu() >= crowded);
+        assert!(gpu.left_to_cpu() >= crowded);
     }
 }
 
@@ -587,7 +594,7 @@ fn stiff_contact_is_as_accurate_as_soft_contact() {
                 }
             }
         }
-        println!("Kc {stiffness}: {touching} touch, residual {worst:.1e}, {} by the CPU", gpu.solved_on_cpu());
+        println!("Kc {stiffness}: {touching} touch, residual {worst:.1e}, {} by the CPU", gpu.left_to_cpu());
         assert!(touching > 20 && worst <= 1e-4);
     }
 }

@@ -106,7 +106,7 @@ pub fn warn(report: &SweepReport) {
 /// What was baked into `file`, for people.
 pub fn describe(text: &mut String, file: &Path, report: &SweepReport) -> fmt::Result {
     let SweepReport { points, contact_points, filled_points, unconverged, overflowed, .. } = report;
-    let SweepReport { seconds, configurations_per_second, algorithm, backend, adapter, .. } = report;
+    let SweepReport { seconds, configurations_per_second, algorithm, backend, adapter, left_to_cpu, .. } = report;
     let Iterations { mean, max } = report.iterations;
     let lost = unconverged + overflowed;
     writeln!(text, "{}: {points} points, {contact_points} in contact, {lost} not converged", file.display())?;
@@ -119,6 +119,9 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport) -> fmt::Re
         "  solved       in {seconds:.2} s, {configurations_per_second:.0} configurations a second, {algorithm} on \
          {backend} ({adapter})"
     )?;
+    if *left_to_cpu > 0 {
+        writeln!(text, "  by the CPU   {left_to_cpu} of them, which the GPU did not decide")?;
+    }
     writeln!(
         text,
         "  residual     at most {:.1e} where converged; iterations {mean:.1} on average, {max} at most",

@@ -213,18 +213,21 @@ impl EnergySearch {
         outcome
     }
 
-    /// Searches from where `forces` on the object's nodes hold it, which should be near the minimum, for the configuration that
-    /// `detection` has taken up.
+    /// Searches from where `forces` on the object's nodes hold it, which should be near the minimum with contact stiffness `kc` [N/m], for
+    /// the configuration that `detection` has taken up.
     pub fn settle(
         &mut self,
         model: &Model,
         detection: &mut Detection,
         geometry: Geometry,
-        forces: &[NodeForce],
+        (forces, kc): (&[NodeForce], f64),
         limits: Limits,
     ) -> Outcome {
-        (self.kc, self.last_kc) = (model.kc, model.kc);
-        self.start(model, detection, geometry);
+        (self.kc, self.last_kc) = (kc, model.kc);
+        self.support.clear();
+        if geometry == Geometry::Frozen {
+            self.start(model, detection, geometry);
+        }
         self.trial.forces.clear();
         for &NodeForce { node, force } in forces {
             let at = 3 * self.support.add(node);
@@ -232,6 +235,7 @@ impl EnergySearch {
             self.trial.forces[at..at + 3].iter_mut().zip(force.to_array()).for_each(|(sum, part)| *sum += part);
         }
         self.take_trial(model, detection, geometry);
+        self.kc = model.kc;
         let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
         self.descend(model, detection, geometry, limits, &mut outcome);
         outcome

@@ -25,6 +25,7 @@ mod relief;
 mod rows;
 mod series;
 mod solver;
+mod solvers;
 mod springs;
 pub(crate) mod support;
 pub(crate) mod surface;
@@ -34,6 +35,7 @@ mod wide;
 pub use model::Model;
 pub use proximity::Proximity;
 pub use solver::Solver;
+pub(crate) use solvers::{SHARE, Solvers};
 
 /// What became of one configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -63,14 +63,15 @@ impl<'a> Solver<'a> {
         })
     }
 
-    /// The same by the energy form, from near the solution on: where `forces` on the object's nodes hold it.
+    /// The same by the energy form, from near the solution on: where `forces` on the object's nodes hold it with contact stiffness
+    /// `kc` [N/m].
     #[must_use]
-    pub(crate) fn settle(&mut self, q: &[f64], forces: &[NodeForce], limits: Limits) -> Equilibrium {
+    pub(crate) fn settle(&mut self, q: &[f64], forces: &[NodeForce], kc: f64, limits: Limits) -> Equilibrium {
         let geometry = match self.model.contact.algorithm {
             Algorithm::Linearised => Geometry::Frozen,
             Algorithm::Energy | Algorithm::Paper => Geometry::Deformed,
         };
-        self.find(q, |solver, equilibrium| solver.minimise(geometry, Some((forces, limits)), equilibrium))
+        self.find(q, |solver, equilibrium| solver.minimise(geometry, Some(((forces, kc), limits)), equilibrium))
     }
 
     /// What `search` finds at `q`, where there is contact.
@@ -152,7 +153,7 @@ impl<'a> Solver<'a> {
     fn minimise(
         &mut self,
         geometry: Geometry,
-        near: Option<(&[NodeForce], Limits)>,
+        near: Option<((&[NodeForce], f64), Limits)>,
         equilibrium: &mut Equilibrium,
     ) -> Outcome {
         let Self { model, detection, energy, pose, .. } = self;

@@ -9,8 +9,7 @@
 //! | `model` | object, proxy and contact law as buffers |
 //! | `pipeline` | the stages of a batch and their buffers |
 //! | `solver` | the backend of a sweep: chunks, batches, retries |
-//! | `refinement` | the energy form's results settled in f64 |
-//! | `unpack` | from what the kernels wrote to equilibria, in f64; between blended facets by the CPU's search |
+//! | `unpack` | from what the kernels wrote to equilibria, settled in f64 by the CPU's search |
 //! | `frame` | the object's nodes, one passive step a frame |
 //! | `kernel` | one compute pipeline with its bindings and dispatches; buffers, poison, read-back |
 //! | `timing` | how long each kernel takes, where that is asked for |
@@ -28,7 +27,6 @@ pub mod layout;
 mod leaf_tests;
 mod model;
 mod pipeline;
-mod refinement;
 pub mod shaders;
 mod solver;
 mod timing;

@@ -34,6 +34,11 @@ pub struct DeviceModel {
     pub(super) gap_band: f64,
 }
 
+/// Contact stiffness of the energy form in f32 [N/m].
+pub(super) fn stiffness(model: &contact::Model<'_>) -> f64 {
+    model.kc.min(tolerances::GPU_STIFFNESS / model.softest)
+}
+
 impl DeviceModel {
     /// Uploads a model.
     ///
@@ -65,7 +70,7 @@ impl DeviceModel {
                 triangles: object.triangles.len() as u32,
                 max_iterations: contact.max_iterations.min(tolerances::GPU_MAX_ITERATIONS),
                 stiffness: contact.stiffness as f32,
-                kc: model.kc as f32,
+                kc: stiffness(model) as f32,
                 tolerance: contact.tolerance.max(tolerances::GPU_LEAST_TOLERANCE) as f32,
                 softest: model.softest as f32,
                 least_distance: (tolerances::GPU_LEAST_DISTANCE_PER_EXTENT * extent) as f32,

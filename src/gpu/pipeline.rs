@@ -38,10 +38,13 @@ impl Room {
     pub(super) fn within(self, binding_limit: u64, model: &contact::Model<'_>) -> Self {
         let budget = binding_limit.min(BUFFER_BUDGET);
         let fit = |bytes: usize| (budget as usize / bytes.max(1)).max(1);
+        let nodes = model.chain.nodes.len();
         let contacts = self.contacts.clamp(1, 32);
+        // Between sharp facets a node has one contact.
+        let contacts = if model.blending > 0.0 { contacts } else { contacts.min(nodes) };
         let facets = if model.blending > 0.0 { Blended::of(contacts).bytes() } else { 0 };
         Self {
-            chunk: self.chunk.clamp(1, fit(16 * model.chain.nodes.len().max(model.chain.joints.len()))),
+            chunk: self.chunk.clamp(1, fit(16 * nodes.max(model.chain.joints.len()))),
             batch: self
                 .batch
                 .clamp(1, fit((16 * model.compliance.nodes.len()).max(size_of::<Touch>() * contacts).max(facets))),

@@ -1,12 +1,12 @@
 //! Equilibria of many configurations on the GPU: the backend of a sweep.
 //!
 //! A chunk of configurations is placed and tested for contact in one submission; the host then knows how many touch, and
-//! submits these in batches, one workgroup a configuration, unpacking one batch while the device solves the next. Sizes
-//! of chunks and batches follow from measured time: a dispatch should last tens of milliseconds. Results do not depend
+//! submits these in batches, one workgroup a configuration. While the device solves one batch, all cores settle the one before in f64.
+//! Sizes of chunks and batches follow from measured time: a dispatch should last tens of milliseconds. Results do not depend
 //! on them.
 //!
-//! What f32 or the kernel's room cannot decide is solved by the CPU's f64 solver: contact within rounding of none,
-//! residuals that rounding keeps above [`GPU_RESOLVED_RESIDUAL`], more contacts than the lists hold. Nothing is cut off.
+//! What f32 or the kernel's room cannot decide is left to the CPU's f64 solver: contact within rounding of none, forces that do
+//! not settle, more contacts than the lists hold. Nothing is cut off.
 
 use super::{
     adapter::AdapterSummary,
@@ -16,12 +16,11 @@ use super::{
 };
 use crate::{
     JointVector,
-    contact::{self, Equilibrium, Status},
+    contact::{self, Equilibrium, Solvers, Status},
     haptize::Backend,
     scene::Algorithm,
     tolerances::GPU_RESOLVED_RESIDUAL,
 };
-use rayon::prelude::*;
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -35,12 +34,12 @@ const DISPATCH_TARGET: Duration = Duration::from_millis(50);
 pub struct GpuSolver<'a> {
     context: Arc<Context>,
     model: &'a contact::Model<'a>,
-    cpu: contact::Solver<'a>,
+    cpu: Solvers<'a>,
     room: Room,
     pipeline: Pipeline,
     chunk: Pace,
     batch: Pace,
-    solved_on_cpu: usize,
+    left_to_cpu: usize,
 }
 
 /// A number of configurations that follows measured time.
@@ -90,13 +89,13 @@ impl<'a> GpuSolver<'a> {
         Ok(Self {
             context,
             model,
-            cpu: contact::Solver::new(model),
+            cpu: Solvers::new(model, rayon::current_num_threads()),
             room,
             pipeline,
             // First dispatches are small: nothing is known of the device yet.
             chunk: Pace { now: room.chunk.min(1024), most: room.chunk },
             batch: Pace { now: room.batch.min(64), most: room.batch },
-            solved_on_cpu: 0,
+            left_to_cpu: 0,
         })
     }
 
@@ -112,12 +111,6 @@ impl<'a> GpuSolver<'a> {
         if self.adapter().hardware { self.room.chunk } else { self.room.chunk.min(1024) }
     }
 
-    /// How many configurations so far went to the CPU's f64 solver, because f32 or the kernel's room did not decide them.
-    #[must_use]
-    pub fn solved_on_cpu(&self) -> usize {
-        self.solved_on_cpu
-    }
-
     /// Equilibria of one chunk.
     fn solve_chunk(&mut self, chunk: &[JointVector]) -> Result<Vec<Equilibrium>, GpuError> {
         let since = Instant::now();
@@ -125,10 +118,8 @@ impl<'a> GpuSolver<'a> {
         self.chunk.adapt(chunk.len(), since.elapsed());
         let mut results: Vec<Equilibrium> =
             gaps.iter().zip(chunk).map(|(&gap, q)| free(f64::from(gap), q.len())).collect();
-        if self.model.blending > 0.0 {
-            measure_gaps(self.model, chunk, &touching, &mut results);
-        }
-        let mut flight = None;
+        self.decide_free(chunk, &touching, &mut results);
+        let mut flight: Option<Flight> = None;
         let mut first = 0;
         while first < touching.len() || flight.is_some() {
             let previous = flight.take();
@@ -141,39 +132,65 @@ impl<'a> GpuSolver<'a> {
             }
             if let Some(done) = previous {
                 let members = &touching[done.first..done.first + done.count];
-                self.land(chunk, members, &done, &mut results)?;
+                let landed = self.land(chunk, members, &done, &mut results)?;
                 // The next one began when this one ended.
                 if let Some(next) = &mut flight {
-                    next.since = Instant::now();
+                    next.since = landed;
                 }
-            }
-        }
-        for (result, q) in results.iter_mut().zip(chunk) {
-            if self.is_undecided(result) {
-                *result = self.cpu.solve(q);
-                self.solved_on_cpu += 1;
             }
         }
         Ok(results)
     }
 
-    /// Waits for a batch and stores its results.
+    /// Of what touches nothing in f32, solves what lies within rounding of contact, and measures gaps to blended facets: a
+    /// microsecond each.
+    fn decide_free(&mut self, chunk: &[JointVector], touching: &[u32], results: &mut [Equilibrium]) {
+        let blended = self.model.blending > 0.0;
+        let mut free = vec![true; chunk.len()];
+        touching.iter().for_each(|&member| free[member as usize] = false);
+        let open: Vec<usize> =
+            (0..chunk.len()).filter(|&k| free[k] && (blended || self.is_undecided(&results[k]))).collect();
+        let decided = self.cpu.map(&open, |solver, &k| {
+            let gap = if blended { solver.gap(&chunk[k]) } else { results[k].gap };
+            let measured = Equilibrium { gap, ..results[k].clone() };
+            if self.is_undecided(&measured) { (solver.solve(&chunk[k]), 1) } else { (measured, 0) }
+        });
+        for (k, (result, left)) in open.into_iter().zip(decided) {
+            results[k] = result;
+            self.left_to_cpu += left;
+        }
+    }
+
+    /// Waits for a batch and stores its results; when the device had done with it.
     fn land(
         &mut self,
         chunk: &[JointVector],
         members: &[u32],
         flight: &Flight,
         results: &mut [Equilibrium],
-    ) -> Result<(), GpuError> {
+    ) -> Result<Instant, GpuError> {
         let (outcomes, touches) = self.pipeline.collect(&self.context, flight.set, flight.count, &flight.submission)?;
-        self.batch.adapt(flight.count, flight.since.elapsed());
-        let unpacked = unpack(self.model, self.room.contacts, chunk, members, &outcomes, &touches)?;
-        for (&member, equilibrium) in members.iter().zip(unpacked) {
-            let result = &mut results[member as usize];
-            let gap = if self.model.blending > 0.0 { equilibrium.gap } else { result.gap };
-            *result = Equilibrium { gap, ..equilibrium };
+        let landed = Instant::now();
+        self.batch.adapt(flight.count, landed - flight.since);
+        let places: Vec<usize> = (0..members.len()).collect();
+        let solved = self.cpu.map(&places, |solver, &place| {
+            let member = members[place] as usize;
+            let list = &touches[place * self.room.contacts..][..self.room.contacts];
+            let mut result = unpack(self.model, solver, &chunk[member], &outcomes[place], list)?;
+            if self.model.contact.algorithm == Algorithm::Paper {
+                result.gap = results[member].gap;
+            }
+            Some(if self.is_undecided(&result) { (solver.solve(&chunk[member]), 1) } else { (result, 0) })
+        });
+        let unwritten = solved.iter().filter(|result| result.is_none()).count();
+        if unwritten > 0 {
+            return Err(GpuError::NeverWritten { count: unwritten, total: members.len() });
         }
-        Ok(())
+        for (&member, (result, left)) in members.iter().zip(solved.into_iter().flatten()) {
+            results[member as usize] = result;
+            self.left_to_cpu += left;
+        }
+        Ok(landed)
     }
 
     /// Whether f32 or the kernel's room left open what the equilibrium is. The paper's iteration often does not converge in
@@ -200,16 +217,6 @@ impl<'a> GpuSolver<'a> {
         }
         Ok(())
     }
-}
-
-/// Gaps to blended facets of the configurations that touch nothing, in f64: a microsecond each.
-fn measure_gaps(model: &contact::Model<'_>, chunk: &[JointVector], touching: &[u32], results: &mut [Equilibrium]) {
-    let mut free = vec![true; chunk.len()];
-    touching.iter().for_each(|&member| free[member as usize] = false);
-    (results.par_iter_mut(), chunk, free)
-        .into_par_iter()
-        .filter(|(_, _, free)| *free)
-        .for_each_init(|| contact::Solver::new(model), |solver, (result, q, _)| result.gap = solver.gap(q));
 }
 
 /// No contact.
@@ -245,5 +252,9 @@ impl Backend for GpuSolver<'_> {
             results.extend(solved);
         }
         Ok(results)
+    }
+
+    fn left_to_cpu(&self) -> usize {
+        self.left_to_cpu
     }
 }

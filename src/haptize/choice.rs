@@ -118,4 +118,11 @@ impl Backend for ChosenBackend<'_> {
             Self::Gpu { solver, .. } => solver.notices(),
         }
     }
+
+    fn left_to_cpu(&self) -> usize {
+        match self {
+            Self::Cpu(cpu) => cpu.left_to_cpu(),
+            Self::Gpu { solver, .. } => solver.left_to_cpu(),
+        }
+    }
 }

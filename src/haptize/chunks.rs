@@ -89,6 +89,7 @@ impl Sweep<'_> {
     ) -> Result<(SweepReport, Provenance), SweepError> {
         let Begun { mut tally, mut provenance } = begun;
         let (points, resumed, start) = (self.grid.points(), tally.points, Instant::now());
+        let left_before = backend.left_to_cpu();
         let mut tell = |tally: &Tally, rate| {
             let (done, contact_points) = (tally.points, tally.statuses.in_contact());
             (run.progress)(Progress { done, points, contact_points, rate, footprint });
@@ -132,6 +133,7 @@ impl Sweep<'_> {
             skipped_points: skipped,
             resumed_points: resumed,
             solved_points: tally.points - resumed,
+            left_to_cpu: backend.left_to_cpu() - left_before,
             time: start.elapsed(),
         };
         Ok((SweepReport::of(&tally, facts, &provenance, &self.warnings), provenance))

@@ -3,17 +3,10 @@
 use super::Backend;
 use crate::{
     JointVector,
-    contact::{Equilibrium, Model, Solver},
+    contact::{Equilibrium, Model, SHARE, Solvers},
 };
-use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
-use std::{
-    convert::Infallible,
-    sync::{Mutex, PoisonError},
-};
-
-/// Configurations that one thread takes at a time: enough that sharing them out costs nothing, few enough that no thread
-/// waits long for the last.
-const SHARE: usize = 8;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::convert::Infallible;
 
 /// Shares of each thread in a chunk: progress is told several times a second, and threads rarely wait at a chunk's end.
 const SHARES: usize = 32;
@@ -21,8 +14,7 @@ const SHARES: usize = 32;
 /// Solves configurations on all cores.
 pub struct CpuBackend<'a> {
     pool: ThreadPool,
-    /// One a thread, by the thread's number: the lock is never contended.
-    solvers: Vec<Mutex<Solver<'a>>>,
+    solvers: Solvers<'a>,
 }
 
 impl<'a> CpuBackend<'a> {
@@ -32,14 +24,14 @@ impl<'a> CpuBackend<'a> {
     /// When the system gives no threads.
     pub fn new(model: &'a Model<'a>, threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
         let pool = ThreadPoolBuilder::new().num_threads(threads).thread_name(|k| format!("contact {k}")).build()?;
-        let solvers = (0..pool.current_num_threads()).map(|_| Mutex::new(Solver::new(model))).collect();
+        let solvers = Solvers::new(model, pool.current_num_threads());
         Ok(Self { pool, solvers })
     }
 
     /// Number of threads.
     #[must_use]
     pub fn threads(&self) -> usize {
-        self.solvers.len()
+        self.solvers.threads()
     }
 
     /// A good [`super::Run::chunk`] for this backend.
@@ -59,17 +51,6 @@ impl Backend for CpuBackend<'_> {
     type Error = Infallible;
 
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Infallible> {
-        let solvers = &self.solvers;
-        Ok(self.pool.install(|| {
-            configurations
-                .par_iter()
-                .with_min_len(SHARE)
-                .map(|q| {
-                    let solver = &solvers[rayon::current_thread_index().unwrap_or(0) % solvers.len()];
-                    // A solver keeps nothing from one configuration to the next that a panic could have spoilt.
-                    solver.lock().unwrap_or_else(PoisonError::into_inner).solve(q)
-                })
-                .collect()
-        }))
+        Ok(self.pool.install(|| self.solvers.map(configurations, |solver, q| solver.solve(q))))
     }
 }

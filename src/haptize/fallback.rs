@@ -20,12 +20,14 @@ pub struct WithFallback<'a, B> {
     /// What the device is called.
     name: String,
     notices: Vec<String>,
+    /// By the device, before it failed.
+    left_to_cpu: usize,
 }
 
 impl<'a, B: Backend> WithFallback<'a, B> {
     /// `device`, called `name`, which solves `model`.
     pub fn new(device: B, name: impl Display, model: &'a Model<'a>) -> Self {
-        Self { model, device: Some(device), cpu: None, name: name.to_string(), notices: Vec::new() }
+        Self { model, device: Some(device), cpu: None, name: name.to_string(), notices: Vec::new(), left_to_cpu: 0 }
     }
 
     /// What the device is called.
@@ -44,6 +46,7 @@ impl<B: Backend> Backend for WithFallback<'_, B> {
             match device.solve(configurations) {
                 Ok(equilibria) => return Ok(equilibria),
                 Err(error) => {
+                    self.left_to_cpu = device.left_to_cpu();
                     self.device = None;
                     self.notices.push(format!(
                         "solved by {}, since {} failed: {error}",
@@ -62,5 +65,9 @@ impl<B: Backend> Backend for WithFallback<'_, B> {
 
     fn notices(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notices)
+    }
+
+    fn left_to_cpu(&self) -> usize {
+        self.device.as_ref().map_or(self.left_to_cpu, Backend::left_to_cpu)
     }
 }

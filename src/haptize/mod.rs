@@ -56,4 +56,9 @@ pub trait Backend {
     fn notices(&mut self) -> Vec<String> {
         Vec::new()
     }
+
+    /// Of all configurations so far, how many the device left to the CPU because its precision or room did not decide them.
+    fn left_to_cpu(&self) -> usize {
+        0
+    }
 }

@@ -26,6 +26,8 @@ pub struct SweepReport {
     pub skipped_points: usize,
     /// Points that were taken over from an interrupted sweep.
     pub resumed_points: usize,
+    /// Points that this run's GPU left to the CPU, because its precision or room did not decide them.
+    pub left_to_cpu: usize,
     /// Wall time of this run [s].
     pub seconds: f64,
     /// Points solved by this run, over its wall time [1/s].
@@ -53,7 +55,7 @@ pub struct Iterations {
 
 impl SweepReport {
     pub(super) fn of(tally: &Tally, run: RunFacts, provenance: &Provenance, object_warnings: &[String]) -> Self {
-        let RunFacts { footprint, skipped_points, resumed_points, solved_points, time } = run;
+        let RunFacts { footprint, skipped_points, resumed_points, solved_points, left_to_cpu, time } = run;
         let contact_points = tally.statuses.in_contact();
         let seconds = time.as_secs_f64();
         Self {
@@ -69,6 +71,7 @@ impl SweepReport {
             },
             skipped_points,
             resumed_points,
+            left_to_cpu,
             seconds,
             // A clock that did not move is taken for its own resolution.
             configurations_per_second: solved_points as f64 / time.max(Duration::from_nanos(1)).as_secs_f64(),
@@ -88,5 +91,7 @@ pub(super) struct RunFacts {
     pub resumed_points: usize,
     /// By this run, with those that it skipped where it goes through the grid point by point.
     pub solved_points: usize,
+    /// By the backend.
+    pub left_to_cpu: usize,
     pub time: Duration,
 }

@@ -34,6 +34,7 @@ fn a_sweep_whose_device_is_lost_goes_on_with_the_cpu() {
     let lossy = || WithFallback::new(MadeUp { breaks_after: 25, ..MadeUp::default() }, "a made-up device", &model);
     let folder = Folder::new();
     let report = bake(&sweep(), &mut lossy(), &folder.output(), false, 10, usize::MAX).unwrap();
+    assert_eq!(report.left_to_cpu, 10, "half of the first two batches");
     let dataset = Dataset::open(&folder.output()).unwrap();
     let [notice] = &dataset.provenance.notices[..] else { panic!("{:?}", dataset.provenance) };
     assert!(notice.starts_with("from grid point 20 on: solved by "), "{notice}");
@@ -65,6 +66,17 @@ fn a_folder_that_cannot_be_written_is_named_at_once() {
     let error = bake(&sweep(), &mut backend, folder.0.path(), false, 10, usize::MAX).unwrap_err();
     assert!(matches!(error, SweepError::IsFolder { .. }), "{error}");
     assert_eq!((backend.solved, folder.names()), (0, Vec::new()));
+}
+
+/// What a device leaves to the CPU is told of each sweep by itself.
+#[test]
+fn what_is_left_to_the_cpu_is_told() {
+    let folder = Folder::new();
+    let mut backend = MadeUp::default();
+    for sweeps in 1..=2 {
+        let report = bake(&sweep(), &mut backend, &folder.output(), false, 10, usize::MAX).unwrap();
+        assert_eq!((report.left_to_cpu, sweeps * report.left_to_cpu), (POINTS / 2, backend.left_to_cpu));
+    }
 }
 
 /// A folder takes the output's name while the last points are solved: the finished file cannot take it.

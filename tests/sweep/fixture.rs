@@ -54,9 +54,10 @@ pub fn sweep() -> Sweep<'static> {
     sweep_of(&scene(), "none", "2012-03-04T00:00:00Z")
 }
 
-/// Answers with made-up numbers that depend on the configuration alone; breaks down after some configurations.
+/// Answers with made-up numbers that depend on the configuration alone, half of them by the CPU; breaks down after some configurations.
 pub struct MadeUp {
     pub solved: usize,
+    pub left_to_cpu: usize,
     pub breaks_after: usize,
     pub answer: fn(&[f64]) -> Equilibrium,
 }
@@ -67,7 +68,7 @@ pub struct DeviceLost;
 
 impl Default for MadeUp {
     fn default() -> Self {
-        Self { solved: 0, breaks_after: usize::MAX, answer }
+        Self { solved: 0, left_to_cpu: 0, breaks_after: usize::MAX, answer }
     }
 }
 
@@ -78,7 +79,12 @@ impl Backend for MadeUp {
         if self.solved > self.breaks_after {
             return Err(DeviceLost);
         }
+        self.left_to_cpu += configurations.len() / 2;
         Ok(configurations.iter().map(|q| (self.answer)(q)).collect())
+    }
+
+    fn left_to_cpu(&self) -> usize {
+        self.left_to_cpu
     }
 }
 

@@ -106,7 +106,7 @@ pub(super) fn fill<B: Backend>(
     begun: Begun,
     kept: Kept<'_>,
 ) -> Result<(Columns, SweepReport, Provenance), SweepError> {
-    let start = Instant::now();
+    let (start, left_before) = (Instant::now(), backend.left_to_cpu());
     let footprint = footprint(sweep, run.chunk, kept.store.path().is_none());
     let points = sweep.grid.points();
     let bytes = footprint.memory.least;
@@ -205,6 +205,7 @@ pub(super) fn fill<B: Backend>(
         skipped_points: free,
         resumed_points,
         solved_points: record.solved() - resumed_points,
+        left_to_cpu: backend.left_to_cpu() - left_before,
         time: start.elapsed(),
     };
     Ok((columns, SweepReport::of(&tally, facts, &provenance, &sweep.warnings), provenance))

@@ -255,6 +255,6 @@ fn on_gpu(
             worst.gpu_residual = worst.gpu_residual.max(result.residual);
         }
     }
-    cell.gpu_on_cpu += solver.solved_on_cpu();
+    cell.gpu_on_cpu += solver.left_to_cpu();
     Ok(())
 }

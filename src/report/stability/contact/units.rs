@@ -124,7 +124,7 @@ pub fn far_away(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
                 let mut solver = GpuSolver::new(Arc::clone(context), model)?;
                 let found = solver.solve(&configurations)?;
                 let worst = difference(&expected, &found, 1.0, |_| 1.0);
-                let note = format!("{} of {} by the CPU", solver.solved_on_cpu(), configurations.len());
+                let note = format!("{} of {} by the CPU", solver.left_to_cpu(), configurations.len());
                 outcomes.push(outcome(case, &format!("{place}, {name}, GPU"), measure, worst, 1e-5, note));
             }
         }

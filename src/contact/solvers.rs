@@ -1,0 +1,40 @@
+//! Many configurations on all cores: one solver a thread.
+
+use super::{Model, Solver};
+use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
+
+/// Items that one thread takes at a time: enough that sharing them out costs nothing, few enough that no thread waits long
+/// for the last.
+pub(crate) const SHARE: usize = 8;
+
+/// Solvers of one model, one a thread of a pool.
+pub(crate) struct Solvers<'a> {
+    /// By the thread's number: the lock is never contended.
+    solvers: Vec<Mutex<Solver<'a>>>,
+}
+
+impl<'a> Solvers<'a> {
+    /// Solvers of `model` for a pool of `threads` threads.
+    pub fn new(model: &'a Model<'a>, threads: usize) -> Self {
+        Self { solvers: (0..threads).map(|_| Mutex::new(Solver::new(model))).collect() }
+    }
+
+    /// How many there are.
+    pub fn threads(&self) -> usize {
+        self.solvers.len()
+    }
+
+    /// What `solve` makes of each item, in the same order, on the pool that this is called on, else on the program's.
+    pub fn map<T: Sync, R: Send>(&self, items: &[T], solve: impl Fn(&mut Solver<'a>, &T) -> R + Sync) -> Vec<R> {
+        items
+            .par_iter()
+            .with_min_len(SHARE)
+            .map(|item| {
+                let solver = &self.solvers[rayon::current_thread_index().unwrap_or(0) % self.solvers.len()];
+                // A solver keeps nothing from one configuration to the next that a panic could have spoilt.
+                solve(&mut solver.lock().unwrap_or_else(PoisonError::into_inner), item)
+            })
+            .collect()
+    }
+}
