@@ -29,8 +29,8 @@ pub const GPU_LEAST_DIVISOR: f32 = 1e-36;
 /// hundred products to a few 1e-6, so 1e-5 is what can be told from zero.
 pub const GPU_LEAST_TOLERANCE: f64 = 1e-5;
 
-/// Largest relative residual of an f32 result of the paper's iteration that is passed on as converged [1]; of the others see
-/// [`GPU_SETTLED_RESIDUAL`]. What has more is solved in f64.
+/// Largest relative residual of a GPU's result that is passed on as converged, however rough the scene's tolerance [1]: what is promised of
+/// f32. What has more is solved in f64.
 pub const GPU_RESOLVED_RESIDUAL: f64 = 1e-4;
 
 /// Distance of a node to an edge or vertex, relative to the object's extent, below which f32 does not resolve the
@@ -72,8 +72,8 @@ pub const SETTLING_STEPS: u32 = 4;
 /// moves by more than a thousandth of its displacement.
 pub const GPU_STIFFNESS: f64 = 1e3;
 
-/// What the contact forces of a result of the energy form may lack after these steps, relative, in the energy norm [1]: soft directions
-/// of a deep dent raise it a hundredfold in the torque, which is to agree to 1e-5 with the CPU's.
+/// What the contact forces of a result of the energy form may lack after these steps unless the scene asks for less, relative, in the energy
+/// norm [1]: soft directions of a deep dent raise it a hundredfold in the torque, which is to agree to 1e-5 with the CPU's.
 pub const GPU_SETTLED_RESIDUAL: f64 = 1e-7;
 
 /// Relative residual of the paper's step 2 in f32 [1]: ten times better than the least tolerance of the iteration.

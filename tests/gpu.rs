@@ -567,6 +567,22 @@ fn the_gpu_keeps_the_bounds_of_its_hard_cases() {
     assert!(outcomes.iter().all(haptize::report::stability::Outcome::passed), "{}", table(&outcomes));
 }
 
+/// The scene's tolerance is what accuracy costs on the GPU too: the rougher it is the fewer steps are taken, in f32 and f64.
+#[test]
+fn a_rougher_tolerance_takes_fewer_steps_and_is_kept() {
+    let (scene, object, chain) = load("sphere.toml");
+    let configurations = configurations(&scene, 11, 131);
+    let [fine, rough] = [1e-8, 1e-4].map(|tolerance| {
+        let model = Model::new(&object, &chain, haptize::scene::ContactSpec { tolerance, ..scene.contact });
+        GpuSolver::new(context(), &model).unwrap().solve(&configurations).unwrap()
+    });
+    let steps = |results: &[Equilibrium]| results.iter().map(|result| result.iterations).sum::<u32>();
+    assert!(20 * steps(&rough) < 17 * steps(&fine), "{} and {}", steps(&rough), steps(&fine));
+    let worst = |results: &[Equilibrium]| results.iter().map(|result| result.residual).fold(0.0, f64::max);
+    assert!(worst(&fine) <= GPU_SETTLED_RESIDUAL && worst(&rough) <= 1e-4, "{:e}, {:e}", worst(&fine), worst(&rough));
+    assert!(worst(&rough) > GPU_SETTLED_RESIDUAL);
+}
+
 /// At 600 times the paper's stiffness, where a depth in f32 says little: whatever is called converged is that.
 #[test]
 fn stiff_contact_is_as_accurate_as_soft_contact() {

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     contact::{self, Equilibrium, NodeForce, Status, energy::Limits},
     scene::Algorithm,
-    tolerances::{GPU_SETTLED_RESIDUAL, MINIMUM_SQUARE, SETTLING_STEPS},
+    tolerances::{GPU_RESOLVED_RESIDUAL, GPU_SETTLED_RESIDUAL, MINIMUM_SQUARE, SETTLING_STEPS},
 };
 use glam::DVec3;
 
@@ -40,12 +40,18 @@ pub(super) fn unpack(
     }
     Some(match model.contact.algorithm {
         Algorithm::Paper => iterated(model, q, status, outcome, list),
-        Algorithm::Energy | Algorithm::Linearised => settled(solver, q, stiffness(model), outcome, list),
+        Algorithm::Energy | Algorithm::Linearised => settled(model, solver, q, outcome, list),
     })
 }
 
-/// What the CPU's search finds near the kernel's forces, found with contact stiffness `kc` [N/m].
-fn settled(solver: &mut contact::Solver<'_>, q: &[f64], kc: f64, outcome: &Outcome, list: &[Touch]) -> Equilibrium {
+/// What the CPU's search finds near the kernel's forces.
+fn settled(
+    model: &contact::Model<'_>,
+    solver: &mut contact::Solver<'_>,
+    q: &[f64],
+    outcome: &Outcome,
+    list: &[Touch],
+) -> Equilibrium {
     let nodes = |touch: &Touch| touch.nodes.into_iter().zip([touch.force_0, touch.force_1, touch.force_2]);
     let forces: Vec<NodeForce> = list
         .iter()
@@ -53,8 +59,9 @@ fn settled(solver: &mut contact::Solver<'_>, q: &[f64], kc: f64, outcome: &Outco
         .filter(|(node, force)| *node != contact::support::ABSENT && *force != [0.0; 3])
         .map(|(node, force)| NodeForce { node, force: DVec3::from(force.map(f64::from)) })
         .collect();
-    let limits = Limits { tolerance: GPU_SETTLED_RESIDUAL, iterations: SETTLING_STEPS };
-    let result = solver.settle(q, &forces, kc, limits);
+    let tolerance = model.contact.tolerance.clamp(GPU_SETTLED_RESIDUAL, GPU_RESOLVED_RESIDUAL);
+    let limits = Limits { tolerance, iterations: SETTLING_STEPS };
+    let result = solver.settle(q, &forces, stiffness(model), limits);
     Equilibrium { iterations: outcome.iterations + result.iterations, ..result }
 }
 
