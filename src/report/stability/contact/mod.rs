@@ -35,7 +35,7 @@ mod tests {
     use super::super::{Effort, Outcome, Setting, table};
     use super::*;
 
-    /// On the CPU; the GPU's half is in `tests/gpu.rs`.
+    /// On the CPU; the GPU's half is in `tests/gpu`.
     #[test]
     fn a_sample_of_every_case_keeps_its_bounds() {
         let setting = Setting { effort: Effort::Sample, gpu: None };

@@ -1,42 +1,17 @@
-//! The GPU backend against the CPU's f64 solver, on whatever adapter there is (software Vulkan counts). None is a failure.
+//! Equilibria of the GPU backend against the CPU's, and by the laws that they obey.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
+use crate::fixture::{context, load, load_of};
 use glam::DVec3;
-use haptize::JointVector;
-use haptize::contact::{Equilibrium, Model, Solver, Status, Touch};
-use haptize::gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuError, GpuSolver, Room, adapters};
-use haptize::haptize::Backend;
-use haptize::object::{Compliance, Object};
-use haptize::proxy::Chain;
-use haptize::render::graphics::ObjectMotion;
-use haptize::scene::{
-    Algorithm, Blending, ElasticSpec, GraphicsEffects, Material, Scene, SpringKind, SpringSpec, StiffeningSpec,
+use haptize::{
+    JointVector,
+    contact::{Equilibrium, Model, Solver, Status, Touch},
+    gpu::{GpuError, GpuSolver, Room},
+    haptize::Backend,
+    object::{Compliance, Object},
+    proxy::Chain,
+    scene::{Algorithm, Blending, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
+    tolerances::{FACET_ROUNDING, GPU_SETTLED_RESIDUAL, WALL_COMPLIANCE},
 };
-use haptize::tolerances::{FACET_ROUNDING, GPU_SETTLED_RESIDUAL, WALL_COMPLIANCE};
-use std::sync::{Arc, OnceLock};
-
-/// One device for all tests of this process: opening one costs a second, and drivers dislike many.
-fn context() -> Arc<Context> {
-    static CONTEXT: OnceLock<Arc<Context>> = OnceLock::new();
-    Arc::clone(CONTEXT.get_or_init(|| {
-        Arc::new(Context::open(AdapterChoice::Any).unwrap_or_else(|error| panic!("GPU tests need an adapter: {error}")))
-    }))
-}
-
-/// Scene, object and proxy of a file in `datasets/`.
-fn load(name: &str) -> (Scene, Object, Chain) {
-    load_of(name, None)
-}
-
-/// The same of another material.
-fn load_of(name: &str, material: Option<Material>) -> (Scene, Object, Chain) {
-    let mut scene = Scene::load(format!("{}/datasets/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
-    scene.object.material = material.unwrap_or(scene.object.material);
-    let object = Object::build(&scene.object).unwrap();
-    let chain = Chain::new(&scene.proxy);
-    (scene, object, chain)
-}
 
 /// Springs along their rest direction, and a solid: of both, unlike isotropic springs, the compliance has blocks of nine numbers.
 const AXIAL: Material = Material::Springs(SpringSpec { kind: SpringKind::Axial, stiffness: 300.0 });
@@ -389,89 +364,6 @@ fn no_configuration_is_no_work() {
     assert!(GpuSolver::new(context(), &model).unwrap().solve(&[]).unwrap().is_empty());
 }
 
-#[test]
-fn asking_for_hardware_names_what_was_found_instead() {
-    let hardware = adapters().iter().any(|adapter| adapter.hardware);
-    match Context::open(AdapterChoice::Hardware) {
-        Ok(context) => assert!(hardware && context.adapter().hardware),
-        Err(GpuError::NoAdapter { found, .. }) => {
-            assert!(!hardware);
-            assert!(adapters().iter().all(|adapter| found.contains(&adapter.name)), "{found}");
-        }
-        Err(other) => panic!("{other}"),
-    }
-}
-
-/// A push on one node for some frames, then none: states of both sides after each frame.
-fn frames(method: FrameMethod, check: impl Fn(usize, &ObjectMotion, &[DVec3], &[DVec3])) {
-    let (_, object, _) = load("sphere.toml");
-    let period = 1.0 / 60.0;
-    let mut twin = ObjectMotion::new(&object, period, &GraphicsEffects::default()).unwrap();
-    let mut gpu = FrameUpdate::new(context(), &object, period, method, &GraphicsEffects::default()).unwrap();
-    for frame in 0..40 {
-        let mut forces = vec![DVec3::ZERO; object.rest.len()];
-        if frame < 15 {
-            forces[17] = DVec3::new(1.0, -0.5, 2.0);
-            forces[60] = DVec3::new(0.0, 0.3, 0.0);
-        }
-        twin.step(&forces);
-        gpu.step(&forces).unwrap();
-        let (displacement, velocity) = gpu.read().unwrap();
-        check(frame, &twin, &displacement, &velocity);
-    }
-}
-
-/// Largest difference of two fields over the largest of the first.
-fn relative(reference: &[DVec3], other: &[DVec3]) -> f64 {
-    let size = reference.iter().map(|v| v.length()).fold(0.0, f64::max);
-    let error = reference.iter().zip(other).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-    error / size
-}
-
-/// Stored and kinetic energy of the object [J].
-fn energy(object: &Object, displacement: &[DVec3], velocity: &[DVec3]) -> f64 {
-    let mut force = vec![DVec3::ZERO; displacement.len()];
-    object.stiffness.apply(displacement, &mut force);
-    let stored: f64 = displacement.iter().zip(&force).map(|(u, f)| u.dot(*f)).sum();
-    let kinetic: f64 = velocity.iter().zip(&object.mass).map(|(v, m)| m * v.length_squared()).sum();
-    0.5 * (stored + kinetic)
-}
-
-#[test]
-fn frames_follow_the_cpus() {
-    // Forty frames of sums of three hundred terms rounded by 6e-8 each.
-    frames(FrameMethod::Inverse, |frame, twin, displacement, velocity| {
-        assert!(relative(twin.displacement(), displacement) < 1e-4, "frame {frame}");
-        assert!(relative(twin.velocity(), velocity) < 1e-4, "frame {frame}");
-    });
-    frames(FrameMethod::Iterations(60), |frame, twin, displacement, velocity| {
-        assert!(relative(twin.displacement(), displacement) < 1e-3, "frame {frame}");
-        assert!(relative(twin.velocity(), velocity) < 1e-3, "frame {frame}");
-    });
-    let rotated: Vec<DVec3> = [DVec3::X, DVec3::Y].into();
-    assert!(relative(&[DVec3::X, DVec3::X], &rotated) > 1.0, "the comparator tells fields apart");
-}
-
-#[test]
-fn without_forces_the_objects_energy_never_rises_however_few_the_iterations() {
-    let (_, object, _) = load("sphere.toml");
-    for method in [FrameMethod::Inverse, FrameMethod::Iterations(1), FrameMethod::Iterations(3)] {
-        let before = std::cell::Cell::new(f64::MAX);
-        let greatest = std::cell::Cell::new(0.0f64);
-        frames(method, |frame, _, displacement, velocity| {
-            let now = energy(&object, displacement, velocity);
-            assert!(now.is_finite());
-            greatest.set(greatest.get().max(now));
-            if frame > 15 {
-                // To rounding of what is stored: 1e-6 of it.
-                assert!(now <= before.get() * (1.0 + 1e-6), "{method:?}, frame {frame}: {now} after {}", before.get());
-            }
-            before.set(now);
-        });
-        assert!(greatest.get() > 1e-6 && before.get() < 0.9 * greatest.get(), "{method:?}: it moved, and came to rest");
-    }
-}
-
 /// The kernels freeze geometry once: a scene that asks for more is refused, and left to the CPU where the choice is free.
 #[test]
 fn updates_are_refused() {
@@ -481,79 +373,6 @@ fn updates_are_refused() {
     model.contact.updates = 1;
     let refusal = GpuSolver::new(context(), &model).err().unwrap();
     assert!(matches!(refusal, GpuError::Unsupported("updates")), "{refusal}");
-}
-
-#[test]
-fn effects_follow_the_cpus_and_leave_nothing_behind_where_they_are_not_named() {
-    let (_, object, _) = load("sphere.toml");
-    let period = 1.0 / 60.0;
-    let none = GraphicsEffects::default();
-    let gravity = GraphicsEffects { gravity: Some(DVec3::new(0.0, 2.0, -9.81)), ..none };
-    let stiffening = GraphicsEffects { stiffening: Some(StiffeningSpec { factor: 6.0, strain: 0.02 }), ..none };
-    let both = GraphicsEffects { gravity: gravity.gravity, ..stiffening };
-    let quasi_static = GraphicsEffects { quasi_static: true, ..gravity };
-    let mut costs = Vec::new();
-    for effects in [none, gravity, stiffening, both, quasi_static] {
-        let mut twin = ObjectMotion::new(&object, period, &effects).unwrap();
-        let method = FrameMethod::Iterations(60);
-        let mut update = FrameUpdate::new(context(), &object, period, method, &effects).unwrap();
-        let mut forces = vec![DVec3::ZERO; object.rest.len()];
-        for frame in 0..20 {
-            forces[17] = if frame < 12 { DVec3::new(1.0, -0.5, 2.0) } else { DVec3::ZERO };
-            twin.step(&forces);
-            update.step(&forces).unwrap();
-            let (displacement, velocity) = update.read().unwrap();
-            assert!(relative(twin.displacement(), &displacement) < 1e-3, "{effects:?}, frame {frame}");
-            assert_eq!(velocity.len(), twin.velocity().len());
-        }
-        costs.push(update.takes());
-    }
-    // A load buffer for gravity and stiffening, reaches and a stage for stiffening; less without dynamics.
-    let [plain, heavy, stiff, all, still] = costs[..] else { panic!("{costs:?}") };
-    let (nodes, blocks) = (object.rest.len() as u64, object.stiffness.blocks.len() as u64);
-    let beyond = |cost: haptize::gpu::FrameCost| {
-        (cost.bytes - plain.bytes, cost.buffers - plain.buffers, cost.dispatches - plain.dispatches)
-    };
-    assert_eq!(beyond(heavy), (16 * nodes, 1, 0));
-    assert_eq!(beyond(stiff), (16 * nodes + 4 * blocks, 2, 1));
-    assert_eq!(beyond(all), beyond(stiff));
-    assert_eq!(stiff.pipelines, plain.pipelines + 1);
-    assert_eq!((heavy.bytes - still.bytes, heavy.buffers - still.buffers), (16 * nodes + 8 * nodes, 1));
-}
-
-#[test]
-fn on_the_gpu_too_effects_never_raise_energy_however_few_the_iterations() {
-    let (_, object, _) = load("sphere.toml");
-    let stiffening = StiffeningSpec { factor: 20.0, strain: 0.01 };
-    let effects = GraphicsEffects { stiffening: Some(stiffening), ..GraphicsEffects::default() };
-    let law = haptize::object::Stiffening::new(&object, stiffening.factor, stiffening.strain);
-    let method = FrameMethod::Iterations(2);
-    for period in [1e-3, 0.3] {
-        let mut update = FrameUpdate::new(context(), &object, period, method, &effects).unwrap();
-        let mut forces = vec![DVec3::ZERO; object.rest.len()];
-        let (mut before, mut greatest) = (f64::MAX, 0.0_f64);
-        for frame in 0..60 {
-            let pushed = frame < 20;
-            forces[60] = if pushed { DVec3::new(3.0, -5.0, 9.0) } else { DVec3::ZERO };
-            update.step(&forces).unwrap();
-            let (u, v) = update.read().unwrap();
-            let kinetic: f64 = v.iter().zip(&object.mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
-            let now = kinetic + law.energy(&object, &u);
-            assert!(pushed || now <= before * (1.0 + 1e-6), "{period} s, frame {frame}: {now} after {before}");
-            (before, greatest) = (now, greatest.max(now));
-        }
-        assert!(greatest > 1e-6, "{greatest}");
-    }
-}
-
-#[test]
-fn a_frame_period_that_is_no_time_is_refused() {
-    let (_, object, _) = load("sphere.toml");
-    for period in [0.0, -0.1, f64::NAN, f64::INFINITY] {
-        assert!(
-            FrameUpdate::new(context(), &object, period, FrameMethod::Inverse, &GraphicsEffects::default()).is_err()
-        );
-    }
 }
 
 /// A kilometre from the origin, shallow to deep, points and balls: what f32 leaves is settled in f64.
@@ -612,5 +431,7 @@ fn stiff_contact_is_as_accurate_as_soft_contact() {
         }
         println!("Kc {stiffness}: {touching} touch, residual {worst:.1e}, {} by the CPU", gpu.left_to_cpu());
         assert!(touching > 20 && worst <= 1e-4);
+        // Found at the stiffness that f32 resolves, and stiffened in f64; at its own, three quarters of the rigid ones are left.
+        assert!(gpu.left_to_cpu() * 2 <= touching, "Kc {stiffness}: {} left to the CPU", gpu.left_to_cpu());
     }
 }

@@ -1,0 +1,153 @@
+//! The frame update of the object's nodes against its twin on the CPU.
+
+use crate::fixture::{context, load};
+use glam::DVec3;
+use haptize::{
+    gpu::{FrameMethod, FrameUpdate},
+    object::Object,
+    render::graphics::ObjectMotion,
+    scene::{GraphicsEffects, StiffeningSpec},
+};
+
+/// A push on one node for some frames, then none: states of both sides after each frame.
+fn frames(method: FrameMethod, check: impl Fn(usize, &ObjectMotion, &[DVec3], &[DVec3])) {
+    let (_, object, _) = load("sphere.toml");
+    let period = 1.0 / 60.0;
+    let mut twin = ObjectMotion::new(&object, period, &GraphicsEffects::default()).unwrap();
+    let mut gpu = FrameUpdate::new(context(), &object, period, method, &GraphicsEffects::default()).unwrap();
+    for frame in 0..40 {
+        let mut forces = vec![DVec3::ZERO; object.rest.len()];
+        if frame < 15 {
+            forces[17] = DVec3::new(1.0, -0.5, 2.0);
+            forces[60] = DVec3::new(0.0, 0.3, 0.0);
+        }
+        twin.step(&forces);
+        gpu.step(&forces).unwrap();
+        let (displacement, velocity) = gpu.read().unwrap();
+        check(frame, &twin, &displacement, &velocity);
+    }
+}
+
+/// Largest difference of two fields over the largest of the first.
+fn relative(reference: &[DVec3], other: &[DVec3]) -> f64 {
+    let size = reference.iter().map(|v| v.length()).fold(0.0, f64::max);
+    let error = reference.iter().zip(other).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    error / size
+}
+
+/// Stored and kinetic energy of the object [J].
+fn energy(object: &Object, displacement: &[DVec3], velocity: &[DVec3]) -> f64 {
+    let mut force = vec![DVec3::ZERO; displacement.len()];
+    object.stiffness.apply(displacement, &mut force);
+    let stored: f64 = displacement.iter().zip(&force).map(|(u, f)| u.dot(*f)).sum();
+    let kinetic: f64 = velocity.iter().zip(&object.mass).map(|(v, m)| m * v.length_squared()).sum();
+    0.5 * (stored + kinetic)
+}
+
+#[test]
+fn frames_follow_the_cpus() {
+    // Forty frames of sums of three hundred terms rounded by 6e-8 each.
+    frames(FrameMethod::Inverse, |frame, twin, displacement, velocity| {
+        assert!(relative(twin.displacement(), displacement) < 1e-4, "frame {frame}");
+        assert!(relative(twin.velocity(), velocity) < 1e-4, "frame {frame}");
+    });
+    frames(FrameMethod::Iterations(60), |frame, twin, displacement, velocity| {
+        assert!(relative(twin.displacement(), displacement) < 1e-3, "frame {frame}");
+        assert!(relative(twin.velocity(), velocity) < 1e-3, "frame {frame}");
+    });
+    let rotated: Vec<DVec3> = [DVec3::X, DVec3::Y].into();
+    assert!(relative(&[DVec3::X, DVec3::X], &rotated) > 1.0, "the comparator tells fields apart");
+}
+
+#[test]
+fn without_forces_the_objects_energy_never_rises_however_few_the_iterations() {
+    let (_, object, _) = load("sphere.toml");
+    for method in [FrameMethod::Inverse, FrameMethod::Iterations(1), FrameMethod::Iterations(3)] {
+        let before = std::cell::Cell::new(f64::MAX);
+        let greatest = std::cell::Cell::new(0.0f64);
+        frames(method, |frame, _, displacement, velocity| {
+            let now = energy(&object, displacement, velocity);
+            assert!(now.is_finite());
+            greatest.set(greatest.get().max(now));
+            if frame > 15 {
+                // To rounding of what is stored: 1e-6 of it.
+                assert!(now <= before.get() * (1.0 + 1e-6), "{method:?}, frame {frame}: {now} after {}", before.get());
+            }
+            before.set(now);
+        });
+        assert!(greatest.get() > 1e-6 && before.get() < 0.9 * greatest.get(), "{method:?}: it moved, and came to rest");
+    }
+}
+
+#[test]
+fn effects_follow_the_cpus_and_leave_nothing_behind_where_they_are_not_named() {
+    let (_, object, _) = load("sphere.toml");
+    let period = 1.0 / 60.0;
+    let none = GraphicsEffects::default();
+    let gravity = GraphicsEffects { gravity: Some(DVec3::new(0.0, 2.0, -9.81)), ..none };
+    let stiffening = GraphicsEffects { stiffening: Some(StiffeningSpec { factor: 6.0, strain: 0.02 }), ..none };
+    let both = GraphicsEffects { gravity: gravity.gravity, ..stiffening };
+    let quasi_static = GraphicsEffects { quasi_static: true, ..gravity };
+    let mut costs = Vec::new();
+    for effects in [none, gravity, stiffening, both, quasi_static] {
+        let mut twin = ObjectMotion::new(&object, period, &effects).unwrap();
+        let method = FrameMethod::Iterations(60);
+        let mut update = FrameUpdate::new(context(), &object, period, method, &effects).unwrap();
+        let mut forces = vec![DVec3::ZERO; object.rest.len()];
+        for frame in 0..20 {
+            forces[17] = if frame < 12 { DVec3::new(1.0, -0.5, 2.0) } else { DVec3::ZERO };
+            twin.step(&forces);
+            update.step(&forces).unwrap();
+            let (displacement, velocity) = update.read().unwrap();
+            assert!(relative(twin.displacement(), &displacement) < 1e-3, "{effects:?}, frame {frame}");
+            assert_eq!(velocity.len(), twin.velocity().len());
+        }
+        costs.push(update.takes());
+    }
+    // A load buffer for gravity and stiffening, reaches and a stage for stiffening; less without dynamics.
+    let [plain, heavy, stiff, all, still] = costs[..] else { panic!("{costs:?}") };
+    let (nodes, blocks) = (object.rest.len() as u64, object.stiffness.blocks.len() as u64);
+    let beyond = |cost: haptize::gpu::FrameCost| {
+        (cost.bytes - plain.bytes, cost.buffers - plain.buffers, cost.dispatches - plain.dispatches)
+    };
+    assert_eq!(beyond(heavy), (16 * nodes, 1, 0));
+    assert_eq!(beyond(stiff), (16 * nodes + 4 * blocks, 2, 1));
+    assert_eq!(beyond(all), beyond(stiff));
+    assert_eq!(stiff.pipelines, plain.pipelines + 1);
+    assert_eq!((heavy.bytes - still.bytes, heavy.buffers - still.buffers), (16 * nodes + 8 * nodes, 1));
+}
+
+#[test]
+fn on_the_gpu_too_effects_never_raise_energy_however_few_the_iterations() {
+    let (_, object, _) = load("sphere.toml");
+    let stiffening = StiffeningSpec { factor: 20.0, strain: 0.01 };
+    let effects = GraphicsEffects { stiffening: Some(stiffening), ..GraphicsEffects::default() };
+    let law = haptize::object::Stiffening::new(&object, stiffening.factor, stiffening.strain);
+    let method = FrameMethod::Iterations(2);
+    for period in [1e-3, 0.3] {
+        let mut update = FrameUpdate::new(context(), &object, period, method, &effects).unwrap();
+        let mut forces = vec![DVec3::ZERO; object.rest.len()];
+        let (mut before, mut greatest) = (f64::MAX, 0.0_f64);
+        for frame in 0..60 {
+            let pushed = frame < 20;
+            forces[60] = if pushed { DVec3::new(3.0, -5.0, 9.0) } else { DVec3::ZERO };
+            update.step(&forces).unwrap();
+            let (u, v) = update.read().unwrap();
+            let kinetic: f64 = v.iter().zip(&object.mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
+            let now = kinetic + law.energy(&object, &u);
+            assert!(pushed || now <= before * (1.0 + 1e-6), "{period} s, frame {frame}: {now} after {before}");
+            (before, greatest) = (now, greatest.max(now));
+        }
+        assert!(greatest > 1e-6, "{greatest}");
+    }
+}
+
+#[test]
+fn a_frame_period_that_is_no_time_is_refused() {
+    let (_, object, _) = load("sphere.toml");
+    for period in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+        assert!(
+            FrameUpdate::new(context(), &object, period, FrameMethod::Inverse, &GraphicsEffects::default()).is_err()
+        );
+    }
+}
