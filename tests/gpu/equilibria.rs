@@ -261,6 +261,67 @@ fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
     assert!(matches!(refusal, GpuError::TooManyNodes { .. }), "{refusal}");
 }
 
+/// Configurations whose gap at rest is `wanted` [m] by f64, each between one in contact and a free one next to it in `path`.
+fn grazing(cpu: &mut Solver, path: &[JointVector], wanted: f64) -> Vec<JointVector> {
+    let mut over = |q: &JointVector| cpu.gap(q) - wanted;
+    let mut found = Vec::new();
+    for pair in path.windows(2) {
+        let (mut low, mut high) = (pair[0], pair[1]);
+        if (over(&low) < 0.0) == (over(&high) < 0.0) {
+            continue;
+        }
+        if over(&low) >= 0.0 {
+            std::mem::swap(&mut low, &mut high);
+        }
+        // Steps of 2^-50 of the way: gaps to the last bit of some 0.1 m.
+        for _ in 0..50 {
+            let mut middle = low;
+            middle.iter_mut().zip(high.iter()).for_each(|(middle, high)| *middle = 0.5 * (*middle + high));
+            if over(&middle) < 0.0 { low = middle } else { high = middle }
+        }
+        found.push(high);
+    }
+    found
+}
+
+/// A gap that f32 cannot tell from none, points and balls: contact or not, and what comes of it, is the CPU's.
+#[test]
+fn contact_within_rounding_of_none_is_decided_in_f64() {
+    for (name, blending) in
+        [("sphere.toml", Blending::Width(0.0)), ("mesh.toml", Blending::Width(0.0)), ("sphere.toml", Blending::Mesh)]
+    {
+        let (scene, object, chain) = load(name);
+        let path = configurations(&scene, 11, 101);
+        let model = Model::new(&object, &chain, haptize::scene::ContactSpec { blending, ..scene.contact });
+        let mut cpu = Solver::new(&model);
+        for wanted in [-1e-9, -1e-11, 1e-11, 1e-9] {
+            let near = grazing(&mut cpu, &path, wanted);
+            assert!(near.len() >= 5, "{name}, {blending:?}: only {} configurations", near.len());
+            let mut gpu = GpuSolver::new(context(), &model).unwrap();
+            for (q, result) in near.iter().zip(gpu.solve(&near).unwrap()) {
+                let reference = cpu.solve(q);
+                let status = if wanted < 0.0 { Status::Contact } else { Status::Free };
+                assert_eq!(
+                    (reference.status, result.status),
+                    (status, status),
+                    "{name}, {blending:?}, {q:?}, {wanted:e}"
+                );
+                assert!(
+                    (result.gap - wanted).abs() < 1e-14,
+                    "{name}, {blending:?}: gap {:e} for {wanted:e}",
+                    result.gap
+                );
+                if blending == Blending::Width(0.0) {
+                    assert_eq!(format!("{result:?}"), format!("{reference:?}"), "the f64 result itself");
+                }
+            }
+            if blending == Blending::Width(0.0) {
+                assert_eq!(gpu.left_to_cpu(), near.len(), "{name}, {wanted:e}");
+            }
+        }
+    }
+}
+
 /// Facets beyond what the kernel has room for are no reason to leave any out.
 #[test]
 fn facets_beyond_the_kernels_room_are_solved_on_the_cpu() {
