@@ -300,6 +300,25 @@ fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
 }
 
 #[test]
+fn tables_that_cannot_be_gridized_are_refused_with_place_and_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("table.csv"), "a,b\n1,2\n").unwrap();
+    std::fs::write(folder.path().join("columns.toml"), "colour = 1\n").unwrap();
+    for (arguments, expected) in [
+        (&["none.csv", "--step", "1"][..], "none.csv: cannot be read"),
+        (&["table.csv", "--step", "-1"], "table.csv: not a scan log"),
+        (&["table.csv", "--step", "1"], "--columns"),
+        (&["table.csv", "--step", "1", "--columns", "none.toml"], "none.toml: cannot be read"),
+        (&["table.csv", "--step", "1", "--columns", "columns.toml"], "columns.toml:1:1: unknown field `colour`"),
+    ] {
+        let output = haptize(folder.path(), &[&["gridize"], arguments].concat());
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {message}");
+        assert!(message.starts_with("haptize: ") && message.contains(expected), "{arguments:?}: {message}");
+    }
+}
+
+#[test]
 fn hard_cases_make_one_table_and_an_unknown_room_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let found = json(folder.path(), &["stability", "gridization", "--no-gpu", "--json"]);

@@ -36,7 +36,7 @@ pub struct Arguments {
     resume: bool,
     /// Choose grid spacing, interpolation and the solver's tolerance for this rms error of the torque, and verify it: a share of
     /// the torque's own rms over the grid's region (0.01), or a torque ("0.002 N m").
-    #[arg(long, value_name = "ERROR")]
+    #[arg(long, value_name = "ERROR", allow_negative_numbers = true)]
     max_error: Option<Aim>,
     /// Most grid points that --max-error may choose.
     #[arg(long, default_value_t = 2_000_000, value_name = "POINTS")]

@@ -29,7 +29,7 @@ pub struct Arguments {
     #[arg(required = true)]
     logs: Vec<PathBuf>,
     /// Grid step [rad or m]: one number, or one a joint, separated by commas.
-    #[arg(long, required = true, value_delimiter = ',', num_args = 1, value_name = "H")]
+    #[arg(long, required = true, value_delimiter = ',', num_args = 1, value_name = "H", allow_negative_numbers = true)]
     step: Vec<f64>,
     /// The dataset to write; by default the first log's name in the current folder, ending in .haptize.
     #[arg(short, long)]
@@ -42,7 +42,7 @@ pub struct Arguments {
     scene: Option<PathBuf>,
     /// Torque above which a configuration counts as contact [N m]; by default what the scan's scene says, three standard
     /// deviations of the samples, or a hundredth of the greatest torque.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     epsilon: Option<f64>,
     /// How torques are interpolated.
     #[arg(long, default_value = "linear")]
@@ -52,7 +52,7 @@ pub struct Arguments {
     smooth: bool,
     /// Say how well the dataset predicts measurements: this share of the samples is left out of a second one, which has to
     /// predict them.
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     held_out: Option<f64>,
     /// Say how well the dataset predicts other logs of the same object.
     #[arg(long, value_name = "LOG", num_args = 1..)]

@@ -29,7 +29,7 @@ pub struct Arguments {
     #[arg(long, default_value = "press")]
     motion: String,
     /// How long; by default as long as the motion [s].
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// The device moves exactly as the motion says, whatever the torque, instead of being held by a simulated hand.
     #[arg(long)]

@@ -28,7 +28,7 @@ pub struct Arguments {
     resume: bool,
     /// Instead of going through the plan, log for so many seconds wherever a hand leads the device to and lets go of it. The
     /// simulated rig is led by a simulated hand, to places of the plan.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     guided: Option<f64>,
 }
 

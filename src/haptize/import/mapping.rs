@@ -1,7 +1,8 @@
 //! Which columns of a log are what: a small TOML file, so that any table of joint positions and torques becomes a
 //! dataset without code. `datasets/instrument.toml` is an example with every key explained.
 
-use crate::{MAX_JOINTS, haptize::gridize::JointLabel};
+use super::check::check;
+use crate::{haptize::gridize::JointLabel, scene::Diagnostic};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -188,51 +189,39 @@ fn radians() -> String {
 #[derive(Debug, thiserror::Error)]
 pub enum MappingError {
     /// The file cannot be read.
-    #[error("{file}: {source}")]
+    #[error("{file}: cannot be read: {source}; check the path and its permissions")]
     Read {
         /// The file.
         file: String,
         /// What the system said.
         source: std::io::Error,
     },
-    /// Not TOML, an unknown key, or a wrong type.
-    #[error("{file}: {message}")]
-    Syntax {
-        /// The file.
-        file: String,
-        /// Line, column and reason.
-        message: String,
-    },
-    /// A value that cannot be.
-    #[error("{file}: {message}")]
-    Value {
-        /// The file.
-        file: String,
-        /// Which key, and what it must be.
-        message: String,
-    },
+    /// Not TOML, an unknown key, a wrong type, or a value that cannot be.
+    #[error(transparent)]
+    Invalid(Box<Diagnostic>),
 }
 
 impl Mapping {
     /// Reads and validates a mapping file.
     ///
     /// # Errors
-    /// [`MappingError`] names the file and the key.
+    /// [`MappingError`] names the file, the line and the key.
     pub fn load(path: &Path) -> Result<Self, MappingError> {
-        let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|source| MappingError::Read { file: file.clone(), source })?;
-        Self::parse(&text, &file)
+        let file = || path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|source| MappingError::Read { file: file(), source })?;
+        Self::parse(&text, path)
     }
 
-    /// Validates `text`; `file` is named in errors.
+    /// Validates `text`, the content of the file at `path`, which errors name.
     ///
     /// # Errors
-    /// [`MappingError`] names the file and the key.
-    pub fn parse(text: &str, file: &str) -> Result<Self, MappingError> {
-        let file = file.to_owned();
-        let mapping: Self = toml::from_str(text)
-            .map_err(|error| MappingError::Syntax { file: file.clone(), message: error.to_string() })?;
-        mapping.check().map_err(|message| MappingError::Value { file, message })?;
+    /// [`MappingError`] names the file, the line and the key.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, MappingError> {
+        let invalid =
+            |place, message: &str| MappingError::Invalid(Box::new(Diagnostic::new(path, text, place, message)));
+        let mapping: Self =
+            toml::from_str(text).map_err(|error| invalid(error.span().unwrap_or(0..0), error.message()))?;
+        check(&mapping).map_err(|refusal| invalid(refusal.place(text), &refusal.message))?;
         Ok(mapping)
     }
 
@@ -247,81 +236,5 @@ impl Mapping {
     pub fn lead(&self) -> usize {
         let named = self.torque.lead.as_ref();
         named.and_then(|name| self.joints.iter().position(|joint| joint.name == *name)).unwrap_or(0)
-    }
-
-    fn check(&self) -> Result<(), String> {
-        let count = self.joints.len();
-        let refuse = |bad: bool, message: String| if bad { Err(message) } else { Ok(()) };
-        refuse(!(1..=MAX_JOINTS).contains(&count), format!("{count} [[joint]] tables; 1 to {MAX_JOINTS} are needed"))?;
-        refuse(
-            self.table.delimiter == self.table.decimal,
-            "table.delimiter and table.decimal are the same character; tables with comma decimals mostly use `;`"
-                .to_owned(),
-        )?;
-        refuse(![',', '.'].contains(&self.table.decimal), "table.decimal must be `.` or `,`".to_owned())?;
-        let positive = |x: f64| x > 0.0;
-        match (&self.time.column, self.time.period) {
-            (Some(_), None) => refuse(
-                !(positive(self.time.scale) && self.time.scale.is_finite()),
-                "time.scale must be a positive number of seconds".to_owned(),
-            )?,
-            (None, Some(period)) => refuse(
-                !(positive(period) && period.is_finite()),
-                "time.period must be a positive number of seconds".to_owned(),
-            )?,
-            _ => return Err("[time] needs either a column or a period".to_owned()),
-        }
-        refuse(!positive(self.time.gap), "time.gap must be a positive number of seconds".to_owned())?;
-        for (number, joint) in self.joints.iter().enumerate() {
-            let name = &joint.name;
-            let twin = self.joints[..number].iter().any(|other| other.name == *name);
-            refuse(twin || name.is_empty(), format!("joint name `{name}` is empty or used twice"))?;
-            refuse(
-                !["rad", "m"].contains(&joint.unit.as_str()),
-                format!("unit of joint `{name}` must be `rad` or `m`; degrees and millimetres are scaled to these"),
-            )?;
-            for (what, quantity) in [("position", &joint.position), ("torque", &joint.torque)] {
-                let usable = quantity.scale.is_finite() && quantity.scale != 0.0 && quantity.offset.is_finite();
-                refuse(
-                    !usable,
-                    format!("{what} of joint `{name}`: scale must be a number other than zero, offset a number"),
-                )?;
-            }
-        }
-        self.check_columns()?;
-        refuse(self.filter.decimate == 0, "filter.decimate must be 1 or more".to_owned())?;
-        refuse(
-            !(1..=10_000).contains(&self.filter.speed_rows),
-            "filter.speed_rows must lie between 1 and 10000".to_owned(),
-        )?;
-        let outliers = self.filter.outliers.unwrap_or(1.0);
-        refuse(!(outliers.is_finite() && positive(outliers)), "filter.outliers must be a positive number".to_owned())?;
-        let torque = &self.torque;
-        refuse(!(torque.still.is_finite() && torque.still >= 0.0), "torque.still must be zero or more".to_owned())?;
-        if let Some(lead) = &torque.lead {
-            refuse(!self.joints.iter().any(|joint| joint.name == *lead), format!("torque.lead: no joint `{lead}`"))?;
-        }
-        let cells = torque.cell.len() == count && torque.cell.iter().all(|side| side.is_finite() && positive(*side));
-        refuse(
-            torque.keep != Keep::All && !cells,
-            format!("torque.cell must hold {count} positive numbers, one a joint, to average rows"),
-        )
-    }
-
-    fn check_columns(&self) -> Result<(), String> {
-        let quantities = self.joints.iter().flat_map(|joint| [&joint.position.column, &joint.torque.column]);
-        for column in quantities.chain(&self.time.column) {
-            match column {
-                ColumnName::Number(0) => return Err("columns are numbered from 1, not from 0".to_owned()),
-                ColumnName::Number(number) if self.table.columns.is_some_and(|columns| *number > columns) => {
-                    return Err(format!("column {number} is beyond table.columns"));
-                }
-                ColumnName::Name(name) if !self.table.header => {
-                    return Err(format!("column `{name}` is named, but table.header is not true"));
-                }
-                _ => {}
-            }
-        }
-        Ok(())
     }
 }

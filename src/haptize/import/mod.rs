@@ -9,6 +9,7 @@
 //! directions, in which dry friction cancels, or either branch), and the report says how far apart they lie.
 
 mod cells;
+mod check;
 mod mapping;
 mod rows;
 mod window;
@@ -30,7 +31,7 @@ use window::{Seen, Window};
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// The file cannot be read.
-    #[error("{file}: {source}")]
+    #[error("{file}: cannot be read: {source}; check the path and its permissions")]
     Read {
         /// The file.
         file: String,

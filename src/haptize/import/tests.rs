@@ -12,7 +12,7 @@ torque = { column = 3 }
 "#;
 
 fn read(mapping: &str, log: &str) -> Result<(Samples, ImportReport), ImportError> {
-    let mapping = Mapping::parse(mapping, "map.toml").unwrap();
+    let mapping = Mapping::parse(mapping, Path::new("map.toml")).unwrap();
     let mut import = Import::new(&mapping);
     import.read(log.as_bytes(), "log.csv", &mut |_, _| {})?;
     import.finish().map(|imported| (imported.samples, imported.report))
@@ -92,7 +92,7 @@ fn comma_decimals_in_a_table_of_points_are_explained() {
 #[test]
 fn binary_files_and_other_text_are_refused_in_small_memory() {
     let binary = vec![7_u8; 3 << 20];
-    let mapping = Mapping::parse(TWO, "map.toml").unwrap();
+    let mapping = Mapping::parse(TWO, Path::new("map.toml")).unwrap();
     let error = Import::new(&mapping).read(binary.as_slice(), "x.bin", &mut |_, _| {}).err().unwrap().to_string();
     assert!(error.contains("x.bin:1") && error.contains("not a table"), "{error}");
     assert!(refused(TWO, "only one column\n").contains("column 2"));
@@ -100,19 +100,29 @@ fn binary_files_and_other_text_are_refused_in_small_memory() {
 }
 
 #[test]
-fn mappings_that_cannot_be_are_refused_with_the_key() {
-    let bad = |from: &str, to: &str| Mapping::parse(&TWO.replace(from, to), "map.toml").err().unwrap().to_string();
-    assert!(bad("column = 2", "column = 0").contains("from 1"));
-    assert!(bad("column = 2", "column = \"x\"").contains("table.header"));
-    assert!(bad("column = 2", "column = 2, scale = 0.0").contains("scale"));
-    assert!(bad("column = 2", "column = 2, scael = 1.0").contains("map.toml"));
-    assert!(bad("column = 1\n", "").contains("[time]"));
-    assert!(bad("name = \"a\"", "name = \"a\"\nunit = \"deg\"").contains("degrees"));
-    assert!(bad("[time]", "[torque]\nkeep = \"average\"\n[time]").contains("torque.cell"));
-    assert!(bad("[time]", "[torque]\nlead = \"z\"\n[time]").contains("`z`"));
-    assert!(bad("[time]", "[table]\ndecimal = \",\"\n[time]").contains("same character"));
-    assert!(bad("[time]", "[filter]\ndecimate = 0\n[time]").contains("decimate"));
-    assert!(bad("[time]", "[time]\ngap = -1\n[time]").contains("map.toml"));
+fn mappings_that_cannot_be_are_refused_with_the_line_and_the_key() {
+    let bad = |from: &str, to: &str, place: &str, expected: &str| {
+        let error = Mapping::parse(&TWO.replacen(from, to, 1), Path::new("map.toml")).err().unwrap().to_string();
+        assert!(error.starts_with(&format!("map.toml:{place}: ")) && error.contains(expected), "{to:?}: {error}");
+    };
+    bad("column = 2", "column = 0", "6:23", "from 1");
+    bad("column = 2", "column = \"x\"", "6:23", "table.header");
+    bad("[time]", "[table]\ncolumns = 2\n[time]", "9:21", "column 3 is beyond table.columns");
+    bad("column = 2", "column = 2, scale = 0.0", "6:34", "other than zero");
+    bad("column = 2", "column = 2, offset = inf", "6:35", "offset");
+    bad("column = 2", "column = 2, scael = 1.0", "6:26", "unknown field `scael`");
+    bad("column = 1\n", "", "2:1", "[time]");
+    bad("column = 1\n", "column = 1\nscale = nan\n", "4:9", "time.scale");
+    bad("column = 1\n", "period = 0.0\n", "3:10", "time.period");
+    bad("[time]", "[time]\ngap = -1.0", "3:7", "time.gap");
+    bad("name = \"a\"", "name = \"\"", "5:8", "is empty");
+    bad("name = \"a\"", "name = \"a\"\nunit = \"deg\"", "6:8", "degrees");
+    bad("[time]", "[torque]\nkeep = \"average\"\n[time]", "2:1", "torque.cell");
+    bad("[time]", "[torque]\nlead = \"z\"\n[time]", "3:8", "`z`");
+    bad("[time]", "[torque]\nstill = -1.0\n[time]", "3:9", "torque.still");
+    bad("[time]", "[table]\ndecimal = \",\"\n[time]", "3:11", "same character");
+    bad("[time]", "[filter]\ndecimate = 0\n[time]", "3:12", "decimate");
+    bad("[time]", "[filter]\noutliers = -1.0\n[time]", "3:12", "outliers");
     assert!(Mapping::load(Path::new("no/such.toml")).err().unwrap().to_string().contains("no/such.toml"));
 }
 

@@ -105,7 +105,7 @@ pub struct LogWriter {
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The system refused.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: cannot be read or written: {source}; check the path, its permissions and the room left", .path.display())]
     File {
         /// The log.
         path: PathBuf,
@@ -119,7 +119,7 @@ pub enum LogError {
     #[error("{}: the log was made with another scene or rig, or one with a plan and one led by hand; it cannot be continued with this one", .0.display())]
     OtherScene(PathBuf),
     /// Not a scan log.
-    #[error("{}: not a scan log (its first line is not `{SIGNATURE}`); other tables need a column mapping", .0.display())]
+    #[error("{}: not a scan log (its first line is not `{SIGNATURE}`); other tables need a column mapping (--columns)", .0.display())]
     Foreign(PathBuf),
     /// A line that is wrong.
     #[error("{}:{line}: {message}", .path.display())]

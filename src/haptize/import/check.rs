@@ -1,0 +1,124 @@
+//! Whether the values of a column mapping can be, and where in its file stands one that cannot.
+
+use super::mapping::{ColumnName, Joint, Keep, Mapping};
+use crate::MAX_JOINTS;
+use std::ops::Range;
+use toml::{
+    Spanned,
+    de::{DeTable, DeValue},
+};
+
+/// A value that cannot be.
+pub(super) struct Refusal {
+    /// Keys and, of arrays, numbers from 0, with points between: `joint.0.position.scale`.
+    key: String,
+    /// What is wrong, and what it must be.
+    pub message: String,
+}
+
+impl Refusal {
+    /// The bytes of `text` in which the value stands; where the key is absent, those of the table that lacks it.
+    pub fn place(&self, text: &str) -> Range<usize> {
+        let Ok(document) = DeTable::parse(text) else { return 0..0 };
+        let mut keys = self.key.split('.');
+        let mut found = keys.next().and_then(|key| document.get_ref().get(key));
+        for key in keys {
+            let inner = match found.map(Spanned::get_ref) {
+                Some(DeValue::Table(table)) => table.get(key),
+                Some(DeValue::Array(array)) => key.parse().ok().and_then(|number: usize| array.get(number)),
+                _ => None,
+            };
+            if inner.is_none() {
+                break;
+            }
+            found = inner;
+        }
+        found.map_or(0..0, Spanned::span)
+    }
+}
+
+/// Refuses the value of `key` where it is `bad`.
+fn refuse(bad: bool, key: impl Into<String>, message: impl Into<String>) -> Result<(), Refusal> {
+    if bad { Err(Refusal { key: key.into(), message: message.into() }) } else { Ok(()) }
+}
+
+/// Whether `x` is a number above zero.
+fn is_positive(x: f64) -> bool {
+    x.is_finite() && x > 0.0
+}
+
+/// Refuses the first value that cannot be.
+pub(super) fn check(mapping: &Mapping) -> Result<(), Refusal> {
+    let Mapping { table, time, joints, filter, torque } = mapping;
+    let count = joints.len();
+    let within = (1..=MAX_JOINTS).contains(&count);
+    refuse(!within, "joint", format!("{count} [[joint]] tables; 1 to {MAX_JOINTS} are needed"))?;
+    let same = "table.delimiter and table.decimal are the same character; tables with comma decimals mostly use `;`";
+    refuse(table.delimiter == table.decimal, "table.decimal", same)?;
+    refuse(![',', '.'].contains(&table.decimal), "table.decimal", "table.decimal must be `.` or `,`")?;
+    refuse(time.column.is_some() == time.period.is_some(), "time", "[time] needs either a column or a period")?;
+    refuse(!is_positive(time.scale), "time.scale", "time.scale must be a positive number of seconds")?;
+    let period = time.period.unwrap_or(1.0);
+    refuse(!is_positive(period), "time.period", "time.period must be a positive number of seconds")?;
+    let parted = time.gap > 0.0;
+    refuse(!parted, "time.gap", "time.gap must be a positive number of seconds")?;
+    for (number, joint) in joints.iter().enumerate() {
+        check_joint(&joints[..number], number, joint)?;
+    }
+    check_columns(mapping)?;
+    refuse(filter.decimate == 0, "filter.decimate", "filter.decimate must be 1 or more")?;
+    let rows = (1..=10_000).contains(&filter.speed_rows);
+    refuse(!rows, "filter.speed_rows", "filter.speed_rows must lie between 1 and 10000")?;
+    let outliers = filter.outliers.unwrap_or(1.0);
+    refuse(!is_positive(outliers), "filter.outliers", "filter.outliers must be a positive number")?;
+    let still = torque.still.is_finite() && torque.still >= 0.0;
+    refuse(!still, "torque.still", "torque.still must be zero or more")?;
+    if let Some(lead) = &torque.lead {
+        let known = joints.iter().any(|joint| joint.name == *lead);
+        refuse(!known, "torque.lead", format!("torque.lead: no joint `{lead}`"))?;
+    }
+    let cells = torque.cell.len() == count && torque.cell.iter().all(|&side| is_positive(side));
+    let message = format!("torque.cell must hold {count} positive numbers, one a joint, to average rows");
+    refuse(torque.keep != Keep::All && !cells, "torque.cell", message)
+}
+
+/// Of joint `number`, with those before it.
+fn check_joint(before: &[Joint], number: usize, joint: &Joint) -> Result<(), Refusal> {
+    let name = &joint.name;
+    let twin = before.iter().any(|other| other.name == *name);
+    let message = format!("joint name `{name}` is empty or used twice");
+    refuse(twin || name.is_empty(), format!("joint.{number}.name"), message)?;
+    let message = format!("unit of joint `{name}` must be `rad` or `m`; degrees and millimetres are scaled to these");
+    refuse(!["rad", "m"].contains(&joint.unit.as_str()), format!("joint.{number}.unit"), message)?;
+    for (what, quantity) in [("position", &joint.position), ("torque", &joint.torque)] {
+        let scaled = quantity.scale.is_finite() && quantity.scale != 0.0;
+        let message = format!("{what} of joint `{name}`: scale must be a number other than zero");
+        refuse(!scaled, format!("joint.{number}.{what}.scale"), message)?;
+        let message = format!("{what} of joint `{name}`: offset must be a number");
+        refuse(!quantity.offset.is_finite(), format!("joint.{number}.{what}.offset"), message)?;
+    }
+    Ok(())
+}
+
+/// Every column that is named against the table's layout.
+fn check_columns(mapping: &Mapping) -> Result<(), Refusal> {
+    let of_joint = |(number, joint): (usize, &Joint)| {
+        [("position", joint.position.column.clone()), ("torque", joint.torque.column.clone())]
+            .map(|(what, column)| (format!("joint.{number}.{what}.column"), column))
+    };
+    let of_time = mapping.time.column.iter().map(|column| ("time.column".to_owned(), column.clone()));
+    for (key, column) in mapping.joints.iter().enumerate().flat_map(of_joint).chain(of_time) {
+        match column {
+            ColumnName::Number(number) => {
+                refuse(number == 0, &*key, "columns are numbered from 1, not from 0")?;
+                let beyond = mapping.table.columns.is_some_and(|columns| number > columns);
+                refuse(beyond, key, format!("column {number} is beyond table.columns"))?;
+            }
+            ColumnName::Name(name) => {
+                let message = format!("column `{name}` is named, but table.header is not true");
+                refuse(!mapping.table.header, key, message)?;
+            }
+        }
+    }
+    Ok(())
+}
