@@ -436,15 +436,18 @@ fn updates_are_refused() {
     assert!(matches!(refusal, GpuError::Unsupported("updates")), "{refusal}");
 }
 
-/// A kilometre from the origin, shallow to deep, points and balls: what f32 leaves is settled in f64.
+/// Every hard case of contact that the CPU keeps: stiffness, exact places and awkward ones, slivers, units, a kilometre from the
+/// origin, torque along paths and against the energy, singular arms.
 #[test]
 fn the_gpu_keeps_the_bounds_of_its_hard_cases() {
-    use haptize::report::stability::{Effort, Setting, cases, table};
+    use haptize::report::stability::{Effort, Outcome, Setting, cases, table};
     let setting = Setting { effort: Effort::Sample, gpu: Some(context()) };
-    let case = cases().into_iter().find(|case| case.name == "far from the origin").unwrap();
-    let outcomes = (case.run)(&setting).unwrap();
-    assert!(outcomes.iter().filter(|outcome| outcome.varied.contains("GPU")).count() == 4);
-    assert!(outcomes.iter().all(haptize::report::stability::Outcome::passed), "{}", table(&outcomes));
+    for case in cases().into_iter().filter(|case| case.room == "contact") {
+        let outcomes = (case.run)(&setting).unwrap();
+        let on_gpu: Vec<Outcome> = outcomes.into_iter().filter(|outcome| outcome.varied.contains("GPU")).collect();
+        assert!(!on_gpu.is_empty(), "{}", case.name);
+        assert!(on_gpu.iter().all(Outcome::passed), "{}", table(&on_gpu));
+    }
 }
 
 /// The scene's tolerance is what accuracy costs on the GPU too: the rougher it is the fewer steps are taken, in f32 and f64.

@@ -1,13 +1,14 @@
 //! Exact places and awkward arrangements: nodes on faces, edges and vertices to the last bit, on each other, in the middle of
 //! the object, right through it, in hollows, and on two sides at once.
 
-use super::super::{Bound, Failure, Outcome, Setting};
-use super::world::{BALL, PAPER, RADIUS, contact, floating_bar, joint, pressed, probe, sphere, torus};
+use super::super::{Bound, Effort, Failure, Outcome, Setting};
+use super::processor::{Processor, processors};
+use super::world::{BALL, PAPER, RADIUS, contact, floating_bar, gantry, pressed, sphere, torus};
 use crate::{
-    contact::{Equilibrium, Model, Solver, Status},
+    JointVector,
+    contact::{Model, Status},
     object::Object,
-    proxy::Chain,
-    scene::{JointKind, ProxyNodeSpec, ProxySpec},
+    scene::ProxyNodeSpec,
 };
 use glam::DVec3;
 
@@ -36,23 +37,29 @@ fn places(object: &Object) -> Vec<(&'static str, DVec3, DVec3)> {
     places
 }
 
+/// The joint coordinates of a gantry at `place`.
+fn at(place: DVec3) -> JointVector {
+    JointVector::from_slice(&place.to_array())
+}
+
 /// A node on a face, an edge, a vertex, and 1 nm off it to either side: contact just where the gap is below zero, and forces that
 /// vanish with the depth.
-pub fn exact_places(_: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn exact_places(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let object = sphere(PAPER)?;
-    let mut gap_error = 0.0f64;
-    let mut wrong = 0;
-    let mut force = 0.0f64;
-    let mut tried = 0;
+    let chain = gantry(vec![ProxyNodeSpec { position: DVec3::ZERO, radius: 0.0 }]);
+    let mut model = Model::new(&object, &chain, contact(1.0));
+    let mut tried = Vec::new();
     for (kind, point, outward) in places(&object) {
-        let chain = probe(point, outward, 0.0);
-        let mut model = Model::new(&object, &chain, contact(1.0));
+        tried.extend([0.0, 1e-9, -1e-9].map(|offset| (kind, offset, at(point + outward * offset))));
+    }
+    let configurations: Vec<JointVector> = tried.iter().map(|(_, _, q)| *q).collect();
+    let mut outcomes = Vec::new();
+    for mut processor in processors(setting) {
+        let (mut gap_error, mut wrong, mut force) = (0.0f64, 0, 0.0f64);
         for stiffness in STIFFNESSES {
             model.set_stiffness(stiffness);
-            let mut solver = Solver::new(&model);
-            for offset in [0.0, 1e-9, -1e-9] {
-                let result = solver.solve(&[offset]);
-                tried += 1;
+            let results = processor.solve(&model, &configurations)?;
+            for (result, &(kind, offset, _)) in results.iter().zip(&tried) {
                 // Inside an edge or a vertex the faces are nearer than 1 nm.
                 let exact = kind == "face" || offset >= 0.0;
                 let error =
@@ -60,110 +67,116 @@ pub fn exact_places(_: &Setting) -> Result<Vec<Outcome>, Failure> {
                 gap_error = gap_error.max(error);
                 wrong += usize::from((result.status == Status::Free) != (result.gap >= 0.0));
                 // No contact can push harder than the object resists at all.
-                force = force.max(result.torque[0].abs());
+                force = force.max(result.torque.norm());
             }
         }
+        let note = processor.note(format!("{} solved", configurations.len() * STIFFNESSES.len()));
+        let varied = processor.name("node on faces, edges, vertices, +-1 nm; Kc 1e2, 1e4, rigid");
+        let figure = |measure: &str, worst: f64, bound: f64, note: String| {
+            outcome("exact places", &varied, measure, worst, Bound::AtMost(bound), note)
+        };
+        outcomes.push(figure("error of the gap [m]", gap_error, 1e-15, note));
+        outcomes.push(figure("contact where the gap is not below 0, or not", wrong as f64, 0.0, String::new()));
+        outcomes.push(figure("force at 1 nm [N]", force, 1e-5, String::new()));
     }
-    let varied = "node on faces, edges, vertices, +-1 nm; Kc 1e2, 1e4, rigid";
-    let note = format!("{tried} solved");
-    Ok(vec![
-        outcome("exact places", varied, "error of the gap [m]", gap_error, Bound::AtMost(1e-15), note),
-        outcome(
-            "exact places",
-            varied,
-            "contact where the gap is not below 0, or not",
-            wrong as f64,
-            Bound::AtMost(0.0),
-            String::new(),
-        ),
-        outcome("exact places", varied, "force at 1 nm [N]", force, Bound::AtMost(1e-5), String::new()),
-    ])
-}
-
-/// A chain of one slide with `nodes`.
-fn slide(axis: DVec3, nodes: Vec<ProxyNodeSpec>) -> Chain {
-    Chain::new(&ProxySpec { joints: vec![joint(JointKind::Prismatic, DVec3::ZERO, axis, nodes)] })
+    Ok(outcomes)
 }
 
 /// Two nodes in one place are one spring of twice the stiffness.
-pub fn coincident_nodes(_: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn coincident_nodes(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let object = sphere(PAPER)?;
-    let mut worst = 0.0f64;
-    let mut unconverged = 0;
-    for radius in [0.0, BALL] {
-        for (_, point, outward) in places(&object).into_iter().step_by(4) {
-            let node = ProxyNodeSpec { position: point + outward * (radius - 0.004), radius };
-            let [one, two] = [1, 2].map(|count| slide(outward, vec![node; count]));
+    let mut outcomes = Vec::new();
+    for mut processor in processors(setting) {
+        let (mut worst, mut unconverged) = (0.0f64, 0);
+        for radius in [0.0, BALL] {
+            let pressed_in = |(_, point, outward): (&str, DVec3, DVec3)| at(point + outward * (radius - 0.004));
+            let configurations: Vec<JointVector> = places(&object).into_iter().step_by(4).map(pressed_in).collect();
+            let node = ProxyNodeSpec { position: DVec3::ZERO, radius };
+            let [one, two] = [1, 2].map(|count| gantry(vec![node; count]));
             let [mut one, mut two] = [&one, &two].map(|chain| Model::new(&object, chain, contact(1.0)));
             for stiffness in [1e2, 1e4] {
                 one.set_stiffness(2.0 * stiffness);
                 two.set_stiffness(stiffness);
-                let mut solved = Vec::new();
-                for model in [&one, &two] {
-                    let result = Solver::new(model).solve(&[0.0]);
-                    unconverged += usize::from(result.status != Status::Contact);
-                    solved.push(result.torque[0]);
+                let (one, two) = (processor.solve(&one, &configurations)?, processor.solve(&two, &configurations)?);
+                unconverged += one.iter().chain(&two).filter(|result| result.status != Status::Contact).count();
+                for (one, two) in one.iter().zip(&two) {
+                    let square: f64 = one.torque.iter().zip(two.torque.iter()).map(|(a, b)| (a - b).powi(2)).sum();
+                    worst = worst.max(square.sqrt() / one.torque.norm().max(1e-9));
                 }
-                worst = worst.max((solved[0] - solved[1]).abs() / solved[0].abs().max(1e-9));
             }
         }
+        let varied = processor.name("two nodes in one place; points and balls; Kc 1e2, 1e4");
+        let note = processor.note(format!("{unconverged} unconverged"));
+        let measure = "force against one of twice Kc, relative [1]";
+        outcomes.push(outcome("coincident nodes", &varied, measure, worst, Bound::AtMost(1e-5), note));
     }
-    let varied = "two nodes in one place; points and balls; Kc 1e2, 1e4";
-    let note = format!("{unconverged} unconverged");
-    Ok(vec![outcome(
-        "coincident nodes",
-        varied,
-        "force against one of twice Kc, relative [1]",
-        worst,
-        Bound::AtMost(1e-5),
-        note,
-    )])
+    Ok(outcomes)
 }
 
-/// Number of results that are neither balanced to 1e-6 nor flagged, and of those flagged.
-fn tally(results: impl Iterator<Item = Equilibrium>) -> (usize, usize, usize) {
-    let (mut wrong, mut flagged, mut all) = (0, 0, 0);
-    for result in results {
-        all += 1;
-        let finite = result.torque.is_finite() && result.energy.is_finite() && result.gap.is_finite();
-        let honest = match result.status {
-            Status::Free => result.gap >= 0.0 && result.energy == 0.0,
-            Status::Contact => result.gap < 0.0 && result.residual <= 1e-6,
-            Status::Unconverged => true,
-            Status::Overflow | Status::Outside | Status::Filled => false,
-        };
-        flagged += usize::from(result.status == Status::Unconverged);
-        wrong += usize::from(!(finite && honest));
+/// What becomes of configurations.
+#[derive(Default)]
+struct Tally {
+    /// Neither balanced nor flagged.
+    wrong: usize,
+    flagged: usize,
+    all: usize,
+}
+
+impl Tally {
+    /// Adds `configurations` of `model`.
+    fn add(
+        &mut self,
+        processor: &mut Processor<'_>,
+        model: &Model<'_>,
+        configurations: &[JointVector],
+    ) -> Result<(), Failure> {
+        for result in processor.solve(model, configurations)? {
+            let finite = result.torque.is_finite() && result.energy.is_finite() && result.gap.is_finite();
+            let honest = match result.status {
+                Status::Free => result.gap >= 0.0 && result.energy == 0.0,
+                Status::Contact => result.gap < 0.0 && result.residual <= processor.residual(),
+                Status::Unconverged => true,
+                Status::Overflow | Status::Outside | Status::Filled => false,
+            };
+            self.all += 1;
+            self.flagged += usize::from(result.status == Status::Unconverged);
+            self.wrong += usize::from(!(finite && honest));
+        }
+        Ok(())
     }
-    (wrong, flagged, all)
 }
 
 /// A node from one side of the sphere to the other, through its very centre, through vertices, and past them.
-pub fn right_through(_: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn right_through(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let object = sphere(PAPER)?;
-    let (mut wrong, mut flagged, mut all) = (0, 0, 0);
-    for radius in [0.0, BALL] {
-        for axis in [DVec3::Z, DVec3::X, DVec3::new(0.3, -0.5, 0.8)] {
-            let chain = probe(axis.normalize() * 0.08, -axis.normalize(), radius);
+    let mut outcomes = Vec::new();
+    for mut processor in processors(setting) {
+        let mut tally = Tally::default();
+        for radius in [0.0, BALL] {
+            let chain = gantry(vec![ProxyNodeSpec { position: DVec3::ZERO, radius }]);
             let mut model = Model::new(&object, &chain, contact(1.0));
+            let mut configurations = Vec::new();
+            for axis in [DVec3::Z, DVec3::X, DVec3::new(0.3, -0.5, 0.8).normalize()] {
+                configurations.extend((-40..=40).map(|k| at(axis * (0.002 * f64::from(k)))));
+            }
             for stiffness in STIFFNESSES {
                 model.set_stiffness(stiffness);
-                let mut solver = Solver::new(&model);
-                // The 40th of 80 steps is the centre.
-                let found = tally((0..=80).map(|k| solver.solve(&[0.002 * f64::from(k)])));
-                (wrong, flagged, all) = (wrong + found.0, flagged + found.1, all + found.2);
+                tally.add(&mut processor, &model, &configurations)?;
             }
         }
+        let Tally { wrong, flagged, all } = tally;
+        let varied = processor.name("node through the centre; points and balls; Kc 1e2, 1e4, rigid");
+        let note = processor.note(format!("{flagged} of {all} flagged as unconverged"));
+        let measure = "neither balanced nor flagged";
+        outcomes.push(outcome("right through", &varied, measure, wrong as f64, Bound::AtMost(0.0), note));
     }
-    let varied = "node through the centre; points and balls; Kc 1e2, 1e4, rigid";
-    let note = format!("{flagged} of {all} flagged as unconverged");
-    Ok(vec![outcome("right through", varied, "neither balanced nor flagged", wrong as f64, Bound::AtMost(0.0), note)])
+    Ok(outcomes)
 }
 
 /// The bar in the hole and the groove of a torus.
 pub fn concave(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let object = torus(DVec3::ZERO)?;
-    let count = if setting.effort == super::super::Effort::Full { 200 } else { 30 };
+    let count = if setting.effort == Effort::Full { 200 } else { 30 };
     let mut outcomes = Vec::new();
     for (name, radius) in [("points", 0.0), ("balls", 0.004)] {
         let chain = floating_bar(radius);
@@ -172,40 +185,46 @@ pub fn concave(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
         let configurations = pressed(&model, 3, count, 0.0, 0.2 * 0.016);
         for stiffness in [1e2, 1e4, 1e6] {
             model.set_stiffness(stiffness);
-            let mut solver = Solver::new(&model);
-            let (wrong, flagged, all) = tally(configurations.iter().map(|q| solver.solve(q)));
-            outcomes.push(outcome(
-                "concave object",
-                &format!("bar on a torus, {name}, Kc {stiffness:.0e}"),
-                "share converged [1]",
-                (all - flagged - wrong) as f64 / all as f64,
-                Bound::AtLeast(0.99),
-                format!("{flagged} of {all} flagged"),
-            ));
+            for mut processor in processors(setting) {
+                let mut tally = Tally::default();
+                tally.add(&mut processor, &model, &configurations)?;
+                let Tally { wrong, flagged, all } = tally;
+                let varied = processor.name(&format!("bar on a torus, {name}, Kc {stiffness:.0e}"));
+                let share = (all - flagged - wrong) as f64 / all as f64;
+                let note = processor.note(format!("{flagged} of {all} flagged"));
+                let bound = Bound::AtLeast(0.99);
+                outcomes.push(outcome("concave object", &varied, "share converged [1]", share, bound, note));
+            }
         }
     }
     Ok(outcomes)
 }
 
-/// Two nodes on opposite poles of the sphere push it equally: the forces on the slide cancel.
-pub fn two_regions(_: &Setting) -> Result<Vec<Outcome>, Failure> {
+/// Two nodes on opposite poles of the sphere push it equally: the forces on the gantry's slide between them cancel. Sideways a point
+/// in a vertex leans on one of its facets.
+pub fn two_regions(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let object = sphere(PAPER)?;
-    let mut worst = 0.0f64;
-    let mut unconverged = 0;
-    for radius in [0.0, BALL] {
-        let nodes =
-            [1.0, -1.0].map(|side| ProxyNodeSpec { position: DVec3::Z * (side * (0.9 * RADIUS + radius)), radius });
-        let chain = slide(DVec3::Z, nodes.to_vec());
-        let mut model = Model::new(&object, &chain, contact(1.0));
-        for stiffness in STIFFNESSES {
-            model.set_stiffness(stiffness);
-            let result = Solver::new(&model).solve(&[0.0]);
-            unconverged += usize::from(result.status != Status::Contact);
-            let size: f64 = result.touches.iter().map(|touch| touch.force.length()).sum();
-            worst = worst.max(result.torque[0].abs() / size.max(1e-12));
+    let mut outcomes = Vec::new();
+    for mut processor in processors(setting) {
+        let (mut worst, mut unconverged) = (0.0f64, 0);
+        for radius in [0.0, BALL] {
+            let nodes =
+                [1.0, -1.0].map(|side| ProxyNodeSpec { position: DVec3::Z * (side * (0.9 * RADIUS + radius)), radius });
+            let chain = gantry(nodes.to_vec());
+            let mut model = Model::new(&object, &chain, contact(1.0));
+            for stiffness in STIFFNESSES {
+                model.set_stiffness(stiffness);
+                for result in processor.solve(&model, &[at(DVec3::ZERO)])? {
+                    unconverged += usize::from(result.status != Status::Contact);
+                    let size: f64 = result.touches.iter().map(|touch| touch.force.length()).sum();
+                    worst = worst.max(result.torque[2].abs() / size.max(1e-12));
+                }
+            }
         }
+        let varied = processor.name("nodes on both poles; points and balls; Kc 1e2, 1e4, rigid");
+        let note = processor.note(format!("{unconverged} unconverged"));
+        let measure = "net force over the sum of forces [1]";
+        outcomes.push(outcome("two regions", &varied, measure, worst, Bound::AtMost(1e-6), note));
     }
-    let varied = "nodes on both poles; points and balls; Kc 1e2, 1e4, rigid";
-    let note = format!("{unconverged} unconverged");
-    Ok(vec![outcome("two regions", varied, "net force over the sum of forces [1]", worst, Bound::AtMost(1e-6), note)])
+    Ok(outcomes)
 }

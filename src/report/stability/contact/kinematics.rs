@@ -1,9 +1,11 @@
 //! Arms in singular postures, at their limits, with axes that coincide: contact sees where the nodes are and nothing else.
 
 use super::super::{Bound, Failure, Outcome, Setting};
+use super::processor::{Processor, processors};
 use super::world::{PAPER, contact, joint, sphere};
 use crate::{
-    contact::{Model, Solver},
+    JointVector,
+    contact::Model,
     proxy::Chain,
     scene::{JointKind, JointSpec, ProxyNodeSpec, ProxySpec},
 };
@@ -24,7 +26,7 @@ fn nodes(from: f64) -> Vec<ProxyNodeSpec> {
 }
 
 /// Equilibria of one posture by arms of one, two and three joints that put the same nodes in the same place.
-pub fn run(_: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let object = sphere(PAPER)?;
     let plain = vec![revolute(BASE, nodes(0.1))];
     // Two joints about one axis.
@@ -45,35 +47,36 @@ pub fn run(_: &Setting) -> Result<Vec<Outcome>, Failure> {
     let mut outcomes = Vec::new();
     for (name, joints, posture) in arms {
         let arm = Chain::new(&ProxySpec { joints });
-        let mut worst = 0.0f64;
-        let mut touching = 0;
-        for stiffness in [1e2, 1e4] {
-            let models = [&reference, &arm].map(|chain| Model::new(&object, chain, contact(stiffness)));
-            let mut solvers = [Solver::new(&models[0]), Solver::new(&models[1])];
-            for q in angles {
-                let expected = solvers[0].solve(&[q]);
-                let found = solvers[1].solve(&posture(q));
-                touching += usize::from(!expected.touches.is_empty());
-                if expected.status != found.status || expected.forces.len() != found.forces.len() {
-                    worst = f64::INFINITY;
-                    continue;
+        let postures = angles.map(|q| JointVector::from_slice(&posture(q)));
+        for mut processor in processors(setting) {
+            let mut worst = 0.0f64;
+            let mut touching = 0;
+            for stiffness in [1e2, 1e4] {
+                let [plain, singular] = [&reference, &arm].map(|chain| Model::new(&object, chain, contact(stiffness)));
+                let expected = Processor::cpu().solve(&plain, &angles.map(|q| JointVector::from_slice(&[q])))?;
+                for (expected, found) in expected.iter().zip(processor.solve(&singular, &postures)?) {
+                    touching += usize::from(!expected.touches.is_empty());
+                    if expected.status != found.status || expected.forces.len() != found.forces.len() {
+                        worst = f64::INFINITY;
+                        continue;
+                    }
+                    let size = expected.forces.iter().map(|force| force.force.length()).fold(1e-9, f64::max);
+                    for (a, b) in expected.forces.iter().zip(&found.forces) {
+                        worst = worst.max(a.force.distance(b.force) / size);
+                    }
+                    // The first joint turns everything, whatever comes after it.
+                    worst = worst.max((expected.torque[0] - found.torque[0]).abs() / (size * 0.2));
                 }
-                let size = expected.forces.iter().map(|force| force.force.length()).fold(1e-9, f64::max);
-                for (a, b) in expected.forces.iter().zip(&found.forces) {
-                    worst = worst.max(a.force.distance(b.force) / size);
-                }
-                // The first joint turns everything, whatever comes after it.
-                worst = worst.max((expected.torque[0] - found.torque[0]).abs() / (size * 0.2));
             }
+            outcomes.push(Outcome {
+                case: "singular arms".into(),
+                varied: processor.name(name),
+                measure: "forces and torque against a plain arm's, relative [1]".into(),
+                worst,
+                bound: Bound::AtMost(processor.choose(1e-6, 1e-5)),
+                note: processor.note(format!("{touching} in contact")),
+            });
         }
-        outcomes.push(Outcome {
-            case: "singular arms".into(),
-            varied: name.into(),
-            measure: "forces and torque against a plain arm's, relative [1]".into(),
-            worst,
-            bound: Bound::AtMost(1e-6),
-            note: format!("{touching} in contact"),
-        });
     }
     Ok(outcomes)
 }

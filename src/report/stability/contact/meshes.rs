@@ -2,8 +2,10 @@
 //! with the reason. Slivers are sound, and their torque is that of the stored energy.
 
 use super::super::{Bound, Failure, Outcome, Setting};
+use super::processor::{Processor, processors};
 use super::world::{PAPER, RADIUS, contact, joint, probe, sphere, sphere_spec};
 use crate::{
+    JointVector,
     contact::{Model, Solver, Status},
     object::{Object, ObjectError, SurfaceDefect},
     proxy::Chain,
@@ -125,7 +127,7 @@ fn torques(object: &Object) -> Vec<f64> {
 }
 
 /// All of them.
-pub fn run(_: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let folder = tempfile::tempdir()?;
     let sound = sphere(PAPER)?;
     let surface = (sound.rest.clone(), sound.triangles.clone());
@@ -159,12 +161,14 @@ pub fn run(_: &Setting) -> Result<Vec<Outcome>, Failure> {
             note: said,
         });
     }
-    outcomes.push(slivers()?);
+    for processor in processors(setting) {
+        outcomes.push(slivers(processor)?);
+    }
     Ok(outcomes)
 }
 
 /// A box with strips of aspect 1e4 along its edges.
-fn slivers() -> Result<Outcome, Failure> {
+fn slivers(mut processor: Processor<'_>) -> Result<Outcome, Failure> {
     let (size, strip) = (0.1, 1e-5);
     let lines = [0.0, strip, 0.5 * size, size - strip, size];
     let count = lines.len();
@@ -203,27 +207,26 @@ fn slivers() -> Result<Outcome, Failure> {
             ],
         });
         let model = Model::new(&object, &chain, contact(1e3));
-        let mut solver = Solver::new(&model);
+        let h = 1e-7;
         // Across the face and over the strip at its edge.
-        for place in [0.0, 0.02, 0.04, 0.0495, 0.05 - 0.7 * strip] {
+        let places = [0.0, 0.02, 0.04, 0.0495, 0.05 - 0.7 * strip];
+        let stencil = |place| [0.0, -h, h].map(|step| JointVector::from_slice(&[0.003 + step, place]));
+        for results in processor.solve(&model, places.map(stencil).as_flattened())?.chunks_exact(3) {
             tried += 1;
-            let result = solver.solve(&[0.003, place]);
-            let h = 1e-7;
-            let [before, after] = [-h, h].map(|step| solver.solve(&[0.003 + step, place]));
-            if [&result, &before, &after].iter().any(|result| result.status != Status::Contact) {
+            if results.iter().any(|result| result.status != Status::Contact) {
                 unconverged += 1;
                 continue;
             }
-            let slope = (after.energy - before.energy) / (2.0 * h);
-            worst = worst.max((slope + result.torque[0]).abs() / result.torque[0].abs());
+            let slope = (results[2].energy - results[1].energy) / (2.0 * h);
+            worst = worst.max((slope + results[0].torque[0]).abs() / results[0].torque[0].abs());
         }
     }
     Ok(Outcome {
         case: "broken meshes".into(),
-        varied: "slivers of aspect 1e4; points and balls".into(),
+        varied: processor.name("slivers of aspect 1e4; points and balls"),
         measure: "tau against -dU/dq, relative [1]".into(),
         worst,
         bound: Bound::AtMost(1e-4),
-        note: format!("{unconverged} of {tried} flagged as unconverged"),
+        note: processor.note(format!("{unconverged} of {tried} flagged as unconverged")),
     })
 }

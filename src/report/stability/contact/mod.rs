@@ -4,6 +4,7 @@ mod field;
 mod geometry;
 mod kinematics;
 mod meshes;
+mod processor;
 mod stiffness;
 mod units;
 pub mod world;

@@ -1,18 +1,19 @@
 //! Every combination of contact stiffness, ground, springs, resolution and node radius, on random configurations: what share
-//! converges, with how many iterations, in what time; that E never rises and no number breaks; and beside it, on a tenth of them,
-//! the same with blended facets, and the paper's iteration.
+//! converges, with how many iterations, in what time; that E never rises and no number breaks. Beside it the same on the GPU, of the
+//! fine surface a tenth, and a tenth of all with blended facets and by the paper's iteration.
 
 use super::super::{Bound, Effort, Failure, Outcome, Setting};
+use super::processor::Processor;
 use super::world::{BALL, Ball, RADIUS, contact, floating_bar, pressed, sphere};
 use crate::{
     JointVector,
     contact::{Model, Solver, Status},
-    gpu::{Context, GpuSolver},
-    haptize::Backend,
+    gpu::{Context, GpuError},
     scene::{Algorithm, Blending, SpringKind},
 };
 use rayon::prelude::*;
 use std::{
+    ops::AddAssign,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -21,24 +22,47 @@ use std::{
 /// converge in each.
 const DEPTHS: [(f64, f64, f64); 2] = [(0.0, 0.2, 0.999), (0.2, 0.5, 0.95)];
 
-/// Largest relative residual of what is called converged, on the CPU and on the GPU.
-const RESIDUALS: [f64; 2] = [1e-6, 1e-4];
+/// How many of how many converge, and what time they take together.
+#[derive(Clone, Copy, Default)]
+struct Share {
+    converged: usize,
+    solved: usize,
+    time: Duration,
+}
+
+impl Share {
+    /// One configuration.
+    fn of(converged: bool, time: Duration) -> Self {
+        Self { converged: usize::from(converged), solved: 1, time }
+    }
+
+    /// What part converges; all of none.
+    fn part(self) -> f64 {
+        if self.solved == 0 { 1.0 } else { self.converged as f64 / self.solved as f64 }
+    }
+}
+
+impl AddAssign for Share {
+    fn add_assign(&mut self, other: Self) {
+        self.converged += other.converged;
+        self.solved += other.solved;
+        self.time += other.time;
+    }
+}
 
 /// What the cells of the table add up.
 #[derive(Default)]
 struct Cell {
-    solved: usize,
-    converged: usize,
+    all: Share,
     /// Least share of any combination, and which one.
     least: Option<(f64, String)>,
     iterations: Vec<u32>,
-    time: Duration,
-    paper: (usize, usize),
-    paper_time: Duration,
-    blended: (usize, usize),
-    blended_time: Duration,
-    gpu: (usize, usize),
+    paper: Share,
+    blended: Share,
+    gpu: Share,
     gpu_on_cpu: usize,
+    /// Combinations whose compliance the adapter does not bind.
+    gpu_too_large: usize,
 }
 
 /// Worst of all cells.
@@ -77,18 +101,26 @@ pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
         let (from, to, share) = DEPTHS[depth];
         outcomes.push(cell.outcome(stiffness, radius == 1, from, to, share));
     }
-    for (depth, (from, to, share)) in DEPTHS.into_iter().enumerate() {
-        let of = |place: &(usize, &Cell)| place.0 % 2 == depth;
-        let blended = cells.iter().enumerate().filter(of).map(|(_, cell)| cell.blended);
-        let (converged, solved) = blended.fold((0, 0), |sum, cell| (sum.0 + cell.0, sum.1 + cell.1));
-        outcomes.push(Outcome {
+    for (depth, (from, to, least)) in DEPTHS.into_iter().enumerate() {
+        let (mut blended, mut gpu, mut too_large) = (Share::default(), Share::default(), 0);
+        for cell in cells.iter().skip(depth).step_by(DEPTHS.len()) {
+            blended += cell.blended;
+            gpu += cell.gpu;
+            too_large += cell.gpu_too_large;
+        }
+        let outcome = |how: &str, share: Share, note: String| Outcome {
             case: "stiffness".into(),
-            varied: format!("all of these, blended, depth {from} to {to} R"),
+            varied: format!("all of these, {how}, depth {from} to {to} R"),
             measure: "share converged [1]".into(),
-            worst: converged as f64 / solved.max(1) as f64,
-            bound: Bound::AtLeast(share),
-            note: format!("{solved} solved"),
-        });
+            worst: share.part(),
+            bound: Bound::AtLeast(least),
+            note,
+        };
+        outcomes.push(outcome("blended", blended, format!("{} solved", blended.solved)));
+        if setting.gpu.is_some() {
+            let note = format!("{} solved, {too_large} combinations too large for the adapter", gpu.solved);
+            outcomes.push(outcome("on the GPU", gpu, note));
+        }
     }
     let figure = |varied: &str, measure: &str, worst: f64, bound: f64| Outcome {
         case: "stiffness".into(),
@@ -101,15 +133,17 @@ pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let note = format!("{} configurations", worst.checked);
     outcomes.push(Outcome {
         note,
-        ..figure("all of these", "residual of what is called converged [1]", worst.residual, RESIDUALS[0])
-    });
-    if setting.gpu.is_some() {
-        outcomes.push(figure(
-            "all, on the GPU",
+        ..figure(
+            "all of these",
             "residual of what is called converged [1]",
-            worst.gpu_residual,
-            RESIDUALS[1],
-        ));
+            worst.residual,
+            Processor::cpu().residual(),
+        )
+    });
+    if let Some(context) = &setting.gpu {
+        let bound = Processor::gpu(context).residual();
+        let measure = "residual of what is called converged [1]";
+        outcomes.push(figure("all, on the GPU", measure, worst.gpu_residual, bound));
     }
     outcomes.push(figure("all of these", "rise of E in a step, relative [1]", worst.rise, 1e-12));
     outcomes.push(figure("all of these", "results with numbers that are not finite", worst.broken as f64, 0.0));
@@ -124,22 +158,22 @@ impl Cell {
         let median = iterations.get(iterations.len() / 2).copied().unwrap_or(0);
         let most = iterations.last().copied().unwrap_or(0);
         let (least, which) = self.least.clone().unwrap_or((1.0, String::new()));
-        let each = |time: Duration, count: usize| 1e6 * time.as_secs_f64() / count.max(1) as f64;
-        let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
+        let percent = |share: Share| 100.0 * share.part();
+        let each = |share: Share| 1e6 * share.time.as_secs_f64() / share.solved.max(1) as f64;
         let mut note = format!(
             "worst with {which}; {:.1} % of all {}, {median}/{most} iterations (median/max), {:.0} us; blended {:.0} %, {:.0} us; \
              paper {:.0} %, {:.0} us",
-            percent(self.converged, self.solved),
-            self.solved,
-            each(self.time, self.solved),
-            percent(self.blended.0, self.blended.1),
-            each(self.blended_time, self.blended.1),
-            percent(self.paper.0, self.paper.1),
-            each(self.paper_time, self.paper.1),
+            percent(self.all),
+            self.all.solved,
+            each(self.all),
+            percent(self.blended),
+            each(self.blended),
+            percent(self.paper),
+            each(self.paper),
         );
-        if self.gpu.1 > 0 {
-            let (on_gpu, of) = (percent(self.gpu.0, self.gpu.1), percent(self.gpu_on_cpu, self.gpu.1));
-            note += &format!("; GPU {on_gpu:.1} %, {of:.0} % of them by the CPU");
+        if self.gpu.solved > 0 {
+            let on_cpu = 100.0 * self.gpu_on_cpu as f64 / self.gpu.solved as f64;
+            note += &format!("; GPU {:.1} %, {:.0} us, {on_cpu:.0} % by the CPU", percent(self.gpu), each(self.gpu));
         }
         let stiffness = if stiffness.is_finite() { format!("{stiffness:.0e} N/m") } else { "rigid".into() };
         let nodes = if ball { "balls" } else { "points" };
@@ -187,22 +221,22 @@ fn combination(
                         },
                     )
                     .collect();
-                let before = cell.converged;
+                let mut share = Share::default();
                 for (time, rise, result) in results {
-                    cell.time += time;
-                    cell.solved += 1;
+                    let converged = result.status == Status::Contact;
+                    share += Share::of(converged, time);
                     cell.iterations.push(result.iterations);
                     worst.checked += 1;
                     worst.rise = worst.rise.max(rise);
                     if !(result.energy.is_finite() && result.torque.is_finite() && result.residual.is_finite()) {
                         worst.broken += 1;
                     }
-                    if result.status == Status::Contact {
-                        cell.converged += 1;
+                    if converged {
                         worst.residual = worst.residual.max(result.residual);
                     }
                 }
-                let share = (cell.converged - before) as f64 / count as f64;
+                cell.all += share;
+                let share = share.part();
                 if cell.least.as_ref().is_none_or(|(least, _)| share < *least) {
                     let held = if ball.patch { "a patch" } else { "all nodes" };
                     let Ball { rings, springs, ground, .. } = ball;
@@ -210,13 +244,15 @@ fn combination(
                     cell.least = Some((share, format!("{nodes} nodes, {springs:?}, Kg {ground} on {held}")));
                 }
                 model.set_blending(Blending::Mesh);
-                tenth(&model, &configurations, &mut cell.blended, &mut cell.blended_time);
+                cell.blended += tenth(&model, &configurations);
                 model.set_blending(Blending::Width(0.0));
                 model.contact.algorithm = Algorithm::Paper;
-                tenth(&model, &configurations, &mut cell.paper, &mut cell.paper_time);
+                cell.paper += tenth(&model, &configurations);
                 model.contact.algorithm = Algorithm::Energy;
-                if let (Some(context), true) = (&setting.gpu, ball.rings <= 10) {
-                    on_gpu(context, &model, &configurations, cell, worst)?;
+                if let Some(context) = &setting.gpu {
+                    let every = if ball.rings > 10 { 10 } else { 1 };
+                    let some: Vec<JointVector> = configurations.iter().step_by(every).copied().collect();
+                    on_gpu(context, &model, &some, cell, worst)?;
                 }
             }
         }
@@ -224,37 +260,44 @@ fn combination(
     Ok(())
 }
 
-/// The model on a tenth of the configurations: how many of how many converge, and in what time.
-fn tenth(model: &Model<'_>, configurations: &[Vec<f64>], share: &mut (usize, usize), time: &mut Duration) {
-    let solve = |solver: &mut Solver<'_>, q: &Vec<f64>| {
+/// The model on a tenth of the configurations.
+fn tenth(model: &Model<'_>, configurations: &[JointVector]) -> Share {
+    let solve = |solver: &mut Solver<'_>, q: &JointVector| {
         let since = Instant::now();
-        (usize::from(solver.solve(q).status == Status::Contact), since.elapsed())
+        let converged = solver.solve(q).status == Status::Contact;
+        Share::of(converged, since.elapsed())
     };
-    let results: Vec<_> = configurations.par_iter().step_by(10).map_init(|| Solver::new(model), solve).collect();
-    for (converged, took) in results {
-        share.0 += converged;
-        share.1 += 1;
-        *time += took;
-    }
+    let shares: Vec<_> = configurations.par_iter().step_by(10).map_init(|| Solver::new(model), solve).collect();
+    let mut sum = Share::default();
+    shares.into_iter().for_each(|share| sum += share);
+    sum
 }
 
 /// The same by the kernels.
 fn on_gpu(
     context: &Arc<Context>,
     model: &Model<'_>,
-    configurations: &[Vec<f64>],
+    configurations: &[JointVector],
     cell: &mut Cell,
     worst: &mut Worst,
 ) -> Result<(), Failure> {
-    let mut solver = GpuSolver::new(Arc::clone(context), model)?;
-    let configurations: Vec<JointVector> = configurations.iter().map(|q| JointVector::from_slice(q)).collect();
-    for result in solver.solve(&configurations)? {
-        cell.gpu.1 += 1;
-        if result.status == Status::Contact {
-            cell.gpu.0 += 1;
+    let since = Instant::now();
+    let mut processor = Processor::gpu(context);
+    let results = match processor.solve(model, configurations) {
+        Err(GpuError::TooLarge { .. }) => {
+            cell.gpu_too_large += 1;
+            return Ok(());
+        }
+        results => results?,
+    };
+    cell.gpu.time += since.elapsed();
+    for result in results {
+        let converged = result.status == Status::Contact;
+        cell.gpu += Share::of(converged, Duration::ZERO);
+        if converged {
             worst.gpu_residual = worst.gpu_residual.max(result.residual);
         }
     }
-    cell.gpu_on_cpu += solver.left_to_cpu();
+    cell.gpu_on_cpu += processor.left_to_cpu();
     Ok(())
 }

@@ -1,18 +1,16 @@
 //! Units and places of the world that must not matter: lengths in millimetres, an object a kilometre from the origin.
 
 use super::super::{Bound, Failure, Outcome, Setting};
+use super::processor::{Processor, processors};
 use super::world::{PAPER, RADIUS, contact, floating_bar, joint, pressed, sphere, sphere_spec};
 use crate::{
     JointVector,
-    contact::{Equilibrium, Model, Solver, Status},
-    gpu::GpuSolver,
-    haptize::Backend,
+    contact::{Equilibrium, Model, Status},
     object::Object,
     proxy::Chain,
     scene::{JointKind, ProxyNodeSpec, ProxySpec},
 };
 use glam::DVec3;
-use std::sync::Arc;
 
 /// Depths of the configurations [m].
 const DEPTH: f64 = 0.2 * RADIUS;
@@ -52,33 +50,29 @@ fn bar(radius: f64, scale: f64) -> Chain {
 
 /// A world measured in other lengths: stiffness in newtons per that length, torque and energy in newtons times it. By a power
 /// of two every product rounds alike, and results agree to the last bit; by a thousand, to rounding.
-pub fn units(_: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn units(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let object = sphere(PAPER)?;
     let mut outcomes = Vec::new();
     for (name, scale, bound) in [("mm for m, by 1000", 1e3, 1e-7), ("by 1024, exact in binary", 1024.0, 0.0)] {
-        let mut worst = 0.0f64;
         let scaled = Object::build(&sphere_spec(PAPER, DVec3::ZERO, scale, 1.0 / scale))?;
-        for radius in [0.0, 0.008] {
-            let (here, there) = (bar(radius, 1.0), bar(radius, scale));
-            let model = Model::new(&object, &here, contact(1e3));
-            let other = Model::new(&scaled, &there, contact(1e3 / scale));
-            let configurations = pressed(&model, 5, 40, 0.0, DEPTH);
-            let mut solver = Solver::new(&model);
-            let expected: Vec<_> = configurations.iter().map(|q| solver.solve(q)).collect();
-            let mut solver = Solver::new(&other);
-            let found: Vec<_> = configurations
-                .iter()
-                .map(|q| {
-                    let mut q = q.clone();
-                    q[..3].iter_mut().for_each(|x| *x *= scale);
-                    solver.solve(&q)
-                })
-                .collect();
-            // Slides give forces, which stay; turns give torques.
-            worst = worst.max(difference(&expected, &found, scale, |k| if k < 3 { 1.0 } else { scale }));
+        for mut processor in processors(setting) {
+            let mut worst = 0.0f64;
+            for radius in [0.0, 0.008] {
+                let (here, there) = (bar(radius, 1.0), bar(radius, scale));
+                let model = Model::new(&object, &here, contact(1e3));
+                let other = Model::new(&scaled, &there, contact(1e3 / scale));
+                let configurations = pressed(&model, 5, 40, 0.0, DEPTH);
+                let mut elsewhere = configurations.clone();
+                elsewhere.iter_mut().for_each(|q| q[..3].iter_mut().for_each(|x| *x *= scale));
+                let expected = processor.solve(&model, &configurations)?;
+                let found = processor.solve(&other, &elsewhere)?;
+                // Slides give forces, which stay; turns give torques.
+                worst = worst.max(difference(&expected, &found, scale, |k| if k < 3 { 1.0 } else { scale }));
+            }
+            let measure = "U and tau scaled back, relative [1]";
+            let note = processor.note("points and balls, Kc 1e3".into());
+            outcomes.push(outcome("units", &processor.name(name), measure, worst, processor.choose(bound, 1e-5), note));
         }
-        let measure = "U and tau scaled back, relative [1]";
-        outcomes.push(outcome("units", name, measure, worst, bound, "points and balls, Kc 1e3".into()));
     }
     Ok(outcomes)
 }
@@ -111,21 +105,15 @@ pub fn far_away(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
                 configurations.push(JointVector::from_slice(&[0.0005 + 0.0005 * f64::from(k), turn]));
             }
         }
-        let solve = |model: &Model<'_>| {
-            let mut solver = Solver::new(model);
-            configurations.iter().map(|q| solver.solve(q)).collect::<Vec<_>>()
-        };
-        let expected = solve(&models[0]);
-        let worst = difference(&expected, &solve(&models[1]), 1.0, |_| 1.0);
         let (case, measure) = ("far from the origin", "U and tau against those at it, relative [1]");
-        outcomes.push(outcome(case, &format!("1 km, {name}, CPU"), measure, worst, 1e-6, String::new()));
-        if let Some(context) = &setting.gpu {
-            for (place, model) in [("at the origin", &models[0]), ("1 km away", &models[1])] {
-                let mut solver = GpuSolver::new(Arc::clone(context), model)?;
-                let found = solver.solve(&configurations)?;
+        let expected = Processor::cpu().solve(&models[0], &configurations)?;
+        for (place, model) in [("at the origin", &models[0]), ("1 km away", &models[1])] {
+            for mut processor in processors(setting) {
+                let found = processor.solve(model, &configurations)?;
                 let worst = difference(&expected, &found, 1.0, |_| 1.0);
-                let note = format!("{} of {} by the CPU", solver.left_to_cpu(), configurations.len());
-                outcomes.push(outcome(case, &format!("{place}, {name}, GPU"), measure, worst, 1e-5, note));
+                let varied = processor.name(&format!("{place}, {name}"));
+                let bound = processor.choose(1e-6, 1e-5);
+                outcomes.push(outcome(case, &varied, measure, worst, bound, processor.note(String::new())));
             }
         }
     }

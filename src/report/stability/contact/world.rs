@@ -2,6 +2,7 @@
 
 use super::super::Failure;
 use crate::{
+    JointVector,
     contact::{Model, Solver},
     object::Object,
     proxy::Chain,
@@ -133,6 +134,14 @@ pub fn probe(from: DVec3, axis: DVec3, radius: f64) -> Chain {
     Chain::new(&ProxySpec { joints: vec![joint(JointKind::Prismatic, from, axis, nodes)] })
 }
 
+/// Nodes on three slides along the axes of the world: the joint coordinates are where their origin is [m].
+#[must_use]
+pub fn gantry(nodes: Vec<ProxyNodeSpec>) -> Chain {
+    let slide = |axis, nodes| joint(JointKind::Prismatic, DVec3::ZERO, axis, nodes);
+    let joints = vec![slide(DVec3::X, vec![]), slide(DVec3::Y, vec![]), slide(DVec3::Z, nodes)];
+    Chain::new(&ProxySpec { joints })
+}
+
 /// A bent bar of 17 nodes that floats: three slides, three turns.
 #[must_use]
 pub fn floating_bar(radius: f64) -> Chain {
@@ -156,7 +165,7 @@ pub fn floating_bar(radius: f64) -> Chain {
 /// Random configurations of [`floating_bar`] whose deepest node lies between `least` and `most` below the surface of a sphere
 /// around the origin [m].
 #[must_use]
-pub fn pressed(model: &Model<'_>, seed: u64, count: usize, least: f64, most: f64) -> Vec<Vec<f64>> {
+pub fn pressed(model: &Model<'_>, seed: u64, count: usize, least: f64, most: f64) -> Vec<JointVector> {
     let mut sequence = Sequence::new(seed);
     let mut solver = Solver::new(model);
     let mut found = Vec::with_capacity(count);
@@ -171,8 +180,7 @@ pub fn pressed(model: &Model<'_>, seed: u64, count: usize, least: f64, most: f64
         // From afar inwards by what is missing: the gap grows no faster than the way.
         let mut away = 2.0 * RADIUS + 0.06;
         for _ in 0..20 {
-            let mut q = (direction * away).to_array().to_vec();
-            q.extend(turns);
+            let q = JointVector::from_slice(&[(direction * away).to_array(), turns].concat());
             let gap = solver.gap(&q);
             if (gap - wanted).abs() < 1e-4 && -gap > least && -gap <= most {
                 found.push(q);
