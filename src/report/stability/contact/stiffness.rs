@@ -173,7 +173,7 @@ impl Cell {
         );
         if self.gpu.solved > 0 {
             let on_cpu = 100.0 * self.gpu_on_cpu as f64 / self.gpu.solved as f64;
-            note += &format!("; GPU {:.1} %, {:.0} us, {on_cpu:.0} % by the CPU", percent(self.gpu), each(self.gpu));
+            note += &format!("; GPU {:.1} %, {on_cpu:.0} % of them by the CPU", percent(self.gpu));
         }
         let stiffness = if stiffness.is_finite() { format!("{stiffness:.0e} N/m") } else { "rigid".into() };
         let nodes = if ball { "balls" } else { "points" };
@@ -281,7 +281,6 @@ fn on_gpu(
     cell: &mut Cell,
     worst: &mut Worst,
 ) -> Result<(), Failure> {
-    let since = Instant::now();
     let mut processor = Processor::gpu(context);
     let results = match processor.solve(model, configurations) {
         Err(GpuError::TooLarge { .. }) => {
@@ -290,7 +289,6 @@ fn on_gpu(
         }
         results => results?,
     };
-    cell.gpu.time += since.elapsed();
     for result in results {
         let converged = result.status == Status::Contact;
         cell.gpu += Share::of(converged, Duration::ZERO);
