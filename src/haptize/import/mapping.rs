@@ -207,8 +207,8 @@ impl Mapping {
     /// # Errors
     /// [`MappingError`] names the file, the line and the key.
     pub fn load(path: &Path) -> Result<Self, MappingError> {
-        let file = || path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|source| MappingError::Read { file: file(), source })?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| MappingError::Read { file: path.display().to_string(), source })?;
         Self::parse(&text, path)
     }
 

@@ -40,17 +40,25 @@ fn largest_step(path: &[Equilibrium]) -> (f64, f64, usize) {
     (largest, size, path.iter().filter(|result| torque(result).is_none()).count())
 }
 
-/// Paths from contact to contact, refined ten times.
-pub fn continuity(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+/// What is measured with nodes of one kind: their name, radius [m] and Kc [N/m].
+type Measure = fn(Effort, Processor<'_>, &str, f64, f64) -> Result<Outcome, Failure>;
+
+/// `measure` of balls and points, soft and stiff.
+fn of_each(measure: Measure, setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let mut outcomes = Vec::new();
     for (name, radius) in [("balls", BALL), ("points", 0.0)] {
         for stiffness in [1e2, 1e4] {
             for processor in processors(setting) {
-                outcomes.push(refined(setting.effort, processor, name, radius, stiffness)?);
+                outcomes.push(measure(setting.effort, processor, name, radius, stiffness)?);
             }
         }
     }
     Ok(outcomes)
+}
+
+/// Paths from contact to contact, refined ten times.
+pub fn continuity(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+    of_each(refined, setting)
 }
 
 /// The same of nodes of one kind.
@@ -77,8 +85,10 @@ fn refined(
         }
         let (coarse, _, _) = largest_step(&processor.solve(&model, &path(&end, &other, steps))?);
         let (fine, size, missing) = largest_step(&processor.solve(&model, &path(&end, &other, 10 * steps))?);
-        worst = worst.max(fine / coarse.max(f64::MIN_POSITIVE));
-        jump = jump.max(fine / size.max(f64::MIN_POSITIVE));
+        // A path without a step between sound points says nothing.
+        let ratio = |whole: f64| if whole > 0.0 { fine / whole } else { f64::INFINITY };
+        worst = worst.max(ratio(coarse));
+        jump = jump.max(ratio(size));
         flagged += missing;
     }
     let (measure, worst, bound, beside) = if radius > 0.0 {
@@ -101,15 +111,7 @@ fn refined(
 
 /// Central differences of U at random configurations.
 pub fn curl(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
-    let mut outcomes = Vec::new();
-    for (name, radius) in [("balls", BALL), ("points", 0.0)] {
-        for stiffness in [1e2, 1e4] {
-            for processor in processors(setting) {
-                outcomes.push(against_energy(setting.effort, processor, name, radius, stiffness)?);
-            }
-        }
-    }
-    Ok(outcomes)
+    of_each(against_energy, setting)
 }
 
 /// Half the width of a stencil [m or rad].

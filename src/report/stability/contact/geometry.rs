@@ -101,7 +101,8 @@ pub fn coincident_nodes(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
                 unconverged += one.iter().chain(&two).filter(|result| result.status != Status::Contact).count();
                 for (one, two) in one.iter().zip(&two) {
                     let square: f64 = one.torque.iter().zip(two.torque.iter()).map(|(a, b)| (a - b).powi(2)).sum();
-                    worst = worst.max(square.sqrt() / one.torque.norm().max(1e-9));
+                    let touching = one.status == Status::Contact && two.status == Status::Contact;
+                    worst = worst.max(if touching { square.sqrt() / one.torque.norm() } else { f64::INFINITY });
                 }
             }
         }
@@ -217,7 +218,8 @@ pub fn two_regions(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
                 for result in processor.solve(&model, &[at(DVec3::ZERO)])? {
                     unconverged += usize::from(result.status != Status::Contact);
                     let size: f64 = result.touches.iter().map(|touch| touch.force.length()).sum();
-                    worst = worst.max(result.torque[2].abs() / size.max(1e-12));
+                    let touching = result.status == Status::Contact;
+                    worst = worst.max(if touching { result.torque[2].abs() / size } else { f64::INFINITY });
                 }
             }
         }

@@ -221,6 +221,9 @@ fn slivers(mut processor: Processor<'_>) -> Result<Outcome, Failure> {
             worst = worst.max((slope + results[0].torque[0]).abs() / results[0].torque[0].abs());
         }
     }
+    if unconverged == tried {
+        worst = f64::INFINITY;
+    }
     Ok(Outcome {
         case: "broken meshes".into(),
         varied: processor.name("slivers of aspect 1e4; points and balls"),

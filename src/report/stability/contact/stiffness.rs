@@ -36,9 +36,9 @@ impl Share {
         Self { converged: usize::from(converged), solved: 1, time }
     }
 
-    /// What part converges; all of none.
+    /// What part converges; of none it is no number, which keeps no bound.
     fn part(self) -> f64 {
-        if self.solved == 0 { 1.0 } else { self.converged as f64 / self.solved as f64 }
+        self.converged as f64 / self.solved as f64
     }
 }
 

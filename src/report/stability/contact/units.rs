@@ -64,7 +64,7 @@ pub fn units(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
                 let configurations = pressed(&model, 5, 40, 0.0, DEPTH);
                 let mut elsewhere = configurations.clone();
                 elsewhere.iter_mut().for_each(|q| q[..3].iter_mut().for_each(|x| *x *= scale));
-                let expected = processor.solve(&model, &configurations)?;
+                let expected = Processor::cpu().solve(&model, &configurations)?;
                 let found = processor.solve(&other, &elsewhere)?;
                 // Slides give forces, which stay; turns give torques.
                 worst = worst.max(difference(&expected, &found, scale, |k| if k < 3 { 1.0 } else { scale }));
