@@ -1,4 +1,4 @@
-// List of the configurations that may be in contact, ascending: `list[0]` is their number, the numbers follow.
+// List of the configurations in contact at rest, ascending: `list[0]` is their number, the numbers follow.
 // One workgroup; each invocation owns a run of consecutive configurations, so that the order does not depend on timing.
 
 override WORKGROUP: u32 = 256u;
@@ -18,7 +18,7 @@ fn main(@builtin(local_invocation_index) local: u32) {
     let last = min(first + run, parameters.configurations);
     var count = 0u;
     for (var configuration = first; configuration < last; configuration += 1u) {
-        count += select(0u, 1u, gaps[configuration] < parameters.bulge);
+        count += select(0u, 1u, gaps[configuration] < 0.0);
     }
     sums[local] = count;
     workgroupBarrier();
@@ -34,7 +34,7 @@ fn main(@builtin(local_invocation_index) local: u32) {
     }
     var place = sums[local] - count;
     for (var configuration = first; configuration < last; configuration += 1u) {
-        if gaps[configuration] < parameters.bulge {
+        if gaps[configuration] < 0.0 {
             list[1u + place] = configuration;
             place += 1u;
         }

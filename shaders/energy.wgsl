@@ -12,16 +12,16 @@ override FROZEN: bool = false;
 
 // Brings support, contact forces and residual force up to date with a contact of each invocation; returns r . C r and
 // c . C c.
-fn balance(contact: Spring, kc: f32, local: u32) -> vec2<f32> {
+fn balance(contact: Contact, kc: f32, local: u32) -> vec2<f32> {
     occupy(contact, local);
     press(contact, kc, local);
-    sync();
+    workgroupBarrier();
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
         let force = gather(slot);
         vectors[at(IMAGE, slot)] = force;
         vectors[at(BALANCE, slot)] = force - vectors[at(FORCES, slot)];
     }
-    sync();
+    workgroupBarrier();
     var squares = vec4<f32>(0.0);
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
         let product = multiply(BALANCE, slot);
@@ -45,7 +45,6 @@ fn main(
     }
     displacement_base = place * parameters.covered;
     position_base = list[1u + parameters.first + place] * parameters.proxy_nodes;
-    begin(place, local);
     for (var slot = local; slot < SUPPORT; slot += WORKGROUP) {
         vectors[at(FORCES, slot)] = vec3<f32>(0.0);
     }
@@ -73,8 +72,8 @@ fn main(
         kc = min(kc, CONTINUATION_START / parameters.softest * greatest(radii, local));
     }
     var outcome = Outcome();
-    var contact = Spring();
-    var row = Spring();
+    var contact = Contact();
+    var row = Contact();
     var elastic = 0.0;
     var energy = 0.0;
     var square = 0.0;
@@ -97,7 +96,7 @@ fn main(
             kc = min(parameters.kc, CONTINUATION_FACTOR * kc);
         } else {
             if !FROZEN || at_rest {
-                trial = detect(moved, reach, local);
+                trial = deformed(moved, reach, local);
             }
             if FROZEN {
                 if at_rest {
@@ -141,7 +140,7 @@ fn main(
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
                 vectors[at(FORCES, slot)] = vectors[at(DIRECTION_FORCE, slot)];
             }
-            sync();
+            workgroupBarrier();
             let squares = balance(contact, kc, local);
             square = squares.x;
             scale = max(sqrt(squares.y), RESIDUAL_FLOOR);
@@ -154,7 +153,7 @@ fn main(
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
                 vectors[at(DIRECTION_FORCE, slot)] = vectors[at(FORCES, slot)];
             }
-            sync();
+            workgroupBarrier();
             continue;
         }
         converged = kc == parameters.kc && outcome.residual <= parameters.tolerance;
@@ -188,7 +187,7 @@ fn main(
                 for (var slot = local; slot < support_count; slot += WORKGROUP) {
                     vectors[at(DIRECTION_FORCE, slot)] = vectors[at(FORCES, slot)];
                 }
-                sync();
+                workgroupBarrier();
                 continue;
             }
             elastic += work.x;

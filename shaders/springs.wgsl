@@ -1,8 +1,5 @@
-// Contact with facets as they are: the closest one pushes, a spring a contact (twins: src/contact/detection.rs and
+// Contact: the closest facet pushes, a spring a contact (twins: src/contact/detection.rs and
 // springs.rs). Invocation k keeps contact k. Vectors on the support are in the workgroup's memory.
-
-// A contact as its invocation keeps it.
-alias Spring = Contact;
 
 // A size that follows; named, because naga 30 loses count of overrides in array sizes that are expressions.
 override VECTOR_ENTRIES: u32 = VECTORS * SUPPORT;
@@ -18,14 +15,6 @@ var<workgroup> vectors: array<vec3<f32>, VECTOR_ENTRIES>;
 fn at(vector: u32, slot: u32) -> u32 {
     return vector * SUPPORT + slot;
 }
-
-// Waits for what others have written of vectors, slots and shares.
-fn sync() {
-    workgroupBarrier();
-}
-
-// Makes ready for the configuration at `place` of the batch.
-fn begin(place: u32, local: u32) {}
 
 // Gives slots to the nodes of every contact; `nodes` is ABSENT where the contact does not act.
 fn assign_slots(nodes: vec3<u32>, local: u32) {
@@ -133,13 +122,8 @@ fn deformed(moved: f32, reach: f32, local: u32) -> Contact {
     return contact;
 }
 
-// The same for the search.
-fn detect(moved: f32, reach: f32, local: u32) -> Spring {
-    return deformed(moved, reach, local);
-}
-
 // A contact that changes in proportion to displacements.
-fn freeze(contact: Spring) -> Spring {
+fn freeze(contact: Contact) -> Contact {
     var row = contact;
     row.along = vec3<f32>(0.0);
     row.distance = 0.0;
@@ -149,7 +133,7 @@ fn freeze(contact: Spring) -> Spring {
 }
 
 // A frozen row's contact at the displacement at hand.
-fn frozen_contact(row: Spring) -> Spring {
+fn frozen_contact(row: Contact) -> Contact {
     var contact = row;
     for (var k = 0u; k < 3u; k += 1u) {
         contact.depth += row.weights[k] * dot(row.normal, displaced(row.nodes[k]));
@@ -165,18 +149,18 @@ fn acting_nodes(contact: Contact) -> vec3<u32> {
 }
 
 // Gives slots to the nodes of all contacts.
-fn occupy(contact: Spring, local: u32) {
+fn occupy(contact: Contact, local: u32) {
     assign_slots(acting_nodes(contact), local);
 }
 
 // Contact forces -kc depth w_j N on the object's nodes: columns.
-fn contact_forces(contact: Spring, kc: f32) -> mat3x3<f32> {
+fn contact_forces(contact: Contact, kc: f32) -> mat3x3<f32> {
     let force = contact.normal * (-kc * max(contact.depth, 0.0));
     return mat3x3<f32>(force * contact.weights.x, force * contact.weights.y, force * contact.weights.z);
 }
 
 // Shares: contact forces.
-fn press(contact: Spring, kc: f32, local: u32) {
+fn press(contact: Contact, kc: f32, local: u32) {
     shares[local] = contact_forces(contact, kc);
 }
 
@@ -184,7 +168,7 @@ fn press(contact: Spring, kc: f32, local: u32) {
 var<private> bend: mat3x3<f32>;
 
 // What the displacement `vector` deepens this invocation's contact by, and its second variation along it.
-fn vary(contact: Spring, vector: u32, local: u32) -> vec2<f32> {
+fn vary(contact: Contact, vector: u32, local: u32) -> vec2<f32> {
     let v = entries(vector, slots[local]);
     bend = second_variation(contact, v);
     let deepening = dot(contact.normal, v * contact.weights);
@@ -192,7 +176,7 @@ fn vary(contact: Spring, vector: u32, local: u32) -> vec2<f32> {
 }
 
 // Shares: what depths larger by `push` / kc, and the displacement of the last `vary`, add to the contact forces.
-fn press_on(contact: Spring, push: f32, local: u32) {
+fn press_on(contact: Contact, push: f32, local: u32) {
     shares[local] = mat3x3<f32>(
         -(contact.normal * (push * contact.weights.x) + bend[0] * contact.multiplier),
         -(contact.normal * (push * contact.weights.y) + bend[1] * contact.multiplier),
@@ -201,7 +185,7 @@ fn press_on(contact: Spring, push: f32, local: u32) {
 }
 
 // Shares: product of the contacts' Hessian with the displacement `vector`.
-fn resist(contact: Spring, kc: f32, vector: u32, local: u32) {
+fn resist(contact: Contact, kc: f32, vector: u32, local: u32) {
     shares[local] = hessian_product(contact, kc, entries(vector, slots[local]));
 }
 
@@ -212,7 +196,7 @@ fn write_touch(place: u32, k: u32, nodes: vec3<u32>, proxy_node: u32, forces: ma
 }
 
 // Writes the contacts with their forces; number of touches in use.
-fn write_contacts(contact: Spring, kc: f32, vector: u32, place: u32, local: u32) -> u32 {
+fn write_contacts(contact: Contact, kc: f32, vector: u32, place: u32, local: u32) -> u32 {
     let used = u32(greatest(select(0.0, f32(local + 1u), contact.depth > 0.0), local));
     if local < used {
         write_touch(place, local, contact.nodes, contact.proxy_node, contact_forces(contact, kc));

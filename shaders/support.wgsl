@@ -4,8 +4,7 @@
 // Forces live on A only and displacement is u = C f. Every sum runs in the same order in every invocation, so that all
 // agree to the bit on what to do next, and barriers stay in uniform control flow.
 //
-// How contacts act on A is one of two parts: springs.wgsl, where facets are as they are, and blend.wgsl. They have the same
-// functions, and keep the vectors on A, of which `at(vector, slot)` is the place of an entry.
+// How contacts act on A is told by springs.wgsl, which also keeps the vectors on A.
 
 // Invocations of the workgroup, and most proxy nodes in contact at a time: invocation k keeps contact k.
 override WORKGROUP: u32 = 32u;
@@ -45,24 +44,24 @@ var<workgroup> partial: array<vec4<f32>, WORKGROUP>;
 // Sum of `value` over the workgroup, in every invocation.
 fn add_up(value: vec4<f32>, local: u32) -> vec4<f32> {
     partial[local] = value;
-    sync();
+    workgroupBarrier();
     var sum = vec4<f32>(0.0);
     for (var k = 0u; k < parameters.lanes; k += 1u) {
         sum += partial[k];
     }
-    sync();
+    workgroupBarrier();
     return sum;
 }
 
 // Greatest `value` of the workgroup, in every invocation.
 fn greatest(value: f32, local: u32) -> f32 {
     partial[local].x = value;
-    sync();
+    workgroupBarrier();
     var most = partial[0].x;
     for (var k = 1u; k < parameters.lanes; k += 1u) {
         most = max(most, partial[k].x);
     }
-    sync();
+    workgroupBarrier();
     return most;
 }
 
@@ -210,7 +209,7 @@ fn closest_triangle(proxy_node: u32, moved: f32, local: u32) -> u32 {
     }
     partial[local].x = least;
     candidates[local] = best;
-    sync();
+    workgroupBarrier();
     var nearest = partial[0].x;
     var triangle = candidates[0];
     for (var k = 1u; k < parameters.lanes; k += 1u) {
@@ -219,7 +218,7 @@ fn closest_triangle(proxy_node: u32, moved: f32, local: u32) -> u32 {
             triangle = candidates[k];
         }
     }
-    sync();
+    workgroupBarrier();
     return triangle;
 }
 

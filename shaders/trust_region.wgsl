@@ -45,13 +45,13 @@ fn share_to_boundary(radius: f32, step_square: f32, mixed: f32, direction_square
 
 // Step for the residual force BALANCE with energy norm `square`^(1/2), within `radius`, solved to `tolerance` relative to
 // it; the step is left in STEP_FORCE and STEP.
-fn trust_region_step(contact: Spring, kc: f32, square: f32, radius: f32, tolerance: f32, local: u32) -> Step {
+fn trust_region_step(contact: Contact, kc: f32, square: f32, radius: f32, tolerance: f32, local: u32) -> Step {
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
         vectors[at(RESIDUAL, slot)] = vectors[at(BALANCE, slot)];
         vectors[at(STEP_FORCE, slot)] = vec3<f32>(0.0);
         vectors[at(STEP, slot)] = vec3<f32>(0.0);
     }
-    sync();
+    workgroupBarrier();
     let stop = tolerance * tolerance * square;
     var touching = contact.depth > 0.0;
     var result = Step();
@@ -86,7 +86,7 @@ fn trust_region_step(contact: Spring, kc: f32, square: f32, radius: f32, toleran
                 vectors[at(STEP_FORCE, slot)] = vectors[at(PREVIOUS_FORCE, slot)];
                 vectors[at(STEP, slot)] = vectors[at(PREVIOUS_STEP, slot)];
             }
-            sync();
+            workgroupBarrier();
             break;
         }
         result = Step(sums.x, sqrt(max(sums.z, 0.0)), deepening, stopped);
@@ -97,25 +97,25 @@ fn trust_region_step(contact: Spring, kc: f32, square: f32, radius: f32, toleran
 
         // Residual force of the model at the step.
         press_on(contact, kc * (after - before), local);
-        sync();
+        workgroupBarrier();
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
             vectors[at(RESIDUAL, slot)] = vectors[at(BALANCE, slot)] - vectors[at(STEP_FORCE, slot)] + gather(slot);
         }
-        sync();
+        workgroupBarrier();
     }
     return result;
 }
 
 // Goes on from the current step, contacts having stiffness `kc` or, where they do not touch, none, until the residual's
 // squared energy norm is at most `stop`; true when the boundary stopped it.
-fn conjugate_gradients(contact: Spring, kc: f32, radius: f32, stop: f32, local: u32) -> bool {
+fn conjugate_gradients(contact: Contact, kc: f32, radius: f32, stop: f32, local: u32) -> bool {
     var square = 0.0;
     let most = INNER_ITERATIONS_PER_UNKNOWN * 3u * support_count;
     // Iteration 0 only begins: one place for the product with C keeps the program small.
     for (var iteration = 0u; iteration <= most; iteration += 1u) {
         if iteration > 0u {
             resist(contact, kc, DIRECTION, local);
-            sync();
+            workgroupBarrier();
             var products = vec4<f32>(0.0);
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
                 let direction_force = vectors[at(DIRECTION_FORCE, slot)];
@@ -137,7 +137,7 @@ fn conjugate_gradients(contact: Spring, kc: f32, radius: f32, stop: f32, local: 
                 vectors[at(STEP, slot)] += share * vectors[at(DIRECTION, slot)];
                 vectors[at(RESIDUAL, slot)] -= share * vectors[at(IMAGE, slot)];
             }
-            sync();
+            workgroupBarrier();
             if !inside {
                 return true;
             }
@@ -156,7 +156,7 @@ fn conjugate_gradients(contact: Spring, kc: f32, radius: f32, stop: f32, local: 
                 vectors[at(RESIDUAL, slot)] + ratio * vectors[at(DIRECTION_FORCE, slot)];
             vectors[at(DIRECTION, slot)] = vectors[at(PRECONDITIONED, slot)] + ratio * vectors[at(DIRECTION, slot)];
         }
-        sync();
+        workgroupBarrier();
         if square <= stop {
             break;
         }

@@ -26,15 +26,9 @@ struct Parameters {
     // Invocations of a workgroup of the equilibrium stages: read, not known to the compiler, so that reductions stay
     // loops; unrolled at each of their places they make programs that take minutes to compile.
     lanes: u32,
-    // Width w over which facets pass into each other [m]; zero where they do not, as is the next.
-    blending: f32,
-    // By how much a gap may be less than that to facets as they are [m].
-    bulge: f32,
     // Surface nodes that the compliance covers.
     covered: u32,
-    padding_0: u32,
-    padding_1: u32,
-    padding_2: u32,
+    padding: u32,
 }
 
 // One joint of the chain; axis is a unit vector.

@@ -23,9 +23,6 @@ const WAIT_LIMIT: Duration = Duration::from_secs(120);
 /// Longest wait for what a device that refuses something still does.
 const LAST_WORK: Duration = Duration::from_secs(1);
 
-/// Most storage buffers that one kernel binds: that of the energy form between blended facets.
-pub(super) const MOST_BINDINGS: u32 = 10;
-
 /// Why the GPU could not do it.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
@@ -183,16 +180,11 @@ impl Context {
             return Err(GpuError::NoClock(summary.to_string()));
         }
         let offered = adapter.limits();
-        // WebGPU's defaults, which every device has, but for the two sizes that decide which objects fit, and the buffers that
-        // blended facets take, which almost every device has.
-        let defaults = wgpu::Limits::default();
+        // WebGPU's defaults, which every device has, but for the two sizes that decide which objects fit.
         let limits = wgpu::Limits {
             max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
             max_buffer_size: offered.max_buffer_size,
-            max_storage_buffers_per_shader_stage: offered
-                .max_storage_buffers_per_shader_stage
-                .clamp(defaults.max_storage_buffers_per_shader_stage, MOST_BINDINGS),
-            ..defaults
+            ..wgpu::Limits::default()
         };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("haptize"),
@@ -249,12 +241,6 @@ impl Context {
     pub fn binding_limit(&self) -> u64 {
         let limits = self.device.limits();
         limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
-    }
-
-    /// Whether a kernel may bind as many storage buffers as blended facets take.
-    #[must_use]
-    pub fn binds_facets(&self) -> bool {
-        self.device.limits().max_storage_buffers_per_shader_stage >= MOST_BINDINGS
     }
 
     /// The failure that a callback stored, if any. A lost device stays lost; another error is reported once.

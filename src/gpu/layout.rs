@@ -21,12 +21,8 @@ pub struct Parameters {
     pub least_distance: f32,
     pub depth_rounding: f32,
     pub lanes: u32,
-    pub blending: f32,
-    pub bulge: f32,
     pub covered: u32,
-    pub padding_0: u32,
-    pub padding_1: u32,
-    pub padding_2: u32,
+    pub padding: u32,
 }
 
 /// `Joint` of `shaders/types.wgsl`.
@@ -79,12 +75,6 @@ pub struct Touch {
     pub padding_2: u32,
 }
 
-/// Size of `Facet` of `shaders/blend.wgsl`, which the host never reads [B].
-pub const FACET_BYTES: u64 = 384;
-
-/// Vectors on the support in `shaders/trust_region.wgsl`, of four f32 each entry.
-pub const SEARCH_VECTORS: u64 = 11;
-
 /// `FrameParameters` of `shaders/frame_common.wgsl` (uniform).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -99,7 +89,7 @@ pub struct FrameParameters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::shaders::{ALL, ENERGY_BLENDED, parse};
+    use crate::gpu::shaders::{ALL, parse};
     use std::{collections::HashMap, mem::offset_of};
 
     /// Name, offset of each member, and the struct's size, as WGSL lays it out.
@@ -130,7 +120,7 @@ mod tests {
     fn every_shared_struct_is_laid_out_as_in_wgsl() {
         let reflected = reflect();
         let expected = [
-            layout!(Parameters: configurations, first, joints, proxy_nodes, surface_nodes, triangles, max_iterations, stiffness, kc, tolerance, softest, least_distance, depth_rounding, lanes, blending, bulge, covered, padding_0, padding_1, padding_2),
+            layout!(Parameters: configurations, first, joints, proxy_nodes, surface_nodes, triangles, max_iterations, stiffness, kc, tolerance, softest, least_distance, depth_rounding, lanes, covered, padding),
             layout!(Joint: origin, kind, axis, padding),
             layout!(ProxyNode: position, link),
             layout!(Outcome: status, iterations, residual, elastic, touches, padding_0, padding_1, padding_2),
@@ -142,15 +132,5 @@ mod tests {
             assert_eq!(&members, wgsl_members, "{name}");
             assert_eq!(size, *wgsl_size, "size of {name}");
         }
-    }
-
-    #[test]
-    fn what_the_host_only_makes_room_for_is_as_large_as_in_wgsl() {
-        assert_eq!(u64::from(reflect()["Facet"].1), FACET_BYTES);
-        let module = parse(&ENERGY_BLENDED).expect("shader parses");
-        let (_, vectors) =
-            module.constants.iter().find(|(_, c)| c.name.as_deref() == Some("VECTORS")).expect("a count");
-        let value = &module.global_expressions[vectors.init];
-        assert!(matches!(value, naga::Expression::Literal(naga::Literal::U32(n)) if u64::from(*n) == SEARCH_VECTORS));
     }
 }

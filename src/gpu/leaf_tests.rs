@@ -4,7 +4,7 @@ use super::{
     adapter::AdapterChoice,
     context::{Context, GpuError},
     kernel::{Access, Dispatch, Kernel, StorageBuffer},
-    layout::{Joint, Outcome, Parameters, ProxyNode, Touch},
+    layout::{Joint, Parameters, ProxyNode},
     model::DeviceModel,
     pipeline::Room,
     shaders::{self, Shader},
@@ -12,10 +12,9 @@ use super::{
 };
 use crate::{
     contact::{
-        Model, Solver, Status, blend,
+        Model, Solver, Status,
         closest_point::{Feature, closest_point, point_at},
         depth::{Contact, measure, second_variation},
-        detection::{Detection, Walls},
         surface::{area_vector, unit_or_zero},
     },
     haptize::Backend,
@@ -198,228 +197,6 @@ fn depth_and_its_derivatives_are_the_twins() {
         }
     }
     assert!(compared > 1200, "{compared}");
-}
-
-/// What blended depths of one configuration, the surface being displaced, change by along one displacement more. The compliance's
-/// place is taken by that displacement.
-const BLENDED_LEAF: &str = "
-const FROZEN: bool = false;
-const STEP: u32 = 0u;
-const VECTORS: u32 = 1u;
-@compute @workgroup_size(WORKGROUP)
-fn main(@builtin(local_invocation_index) local: u32) {
-    begin(0u, local);
-    var contact = detect(parameters.stiffness, 0.0, local);
-    contact.multiplier = 1.0;
-    occupy(contact, local);
-    for (var slot = local; slot < support_count; slot += WORKGROUP) {
-        let k = 3u * support_nodes[slot];
-        vectors[at(STEP, slot)] = vec3<f32>(compliance[k], compliance[k + 1u], compliance[k + 2u]);
-    }
-    sync();
-    let change = vary(contact, STEP, local);
-    load(contact, 1.0, 0.0, local);
-    sync();
-    for (var slot = local; slot < support_count; slot += WORKGROUP) {
-        touches[CONTACTS + slot].nodes.x = support_nodes[slot];
-        touches[CONTACTS + slot].force_0 = gather(slot);
-    }
-    sync();
-    resist(contact, 0.0, STEP, local);
-    sync();
-    for (var slot = local; slot < support_count; slot += WORKGROUP) {
-        touches[CONTACTS + slot].force_1 = gather(slot);
-    }
-    if local < contact_count {
-        touches[local].proxy_node = contact_nodes[local];
-        touches[local].force_0 = vec3<f32>(contact.depth, change.x, change.y);
-    }
-    if local == 0u {
-        outcomes[0] = Outcome(overflow, contact_count, parameters.kc, 0.0, support_count, list[0], 0u, 0u);
-    }
-}
-";
-
-static BLENDED_LEAF_SHADER: Shader = Shader {
-    name: "blended leaf",
-    entry: "main",
-    parts: &[
-        shaders::TYPES,
-        shaders::CLOSEST_POINT,
-        shaders::SURFACE,
-        shaders::DEPTH,
-        shaders::FACET_DEPTH,
-        shaders::SUPPORT,
-        shaders::BLEND,
-        BLENDED_LEAF,
-    ],
-    overrides: &[&[]],
-};
-
-/// Six nodes of one radius, free to be anywhere, about a sphere whose facets are about as wide as they are blended.
-const BLENDED_SCENE: &str = r#"
-    [object]
-    sphere = { radius = 0.05, rings = 8, segments = 10 }
-    springs = { kind = "isotropic", stiffness = 300.0 }
-    ground = { stiffness = 100.0 }
-    [contact]
-    stiffness = 300.0
-    blending = WIDTH
-    [grid]
-    axes = [{ start = 0.0, stop = 0.01, count = 2 }]
-    [[proxy.joint]]
-    kind = "prismatic"
-    axis = [0.0, 0.0, -1.0]
-    limits = [-0.1, 0.1]
-    nodes = [{ from = [0.0, 0.0, 0.0], to = [0.0, 0.0, 0.1], count = 6, radius = RADIUS }]
-"#;
-
-/// Depth of a node, what it changes by along a displacement to first and to second order, and those derivatives on the
-/// object's nodes.
-#[derive(Default)]
-struct Blended {
-    /// By proxy node.
-    depths: std::collections::BTreeMap<u32, [f64; 3]>,
-    gradient: Vec<DVec3>,
-    bend: Vec<DVec3>,
-}
-
-/// By the kernel's parts.
-fn blended_by_kernel(model: &Model, device: &DeviceModel, nodes: &[DVec3], u: &[DVec3], v: &[DVec3]) -> Blended {
-    use Access::{Read, Uniform, Write};
-    const SUPPORT: usize = 96;
-    const FACETS: usize = 192;
-    let context = context();
-    let moved = u.iter().map(|u| u.length()).fold(0.0, f64::max) * (1.0 + 1e-6);
-    let parameters = Parameters { configurations: 1, stiffness: moved as f32, ..device.parameters };
-    let f32s = |v: &DVec3| v.as_vec3().to_array();
-    let padded = |v: &DVec3, w: f32| v.as_vec3().extend(w).to_array();
-    let positions: Vec<[f32; 4]> = nodes.iter().map(|x| padded(x, -1.0)).collect();
-    let displacement: Vec<[f32; 4]> = u.iter().map(|u| padded(u, 0.0)).collect();
-    let along: Vec<[f32; 3]> = v.iter().map(f32s).collect();
-    let touches = StorageBuffer::new(&context, "touches", (size_of::<Touch>() * (32 + SUPPORT)) as u64).unwrap();
-    let outcomes = StorageBuffer::new(&context, "outcomes", size_of::<Outcome>() as u64).unwrap();
-    touches.poison(&context, touches.size());
-    outcomes.poison(&context, outcomes.size());
-    let accesses = [Uniform, Read, Read, Read, Read, Read, Write, Write, Write, Write, Write];
-    let overrides = [("SUPPORT", SUPPORT as f64), ("FACETS", FACETS as f64)];
-    let kernel = Kernel::new(&context, &BLENDED_LEAF_SHADER, &overrides, &accesses).unwrap();
-    let facets = StorageBuffer::new(&context, "facets", 2 * FACETS as u64 * super::layout::FACET_BYTES).unwrap();
-    let vectors = StorageBuffer::new(&context, "vectors", 16 * SUPPORT as u64).unwrap();
-    let buffers = [
-        &StorageBuffer::uniform(&context, "parameters", &parameters).unwrap(),
-        &device.rest,
-        &device.mesh,
-        &StorageBuffer::from_slice(&context, "displacement more", &along).unwrap(),
-        &StorageBuffer::from_slice(&context, "positions", &positions).unwrap(),
-        &StorageBuffer::from_slice(&context, "list", &[1u32, 0]).unwrap(),
-        &outcomes,
-        &touches,
-        &StorageBuffer::from_slice(&context, "displacement", &displacement).unwrap(),
-        &facets,
-        &vectors,
-    ];
-    run(&context, &kernel, &buffers, 1);
-    let outcome = outcomes.read::<Outcome>(&context, 1).unwrap()[0];
-    assert_eq!(outcome.status, 0, "room for all");
-    let touches: Vec<Touch> = touches.read(&context, 32 + SUPPORT).unwrap();
-    let mut found = Blended {
-        gradient: vec![DVec3::ZERO; model.rest.len()],
-        bend: vec![DVec3::ZERO; model.rest.len()],
-        ..Blended::default()
-    };
-    for touch in &touches[..outcome.iterations as usize] {
-        found.depths.insert(touch.proxy_node, touch.force_0.map(f64::from));
-    }
-    for touch in &touches[32..32 + outcome.touches as usize] {
-        found.gradient[touch.nodes[0] as usize] = vector(&touch.force_0);
-        found.bend[touch.nodes[0] as usize] = vector(&touch.force_1);
-    }
-    found
-}
-
-/// By the twins.
-fn blended_by_twin(model: &Model, nodes: &[DVec3], u: &[DVec3], v: &[DVec3]) -> Blended {
-    let mut detection = Detection::new(model);
-    let world: Vec<DVec3> = nodes.iter().map(|x| *x + model.centre).collect();
-    detection.take_up(model, &world);
-    let displacement: Vec<f64> = u.iter().flat_map(|u| u.to_array()).collect();
-    let positions: Vec<DVec3> = model.rest.iter().zip(u).map(|(rest, u)| *rest + *u).collect();
-    let mut rows = Vec::new();
-    detection.deformed(model, &displacement, &positions, Walls::All, &mut rows);
-    let mut found = Blended {
-        gradient: vec![DVec3::ZERO; model.rest.len()],
-        bend: vec![DVec3::ZERO; model.rest.len()],
-        ..Blended::default()
-    };
-    let mut own = Vec::new();
-    for rows in rows.chunk_by(blend::together) {
-        let along = |k: usize| rows[k].nodes.map(|node| v[node as usize]);
-        let deepening = blend::deepening(rows, along, &mut own);
-        let mut bending = 0.0;
-        blend::vary(rows, along, &own, |k, parts| {
-            let spread = rows[k].spread(1.0);
-            for (j, &node) in rows[k].nodes.iter().enumerate() {
-                bending += parts[j].dot(along(k)[j]);
-                found.bend[node as usize] += parts[j];
-                found.gradient[node as usize] += spread[j];
-            }
-        });
-        found.depths.insert(rows[0].proxy_node, [rows[0].depth, deepening, bending]);
-    }
-    found
-}
-
-/// Largest difference over the largest length.
-fn unlike(expected: &[DVec3], found: &[DVec3]) -> f64 {
-    let size = expected.iter().map(|v| v.length()).fold(1e-30, f64::max);
-    expected.iter().zip(found).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) / size
-}
-
-#[test]
-fn blended_depths_and_their_derivatives_are_the_twins() {
-    let mut next = sequence(11);
-    let mut compared = 0;
-    for (radius, width, least, most) in
-        [(0.0, 0.008, 0.02, 0.048), (0.02, 0.008, 0.045, 0.066), (0.04, 0.002, 0.055, 0.088)]
-    {
-        let text = BLENDED_SCENE.replace("RADIUS", &radius.to_string()).replace("WIDTH", &width.to_string());
-        let scene = Scene::parse(&text, "blended.toml").unwrap();
-        let object = Object::build(&scene.object).unwrap();
-        let chain = Chain::new(&scene.proxy);
-        let model = Model::new(&object, &chain, scene.contact);
-        let device = DeviceModel::new(&context(), &model).unwrap();
-        // Squares of distances are rounded by some 6e-8 of themselves, and count in squares of the width.
-        let rounding = 1e-6 * (1.0 + f64::powi(most / width, 2));
-        for _ in 0..12 {
-            let mut point = |size: f64| DVec3::new(next(), next(), next()).as_vec3().as_dvec3() * size;
-            let nodes: Vec<DVec3> = (0..6)
-                .map(|_| {
-                    let direction = point(1.0).normalize();
-                    let share = 0.5 + 0.5 * point(1.0).x;
-                    (direction * (least + share * (most - least))).as_vec3().as_dvec3()
-                })
-                .collect();
-            let u: Vec<DVec3> = model.rest.iter().map(|_| point(0.002).as_vec3().as_dvec3()).collect();
-            let v: Vec<DVec3> = model.rest.iter().map(|_| point(1.0)).collect();
-            let expected = blended_by_twin(&model, &nodes, &u, &v);
-            let found = blended_by_kernel(&model, &device, &nodes, &u, &v);
-            assert!(expected.depths.keys().eq(found.depths.keys()), "{:?} {:?}", expected.depths, found.depths);
-            for (expected, found) in expected.depths.values().zip(found.depths.values()) {
-                assert!((expected[0] - found[0]).abs() < DISTANCE_ROUNDING, "{expected:?} {found:?}");
-                assert!((expected[1] - found[1]).abs() < rounding, "{expected:?} {found:?}");
-                let size = 1.0 / width + expected[2].abs();
-                assert!((expected[2] - found[2]).abs() < rounding * size, "{expected:?} {found:?}");
-                compared += 1;
-            }
-            assert!(unlike(&expected.gradient, &found.gradient) < rounding);
-            assert!(unlike(&expected.bend, &found.bend) < rounding);
-            // What is an order farther off is noticed.
-            let off: Vec<DVec3> = found.bend.iter().map(|v| *v * (1.0 + 10.0 * rounding)).collect();
-            assert!(unlike(&expected.bend, &off) > rounding);
-        }
-    }
-    assert!(compared > 150, "{compared}");
 }
 
 #[test]

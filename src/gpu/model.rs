@@ -30,7 +30,7 @@ pub struct DeviceModel {
     pub(super) mesh: StorageBuffer,
     pub(super) clusters: StorageBuffer,
     pub(super) compliance: StorageBuffer,
-    /// Gaps within this of zero are decided in f64; between blended facets all are [m].
+    /// Gaps within this of zero are decided in f64 [m].
     pub(super) gap_band: f64,
 }
 
@@ -46,8 +46,7 @@ impl DeviceModel {
     /// When a buffer exceeds the device's limits or memory.
     pub fn new(context: &Context, model: &contact::Model<'_>) -> Result<Self, GpuError> {
         let contact::Model { object, chain, compliance, contact, .. } = model;
-        let unsupported =
-            [("blending", model.blending > 0.0 && !context.binds_facets()), ("updates", contact.updates > 0)];
+        let unsupported = [("blending", model.blending > 0.0), ("updates", contact.updates > 0)];
         if let Some((what, _)) = unsupported.into_iter().find(|(_, asked)| *asked) {
             return Err(GpuError::Unsupported(what));
         }
@@ -76,9 +75,6 @@ impl DeviceModel {
                 least_distance: (tolerances::GPU_LEAST_DISTANCE_PER_EXTENT * extent) as f32,
                 depth_rounding: (tolerances::GPU_DEPTH_ROUNDING_PER_EDGE * longest_edge) as f32,
                 lanes: LANES,
-                blending: model.blending as f32,
-                // Where facets are blended contact is decided in f64: here, whether there may be any.
-                bulge: if model.blending > 0.0 { (model.bulge() + gap_band) as f32 } else { 0.0 },
                 ..bytemuck::Zeroable::zeroed()
             },
             kinds: chain.joints.iter().map(|joint| joint.kind).collect(),
@@ -88,7 +84,7 @@ impl DeviceModel {
             mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(model))?,
             clusters: StorageBuffer::from_slice(context, "clusters", &clusters)?,
             compliance: StorageBuffer::from_slice(context, "compliance", &entries)?,
-            gap_band: if model.blending > 0.0 { 0.0 } else { gap_band },
+            gap_band,
         })
     }
 

@@ -3,7 +3,7 @@
 use super::{
     context::{Context, GpuError},
     kernel::{Access, Dispatch, Kernel, POISON, Staging, StorageBuffer},
-    layout::{FACET_BYTES, Outcome, Parameters, SEARCH_VECTORS, Touch},
+    layout::{Outcome, Parameters, Touch},
     model::{DeviceModel, LANES},
     shaders::{self, Shader},
 };
@@ -39,15 +39,11 @@ impl Room {
         let budget = binding_limit.min(BUFFER_BUDGET);
         let fit = |bytes: usize| (budget as usize / bytes.max(1)).max(1);
         let nodes = model.chain.nodes.len();
-        let contacts = self.contacts.clamp(1, 32);
-        // Between sharp facets a node has one contact.
-        let contacts = if model.blending > 0.0 { contacts } else { contacts.min(nodes) };
-        let facets = if model.blending > 0.0 { Blended::of(contacts).bytes() } else { 0 };
+        // A proxy node has one contact.
+        let contacts = self.contacts.clamp(1, 32).min(nodes);
         Self {
             chunk: self.chunk.clamp(1, fit(16 * nodes.max(model.chain.joints.len()))),
-            batch: self
-                .batch
-                .clamp(1, fit((16 * model.compliance.nodes.len()).max(size_of::<Touch>() * contacts).max(facets))),
+            batch: self.batch.clamp(1, fit((16 * model.compliance.nodes.len()).max(size_of::<Touch>() * contacts))),
             contacts,
         }
     }
@@ -55,27 +51,6 @@ impl Room {
     /// Half of each, contacts aside.
     pub(super) fn half(self) -> Self {
         Self { chunk: (self.chunk / 2).max(1), batch: (self.batch / 2).max(1), ..self }
-    }
-}
-
-/// Room for one configuration between blended facets.
-#[derive(Clone, Copy)]
-struct Blended {
-    /// Object nodes that carry contact force.
-    support: usize,
-    /// Facets of all contacts.
-    facets: usize,
-}
-
-impl Blended {
-    /// For as many contacts: the touches, in which the support's forces come back, hold three nodes each.
-    fn of(contacts: usize) -> Self {
-        Self { support: 3 * contacts, facets: 4 * contacts }
-    }
-
-    /// Size of the facets, of two states, which is more than the vectors' [B].
-    fn bytes(self) -> usize {
-        2 * self.facets * FACET_BYTES as usize
     }
 }
 
@@ -168,15 +143,11 @@ impl Pipeline {
         let classification =
             stage(&shaders::CLASSIFICATION, &[(Uniform, &parameters), (Read, &positions), (Write, &gaps)])?;
         let compaction = stage(&shaders::COMPACTION, &[(Uniform, &parameters), (Read, &gaps), (Write, &list)])?;
-        let blended = (model.blending > 0.0).then(|| Blended::of(room.contacts));
-        let shader = match (model.contact.algorithm, blended) {
-            (Algorithm::Paper, _) => &shaders::PAPER,
-            (_, None) => &shaders::ENERGY,
-            (_, Some(_)) => &shaders::ENERGY_BLENDED,
+        let shader = match model.contact.algorithm {
+            Algorithm::Paper => &shaders::PAPER,
+            Algorithm::Energy | Algorithm::Linearised => &shaders::ENERGY,
         };
         let mut overrides = vec![("WORKGROUP", f64::from(LANES)), ("CONTACTS", room.contacts as f64)];
-        let mut accesses = vec![Uniform, Read, Read, Read, Read, Read, Write, Write, Write];
-        let mut search = Vec::new();
         if model.contact.algorithm == Algorithm::Linearised {
             overrides.push(("FROZEN", 1.0));
         }
@@ -186,23 +157,16 @@ impl Pipeline {
         if model.compliance.rows_per_node == 1 {
             overrides.push(("ISOTROPIC", 1.0));
         }
-        if let Some(Blended { support, facets }) = blended {
-            overrides.extend([("SUPPORT", support as f64), ("FACETS", facets as f64)]);
-            accesses.extend([Write, Write]);
-            let batch = room.batch as u64;
-            search.push(buffer("facets", batch * 2 * facets as u64 * FACET_BYTES)?);
-            search.push(buffer("search vectors", batch * SEARCH_VECTORS * 16 * support as u64)?);
-        }
+        let accesses = [Uniform, Read, Read, Read, Read, Read, Write, Write, Write];
         let equilibrium = Kernel::new(context, shader, &overrides, &accesses)?;
-        // Its number and places are read, its workspace is written and read.
-        let workspace = displacement.size() + search.iter().map(StorageBuffer::size).sum::<u64>();
-        let own_bytes = 4 + 16 * nodes + 2 * workspace / room.batch as u64;
+        // Its number and places are read, its displacement is written and read.
+        let own_bytes = 4 + 16 * nodes + 2 * displacement.size() / room.batch as u64;
         let result_set = || -> Result<ResultSet, GpuError> {
             let parameters = StorageBuffer::uniform(context, "parameters", &device.parameters)?;
             let outcomes = buffer("outcomes", (size_of::<Outcome>() * room.batch) as u64)?;
             let touches = buffer("touches", (size_of::<Touch>() * room.contacts * room.batch) as u64)?;
             let staging = Staging::new(context, outcomes.size() + touches.size())?;
-            let mut buffers = vec![
+            let buffers = [
                 &parameters,
                 &device.rest,
                 &device.mesh,
@@ -213,7 +177,6 @@ impl Pipeline {
                 &touches,
                 &displacement,
             ];
-            buffers.extend(&search);
             let bound = equilibrium.bind(context, &buffers)?;
             Ok(ResultSet { parameters, outcomes, touches, staging, bound })
         };
@@ -237,13 +200,13 @@ impl Pipeline {
         })
     }
 
-    /// Gaps within this of zero are decided in f64; between blended facets all are [m].
+    /// Gaps within this of zero are decided in f64 [m].
     pub fn gap_band(&self) -> f64 {
         self.model.gap_band
     }
 
-    /// Places the proxy at each configuration; smallest gap of each at rest, to facets as they are [m], and the
-    /// numbers of those that may be in contact.
+    /// Places the proxy at each configuration; smallest gap of each at rest [m], and the numbers of those
+    /// in contact.
     pub fn detect(&self, context: &Context, chunk: &[JointVector]) -> Result<(Vec<f32>, Vec<u32>), GpuError> {
         let count = chunk.len() as u32;
         let parameters = Parameters { configurations: count, ..self.model.parameters };
@@ -271,7 +234,7 @@ impl Pipeline {
             let list: Vec<u32> = bytemuck::pod_collect_to_vec(list);
             let unwritten = gaps.iter().filter(|gap| gap.to_ne_bytes() == [POISON; 4]).count();
             let touching = list[0] as usize;
-            if unwritten > 0 || touching != gaps.iter().filter(|gap| **gap < parameters.bulge).count() {
+            if unwritten > 0 || touching != gaps.iter().filter(|gap| **gap < 0.0).count() {
                 return Err(GpuError::NeverWritten { count: unwritten.max(1), total: gaps.len() });
             }
             Ok((gaps, list[1..=touching].to_vec()))

@@ -21,10 +21,8 @@ pub(super) const TYPES: &str = include_str!("../../shaders/types.wgsl");
 pub(super) const CLOSEST_POINT: &str = include_str!("../../shaders/closest_point.wgsl");
 pub(super) const SURFACE: &str = include_str!("../../shaders/surface.wgsl");
 pub(super) const DEPTH: &str = include_str!("../../shaders/depth.wgsl");
-pub(super) const FACET_DEPTH: &str = include_str!("../../shaders/facet_depth.wgsl");
-pub(super) const SUPPORT: &str = include_str!("../../shaders/support.wgsl");
+const SUPPORT: &str = include_str!("../../shaders/support.wgsl");
 const SPRINGS: &str = include_str!("../../shaders/springs.wgsl");
-pub(super) const BLEND: &str = include_str!("../../shaders/blend.wgsl");
 const TRUST_REGION: &str = include_str!("../../shaders/trust_region.wgsl");
 const ENERGY_SEARCH: &str = include_str!("../../shaders/energy.wgsl");
 const FRAME_COMMON: &str = include_str!("../../shaders/frame_common.wgsl");
@@ -80,14 +78,6 @@ pub static ENERGY: Shader = Shader {
     name: "energy",
     entry: "main",
     parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, SUPPORT, SPRINGS, TRUST_REGION, ENERGY_SEARCH],
-    overrides: &[&[], &[("FROZEN", 1.0)], PARTIAL, ISOTROPIC, CRAMPED],
-};
-
-/// The same between facets that pass into each other.
-pub static ENERGY_BLENDED: Shader = Shader {
-    name: "energy_blended",
-    entry: "main",
-    parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, FACET_DEPTH, SUPPORT, BLEND, TRUST_REGION, ENERGY_SEARCH],
     overrides: &[&[], &[("FROZEN", 1.0)], PARTIAL, ISOTROPIC, CRAMPED],
 };
 
@@ -165,7 +155,6 @@ pub static ALL: &[&Shader] = &[
     &CLASSIFICATION,
     &COMPACTION,
     &ENERGY,
-    &ENERGY_BLENDED,
     &PAPER,
     &FRAME_STIFFENING,
     &FRAME_LOAD,
@@ -206,8 +195,6 @@ fn constants() -> String {
         ("ENERGY_ROUNDING", tolerances::GPU_ENERGY_ROUNDING),
         ("GIVE_UP_RADIUS", tolerances::GPU_GIVE_UP_RADIUS),
         ("PAPER_INNER_TOLERANCE", tolerances::GPU_PAPER_INNER_TOLERANCE),
-        ("BLEND_SPREAD", tolerances::BLEND_SPREAD as f32),
-        ("BLEND_LATERAL", tolerances::BLEND_LATERAL as f32),
     ] {
         text.push_str(&format!("const {name}: f32 = {value:e}f;\n"));
     }

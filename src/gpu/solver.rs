@@ -142,22 +142,15 @@ impl<'a> GpuSolver<'a> {
         Ok(results)
     }
 
-    /// Of what touches nothing in f32, solves what lies within rounding of contact, and measures gaps to blended facets: a
-    /// microsecond each.
+    /// Solves in f64 what touches nothing in f32 but lies within rounding of contact.
     fn decide_free(&mut self, chunk: &[JointVector], touching: &[u32], results: &mut [Equilibrium]) {
-        let blended = self.model.blending > 0.0;
         let mut free = vec![true; chunk.len()];
         touching.iter().for_each(|&member| free[member as usize] = false);
-        let open: Vec<usize> =
-            (0..chunk.len()).filter(|&k| free[k] && (blended || self.is_undecided(&results[k]))).collect();
-        let decided = self.cpu.map(&open, |solver, &k| {
-            let gap = if blended { solver.gap(&chunk[k]) } else { results[k].gap };
-            let measured = Equilibrium { gap, ..results[k].clone() };
-            if self.is_undecided(&measured) { (solver.solve(&chunk[k]), 1) } else { (measured, 0) }
-        });
-        for (k, (result, left)) in open.into_iter().zip(decided) {
+        let open: Vec<usize> = (0..chunk.len()).filter(|&k| free[k] && self.is_undecided(&results[k])).collect();
+        let decided = self.cpu.map(&open, |solver, &k| solver.solve(&chunk[k]));
+        self.left_to_cpu += open.len();
+        for (k, result) in open.into_iter().zip(decided) {
             results[k] = result;
-            self.left_to_cpu += left;
         }
     }
 

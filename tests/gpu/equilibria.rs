@@ -188,45 +188,9 @@ fn objects_that_are_not_isotropic_have_the_same_equilibria_on_gpu_and_cpu() {
     }
 }
 
-/// Between blended facets, points and balls: the CPU's gaps, energies and torques, and, where nodes touch, others than between
-/// facets as they are.
-fn check_blended(name: &str, material: Option<Material>, algorithm: Algorithm, blending: Blending, stride: usize) {
-    let (scene, object, chain) = load_of(name, material);
-    let configurations = configurations(&scene, 11, stride);
-    let contact = haptize::scene::ContactSpec { algorithm, ..scene.contact };
-    let sharp = Model::new(&object, &chain, contact);
-    let model = Model::new(&object, &chain, haptize::scene::ContactSpec { blending, ..contact });
-    let (mut cpu, mut sharp) = (Solver::new(&model), Solver::new(&sharp));
-    let mut gpu = GpuSolver::new(context(), &model).unwrap();
-    let (mut touching, mut told_apart, mut unlike) = (0, 0, Vec::new());
-    for (q, result) in configurations.iter().zip(&gpu.solve(&configurations).unwrap()) {
-        let reference = cpu.solve(q);
-        unlike.extend(difference(algorithm, &reference, result).map(|difference| format!("{q:?}: {difference}")));
-        if reference.status == Status::Contact {
-            touching += 1;
-            told_apart += usize::from(difference(algorithm, &sharp.solve(q), result).is_some());
-        }
-    }
-    let left = gpu.left_to_cpu();
-    println!("{name}, {algorithm:?}, {blending:?}: {touching} touch, {told_apart} told apart, {left} by the CPU");
-    assert!(touching >= 15 && told_apart == touching, "{told_apart} of {touching}");
-    assert!(unlike.is_empty(), "{unlike:#?}");
-    assert!(left * 4 <= touching, "{left} of {touching} left to the CPU");
-}
-
-#[test]
-fn blended_facets_have_the_same_equilibria_on_gpu_and_cpu() {
-    check_blended("sphere.toml", None, Algorithm::Energy, Blending::Mesh, 131);
-    check_blended("sphere.toml", None, Algorithm::Linearised, Blending::Mesh, 131);
-    check_blended("mesh.toml", None, Algorithm::Energy, Blending::Mesh, 101);
-    check_blended("mesh.toml", None, Algorithm::Linearised, Blending::Mesh, 101);
-    check_blended("mesh.toml", None, Algorithm::Energy, Blending::Width(0.01), 149);
-    check_blended("sphere.toml", Some(AXIAL), Algorithm::Energy, Blending::Mesh, 131);
-}
-
 /// The model of the sphere that covers the nodes about its top.
-fn part<'a>((scene, object, chain): &'a (Scene, Object, Chain), algorithm: Algorithm, blending: Blending) -> Model<'a> {
-    let contact = haptize::scene::ContactSpec { algorithm, blending, ..scene.contact };
+fn part<'a>((scene, object, chain): &'a (Scene, Object, Chain), algorithm: Algorithm) -> Model<'a> {
+    let contact = haptize::scene::ContactSpec { algorithm, ..scene.contact };
     let mut model = Model::new(object, chain, contact);
     let reached = |node: &u32| model.rest[*node as usize].dot(DVec3::new(-0.3, 0.0, 1.0)) > 0.015;
     model.compliance = Compliance::on(object, (0..object.surface_nodes as u32).filter(reached).collect()).unwrap();
@@ -238,26 +202,23 @@ fn part<'a>((scene, object, chain): &'a (Scene, Object, Chain), algorithm: Algor
 fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
     let [isotropic, axial] = [None, Some(AXIAL)].map(|material| load_of("sphere.toml", material));
     let configurations = configurations(&isotropic.0, 11, 131);
-    for (algorithm, blending, of) in [
-        (Algorithm::Energy, Blending::Width(0.0), &isotropic),
-        (Algorithm::Energy, Blending::Width(0.0), &axial),
-        (Algorithm::Linearised, Blending::Width(0.0), &isotropic),
-        (Algorithm::Energy, Blending::Mesh, &isotropic),
-    ] {
-        let model = part(of, algorithm, blending);
+    for (algorithm, of) in
+        [(Algorithm::Energy, &isotropic), (Algorithm::Energy, &axial), (Algorithm::Linearised, &isotropic)]
+    {
+        let model = part(of, algorithm);
         let mut cpu = Solver::new(&model);
         let results = GpuSolver::new(context(), &model).unwrap().solve(&configurations).unwrap();
         let (mut touching, mut beyond) = (0, 0);
         for (q, result) in configurations.iter().zip(&results) {
             let reference = cpu.solve(q);
-            assert_eq!(difference(algorithm, &reference, result), None, "{algorithm:?}, {blending:?}, {q:?}");
+            assert_eq!(difference(algorithm, &reference, result), None, "{algorithm:?}, {q:?}");
             touching += usize::from(reference.status == Status::Contact);
             beyond += usize::from(reference.status == Status::Overflow);
         }
-        println!("{algorithm:?}, {blending:?}: {touching} touch, {beyond} reach beyond");
-        assert!(touching >= 3 && beyond >= 3, "{algorithm:?}, {blending:?}: {touching}, {beyond}");
+        println!("{algorithm:?}: {touching} touch, {beyond} reach beyond");
+        assert!(touching >= 3 && beyond >= 3, "{algorithm:?}: {touching}, {beyond}");
     }
-    let refusal = GpuSolver::new(context(), &part(&isotropic, Algorithm::Paper, Blending::Width(0.0))).err().unwrap();
+    let refusal = GpuSolver::new(context(), &part(&isotropic, Algorithm::Paper)).err().unwrap();
     assert!(matches!(refusal, GpuError::TooManyNodes { .. }), "{refusal}");
 }
 
@@ -287,60 +248,25 @@ fn grazing(cpu: &mut Solver, path: &[JointVector], wanted: f64) -> Vec<JointVect
 /// A gap that f32 cannot tell from none, points and balls: contact or not, and what comes of it, is the CPU's.
 #[test]
 fn contact_within_rounding_of_none_is_decided_in_f64() {
-    for (name, blending) in
-        [("sphere.toml", Blending::Width(0.0)), ("mesh.toml", Blending::Width(0.0)), ("sphere.toml", Blending::Mesh)]
-    {
+    for name in ["sphere.toml", "mesh.toml"] {
         let (scene, object, chain) = load(name);
         let path = configurations(&scene, 11, 101);
-        let model = Model::new(&object, &chain, haptize::scene::ContactSpec { blending, ..scene.contact });
+        let model = Model::new(&object, &chain, scene.contact);
         let mut cpu = Solver::new(&model);
         for wanted in [-1e-9, -1e-11, 1e-11, 1e-9] {
             let near = grazing(&mut cpu, &path, wanted);
-            assert!(near.len() >= 5, "{name}, {blending:?}: only {} configurations", near.len());
+            assert!(near.len() >= 5, "{name}: only {} configurations", near.len());
             let mut gpu = GpuSolver::new(context(), &model).unwrap();
             for (q, result) in near.iter().zip(gpu.solve(&near).unwrap()) {
                 let reference = cpu.solve(q);
                 let status = if wanted < 0.0 { Status::Contact } else { Status::Free };
-                assert_eq!(
-                    (reference.status, result.status),
-                    (status, status),
-                    "{name}, {blending:?}, {q:?}, {wanted:e}"
-                );
-                assert!(
-                    (result.gap - wanted).abs() < 1e-14,
-                    "{name}, {blending:?}: gap {:e} for {wanted:e}",
-                    result.gap
-                );
-                if blending == Blending::Width(0.0) {
-                    assert_eq!(format!("{result:?}"), format!("{reference:?}"), "the f64 result itself");
-                }
+                assert_eq!((reference.status, result.status), (status, status), "{name}, {q:?}, {wanted:e}");
+                assert!((result.gap - wanted).abs() < 1e-14, "{name}: gap {:e} for {wanted:e}", result.gap);
+                assert_eq!(format!("{result:?}"), format!("{reference:?}"), "the f64 result itself");
             }
-            if blending == Blending::Width(0.0) {
-                assert_eq!(gpu.left_to_cpu(), near.len(), "{name}, {wanted:e}");
-            }
+            assert_eq!(gpu.left_to_cpu(), near.len(), "{name}, {wanted:e}");
         }
     }
-}
-
-/// Facets beyond what the kernel has room for are no reason to leave any out.
-#[test]
-fn facets_beyond_the_kernels_room_are_solved_on_the_cpu() {
-    let (scene, object, chain) = load("sphere.toml");
-    let configurations = configurations(&scene, 11, 131);
-    let mut model = Model::new(&object, &chain, scene.contact);
-    model.set_blending(Blending::Mesh);
-    let mut cpu = Solver::new(&model);
-    let mut gpu = GpuSolver::with_room(context(), &model, Room { contacts: 1, ..Room::default() }).unwrap();
-    let mut crowded = 0;
-    for (q, result) in configurations.iter().zip(&gpu.solve(&configurations).unwrap()) {
-        assert_ne!(result.status, Status::Overflow);
-        let reference = cpu.solve(q);
-        if reference.touches.len() > 8 {
-            crowded += 1;
-            assert_eq!(format!("{result:?}"), format!("{reference:?}"), "the f64 result itself");
-        }
-    }
-    assert!(crowded > 10 && gpu.left_to_cpu() >= crowded, "{crowded}, {}", gpu.left_to_cpu());
 }
 
 #[test]
@@ -384,15 +310,12 @@ fn the_comparators_reject_perturbed_results() {
 fn sizes_of_chunks_and_batches_leave_no_trace() {
     let (scene, object, chain) = load("sphere.toml");
     let configurations = configurations(&scene, 5, 211);
-    let mut model = Model::new(&object, &chain, scene.contact);
-    for blending in [Blending::Width(0.0), Blending::Mesh] {
-        model.set_blending(blending);
-        let solve = |room| GpuSolver::with_room(context(), &model, room).unwrap().solve(&configurations).unwrap();
-        let whole = solve(Room::default());
-        let pieces = solve(Room { chunk: 7, batch: 2, ..Room::default() });
-        assert!(whole.iter().any(|result| result.status == Status::Contact));
-        assert_eq!(format!("{whole:?}"), format!("{pieces:?}"), "bit for bit");
-    }
+    let model = Model::new(&object, &chain, scene.contact);
+    let solve = |room| GpuSolver::with_room(context(), &model, room).unwrap().solve(&configurations).unwrap();
+    let whole = solve(Room::default());
+    let pieces = solve(Room { chunk: 7, batch: 2, ..Room::default() });
+    assert!(whole.iter().any(|result| result.status == Status::Contact));
+    assert_eq!(format!("{whole:?}"), format!("{pieces:?}"), "bit for bit");
 }
 
 #[test]
@@ -425,15 +348,20 @@ fn no_configuration_is_no_work() {
     assert!(GpuSolver::new(context(), &model).unwrap().solve(&[]).unwrap().is_empty());
 }
 
-/// The kernels freeze geometry once: a scene that asks for more is refused, and left to the CPU where the choice is free.
+/// The kernels freeze geometry once and know facets as they are: a scene that asks for more is refused, and left to the CPU where
+/// the choice is free.
 #[test]
-fn updates_are_refused() {
+fn updates_and_blending_are_refused() {
     let (scene, object, chain) = load("sphere.toml");
     let mut model = Model::new(&object, &chain, scene.contact);
     assert!(GpuSolver::new(context(), &model).is_ok());
     model.contact.updates = 1;
     let refusal = GpuSolver::new(context(), &model).err().unwrap();
     assert!(matches!(refusal, GpuError::Unsupported("updates")), "{refusal}");
+    model.contact.updates = 0;
+    model.set_blending(Blending::Mesh);
+    let refusal = GpuSolver::new(context(), &model).err().unwrap();
+    assert!(matches!(refusal, GpuError::Unsupported("blending")), "{refusal}");
 }
 
 /// Every hard case of contact that the CPU keeps: stiffness, exact places and awkward ones, slivers, units, a kilometre from the
