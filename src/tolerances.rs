@@ -472,17 +472,3 @@ pub const SOLVER_SHARE: f64 = 0.05;
 /// How much finer than the finest measured grid the measured order is trusted [1]: two octaves, as many as it was measured
 /// over. What takes more is not offered.
 pub const FARTHEST_EXTRAPOLATION: f64 = 4.0;
-
-/// R - min e_t / w^2 of a blended depth (`contact/blend.rs`) up to which triangles are gathered at first: 1/sqrt(a) = 1.2 for one
-/// triangle of half the area 2.3 w^2, more only where all triangles near are small and few; then it is raised to what is
-/// needed [1].
-pub const BLEND_SPREAD: f64 = 1.2;
-
-/// Lateral distance from a facet, in widths, up to which its plane stands for it outside the surface (`contact/facet_depth.rs`): the
-/// square exceeds [`BLEND_SPREAD`], so that below a flat surface nothing but planes takes part [1].
-pub const BLEND_LATERAL: f64 = 1.25;
-
-/// By how much, in widths, a blended depth may exceed minus the distance outside. Over a facet's plane (`contact/facet_depth.rs`) it
-/// is by no more than l - p = k w (2 y - y^3), y = k w / l <= 1, the greatest at y^2 = 2/3: 1.09 times k, [`BLEND_LATERAL`]; behind the
-/// plane by no more than twice that [1].
-pub const BLEND_BULGE: f64 = 2.18 * BLEND_LATERAL;

@@ -14,7 +14,7 @@ use haptize::{
     object::{Factor, Object},
     proxy::Chain,
     render::{coupling::Coupling, npmi, session, setup::Setup, trace::Trace},
-    scene::{Blending, EFFECTS, Effect, Rendering, Scene},
+    scene::{EFFECTS, Effect, Rendering, Scene},
 };
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -312,15 +312,6 @@ fn on_the_gpu_each_effect_makes_its_own_buffers_and_pipelines_and_no_others() {
         found
     });
     assert!(plain == felt && plain.0.len() > 5 && plain.1 > 3, "{plain:?} {felt:?}");
-    // Blended facets take a kernel in place of another, and two buffers more.
-    let (object, chain) = (Object::build(&sphere().object).unwrap(), Chain::new(&sphere().proxy));
-    let mut model = Model::new(&object, &chain, sphere().contact);
-    model.set_blending(Blending::Mesh);
-    let (_solver, mut blended) = made(&context, || GpuSolver::new(Arc::clone(&context), &model).unwrap());
-    for label in ["facets", "search vectors"] {
-        assert_eq!(blended.0.remove(label), Some(1));
-    }
-    assert_eq!(blended, plain);
 }
 
 #[test]

@@ -32,14 +32,8 @@ pub struct Contact {
     pub weights: [f64; 3],
     /// Outward direction N, of length one, but of walls as their rounding has it.
     pub normal: DVec3,
-    /// r + s, or the smooth depth of [`super::blend`]; positive in contact [m].
+    /// r + s, positive in contact [m].
     pub depth: f64,
-    /// How often the spring counts: one, or what a smooth depth changes by with the row's own distance.
-    pub share: f64,
-    /// What a smooth depth changes by with the logarithm of the triangle's area, else zero; see [`super::blend`] [m].
-    pub stretch: f64,
-    /// What it is part of, where it is one of the rows of a smooth depth; see [`super::blend`].
-    pub part: Option<super::blend::Part>,
     /// Force lambda by which the curvature counts; kc depth at the solution [N].
     pub multiplier: f64,
     /// Second derivative of s.
@@ -143,22 +137,10 @@ pub fn second_variation(contact: &Contact, v: [DVec3; 3]) -> [DVec3; 3] {
 #[inline]
 #[must_use]
 pub fn stiffness_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3] {
-    let Contact { weights, normal, share, multiplier, .. } = contact;
-    let push = *normal * (kc * share * contact.deepening(v));
-    let bend = share * multiplier;
-    let product = if bend == 0.0 { [DVec3::ZERO; 3] } else { second_variation(contact, v) };
-    [0, 1, 2].map(|j| push * weights[j] + product[j] * bend)
-}
-
-/// What displacements deepen the node by, to first order, `rows` being those of its depth and `v` the displacements of each row's
-/// three nodes [m].
-#[inline]
-#[must_use]
-pub fn first_order(rows: &[Contact], v: impl Fn(usize) -> [DVec3; 3]) -> f64 {
-    match rows {
-        [row] if row.part.is_none() => row.deepening(v(0)),
-        _ => rows.iter().enumerate().map(|(k, row)| row.first_order(v(k))).sum(),
-    }
+    let Contact { weights, normal, multiplier, .. } = contact;
+    let push = *normal * (kc * contact.deepening(v));
+    let product = if *multiplier == 0.0 { [DVec3::ZERO; 3] } else { second_variation(contact, v) };
+    [0, 1, 2].map(|j| push * weights[j] + product[j] * *multiplier)
 }
 
 impl Contact {
@@ -174,19 +156,7 @@ impl Contact {
     #[must_use]
     pub fn new(proxy_node: u32, nodes: [u32; 3], weights: [f64; 3], measured: (DVec3, f64, Curvature)) -> Self {
         let (normal, depth, curvature) = measured;
-        Self {
-            proxy_node,
-            nodes,
-            weights,
-            normal,
-            depth,
-            share: 1.0,
-            stretch: 0.0,
-            part: None,
-            multiplier: 0.0,
-            curvature,
-            wall: None,
-        }
+        Self { proxy_node, nodes, weights, normal, depth, multiplier: 0.0, curvature, wall: None }
     }
 
     /// What displacements `v` of its nodes bring the feature nearer by, to first order [m].
@@ -198,25 +168,25 @@ impl Contact {
             + self.weights[2] * self.normal.dot(v[2])
     }
 
-    /// By what share displacements `v` of its nodes stretch the triangle's area, to first order [1].
-    #[must_use]
-    pub fn stretching(&self, v: [DVec3; 3]) -> f64 {
-        let g = self.curvature.gradients;
-        g[0].dot(v[0]) + g[1].dot(v[1]) + g[2].dot(v[2])
-    }
-
-    /// What displacements `v` of its nodes add to the depth that the row is part of, to first order [m].
-    #[must_use]
-    pub fn first_order(&self, v: [DVec3; 3]) -> f64 {
-        self.share * self.deepening(v) + self.stretch * self.stretching(v)
-    }
-
-    /// What a force `push` along the depth gives to the feature's nodes: push (share w_j N + stretch g_j) [N].
+    /// What a force `push` along the depth gives to the feature's nodes: push w_j N [N].
     #[inline]
     #[must_use]
     pub fn spread(&self, push: f64) -> [DVec3; 3] {
-        let Self { weights, normal, share, stretch, curvature, .. } = self;
-        [0, 1, 2].map(|j| (*normal * (share * weights[j]) + curvature.gradients[j] * *stretch) * push)
+        self.weights.map(|weight| self.normal * (push * weight))
+    }
+
+    /// Its depth changes in proportion to displacements from here on.
+    pub fn freeze(&mut self) {
+        self.curvature = Curvature::default();
+        if let Some(wall) = &mut self.wall {
+            wall.freeze();
+        }
+    }
+
+    /// Whether two contacts are walls of one ball, which share its spring.
+    #[must_use]
+    pub fn shares_ball(&self, other: &Self) -> bool {
+        self.wall.is_some() && other.wall.is_some() && self.proxy_node == other.proxy_node
     }
 }
 

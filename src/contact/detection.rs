@@ -7,7 +7,6 @@
 //!
 //! Ties go to the lower triangle number.
 
-use super::blend::{self, Blend};
 use super::closest_point::{ClosestPoint, Feature, closest_point, point_at};
 use super::deformation::Deformation;
 use super::depth::{Contact, measure};
@@ -16,7 +15,7 @@ use super::newton::Care;
 use super::series::share_out;
 use super::surface;
 use super::walls::{WallSearch, wall};
-use crate::tolerances::{BLEND_SPREAD, FACET_ROUNDING, KNOWN_WALLS, WALL_COMPLIANCE};
+use crate::tolerances::{FACET_ROUNDING, KNOWN_WALLS, WALL_COMPLIANCE};
 use glam::DVec3;
 
 /// Where a proxy node stands at rest, and what is known of it since.
@@ -28,8 +27,6 @@ struct Standing {
     exact: bool,
     /// Inside at rest.
     inside: bool,
-    /// Greatest R - min e_t / w^2 (see [`super::blend`]) so far [1].
-    spread: f64,
     /// Has touched since the configuration was taken up, and is reported as a near miss from then on.
     watched: bool,
     /// Triangle that is closest at rest, where `distance` is exact.
@@ -83,8 +80,7 @@ impl Closest {
 pub enum Walls {
     /// The closest one.
     Closest,
-    /// All that it feels: about as near as the nearest (see [`super::walls`]), or where facets are blended what is near it (see
-    /// [`super::blend`]).
+    /// All that it feels: about as near as the nearest (see [`super::walls`]).
     All,
 }
 
@@ -120,9 +116,6 @@ pub struct Detection {
     /// Of the node at hand.
     walls: WallSearch,
     pushes: Vec<f64>,
-    blend: Blend,
-    /// Of a point at rest.
-    rows: Vec<Contact>,
 }
 
 impl Detection {
@@ -140,8 +133,6 @@ impl Detection {
             left_out: false,
             walls: WallSearch::default(),
             pushes: Vec::new(),
-            blend: Blend::default(),
-            rows: Vec::new(),
         }
     }
 
@@ -169,7 +160,7 @@ impl Detection {
     }
 
     /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns the smallest signed distance of a
-    /// proxy node to the surface at rest, less its radius [m]. The gap ([`Detection::gap`]) is at least that.
+    /// proxy node to the surface at rest, less its radius [m].
     pub fn take_up(&mut self, model: &Model, nodes: &[DVec3]) -> f64 {
         // The node that is most likely the nearest rules out most others.
         let first = self.place(model, nodes);
@@ -195,7 +186,6 @@ impl Detection {
         for (i, &node) in nodes.iter().enumerate() {
             let x = node - model.centre;
             let standing = &mut self.standings[i];
-            standing.spread = BLEND_SPREAD;
             standing.watched = false;
             // Of a node that stands where it stood in the configuration before, as all do that hang on joints which have not moved, all
             // is known.
@@ -220,36 +210,6 @@ impl Detection {
         first
     }
 
-    /// The gap of the configuration taken up: the smallest signed distance of a proxy node to the surface at rest, less its
-    /// radius; where facets are blended, to the smooth surface (see [`super::blend`]) [m].
-    pub fn gap(&mut self, model: &Model) -> f64 {
-        let mut gap = f64::MAX;
-        for i in 0..self.nodes.len() {
-            let radius = model.chain.nodes[i].radius;
-            let nearest = radius + model.bulge();
-            if self.standings[i].signed() - nearest >= gap {
-                continue;
-            }
-            if !self.standings[i].exact {
-                find_standing(model, self.nodes[i], &mut self.standings[i]);
-            }
-            let distance = self.standings[i].signed();
-            if distance - nearest < gap {
-                let smooth = model.blending > 0.0;
-                gap = gap.min(if smooth { -self.depth_at_rest(model, i) } else { distance - radius });
-            }
-        }
-        gap
-    }
-
-    /// Smooth depth of node `i` at rest [m].
-    fn depth_at_rest(&mut self, model: &Model, i: usize) -> f64 {
-        self.rows.clear();
-        let Self { blend, rows, nodes, standings, .. } = self;
-        blended_at_rest(model, i, nodes[i], &standings[i], blend, rows);
-        rows.first().map_or(f64::NAN, |row| row.depth)
-    }
-
     /// Contacts with the surface displaced by `displacement`, i.e. at `positions` relative to the model's centre [m], in
     /// ascending order of proxy nodes. Nodes that touched before in this configuration are included with a depth below zero
     /// when they do not touch now, because they are the ones that may touch again.
@@ -268,14 +228,12 @@ impl Detection {
             let x = self.nodes[i];
             let radius = model.chain.nodes[i].radius;
             let standing = &mut self.standings[i];
-            let bulge = model.bulge();
-            let smooth = walls != Walls::Closest && bulge > 0.0;
-            if !standing.inside && standing.distance - radius - bulge > moved {
+            if !standing.inside && standing.distance - radius > moved {
                 continue;
             }
             if !standing.exact {
                 find_standing(model, x, standing);
-                if !standing.inside && standing.distance - radius - bulge > moved {
+                if !standing.inside && standing.distance - radius > moved {
                     continue;
                 }
             }
@@ -287,7 +245,7 @@ impl Detection {
                 closest.consider(x, positions, triangles, likely);
             }
             let rounding = self.rounding;
-            let feels = walls != Walls::Closest && radius > 0.0 && !smooth;
+            let feels = walls != Walls::Closest && radius > 0.0;
             // Squared distance within which triangles are looked for.
             let within = |closest: &Closest| {
                 if feels {
@@ -312,31 +270,6 @@ impl Detection {
                 });
             }
             standing.last = closest.triangle;
-            if smooth {
-                let distance = closest.distance_squared.sqrt();
-                let spread = loop {
-                    let reach = blend::reach(model, distance, standing.spread);
-                    self.blend.clear();
-                    self.deformation.search(model, positions, x, reach * reach, |triangle| {
-                        self.blend.consider(model, x, reach, positions, triangle);
-                        reach * reach
-                    });
-                    let spread = self.blend.spread();
-                    if spread <= standing.spread || !spread.is_finite() {
-                        break spread;
-                    }
-                    standing.spread = spread;
-                };
-                let first = contacts.len();
-                let outside = contact_at(model, i, x, 0.0, positions, closest.triangle, closest.point)
-                    .is_some_and(|closest| closest.depth < 0.0);
-                self.blend.rows(model, (i, x, outside), positions, spread, contacts);
-                standing.watched |= contacts.get(first).is_some_and(|row| row.depth > 0.0);
-                if !standing.watched {
-                    contacts.truncate(first);
-                }
-                continue;
-            }
             let Some(contact) = contact_at(model, i, x, radius, positions, closest.triangle, closest.point) else {
                 continue;
             };
@@ -373,21 +306,16 @@ impl Detection {
             let x = self.nodes[i];
             let radius = model.chain.nodes[i].radius;
             let standing = &mut self.standings[i];
-            if !standing.inside && standing.distance - radius - model.bulge() > reach {
+            if !standing.inside && standing.distance - radius > reach {
                 continue;
             }
             let closest = find_standing(model, x, standing);
-            let first = rows.len();
-            if model.blending > 0.0 {
-                blended_at_rest(model, i, x, standing, &mut self.blend, rows);
-            } else {
-                let Closest { triangle, point, .. } = closest;
-                rows.extend(contact_at(model, i, x, radius, &model.rest, triangle, point));
+            let Closest { triangle, point, .. } = closest;
+            let row = contact_at(model, i, x, radius, &model.rest, triangle, point);
+            if let Some(mut row) = row.filter(|row| row.depth >= -reach) {
+                row.freeze();
+                rows.push(row);
             }
-            if rows.get(first).is_none_or(|row| row.depth < -reach) {
-                rows.truncate(first);
-            }
-            blend::freeze(&mut rows[first..]);
         }
     }
 }
@@ -426,24 +354,6 @@ fn find_standing(model: &Model, x: DVec3, standing: &mut Standing) -> Closest {
     closest
 }
 
-/// Adds the rows of the smooth depth at rest of node `i` at `x`, which stands as `standing` says.
-fn blended_at_rest(model: &Model, i: usize, x: DVec3, standing: &Standing, blend: &mut Blend, rows: &mut Vec<Contact>) {
-    let mut spread = BLEND_SPREAD;
-    loop {
-        let reach = blend::reach(model, standing.distance, spread);
-        blend.clear();
-        model.bounds.search(x, reach * reach, |t| {
-            blend.consider(model, x, reach, &model.rest, t);
-            reach * reach
-        });
-        let needed = blend.spread();
-        if needed <= spread || !needed.is_finite() {
-            return blend.rows(model, (i, x, !standing.inside), &model.rest, needed, rows);
-        }
-        spread = needed;
-    }
-}
-
 /// The contact (or near miss, with depth <= 0) of proxy node `i` with a feature of `triangle`.
 #[inline(always)]
 fn contact_at(
@@ -470,8 +380,8 @@ mod tests {
     use crate::proxy::Chain;
     use crate::random::sequence;
     use crate::scene::{
-        Algorithm, Blending, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec,
-        ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
+        Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
+        ProxySpec, Shape, SpringKind, SpringSpec,
     };
 
     fn ball() -> Object {
@@ -535,7 +445,6 @@ mod tests {
                 tolerance: 1e-8,
                 max_iterations: 1,
                 updates: 0,
-                blending: Blending::Width(0.0),
             };
             let model = Model::new(&object, &chain, contact);
             let mut detection = Detection::new(&model);

@@ -18,8 +18,7 @@
 mod outside;
 
 use super::NodeForce;
-use super::blend::{self, together};
-use super::depth::{Contact, first_order};
+use super::depth::Contact;
 use super::detection::{Detection, Inner, Walls};
 use super::model::Model;
 use super::newton::{Care, Damping, Newton, Step};
@@ -338,17 +337,10 @@ impl EnergySearch {
         let Self { state, frozen, .. } = self;
         state.place(model);
         detection.deformed(model, &state.displacement, &state.positions, Walls::All, frozen);
-        blend::freeze(frozen);
+        frozen.iter_mut().for_each(Contact::freeze);
         // Depths at rest, by the slopes here.
-        let here: Vec<f64> = frozen
-            .chunk_by(one_depth)
-            .flat_map(|rows| {
-                let change = linear_change(rows, &state.displacement);
-                rows.iter().map(move |row| row.depth - change)
-            })
-            .collect();
-        for (row, depth) in frozen.iter_mut().zip(here) {
-            row.depth = depth;
+        for row in frozen.iter_mut() {
+            row.depth -= linear_change(row, &state.displacement);
         }
         frozen_contacts(frozen, &state.displacement, &mut state.contacts);
     }
@@ -396,9 +388,8 @@ impl EnergySearch {
         for contact in &state.contacts {
             let mut contact_slots = [0; 3];
             for (slot, (&node, &weight)) in contact_slots.iter_mut().zip(contact.nodes.iter().zip(&contact.weights)) {
-                // Nodes without weight take no force, but of what stretches a triangle; their entries are multiplied by zero in any
-                // slot.
-                if weight != 0.0 || contact.stretch != 0.0 {
+                // Nodes without weight take no force; their entries are multiplied by zero in any slot.
+                if weight != 0.0 {
                     *slot = support.add(node);
                 }
             }
@@ -461,7 +452,7 @@ impl EnergySearch {
     fn energy_rounding(&self, nodes: &[DVec3]) -> f64 {
         let mut size = self.state.energy;
         for contact in &self.state.contacts {
-            size += self.kc * contact.share.abs() * contact.bears() * nodes[contact.proxy_node as usize].length();
+            size += self.kc * contact.bears() * nodes[contact.proxy_node as usize].length();
         }
         ENERGY_ROUNDING * size
     }
@@ -495,12 +486,8 @@ fn foresee(contacts: &mut [Contact], before: &[Contact], force: impl Fn(&Contact
 #[must_use]
 pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
     let mut sum = 0.0;
-    for rows in contacts.chunk_by(together) {
-        sum += if rows[0].wall.is_some() {
-            rows.iter().map(|row| row.bears() * row.depth).sum()
-        } else {
-            rows[0].bears() * rows[0].bears()
-        };
+    for contact in contacts {
+        sum += contact.bears() * contact.depth;
     }
     0.5 * kc * sum
 }
@@ -508,19 +495,11 @@ pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
 /// Rows of the frozen problem with their depths at `displacement`.
 fn frozen_contacts(rows: &[Contact], displacement: &[f64], contacts: &mut Vec<Contact>) {
     contacts.clear();
-    for rows in rows.chunk_by(one_depth) {
-        let depth = rows[0].depth + linear_change(rows, displacement);
-        contacts.extend(rows.iter().map(|row| Contact { depth, ..*row }));
-    }
+    contacts.extend(rows.iter().map(|row| Contact { depth: row.depth + linear_change(row, displacement), ..*row }));
     share_out(contacts, &mut Vec::new());
 }
 
-/// Whether two neighbours in a list of contacts are rows of one depth.
-fn one_depth(a: &Contact, b: &Contact) -> bool {
-    a.wall.is_none() && together(a, b)
-}
-
-/// By how much `displacement` deepens the frozen rows of one depth [m].
-fn linear_change(rows: &[Contact], displacement: &[f64]) -> f64 {
-    first_order(rows, |k| rows[k].nodes.map(|node| DVec3::from_slice(&displacement[3 * node as usize..])))
+/// By how much `displacement` deepens a frozen row [m].
+fn linear_change(row: &Contact, displacement: &[f64]) -> f64 {
+    row.deepening(row.nodes.map(|node| DVec3::from_slice(&displacement[3 * node as usize..])))
 }

@@ -5,7 +5,6 @@
 use crate::JointVector;
 use glam::DVec3;
 
-pub(crate) mod blend;
 mod bounding_volumes;
 mod cholesky;
 pub(crate) mod closest_point;
@@ -14,7 +13,6 @@ pub(crate) mod depth;
 pub(crate) mod detection;
 mod distance_bounds;
 pub(crate) mod energy;
-mod facet_depth;
 mod model;
 mod newton;
 mod packet;
@@ -109,9 +107,7 @@ pub struct NodeForce {
 
 /// One proxy node in contact with one feature of the surface: pushed by `force` at x_i, pushing back on three object nodes.
 ///
-/// Where facets are sharp, a point node has at most one; a node with a radius has one for each facet that bears it (`walls.rs`,
-/// `series.rs`). Where they are blended (`blend.rs`), a node has one or two for each
-/// triangle near it, and stretches those besides, without a net force. The node's force is their sum.
+/// A point has at most one; a node with a radius has one for each facet that bears it (`walls.rs`, `series.rs`), whose sum is its force.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
     /// Number of the proxy's node.

@@ -1,6 +1,5 @@
 //! What contact needs to know of object and proxy, computed once and shared by all threads.
 
-use super::blend;
 use super::bounding_volumes::BoundingVolumes;
 use super::closest_point::Feature;
 use super::distance_bounds::DistanceBounds;
@@ -9,8 +8,8 @@ use super::surface;
 use crate::JointVector;
 use crate::object::{Compliance, Object, ObjectError};
 use crate::proxy::Chain;
-use crate::scene::{Algorithm, Blending, ContactSpec};
-use crate::tolerances::{BLEND_BULGE, RIGID_STIFFNESS};
+use crate::scene::ContactSpec;
+use crate::tolerances::RIGID_STIFFNESS;
 use glam::DVec3;
 
 /// An object and a proxy, prepared for contact.
@@ -27,8 +26,6 @@ pub struct Model<'a> {
     /// normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
     /// [`RIGID_STIFFNESS`] [N/m].
     pub kc: f64,
-    /// Width w over which facets pass into each other, zero where they are sharp [m].
-    pub blending: f64,
     /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
     /// loses no digits.
     pub centre: DVec3,
@@ -44,8 +41,6 @@ pub struct Model<'a> {
     pub distance_bounds: DistanceBounds,
     /// Mean length of the surface's edges at rest [m].
     pub mean_edge: f64,
-    /// Areas of the triangles at rest [m^2].
-    pub rest_areas: Vec<f64>,
     /// Unit normals of the triangles at rest.
     pub rest_normals: Vec<DVec3>,
     /// Angle-weighted pseudonormals of the surface nodes at rest, not of length one.
@@ -95,9 +90,7 @@ impl<'a> Model<'a> {
         let rest_normals = (0..triangles.len())
             .map(|t| surface::pseudonormal(&rest, triangles, &object.topology, t, Feature::Face))
             .collect();
-        let area = |nodes: &[u32; 3]| 0.5 * surface::area_vector(surface::corners(&rest, *nodes)).length();
         let mean_edge = surface::mean_edge(&rest, triangles);
-        let rest_areas = triangles.iter().map(area).collect();
         let mut rest_pseudonormals = vec![DVec3::ZERO; rest.len()];
         for (t, triangle) in triangles.iter().enumerate() {
             for (k, &node) in triangle.iter().enumerate() {
@@ -113,38 +106,18 @@ impl<'a> Model<'a> {
             compliance,
             contact,
             kc: 0.0,
-            blending: 0.0,
             centre,
             extent,
             rest,
             bounds,
             distance_bounds: DistanceBounds::none(),
             mean_edge,
-            rest_areas,
             rest_normals,
             rest_pseudonormals,
         };
         model.distance_bounds = DistanceBounds::new(&model);
-        model.set_blending(contact.blending);
         model.set_stiffness(contact.stiffness);
         model
-    }
-
-    /// Takes another blending.
-    pub fn set_blending(&mut self, blending: Blending) {
-        self.contact.blending = blending;
-        self.blending = match blending {
-            _ if self.contact.algorithm == Algorithm::Paper => 0.0,
-            Blending::Width(width) => width,
-            Blending::Mesh => blend::width(&self.rest, &self.object.triangles, &self.bounds),
-        };
-    }
-
-    /// By how much a proxy node's gap may be less than its signed distance to the surface less its radius: where smooth facets
-    /// bulge [m].
-    #[must_use]
-    pub fn bulge(&self) -> f64 {
-        BLEND_BULGE * self.blending
     }
 
     /// Takes another contact stiffness Kc; infinity is rigid [N/m].

@@ -21,8 +21,7 @@
 // Indexed loops as in shaders/trust_region.wgsl.
 #![allow(clippy::needless_range_loop)]
 
-use super::blend::{RowChange, deepening, vary};
-use super::depth::Contact;
+use super::depth::{Contact, second_variation};
 use super::relief::Relief;
 use super::series::bear;
 use super::springs::{Bending, Springs, add_contact_hessian, add_on_nodes, nodes_of};
@@ -125,8 +124,6 @@ pub struct Newton {
     direction_force: Vec<f64>,
     direction: Vec<f64>,
     image: Vec<f64>,
-    /// What happens to the rows of one depth.
-    own: Vec<RowChange>,
     /// Of each depth on the way back: kc times its change, where it starts, and its change.
     springs_on_the_way: Vec<[f64; 3]>,
     /// Of each wall: where its depth starts, and its change; and how many walls each ball has.
@@ -258,7 +255,7 @@ impl Newton {
             for k in 0..self.image.len() {
                 self.image[k] = self.stiffening * self.direction_force[k];
             }
-            add_contact_hessian(springs, &self.touching, &self.direction, &mut self.own, &mut self.image);
+            add_contact_hessian(springs, &self.touching, &self.direction, &mut self.image);
             let curvature = dot(&self.direction, &self.image);
             if curvature <= 0.0 {
                 return Err(-curvature / dot(&self.direction, &self.direction_force));
@@ -289,7 +286,7 @@ impl Newton {
     fn assess(&mut self, springs: Springs, residual: &[f64]) -> f64 {
         let own = 0.5 * self.stiffening * dot(&self.displacement, &self.force);
         let mut decrease = dot(&self.displacement, residual) - own;
-        let Self { deepening: all, bears, displacement, own, .. } = self;
+        let Self { deepening: all, bears, displacement, .. } = self;
         springs.for_each_depth(|first, rows| {
             let v = |k: usize| nodes_of(displacement, springs.slots[first + k]);
             if rows[0].wall.is_some() {
@@ -314,9 +311,9 @@ impl Newton {
                 return;
             }
             let Contact { depth, multiplier, .. } = rows[0];
-            let deepening = deepening(rows, v, own);
-            all[first..first + rows.len()].fill(deepening);
-            bears[first..first + rows.len()].fill((depth + deepening).max(0.0));
+            let deepening = rows[0].deepening(v(0));
+            all[first] = deepening;
+            bears[first] = (depth + deepening).max(0.0);
             let before = depth.max(0.0);
             let after = (depth + deepening).max(0.0);
             // The part of 1/2 kc depth^2 that is of first order is in the residual.
@@ -325,8 +322,7 @@ impl Newton {
             } else {
                 after * after - before * (before + 2.0 * deepening)
             };
-            let mut bending = 0.0;
-            vary(rows, v, own, |k, bend| bending += inner(v(k), bend));
+            let bending = inner(v(0), second_variation(&rows[0], v(0)));
             decrease -= 0.5 * (springs.kc * stretch + multiplier * bending);
         });
         decrease
@@ -335,7 +331,7 @@ impl Newton {
     /// Goes back along the last pass to where the model's energy, quadratic piece by piece on the way, is least.
     fn step_back(&mut self, springs: Springs, residual: &[f64]) {
         let Self { force, displacement, previous_force, previous_displacement, direction_force, stiffening, .. } = self;
-        let (direction, own, springs_on_the_way) = (&mut self.direction, &mut self.own, &mut self.springs_on_the_way);
+        let (direction, springs_on_the_way) = (&mut self.direction, &mut self.springs_on_the_way);
         let (walls_on_the_way, walls, pushes) = (&mut self.walls_on_the_way, &mut self.walls, &mut self.bears);
         walls_on_the_way.clear();
         walls.clear();
@@ -365,10 +361,10 @@ impl Newton {
                 return;
             }
             let Contact { depth, multiplier, .. } = rows[0];
-            let start = depth + deepening(rows, before, own);
-            vary(rows, before, own, |k, part| slope -= multiplier * inner(along(k), part));
-            let change = deepening(rows, along, own);
-            vary(rows, along, own, |k, part| bend += multiplier * inner(along(k), part));
+            let turned = second_variation(&rows[0], along(0));
+            slope -= multiplier * inner(before(0), turned);
+            bend += multiplier * inner(along(0), turned);
+            let (start, change) = (depth + rows[0].deepening(before(0)), rows[0].deepening(along(0)));
             let weight = springs.kc * change;
             slope += weight * depth.max(0.0);
             springs_on_the_way.push([weight, start, change]);
@@ -417,7 +413,7 @@ impl Newton {
         for k in 0..residual.len() {
             self.residual[k] = residual[k] - self.stiffening * self.force[k];
         }
-        let Self { displacement, own, residual, bears, .. } = self;
+        let Self { displacement, residual, bears, .. } = self;
         springs.for_each_depth(|first, rows| {
             let v = |k: usize| nodes_of(displacement, springs.slots[first + k]);
             if rows[0].wall.is_some() {
@@ -432,12 +428,9 @@ impl Newton {
                 return;
             }
             let Contact { depth, multiplier, .. } = rows[0];
-            let push = springs.kc * ((depth + deepening(rows, v, own)).max(0.0) - depth.max(0.0));
-            vary(rows, v, own, |k, bend| {
-                let spread = rows[k].spread(push);
-                let force = [0, 1, 2].map(|j| -(spread[j] + bend[j] * multiplier));
-                add_on_nodes(force, springs.slots[first + k], residual);
-            });
+            let push = springs.kc * ((depth + rows[0].deepening(v(0))).max(0.0) - depth.max(0.0));
+            let (spread, bend) = (rows[0].spread(push), second_variation(&rows[0], v(0)));
+            add_on_nodes([0, 1, 2].map(|j| -(spread[j] + bend[j] * multiplier)), springs.slots[first], residual);
         });
     }
 }

@@ -25,21 +25,16 @@ impl<'a> Proximity<'a> {
         self.detection.place(self.model, &self.pose.nodes)
     }
 
-    /// A lower bound of the gap at the joint coordinates `q`, [`super::Equilibrium::gap`], which no proxy node changes by more
-    /// than it moves: where facets are sharp, the gap itself [m].
+    /// The gap at the joint coordinates `q`, [`super::Equilibrium::gap`], which no proxy node changes by more than it moves [m].
     pub fn gap(&mut self, q: &[f64]) -> f64 {
         self.model.chain.pose(q, &mut self.pose);
-        let distance = self.detection.take_up(self.model, &self.pose.nodes);
-        if self.model.blending == 0.0 {
-            return distance;
-        }
-        self.clearances().fold(f64::INFINITY, f64::min)
+        self.detection.take_up(self.model, &self.pose.nodes)
     }
 
     /// A lower bound of what each proxy node contributes to the last gap [m].
     pub fn clearances(&self) -> impl Iterator<Item = f64> {
         let nodes = self.model.chain.nodes.iter();
-        self.detection.distances().zip(nodes).map(|(distance, node)| distance - node.radius - self.model.bulge())
+        self.detection.distances().zip(nodes).map(|(distance, node)| distance - node.radius)
     }
 
     /// The proxy's pose at the last configuration measured.

@@ -48,7 +48,7 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
         if clearance > motion {
             continue;
         }
-        let radius = (clearance + node.radius).abs() + 2.0 * motion + 2.0 * model.bulge();
+        let radius = (clearance + node.radius).abs() + 2.0 * motion;
         for_triangles_within(model, *x - model.centre, radius, |t| {
             model.object.triangles[t as usize].iter().for_each(|&node| marked[node as usize] = true);
         });
@@ -70,14 +70,9 @@ pub(super) fn covers(
     let mut within = equilibrium.forces.iter().all(|force| covered(force.node));
     for (i, distance) in detection.distances().enumerate() {
         if equilibrium.touches.iter().any(|touch| touch.proxy_node as usize == i) {
-            for_triangles_within(
-                model,
-                detection.nodes()[i],
-                distance.abs() + 2.0 * moved + 2.0 * model.blending,
-                |t| {
-                    within &= model.object.triangles[t as usize].iter().all(|&node| covered(node));
-                },
-            );
+            for_triangles_within(model, detection.nodes()[i], distance.abs() + 2.0 * moved, |t| {
+                within &= model.object.triangles[t as usize].iter().all(|&node| covered(node));
+            });
         }
     }
     within

@@ -9,9 +9,8 @@
 //!
 //! The walls of a ball are springs in series ([`super::series`]), whose compliance is simple: (1 - e) / kc in common, and e / kc each.
 
-use super::blend::together;
 use super::cholesky;
-use super::depth::{Contact, first_order};
+use super::depth::Contact;
 use super::rows::add_rows;
 use super::springs::{Springs, add_on_nodes, nodes_of};
 use super::support::Support;
@@ -107,13 +106,16 @@ impl Relief {
 /// What `displacement` on the support deepens a spring by, to first order [m].
 fn change(springs: Springs, spring: &Range<usize>, displacement: &[f64]) -> f64 {
     let rows = &springs.contacts[spring.clone()];
-    first_order(rows, |k| nodes_of(displacement, springs.slots[spring.start + k]))
+    rows.iter()
+        .zip(&springs.slots[spring.clone()])
+        .map(|(row, &slots)| row.deepening(nodes_of(displacement, slots)))
+        .sum()
 }
 
 /// What one spring gives way by under what another bears, times kc [1].
 fn compliance(springs: Springs, one: &Range<usize>, other: &Range<usize>) -> f64 {
     let (a, b): (&Contact, &Contact) = (&springs.contacts[one.start], &springs.contacts[other.start]);
-    match (one == other, a.wall.is_some() && together(a, b)) {
+    match (one == other, a.shares_ball(b)) {
         (true, _) => 1.0,
         (false, true) => 1.0 - WALL_COMPLIANCE,
         (false, false) => 0.0,

@@ -8,7 +8,6 @@
 //! `1 / (1 - e + e / n)`, at most 1 / (1 - e). Walls less deep than 1 - e of the deepest bear nothing. E is convex in the depths, and its
 //! gradient is continuous, where the depth of the nearest wall alone would have kinks, on which nothing balances.
 
-use super::blend::together;
 use super::depth::Contact;
 use crate::tolerances::WALL_COMPLIANCE;
 
@@ -41,7 +40,7 @@ pub fn bear(depth: impl Fn(usize) -> f64, pushes: &mut [f64]) {
 
 /// Sets what all walls of `contacts` bear at their depths; `pushes` is room for it.
 pub fn share_out(contacts: &mut [Contact], pushes: &mut Vec<f64>) {
-    for rows in contacts.chunk_by_mut(together) {
+    for rows in contacts.chunk_by_mut(Contact::shares_ball) {
         if rows[0].wall.is_none() {
             continue;
         }

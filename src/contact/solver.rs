@@ -123,11 +123,7 @@ impl<'a> Solver<'a> {
 
     /// The gap of the configuration posed last, which detection takes up [m].
     fn take_up(&mut self) -> f64 {
-        let distance = self.detection.take_up(self.model, &self.pose.nodes);
-        if self.model.blending == 0.0 || !distance.is_finite() {
-            return distance;
-        }
-        self.detection.gap(self.model)
+        self.detection.take_up(self.model, &self.pose.nodes)
     }
 
     /// Displacement u of the surface nodes at the last configuration solved, three numbers a node [m].
@@ -168,20 +164,13 @@ impl<'a> Solver<'a> {
             proxy_node: contact.proxy_node,
             nodes: contact.nodes,
             weights: contact.weights,
-            force: contact.normal * (self.model.kc * contact.share * contact.bears()),
+            force: contact.normal * (self.model.kc * contact.bears()),
         }));
         for touch in &equilibrium.touches {
             for (&node, weight) in touch.nodes.iter().zip(touch.weights) {
                 if weight != 0.0 {
                     push(&mut self.node_forces, &mut self.marked, &mut self.touched, node, -touch.force * weight);
                 }
-            }
-        }
-        // What stretches triangles has no net force: the proxy does not feel it.
-        for contact in state.contacts.iter().filter(|c| c.depth > 0.0 && c.stretch != 0.0) {
-            let tension = -self.model.kc * contact.depth * contact.stretch;
-            for (node, gradient) in contact.nodes.into_iter().zip(contact.curvature.gradients) {
-                push(&mut self.node_forces, &mut self.marked, &mut self.touched, node, gradient * tension);
             }
         }
         outcome

@@ -1,6 +1,5 @@
 //! The contact springs on the support: their forces, and products with the Hessian of their energy.
 
-use super::blend::{RowChange, deepening, together, vary};
 use super::depth::{Contact, second_variation, stiffness_product};
 use super::series::common_change;
 use crate::tolerances::WALL_COMPLIANCE;
@@ -32,7 +31,7 @@ impl<'a> Springs<'a> {
     /// Visits the rows of each depth, with the place of the first.
     pub fn for_each_depth(self, mut visit: impl FnMut(usize, &'a [Contact])) {
         let mut first = 0;
-        for rows in self.contacts.chunk_by(together) {
+        for rows in self.contacts.chunk_by(Contact::shares_ball) {
             visit(first, rows);
             first += rows.len();
         }
@@ -59,13 +58,7 @@ impl<'a> Springs<'a> {
 }
 
 /// Adds B p, the product of the Hessian of the contact terms with the displacement `p` on the support, to `product`.
-pub fn add_contact_hessian(
-    springs: Springs,
-    touching: &[bool],
-    p: &[f64],
-    own: &mut Vec<RowChange>,
-    product: &mut [f64],
-) {
+pub fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], product: &mut [f64]) {
     springs.for_each_depth(|first, rows| {
         let multiplier = rows[0].multiplier;
         if rows[0].wall.is_some() {
@@ -89,18 +82,8 @@ pub fn add_contact_hessian(
             return;
         }
         let kc = if touching[first] { springs.kc } else { 0.0 };
-        if let [contact] = rows
-            && contact.part.is_none()
-        {
-            let slots = springs.slots[first];
-            return add_on_nodes(stiffness_product(contact, kc, nodes_of(p, slots)), slots, product);
-        }
-        let v = |k: usize| nodes_of(p, springs.slots[first + k]);
-        let push = kc * deepening(rows, v, own);
-        vary(rows, v, own, |k, bend| {
-            let spread = rows[k].spread(push);
-            add_on_nodes([0, 1, 2].map(|j| spread[j] + bend[j] * multiplier), springs.slots[first + k], product);
-        });
+        let slots = springs.slots[first];
+        add_on_nodes(stiffness_product(&rows[0], kc, nodes_of(p, slots)), slots, product);
     });
 }
 

@@ -46,9 +46,8 @@ impl DeviceModel {
     /// When a buffer exceeds the device's limits or memory.
     pub fn new(context: &Context, model: &contact::Model<'_>) -> Result<Self, GpuError> {
         let contact::Model { object, chain, compliance, contact, .. } = model;
-        let unsupported = [("blending", model.blending > 0.0), ("updates", contact.updates > 0)];
-        if let Some((what, _)) = unsupported.into_iter().find(|(_, asked)| *asked) {
-            return Err(GpuError::Unsupported(what));
+        if contact.updates > 0 {
+            return Err(GpuError::Unsupported("updates"));
         }
         if !compliance.is_whole() && contact.algorithm == Algorithm::Paper {
             return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });

@@ -39,7 +39,7 @@ pub struct ProxyNode {
     pub position: DVec3,
     /// Columns of J_i, one per joint [m/rad, or 1].
     pub jacobian: Vec<DVec3>,
-    /// What it touches: nothing, one feature of the surface, or all that its radius or its blended depth involve.
+    /// What it touches: nothing, one feature of the surface, or all that its radius involves.
     pub contacts: Vec<Contact>,
 }
 

@@ -282,9 +282,8 @@ impl Pilot {
             ),
         };
         format!(
-            "{aim}, is out of reach: {reached}, {falls}. What would help: a larger error, a grid over a smaller or shallower range \
-             (deep contact has several equilibria, between which torque jumps on any grid), or [contact] blending = \"mesh\" where \
-             the object is a mesh that points touch. Nothing was baked"
+            "{aim}, is out of reach: {reached}, {falls}. What would help: a larger error or a grid over a smaller or shallower \
+             range (deep contact has several equilibria, between which torque jumps on any grid). Nothing was baked"
         )
     }
 }

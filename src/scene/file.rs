@@ -120,7 +120,6 @@ pub(super) struct ContactTable {
     pub tolerance: Option<Number>,
     pub max_iterations: Option<Spanned<u32>>,
     pub updates: Option<Spanned<u32>>,
-    pub blending: Option<Spanned<NumberOr<Mesh>>>,
 }
 
 #[derive(Deserialize)]
@@ -305,14 +304,6 @@ pub(super) struct Rigid;
 
 impl Word for Rigid {
     const WORD: &'static str = "rigid";
-}
-
-/// As the object's mesh suggests.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Mesh;
-
-impl Word for Mesh {
-    const WORD: &'static str = "mesh";
 }
 
 impl<'de, W: Word> Deserialize<'de> for NumberOr<W> {

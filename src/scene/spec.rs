@@ -184,18 +184,6 @@ pub struct ContactSpec {
     pub max_iterations: u32,
     /// How often linearised contact takes its geometry anew, at the displacement found.
     pub updates: u32,
-    /// Over what width facets pass into each other for nodes without a radius.
-    pub blending: Blending,
-}
-
-/// Over what width along the surface its facets pass into each other, for proxy nodes without a radius, so that their depth has
-/// a continuous gradient.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Blending {
-    /// As the mesh suggests: half its mean edge, less where the object is thin.
-    Mesh,
-    /// So much; zero leaves facets as they are [m].
-    Width(f64),
 }
 
 /// How equation (2) is solved for one configuration.

@@ -4,7 +4,6 @@
 
 mod analytic;
 mod balance;
-mod blending;
 mod comparison;
 mod convex;
 mod fixture;

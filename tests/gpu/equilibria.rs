@@ -9,7 +9,7 @@ use haptize::{
     haptize::Backend,
     object::{Compliance, Object},
     proxy::Chain,
-    scene::{Algorithm, Blending, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
+    scene::{Algorithm, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
     tolerances::{FACET_ROUNDING, GPU_SETTLED_RESIDUAL, WALL_COMPLIANCE},
 };
 
@@ -348,20 +348,15 @@ fn no_configuration_is_no_work() {
     assert!(GpuSolver::new(context(), &model).unwrap().solve(&[]).unwrap().is_empty());
 }
 
-/// The kernels freeze geometry once and know facets as they are: a scene that asks for more is refused, and left to the CPU where
-/// the choice is free.
+/// The kernels freeze geometry once: a scene that asks for more is refused, and left to the CPU where the choice is free.
 #[test]
-fn updates_and_blending_are_refused() {
+fn updates_are_refused() {
     let (scene, object, chain) = load("sphere.toml");
     let mut model = Model::new(&object, &chain, scene.contact);
     assert!(GpuSolver::new(context(), &model).is_ok());
     model.contact.updates = 1;
     let refusal = GpuSolver::new(context(), &model).err().unwrap();
     assert!(matches!(refusal, GpuError::Unsupported("updates")), "{refusal}");
-    model.contact.updates = 0;
-    model.set_blending(Blending::Mesh);
-    let refusal = GpuSolver::new(context(), &model).err().unwrap();
-    assert!(matches!(refusal, GpuError::Unsupported("blending")), "{refusal}");
 }
 
 /// Every hard case of contact that the CPU keeps: stiffness, exact places and awkward ones, slivers, units, a kilometre from the

@@ -74,22 +74,21 @@ impl EnergySearch {
         direction: DVec3,
     ) -> Outcome {
         let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
-        detection.take_up(model, nodes);
+        let mut gap = detection.take_up(model, nodes);
         let mut moved = nodes.to_vec();
         let mut move_out = |detection: &mut Detection, way: f64| {
             for (moved, node) in moved.iter_mut().zip(nodes) {
                 *moved = *node + direction * way;
             }
-            detection.take_up(model, &moved);
+            detection.take_up(model, &moved)
         };
         let mut way = 0.0;
         for _ in 0..RETREATS {
-            let gap = detection.gap(model);
             if gap >= 0.0 {
                 break;
             }
             way -= gap;
-            move_out(detection, way);
+            gap = move_out(detection, way);
         }
         detection.rounding = if gently { GENTLE_ROUNDING } else { FACET_ROUNDING };
         self.start(model, detection, Geometry::Deformed);

@@ -91,7 +91,7 @@ impl Sample {
         let mut displacement = vec![0.0; force.len()];
         self.support.multiply(force, &mut displacement);
         let mut product: Vec<f64> = force.iter().map(|force| stiffening * force).collect();
-        add_contact_hessian(self.springs(), &self.touching(), &displacement, &mut Vec::new(), &mut product);
+        add_contact_hessian(self.springs(), &self.touching(), &displacement, &mut product);
         product
     }
 }

@@ -11,7 +11,7 @@ mod scan;
 use super::check::Checker;
 use super::error::SceneError;
 use super::file::{ContactTable, NumberOr, SceneTable};
-use super::{Algorithm, Blending, ContactSpec, Rendering, ScanScene, Scene};
+use super::{Algorithm, ContactSpec, Rendering, ScanScene, Scene};
 use toml::Spanned;
 
 /// Default relative residual of the contact solver, in the energy norm [1]. Forces are promised to balance K u to 1e-6 of the
@@ -86,21 +86,6 @@ fn updates(checker: &Checker<'_>, table: &ContactTable) -> Result<u32, SceneErro
     Ok(*value.get_ref())
 }
 
-fn blending(checker: &Checker<'_>, table: &ContactTable) -> Result<Blending, SceneError> {
-    let Some(value) = &table.blending else { return Ok(Blending::Width(0.0)) };
-    if table.algorithm == Some(Algorithm::Paper) {
-        let reason =
-            "blending acts on the energy form: the paper's iteration takes facets as they are; leave one of them out";
-        return Err(checker.error(value.span(), reason));
-    }
-    match value.get_ref() {
-        NumberOr::Number(width) => {
-            Ok(Blending::Width(checker.not_negative("blending", &Spanned::new(value.span(), *width))?))
-        }
-        NumberOr::Word(_) => Ok(Blending::Mesh),
-    }
-}
-
 fn contact(checker: &Checker<'_>, table: &ContactTable) -> Result<ContactSpec, SceneError> {
     let tolerance = table.tolerance.as_ref().map(|value| checker.between("tolerance", value, 0.0, 1.0));
     let max_iterations = match &table.max_iterations {
@@ -119,6 +104,5 @@ fn contact(checker: &Checker<'_>, table: &ContactTable) -> Result<ContactSpec, S
         tolerance: tolerance.unwrap_or(Ok(CONTACT_TOLERANCE))?,
         max_iterations,
         updates: updates(checker, table)?,
-        blending: blending(checker, table)?,
     })
 }

@@ -1,6 +1,6 @@
 //! Every combination of contact stiffness, ground, springs, resolution and node radius, on random configurations: what share
 //! converges, with how many iterations, in what time; that E never rises and no number breaks. Beside it the same on the GPU, of the
-//! fine surface a tenth, and a tenth of all with blended facets and by the paper's iteration.
+//! fine surface a tenth, and a tenth of all by the paper's iteration.
 
 use super::super::{Bound, Effort, Failure, Outcome, Setting};
 use super::processor::Processor;
@@ -9,7 +9,7 @@ use crate::{
     JointVector,
     contact::{Model, Solver, Status},
     gpu::{Context, GpuError},
-    scene::{Algorithm, Blending, SpringKind},
+    scene::{Algorithm, SpringKind},
 };
 use rayon::prelude::*;
 use std::{
@@ -58,7 +58,6 @@ struct Cell {
     least: Option<(f64, String)>,
     iterations: Vec<u32>,
     paper: Share,
-    blended: Share,
     gpu: Share,
     gpu_on_cpu: usize,
     /// Combinations whose compliance the adapter does not bind.
@@ -102,24 +101,20 @@ pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
         outcomes.push(cell.outcome(stiffness, radius == 1, from, to, share));
     }
     for (depth, (from, to, least)) in DEPTHS.into_iter().enumerate() {
-        let (mut blended, mut gpu, mut too_large) = (Share::default(), Share::default(), 0);
+        let (mut gpu, mut too_large) = (Share::default(), 0);
         for cell in cells.iter().skip(depth).step_by(DEPTHS.len()) {
-            blended += cell.blended;
             gpu += cell.gpu;
             too_large += cell.gpu_too_large;
         }
-        let outcome = |how: &str, share: Share, note: String| Outcome {
-            case: "stiffness".into(),
-            varied: format!("all of these, {how}, depth {from} to {to} R"),
-            measure: "share converged [1]".into(),
-            worst: share.part(),
-            bound: Bound::AtLeast(least),
-            note,
-        };
-        outcomes.push(outcome("blended", blended, format!("{} solved", blended.solved)));
         if setting.gpu.is_some() {
-            let note = format!("{} solved, {too_large} combinations too large for the adapter", gpu.solved);
-            outcomes.push(outcome("on the GPU", gpu, note));
+            outcomes.push(Outcome {
+                case: "stiffness".into(),
+                varied: format!("all of these, on the GPU, depth {from} to {to} R"),
+                measure: "share converged [1]".into(),
+                worst: gpu.part(),
+                bound: Bound::AtLeast(least),
+                note: format!("{} solved, {too_large} combinations too large for the adapter", gpu.solved),
+            });
         }
     }
     let figure = |varied: &str, measure: &str, worst: f64, bound: f64| Outcome {
@@ -161,13 +156,10 @@ impl Cell {
         let percent = |share: Share| 100.0 * share.part();
         let each = |share: Share| 1e6 * share.time.as_secs_f64() / share.solved.max(1) as f64;
         let mut note = format!(
-            "worst with {which}; {:.1} % of all {}, {median}/{most} iterations (median/max), {:.0} us; blended {:.0} %, {:.0} us; \
-             paper {:.0} %, {:.0} us",
+            "worst with {which}; {:.1} % of all {}, {median}/{most} iterations (median/max), {:.0} us; paper {:.0} %, {:.0} us",
             percent(self.all),
             self.all.solved,
             each(self.all),
-            percent(self.blended),
-            each(self.blended),
             percent(self.paper),
             each(self.paper),
         );
@@ -243,9 +235,6 @@ fn combination(
                     let nodes = rings * rings + 2;
                     cell.least = Some((share, format!("{nodes} nodes, {springs:?}, Kg {ground} on {held}")));
                 }
-                model.set_blending(Blending::Mesh);
-                cell.blended += tenth(&model, &configurations);
-                model.set_blending(Blending::Width(0.0));
                 model.contact.algorithm = Algorithm::Paper;
                 cell.paper += tenth(&model, &configurations);
                 model.contact.algorithm = Algorithm::Energy;

@@ -7,8 +7,8 @@ use crate::{
     object::Object,
     proxy::Chain,
     scene::{
-        Algorithm, Blending, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec,
-        ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
+        Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
+        ProxySpec, Shape, SpringKind, SpringSpec,
     },
 };
 use glam::DVec3;
@@ -195,12 +195,5 @@ pub fn pressed(model: &Model<'_>, seed: u64, count: usize, least: f64, most: f64
 /// The energy form with contact springs Kc [N/m]; infinity is rigid.
 #[must_use]
 pub fn contact(stiffness: f64) -> ContactSpec {
-    ContactSpec {
-        stiffness,
-        algorithm: Algorithm::Energy,
-        tolerance: 1e-8,
-        max_iterations: ITERATIONS,
-        updates: 0,
-        blending: Blending::Width(0.0),
-    }
+    ContactSpec { stiffness, algorithm: Algorithm::Energy, tolerance: 1e-8, max_iterations: ITERATIONS, updates: 0 }
 }
