@@ -50,19 +50,21 @@ fn diagnostic(text: &str) -> Diagnostic {
 }
 
 #[test]
-fn sphere_scene_has_the_paper_s_grid() {
-    let scene = shipped("sphere.toml");
-    assert_eq!(scene.proxy.joints.len(), 3);
-    assert_eq!(scene.grid.axes.iter().map(|axis| axis.count).product::<usize>(), 8_064);
-    for axis in &scene.grid.axes {
-        assert!((axis.step - std::f64::consts::PI / 60.0).abs() < 1e-15);
+fn spheres_have_the_papers_grid() {
+    for name in ["paper.toml", "sphere.toml"] {
+        let scene = shipped(name);
+        assert_eq!(scene.proxy.joints.len(), 3, "{name}");
+        assert_eq!(scene.grid.axes.iter().map(|axis| axis.count).product::<usize>(), 8_064, "{name}");
+        for axis in &scene.grid.axes {
+            assert!((axis.step - std::f64::consts::PI / 60.0).abs() < 1e-15, "{name}");
+        }
+        assert!(scene.graphics.is_some(), "{name}");
     }
-    assert!(scene.graphics.is_some());
 }
 
 #[test]
 fn shipped_motions_stay_within_the_grid() {
-    for name in ["sphere.toml", "mesh.toml"] {
+    for name in ["paper.toml", "sphere.toml", "mesh.toml"] {
         let scene = shipped(name);
         assert!(!scene.motion.press.is_empty() && !scene.motion.scrape.is_empty(), "{name}");
         for waypoint in scene.motion.press.iter().chain(&scene.motion.scrape) {
