@@ -457,14 +457,9 @@ pub const LEVER_ARM: f64 = 0.1;
 /// still above what rounding leaves of a residual (about 1e-13).
 pub const REFERENCE_TOLERANCE: f64 = 1e-11;
 
-/// Share of an error to stay below that the grid's spacing may have, as the measured order foretells it [1]; what filling and
-/// the solver add is independent of it and adds as squares, so that 0.6 is left for them and for the order's own error.
+/// Share of an error to stay below that the grid's spacing may have, as the measured order predicts it [1]; what the solver adds
+/// is independent of it and adds as squares, so that 0.6 is left for the solver and for the error of the order itself.
 pub const SPACING_SHARE: f64 = 0.8;
-
-/// Share of an rms error to stay below by which points may differ from what coarser grids foretell, and still be filled [1]:
-/// most differ by far less, and the rms over all points, with those that were solved, is a fraction of it. See
-/// [`SPACING_SHARE`].
-pub const FILL_SHARE: f64 = 1.0;
 
 /// Share of an error to stay below that the contact solver's tolerance may have [1]. See [`SPACING_SHARE`].
 pub const SOLVER_SHARE: f64 = 0.05;

@@ -46,12 +46,6 @@ fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
     assert!(front.windows(2).all(|pair| pair[0].solved <= pair[1].solved && pair[0].rms >= pair[1].rms));
     let better = |a: &accuracy::Row, b: &accuracy::Row| a.solved <= b.solved && a.rms <= b.rms;
     assert!(found.of(Study::Spacing).all(|row| front.iter().any(|best| better(best, row))));
-    // What filling saves is told of rows that are there, and err no more.
-    assert!(found.of(Study::Spacing).any(|row| row.series == "filled" && row.solved < row.points));
-    if let Some(saving) = found.saving() {
-        assert!(saving.uniform.worst <= saving.filled.worst && saving.uniform.series == "potential");
-        assert_eq!(saving.times, saving.uniform.solved as f64 / saving.filled.solved as f64);
-    }
     // An offer that was measured keeps its promise.
     let offers = accuracy::offers(&found);
     assert!(offers.iter().any(|offer| offer.measured) && offers.iter().any(|offer| !offer.measured));

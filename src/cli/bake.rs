@@ -105,15 +105,11 @@ pub fn warn(report: &SweepReport) {
 
 /// What was baked into `file`, for people.
 pub fn describe(text: &mut String, file: &Path, report: &SweepReport) -> fmt::Result {
-    let SweepReport { points, contact_points, filled_points, unconverged, overflowed, .. } = report;
+    let SweepReport { points, contact_points, unconverged, overflowed, .. } = report;
     let SweepReport { seconds, configurations_per_second, algorithm, backend, adapter, left_to_cpu, .. } = report;
     let Iterations { mean, max } = report.iterations;
     let lost = unconverged + overflowed;
     writeln!(text, "{}: {points} points, {contact_points} in contact, {lost} not converged", file.display())?;
-    if *filled_points > 0 {
-        let solved = contact_points - filled_points;
-        writeln!(text, "  filled       {filled_points} of those in contact, between {solved} that were solved")?;
-    }
     writeln!(
         text,
         "  solved       in {seconds:.2} s, {configurations_per_second:.0} configurations a second, {algorithm} on \

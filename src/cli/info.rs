@@ -40,12 +40,9 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
     }
     let counts = &summary.statuses;
     write!(text, "  status       {} free, {} in contact", counts.free, counts.contact)?;
-    for (count, word) in [
-        (counts.unconverged, "unconverged"),
-        (counts.overflow, "overflowed"),
-        (counts.outside, "outside"),
-        (counts.filled, "filled between those that were solved"),
-    ] {
+    for (count, word) in
+        [(counts.unconverged, "unconverged"), (counts.overflow, "overflowed"), (counts.outside, "outside")]
+    {
         if count > 0 {
             write!(text, ", {count} {word}")?;
         }
@@ -81,11 +78,10 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
 
 /// The error that was aimed at, and the one that was found.
 pub fn achieved(text: &mut String, found: &Achieved) -> fmt::Result {
-    let Achieved { aim, rms, worst, torque, interpolation, configurations, in_contact, fill } = found;
+    let Achieved { aim, rms, worst, torque, interpolation, configurations, in_contact } = found;
     writeln!(
         text,
-        "  accuracy     {rms:.2e} N m rms, {:.2} % of the torque's, where {aim:.2e} was to be kept: {}; `{interpolation}`, filled to \
-         {fill:.1e} N m",
+        "  accuracy     {rms:.2e} N m rms, {:.2} % of the torque's, where {aim:.2e} was to be kept: {}; `{interpolation}`",
         100.0 * rms / torque,
         if found.is_kept() { "kept" } else { "missed" }
     )?;

@@ -63,10 +63,7 @@ fn state(pilot: &Pilot, choice: &Choice) {
     );
     let disk = choice.footprint.disk;
     eprintln!(
-        "haptize: predicted: at most {} points solved, what coarser grids foretell to {:.1e} N m is filled; at most {:.0} s, {} to {} on \
-         the disk",
-        choice.points,
-        choice.fill,
+        "haptize: predicted: about {:.0} s, {} to {} on the disk",
         choice.seconds.ceil(),
         bake::megabytes(disk.least),
         bake::megabytes(disk.most),

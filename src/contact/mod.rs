@@ -49,22 +49,20 @@ pub enum Status {
     Overflow = 3,
     /// Not computed, or outside the measured region.
     Outside = 4,
-    /// In contact, not solved: torque, energy and forces are interpolated between configurations around it.
-    Filled = 5,
 }
 
 impl Status {
     /// The status whose number is `number`, if there is one.
     #[must_use]
     pub fn from_number(number: u8) -> Option<Self> {
-        let all = [Self::Free, Self::Contact, Self::Unconverged, Self::Overflow, Self::Outside, Self::Filled];
+        let all = [Self::Free, Self::Contact, Self::Unconverged, Self::Overflow, Self::Outside];
         all.into_iter().nth(number.into())
     }
 
-    /// Whether the proxy touches the object, solved for or not.
+    /// Whether the proxy touches the object, converged or not.
     #[must_use]
     pub fn is_in_contact(self) -> bool {
-        matches!(self, Self::Contact | Self::Filled) || self.is_failed()
+        self == Self::Contact || self.is_failed()
     }
 
     /// Whether there is contact whose torque is not to be trusted.

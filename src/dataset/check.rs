@@ -13,7 +13,8 @@ pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
     length("torque", &dataset.torque, torques)?;
     length("status", &dataset.status, points)?;
     if let Some(point) = dataset.status.iter().position(|&number| Status::from_number(number).is_none()) {
-        return Err(format!("status {} of point {point} is unknown", dataset.status[point]));
+        let number = dataset.status[point];
+        return Err(format!("status {number} of point {point} is unknown to this version; bake the scene again"));
     }
     finite("torque", &dataset.torque, |x: &f64| x.is_finite())?;
     if let Some(energy) = &dataset.energy {

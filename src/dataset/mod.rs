@@ -110,8 +110,6 @@ pub struct Achieved {
     pub torque: f64,
     /// Interpolation that it was found with, as the scene names it.
     pub interpolation: String,
-    /// How far filled points may be from what coarser grids foretell [N m].
-    pub fill: f64,
     /// Random configurations, solved directly.
     pub configurations: usize,
     /// Of these, in contact.

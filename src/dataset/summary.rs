@@ -49,8 +49,6 @@ pub struct StatusCounts {
     pub overflow: usize,
     /// [`Status::Outside`].
     pub outside: usize,
-    /// [`Status::Filled`].
-    pub filled: usize,
 }
 
 impl StatusCounts {
@@ -62,14 +60,13 @@ impl StatusCounts {
             Status::Unconverged => &mut self.unconverged,
             Status::Overflow => &mut self.overflow,
             Status::Outside => &mut self.outside,
-            Status::Filled => &mut self.filled,
         } += 1;
     }
 
-    /// Points at which something touches, converged or not, or filled.
+    /// Points at which something touches, converged or not.
     #[must_use]
     pub fn in_contact(&self) -> usize {
-        self.contact + self.unconverged + self.overflow + self.filled
+        self.contact + self.unconverged + self.overflow
     }
 }
 

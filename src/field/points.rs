@@ -10,7 +10,7 @@ pub(super) struct Point {
     /// Object nodes in contact.
     pub contacts: u32,
     pub flags: Flags,
-    /// A torque is stored: contact, filled, unconverged or overflowed.
+    /// A torque is stored: contact, unconverged or overflowed.
     pub in_contact: bool,
     /// Contact index Ic: that of the nearest point that was computed, lest a missing measurement be taken for a boundary
     /// of the object.
@@ -25,7 +25,7 @@ impl Point {
             u32::try_from(count).unwrap_or(u32::MAX)
         });
         let flags = match status {
-            Status::Free | Status::Contact | Status::Filled => Flags::default(),
+            Status::Free | Status::Contact => Flags::default(),
             Status::Unconverged | Status::Overflow => Flags::UNCONVERGED,
             Status::Outside => Flags::ABSENT,
         };

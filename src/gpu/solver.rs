@@ -194,7 +194,7 @@ impl<'a> GpuSolver<'a> {
                 Status::Contact => result.residual.is_nan() || result.residual > GPU_RESOLVED_RESIDUAL,
                 Status::Unconverged => self.model.contact.algorithm != Algorithm::Paper,
                 Status::Overflow => true,
-                Status::Free | Status::Outside | Status::Filled => false,
+                Status::Free | Status::Outside => false,
             }
     }
 

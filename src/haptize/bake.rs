@@ -40,7 +40,7 @@ pub struct Bake<'a> {
 }
 
 impl Bake<'_> {
-    /// Haptizes into the file `output`, in memory that does not grow with the grid unless the scene has it filled; see
+    /// Haptizes into the file `output`, in memory that does not grow with the grid; see
     /// [`Sweep::bake`].
     ///
     /// # Errors
@@ -67,10 +67,7 @@ impl Bake<'_> {
         let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
         let mut backend = ChosenBackend::open(backend, &model)?;
         let mut sweep = Sweep::new(scene, &object, backend.name(), &backend.adapter(), date)?;
-        match scene.grid.fill {
-            Some(tolerance) => sweep.fill(&model, tolerance)?,
-            None => sweep.skip_free_space(&model)?,
-        }
+        sweep.skip_free_space(&model)?;
         let run = Run { chunk: backend.chunk(), stop, progress };
         Ok(sweep_with(&sweep, &mut backend, run)?)
     }

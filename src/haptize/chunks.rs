@@ -45,19 +45,6 @@ impl Store for Columns {
     }
 }
 
-/// Nowhere: a grid that is filled keeps its results itself.
-impl Store for () {
-    fn append(&mut self, _first: usize, _chunk: &Columns) -> Result<(), SweepError> {
-        Ok(())
-    }
-    fn note(&mut self, _notice: &str) -> Result<(), SweepError> {
-        Ok(())
-    }
-    fn path(&self) -> Option<&Path> {
-        None
-    }
-}
-
 /// What there is of a sweep before a run.
 pub(super) struct Begun {
     pub tally: Tally,

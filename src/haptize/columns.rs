@@ -8,7 +8,7 @@
 
 use crate::contact::{Equilibrium, Status};
 use bytemuck::Pod;
-use std::{collections::TryReserveError, ops::Range};
+use std::collections::TryReserveError;
 
 /// What every point of a sweep has.
 #[derive(Clone, Copy)]
@@ -32,20 +32,6 @@ pub(super) struct Columns {
     pub contacts: Vec<u64>,
     pub nodes: Vec<u32>,
     pub forces: Vec<f32>,
-}
-
-/// What is known of one point.
-#[derive(Clone, Copy)]
-pub(super) struct Entry<'a> {
-    pub torque: &'a [f64],
-    pub energy: f64,
-    pub gap: f32,
-    pub residual: f32,
-    pub iterations: u32,
-    pub status: u8,
-    pub nodes: &'a [u32],
-    /// Three numbers a node.
-    pub forces: &'a [f32],
 }
 
 /// The columns of a block, in their order there.
@@ -188,36 +174,6 @@ impl Columns {
         self.iterations.push(0);
         self.status.push(Status::Free as u8);
         self.contacts.push(0);
-    }
-
-    /// What is known of `point`, whose contacts are `contacts`.
-    pub fn entry(&self, point: usize, joints: usize, contacts: Range<usize>) -> Entry<'_> {
-        Entry {
-            torque: &self.torque[point * joints..(point + 1) * joints],
-            energy: self.energy[point],
-            gap: self.gap[point],
-            residual: self.residual[point],
-            iterations: self.iterations[point],
-            status: self.status[point],
-            forces: &self.forces[3 * contacts.start..3 * contacts.end],
-            nodes: &self.nodes[contacts],
-        }
-    }
-
-    /// Adds what is known of the next point; an error where there is no memory for its contacts.
-    pub fn push_entry(&mut self, entry: Entry<'_>) -> Result<(), TryReserveError> {
-        self.nodes.try_reserve(entry.nodes.len())?;
-        self.forces.try_reserve(entry.forces.len())?;
-        self.torque.extend_from_slice(entry.torque);
-        self.energy.push(entry.energy);
-        self.gap.push(entry.gap);
-        self.residual.push(entry.residual);
-        self.iterations.push(entry.iterations);
-        self.status.push(entry.status);
-        self.contacts.push(entry.nodes.len() as u64);
-        self.nodes.extend_from_slice(entry.nodes);
-        self.forces.extend_from_slice(entry.forces);
-        Ok(())
     }
 
     /// Adds the points of `chunk` behind these; an error where there is no memory for their contacts.

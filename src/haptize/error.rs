@@ -1,6 +1,6 @@
 //! Why a sweep ended early, what was kept of it, and what to do.
 
-use crate::{dataset, field::FieldError};
+use crate::dataset;
 use std::{
     collections::TryReserveError,
     io,
@@ -42,9 +42,6 @@ pub enum SweepError {
         /// Results returned.
         found: usize,
     },
-    /// What was solved cannot be interpolated.
-    #[error("the grid cannot be filled: {0}; leave fill out of [grid] to have all points solved")]
-    Field(#[from] FieldError),
     /// Stopped from outside.
     #[error("stopped after {done} of {points} grid points; {}", remedy(part.as_deref()))]
     Stopped {

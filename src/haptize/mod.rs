@@ -16,7 +16,6 @@ mod inspection;
 mod part;
 mod pilot;
 pub(crate) mod reference;
-mod refinement;
 mod report;
 pub mod scan;
 pub(crate) mod spacing;

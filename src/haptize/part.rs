@@ -14,7 +14,6 @@ use super::{
     tally::Tally,
 };
 use crate::dataset::{Grid, Provenance};
-use bytemuck::pod_collect_to_vec;
 use serde::{Deserialize, Serialize};
 use std::{
     fs::{File, OpenOptions, TryLockError},
@@ -39,9 +38,6 @@ pub(super) struct Binding {
     pub scene: String,
     /// CRC-32 of the object's surface at rest: it may come from a mesh file, whose contents the scene does not hold.
     pub surface: u32,
-    /// How far filled points may be from what coarser grids foretell [N m]; absent where all points are solved.
-    #[serde(default)]
-    pub fill: Option<f64>,
     pub provenance: Provenance,
 }
 
@@ -57,7 +53,6 @@ impl Binding {
             ("another tolerance", mine.tolerance != its.tolerance),
             ("another grid", self.grid != other.grid),
             ("another mesh", self.surface != other.surface),
-            ("another fill", self.fill != other.fill),
             ("another text of the scene", self.scene != other.scene),
         ];
         differences.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
@@ -151,26 +146,6 @@ impl Part {
         body.iter().for_each(|piece| hasher.update(piece));
         self.file.write_all(&[&(length as u64).to_le_bytes()[..], &hasher.finalize().to_le_bytes()].concat())?;
         body.iter().try_for_each(|piece| self.file.write_all(piece))
-    }
-
-    /// All points, in the order in which they were added.
-    pub fn all(&self, joints: usize) -> io::Result<Columns> {
-        let bytes = |section| -> io::Result<Vec<u8>> {
-            let mut bytes = Vec::new();
-            self.column(section, joints, &mut |column| column.read_to_end(&mut bytes).map(drop))?;
-            Ok(bytes)
-        };
-        Ok(Columns {
-            torque: pod_collect_to_vec(&bytes(Section::Torque)?),
-            energy: pod_collect_to_vec(&bytes(Section::Energy)?),
-            gap: pod_collect_to_vec(&bytes(Section::Gap)?),
-            residual: pod_collect_to_vec(&bytes(Section::Residual)?),
-            iterations: pod_collect_to_vec(&bytes(Section::Iterations)?),
-            status: bytes(Section::Status)?,
-            contacts: pod_collect_to_vec(&bytes(Section::Contacts)?),
-            nodes: pod_collect_to_vec(&bytes(Section::Nodes)?),
-            forces: pod_collect_to_vec(&bytes(Section::Forces)?),
-        })
     }
 
     /// Hands the bytes of one column of all points, block by block, to `take`, which reads all of them.

@@ -2,7 +2,7 @@
 //!
 //! The pilot bakes some coarse grids over the scene's region, holds them against directly solved random configurations, and
 //! measures how the error falls with the spacing: `error ~ h^p`. The spacing that is needed follows, for each interpolation; the
-//! one with the fewest grid points is taken. Its grid is filled where coarser ones foretell it (`refinement/mod.rs`).
+//! one with the fewest grid points is taken.
 //!
 //! *The error* is the rms of the torque's over the region, in contact or not, as in `haptize accuracy`; relative ones are relative to
 //! the rms of the torque itself. Where torque jumps, the worst error is as large as the jump on any grid: it is reported, and
@@ -11,7 +11,6 @@
 use super::{
     BackendChoice, Bake, BakeError, ChosenBackend, Footprint, Sweep,
     reference::{Reference, ReferenceError, equilibria},
-    refinement::COARSEST,
     sample, spacing,
 };
 use crate::{
@@ -21,7 +20,7 @@ use crate::{
     object::{Object, ObjectError},
     proxy::Chain,
     scene::{ContactSpec, Interpolation, Scene, SceneError},
-    tolerances::{FARTHEST_EXTRAPOLATION, FILL_SHARE, SOLVER_SHARE, SPACING_SHARE},
+    tolerances::{FARTHEST_EXTRAPOLATION, SOLVER_SHARE, SPACING_SHARE},
 };
 use serde::Serialize;
 use std::{fmt, path::Path, str::FromStr, sync::atomic::AtomicBool, time::Instant};
@@ -127,13 +126,11 @@ pub struct Choice {
     pub interpolation: &'static str,
     /// Geometric mean of the spacings [rad or m].
     pub spacing: f64,
-    /// Grid points; of which at most as many are solved.
+    /// Grid points.
     pub points: usize,
     /// Tolerance of the solver [1].
     pub tolerance: f64,
-    /// Tolerance of filling [N m].
-    pub fill: f64,
-    /// Time that solving all points would take: filling takes less [s].
+    /// Time that the bake takes, at the pilot's rate [s].
     pub seconds: f64,
     /// Memory and disk.
     pub footprint: Footprint,
@@ -194,8 +191,7 @@ impl Pilot {
         let finest = (spacing::points(scene) as f64 / PILOT_POINTS).powf(1.0 / joints as f64).max(1.0);
         let (mut trials, mut seconds_per_point) = (Vec::new(), 0.0);
         for coarser in COARSER {
-            let mut spaced = spacing::spaced(scene, |steps| (steps / (finest * coarser)).round());
-            spaced.grid.fill = None;
+            let spaced = spacing::spaced(scene, |steps| (steps / (finest * coarser)).round());
             let points = spacing::points(&spaced);
             if trials.last().is_some_and(|trial: &Trial| trial.points == points) {
                 continue;
@@ -239,11 +235,8 @@ impl Pilot {
             return Err(PilotError::OutOfReach(self.refusal(limit)));
         };
         let finest = self.trials.first().map_or(1.0, |trial| trial.spacing);
-        let fill = FILL_SHARE * self.aim;
         let coarser = finest / best.finer / spacing::spacing_of(scene);
-        let multiples = |steps: f64| (steps / (coarser * COARSEST as f64)).ceil();
-        let mut chosen = spacing::spaced(scene, |steps| COARSEST as f64 * multiples(steps).max(1.0));
-        chosen.grid.fill = Some(fill);
+        let mut chosen = spacing::spaced(scene, |steps| (steps / coarser).ceil());
         chosen.contact.tolerance = self.tolerance;
         let interpolation = Interpolation::ALL.into_iter().find(|i| i.name() == best.interpolation);
         chosen.haptics.interpolation = interpolation.unwrap_or(scene.haptics.interpolation);
@@ -254,7 +247,6 @@ impl Pilot {
             spacing: spacing::spacing_of(&chosen),
             points,
             tolerance: self.tolerance,
-            fill,
             seconds: self.seconds_per_point * points as f64,
             footprint: footprint(&chosen, backend)?,
             scene: chosen,
@@ -340,10 +332,7 @@ fn footprint(scene: &Scene, backend: BackendChoice) -> Result<Footprint, PilotEr
     let model =
         Model::reaching(&ground.object, &ground.chain, scene.contact, &sample(scene)).map_err(BakeError::from)?;
     let backend = ChosenBackend::open(backend, &model).map_err(BakeError::from)?;
-    let mut sweep = Sweep::new(scene, &ground.object, "", "", "").map_err(BakeError::from)?;
-    if let Some(fill) = scene.grid.fill {
-        sweep.fill(&model, fill).map_err(BakeError::from)?;
-    }
+    let sweep = Sweep::new(scene, &ground.object, "", "", "").map_err(BakeError::from)?;
     Ok(sweep.footprint(backend.chunk(), false))
 }
 
@@ -365,7 +354,6 @@ pub fn verify(file: &Path, pilot: &Pilot, choice: &Choice) -> Result<Achieved, P
         worst,
         torque: reference.torque,
         interpolation: choice.interpolation.to_owned(),
-        fill: choice.fill,
         configurations: reference.exact.len(),
         in_contact: reference.in_contact,
     };

@@ -10,10 +10,8 @@ use std::time::Duration;
 pub struct SweepReport {
     /// Grid points.
     pub points: usize,
-    /// Points in contact, converged or not, or filled.
+    /// Points in contact, converged or not.
     pub contact_points: usize,
-    /// Of these, not solved but filled between those that were.
-    pub filled_points: usize,
     /// Of these, not converged.
     pub unconverged: usize,
     /// Of these, with more contacts than the solver has room for.
@@ -44,7 +42,7 @@ pub struct SweepReport {
     pub warnings: Vec<String>,
 }
 
-/// Iterations of the points in contact that were solved.
+/// Iterations of the points in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Iterations {
     /// Mean; 0 where nothing touches.
@@ -61,12 +59,11 @@ impl SweepReport {
         Self {
             points: tally.points,
             contact_points,
-            filled_points: tally.statuses.filled,
             unconverged: tally.statuses.unconverged,
             overflowed: tally.statuses.overflow,
             max_residual: tally.max_residual.into(),
             iterations: Iterations {
-                mean: tally.iterations as f64 / (contact_points - tally.statuses.filled).max(1) as f64,
+                mean: tally.iterations as f64 / contact_points.max(1) as f64,
                 max: tally.max_iterations,
             },
             skipped_points,
@@ -89,7 +86,7 @@ pub(super) struct RunFacts {
     pub footprint: Footprint,
     pub skipped_points: usize,
     pub resumed_points: usize,
-    /// By this run, with those that it skipped where it goes through the grid point by point.
+    /// By this run, with those that it skipped.
     pub solved_points: usize,
     /// By the backend.
     pub left_to_cpu: usize,

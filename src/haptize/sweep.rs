@@ -1,5 +1,4 @@
-//! A sweep: equation (2) solved at every point of a grid in C-space, in chunks, by any [`Backend`]; or where it is needed
-//! ([`Sweep::fill`]).
+//! A sweep: equation (2) solved at every point of a grid in C-space, in chunks, by any [`Backend`].
 //!
 //! Each configuration is solved on its own, so the dataset depends neither on the number of threads nor on how the grid
 //! is cut into chunks, and an interrupted sweep continues where it stopped (see [`Sweep::bake`]).
@@ -11,7 +10,6 @@ use super::{
     columns::{Columns, Shape},
     footprint::{self, Bounds},
     part::{Binding, Part},
-    refinement::{self, Filling, Kept},
     tally::Tally,
 };
 use crate::{
@@ -63,8 +61,6 @@ pub struct Sweep<'a> {
     pub(super) warnings: Vec<String>,
     /// By which free space is found; `None` where all points are solved.
     model: Option<&'a Model<'a>>,
-    /// Where points are filled.
-    filling: Option<Filling<'a>>,
     /// Number of nodes of the proxy.
     pub(super) proxy_nodes: usize,
 }
@@ -122,7 +118,6 @@ impl<'a> Sweep<'a> {
             },
             warnings: object.warnings.clone(),
             model: None,
-            filling: None,
             proxy_nodes: scene.proxy.joints.iter().map(|joint| joint.nodes.len()).sum(),
         })
     }
@@ -133,31 +128,11 @@ impl<'a> Sweep<'a> {
     /// # Errors
     /// [`SweepError::Grid`] when the model's proxy has other joints.
     pub fn skip_free_space(&mut self, model: &'a Model<'a>) -> Result<(), SweepError> {
-        self.fits(model)?;
-        self.model = Some(model);
-        Ok(())
-    }
-
-    /// Solves every fourth grid line along each axis, and between them what those do not foretell to `tolerance`; all other
-    /// points in contact are filled, [`Status::Filled`](crate::contact::Status::Filled). `model` is that of the scene. Memory
-    /// then grows with the grid, also where the results go to a file.
-    ///
-    /// Distances of torques are Euclidean over the joints; a prismatic one counts with [`LEVER_ARM`](crate::tolerances::LEVER_ARM) [N m].
-    ///
-    /// # Errors
-    /// [`SweepError::Grid`] when the model's proxy has other joints, or the grid's steps along an axis are no multiple of four.
-    pub fn fill(&mut self, model: &'a Model<'a>, tolerance: f64) -> Result<(), SweepError> {
-        self.fits(model)?;
-        refinement::check(&self.grid).map_err(SweepError::Grid)?;
-        self.filling = Some(Filling { model, tolerance });
-        Ok(())
-    }
-
-    fn fits(&self, model: &Model<'_>) -> Result<(), SweepError> {
         let joints = model.chain.joints.len();
         if joints != self.grid.joints() {
             return Err(SweepError::Grid(format!("{} axes for {joints} joints", self.grid.joints())));
         }
+        self.model = Some(model);
         Ok(())
     }
 
@@ -170,9 +145,6 @@ impl<'a> Sweep<'a> {
     /// What a sweep in memory, or else into a file, takes up with chunks of `chunk` configurations.
     #[must_use]
     pub fn footprint(&self, chunk: usize, in_memory: bool) -> Footprint {
-        if self.filling.is_some() {
-            return refinement::footprint(self, chunk, in_memory);
-        }
         let points = self.grid.points();
         let solved = chunk.clamp(1, points);
         let free_space = self.free_space();
@@ -196,14 +168,8 @@ impl<'a> Sweep<'a> {
     /// Sweeps in memory.
     ///
     /// # Errors
-    /// [`SweepError::Memory`], [`SweepError::Backend`], [`SweepError::Stopped`], [`SweepError::Field`].
+    /// [`SweepError::Memory`], [`SweepError::Backend`], [`SweepError::Stopped`].
     pub fn run<B: Backend>(&self, backend: &mut B, run: Run<'_>) -> Result<(Dataset, SweepReport), SweepError> {
-        if let Some(filling) = self.filling {
-            let begun = Begun { tally: Tally::default(), provenance: self.provenance.clone() };
-            let kept = Kept { store: &mut (), resumed: Columns::default() };
-            let (columns, report, provenance) = refinement::fill(self, filling, backend, run, begun, kept)?;
-            return Ok((self.dataset(columns, provenance), report));
-        }
         let footprint = self.footprint(run.chunk, true);
         let (points, bytes) = (self.grid.points(), footprint.memory.least);
         let mut columns = Columns::with_room(points, self.shape.joints).map_err(|source| SweepError::Memory {
@@ -241,15 +207,13 @@ impl<'a> Sweep<'a> {
             grid: self.grid.clone(),
             scene: self.scene.clone(),
             surface: surface.finalize(),
-            fill: self.filling.map(|filling| filling.tolerance),
             provenance: self.provenance.clone(),
         };
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
         let mut provenance = binding.provenance;
         if !provenance.notices.is_empty() {
             let Provenance { backend, adapter, .. } = &self.provenance;
-            let point = if self.filling.is_some() { "solved point" } else { "grid point" };
-            let notice = format!("from {point} {} on: resumed on {backend} ({adapter})", tally.points);
+            let notice = format!("from grid point {} on: resumed on {backend} ({adapter})", tally.points);
             part.note(&notice)?;
             provenance.notices.push(notice);
         }
@@ -267,16 +231,6 @@ impl<'a> Sweep<'a> {
                 SweepError::Dataset { part: kept_in.clone(), source }
             }
         };
-        if let Some(filling) = self.filling {
-            let resumed =
-                part.all(self.shape.joints).map_err(|source| SweepError::Part { path: kept_in.clone(), source })?;
-            let kept = Kept { store: &mut part, resumed };
-            let (columns, report, provenance) = refinement::fill(self, filling, backend, run, begun, kept)?;
-            let dataset = self.dataset(columns, provenance);
-            dataset.save(target).map_err(|source| unwritten(source, report.points))?;
-            part.remove()?;
-            return Ok(report);
-        }
         let (report, provenance) = self.solve(backend, run, begun, footprint, &mut part)?;
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
         let results = Results { part: &part, shape: self.shape, stop };

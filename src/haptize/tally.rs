@@ -22,7 +22,7 @@ impl Tally {
         for ((&number, &iterations), &residual) in chunk.status.iter().zip(&chunk.iterations).zip(&chunk.residual) {
             let status = Status::from_number(number).unwrap_or(Status::Outside);
             self.statuses.add(status);
-            if !matches!(status, Status::Free | Status::Outside | Status::Filled) {
+            if !matches!(status, Status::Free | Status::Outside) {
                 self.iterations += u64::from(iterations);
                 self.max_iterations = self.max_iterations.max(iterations);
             }

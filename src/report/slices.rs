@@ -149,13 +149,10 @@ impl Slice {
                 if value.is_finite() {
                     canvas.rectangle(cell, if status == Status::Free { colour::WHITE } else { map.colour(value) });
                 }
-                let (size, ink) = match status {
-                    Status::Unconverged => (0.18, colour::INK),
-                    Status::Filled => (0.1, colour::SOFT_INK),
-                    _ => continue,
-                };
-                let radius = (size * (right - left).min(bottom - top)).min(2.2);
-                canvas.disc(((left + right) / 2.0, (top + bottom) / 2.0), radius, ink);
+                if status == Status::Unconverged {
+                    let radius = (0.18 * (right - left).min(bottom - top)).min(2.2);
+                    canvas.disc(((left + right) / 2.0, (top + bottom) / 2.0), radius, colour::INK);
+                }
             }
             for segment in self.boundary(dataset, cells) {
                 let ends = segment.map(|(x, y)| corner(x, y));
@@ -236,9 +233,6 @@ impl Slice {
         }
         if statuses().any(|status| status == Status::Unconverged) {
             entries.push(entry("not converged", colour::INK, Mark::Dot));
-        }
-        if statuses().any(|status| status == Status::Filled) {
-            entries.push(entry("not solved: filled between neighbours", colour::SOFT_INK, Mark::Dot));
         }
         if statuses().any(|status| status == Status::Outside) {
             entries.push(entry("no data", colour::ABSENT, Mark::Box));

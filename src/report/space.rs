@@ -28,9 +28,7 @@ const PICTURE: Area = Area { x: 36.0, y: 60.0, width: 600.0, height: 480.0 };
 pub fn space(dataset: &Dataset) -> Canvas {
     let points = points_in_contact(dataset);
     let magnitude = |point: usize| torque_size(dataset, point);
-    let filled = |point: usize| dataset.status(point) == Status::Filled;
-    let trusted =
-        |&point: &usize| (dataset.status(point) == Status::Contact || filled(point)) && magnitude(point).is_finite();
+    let trusted = |&point: &usize| dataset.status(point) == Status::Contact && magnitude(point).is_finite();
     let greatest = points.iter().copied().filter(|point| trusted(point)).map(magnitude).fold(0.0, f64::max);
     let map = ColourMap::Root { high: if greatest > 0.0 { greatest } else { 1.0 } };
     let space_box = Box3::of(dataset);
@@ -43,8 +41,8 @@ pub fn space(dataset: &Dataset) -> Canvas {
     space_box.draw_walls(&mut raster, direction);
     for &point in &points {
         if trusted(&point) {
-            // Volume grows with the torque, from half of the greatest radius on. What was not solved is smaller than all that was.
-            let share = (magnitude(point) / greatest).cbrt().max(0.5) * if filled(point) { FILLED } else { 1.0 };
+            // Volume grows with the torque, from half of the greatest radius on.
+            let share = (magnitude(point) / greatest).cbrt().max(0.5);
             raster.sphere(place(point), 0.46 * space_box.cell * share, map.colour(magnitude(point)));
         } else {
             raster.sphere(place(point), 0.2 * space_box.cell, UNTRUSTED);
@@ -55,15 +53,9 @@ pub fn space(dataset: &Dataset) -> Canvas {
     chart::headline(&mut canvas, "Haptized data in the C-space of the proxy");
     let untrusted = points.iter().filter(|point| !trusted(point)).count();
     canvas.text((chart::TITLE_LEFT, chart::MARGIN + 32.0), &caption(dataset, &points), plot::NOTE);
-    let small = points.iter().filter(|&&point| filled(point)).count();
-    let named = [(untrusted, "not converged", UNTRUSTED), (small, "filled, not solved (small)", colour::SOFT_INK)];
-    let entries: Vec<Entry> = named
-        .into_iter()
-        .filter(|(count, ..)| *count > 0)
-        .map(|(count, what, colour)| Entry { name: format!("{count} {what}"), colour, mark: Mark::Dot })
-        .collect();
-    if !entries.is_empty() {
-        plot::legend(&mut canvas, (WIDTH - chart::MARGIN, chart::MARGIN + 12.0), &entries);
+    if untrusted > 0 {
+        let entry = Entry { name: format!("{untrusted} not converged"), colour: UNTRUSTED, mark: Mark::Dot };
+        plot::legend(&mut canvas, (WIDTH - chart::MARGIN, chart::MARGIN + 12.0), &[entry]);
     }
     space_box.label(&mut canvas, raster.camera(), direction, dataset);
     canvas.picture((PICTURE.x, PICTURE.y), raster.picture());
@@ -73,9 +65,6 @@ pub fn space(dataset: &Dataset) -> Canvas {
     plot::colour_bar(&mut canvas, bar, map, &format!("‖τ‖ [{unit}]"), Anchor::Start);
     canvas
 }
-
-/// Radius of what was filled, over what it would be if it had been solved [1].
-const FILLED: f64 = 0.45;
 
 /// Configurations whose torque is not to be trusted.
 const UNTRUSTED: colour::Colour = colour::Colour::hex(0xd5_5e_00);

@@ -126,7 +126,6 @@ pub(super) struct ContactTable {
 #[serde(deny_unknown_fields)]
 pub(super) struct GridTable {
     pub spacing: Option<Number>,
-    pub fill: Option<Number>,
     pub axes: Option<Spanned<Vec<Spanned<AxisTable>>>>,
 }
 

@@ -21,9 +21,6 @@ impl Scene {
         };
         let mut grid = Table::new();
         grid.insert("axes".into(), Value::Array(self.grid.axes.iter().map(axis).collect()));
-        if let Some(fill) = self.grid.fill {
-            grid.insert("fill".into(), fill.into());
-        }
         text.insert("grid".into(), grid.into());
         let mut set = |table: &str, key: &str, value: Value| {
             let table = text.entry(table).or_insert_with(|| Value::Table(Table::new()));
@@ -52,7 +49,6 @@ mod tests {
         scene.grid.axes[0] = AxisSpec { start: -0.9, step: 0.1 / 3.0, count: 9 };
         scene.grid.axes[1].count = 9;
         scene.grid.axes[2].count = 13;
-        scene.grid.fill = Some(0.00123);
         scene.contact.tolerance = 3e-5;
         scene.contact.algorithm = Algorithm::Linearised;
         scene.haptics.interpolation = Interpolation::Potential;

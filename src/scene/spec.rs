@@ -203,8 +203,6 @@ pub enum Algorithm {
 pub struct GridSpec {
     /// One per joint, in the chain's order.
     pub axes: Vec<AxisSpec>,
-    /// Points whose torque coarser grids foretell to this are filled instead of solved [N m]; absent: all are solved.
-    pub fill: Option<f64>,
 }
 
 /// Grid coordinates `start + k step`, `k < count`.

@@ -29,9 +29,6 @@ const DOT: f32 = 0.4;
 const DOTS: [f32; 2] = [1.0, 6.0];
 const LEAST_SHARE: f64 = 0.45;
 
-/// Radius of a dot that was filled over that of one that was solved [1].
-const FILLED: f32 = 0.45;
-
 /// Most dots that are shown: more overlap one another, and cost frames.
 const MOST: usize = 12_000;
 
@@ -120,19 +117,17 @@ impl Cloud {
             let share = (point.torque / self.high.max(f64::MIN_POSITIVE)).cbrt().clamp(LEAST_SHARE, 1.0) as f32;
             let colour =
                 if point.status.is_failed() { palette.flagged } else { palette::egui_colour(map.colour(point.torque)) };
-            let share = if point.status == Status::Filled { FILLED * share } else { share };
             painter.circle_filled(at, radius * share, colour);
         }
         let (here, _) = show(place(dataset, q));
         for (radius, colour) in palette::ring(&palette) {
             painter.circle_filled(here, radius, colour);
         }
-        let pitch = (self.pitch > 1).then(|| format!("one grid line in {}", self.pitch));
-        let filled =
-            points.iter().any(|point| point.status == Status::Filled).then(|| "small: filled, not solved".into());
-        let note = pitch.into_iter().chain(filled).collect::<Vec<String>>().join("\n");
-        let at = rect.left_top() + vec2(GAP, GAP);
-        painter.text(at, Align2::LEFT_TOP, note, theme::small(), ui.visuals().weak_text_color());
+        if self.pitch > 1 {
+            let note = format!("one grid line in {}", self.pitch);
+            let at = rect.left_top() + vec2(GAP, GAP);
+            painter.text(at, Align2::LEFT_TOP, note, theme::small(), ui.visuals().weak_text_color());
+        }
         let unit = theme::units(grid.axes.iter().map(|axis| axis.effort_unit().to_owned()));
         let bar = Rect::from_min_size(rect.right_top() + BAR_AT, vec2(BAR_WIDTH, COLOUR_BAR));
         gradient(&painter, bar, map, true);

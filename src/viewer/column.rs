@@ -91,7 +91,6 @@ pub fn status_colour(status: Status, palette: &Palette) -> Color32 {
     match status {
         Status::Free => palette.free,
         Status::Contact => palette.ghost,
-        Status::Filled => palette.ghost.gamma_multiply(0.5),
         Status::Unconverged => palette.flagged,
         Status::Overflow => palette.force,
         Status::Outside => palette.absent,

@@ -249,14 +249,7 @@ impl Slices {
         let palette = palette::of(ui.visuals());
         if self.column == Column::Status {
             ui.horizontal_wrapped(|ui| {
-                for status in [
-                    Status::Free,
-                    Status::Contact,
-                    Status::Filled,
-                    Status::Unconverged,
-                    Status::Overflow,
-                    Status::Outside,
-                ] {
+                for status in [Status::Free, Status::Contact, Status::Unconverged, Status::Overflow, Status::Outside] {
                     let rect = legend::entry(ui, vec2(SWATCH, SWATCH), &format!("{status:?}").to_lowercase());
                     // Some colours are nearly that of the ground.
                     let rim = Stroke::new(HAIRLINE, palette.axis);

@@ -4,7 +4,6 @@
 
 mod equilibria;
 mod failure;
-mod filled;
 mod fixture;
 mod inspection;
 mod max_error;

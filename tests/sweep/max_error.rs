@@ -34,7 +34,7 @@ fn a_grid_is_chosen_stated_baked_and_verified() {
     let output = haptize(folder.0.path(), &arguments);
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
-    assert!(told.contains("predicted: at most") && told.contains("on the disk"), "{told}");
+    assert!(told.contains("predicted: about") && told.contains("on the disk"), "{told}");
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
     let dataset = Dataset::open(&folder.output()).unwrap();
     let achieved = dataset.provenance.achieved.clone().unwrap();
@@ -47,7 +47,7 @@ fn a_grid_is_chosen_stated_baked_and_verified() {
     let counts: Vec<usize> = scene.grid.axes.iter().map(|axis| axis.count).collect();
     assert_eq!(counts, dataset.grid.counts());
     assert_eq!(scene.haptics.interpolation.name(), achieved.interpolation);
-    assert_eq!((scene.grid.fill, scene.contact.tolerance), (Some(achieved.fill), dataset.provenance.tolerance));
+    assert_eq!(scene.contact.tolerance, dataset.provenance.tolerance);
     let ends = |scene: &Scene| -> Vec<f64> {
         scene.grid.axes.iter().map(|axis| axis.start + axis.step * (axis.count - 1) as f64).collect()
     };
@@ -77,7 +77,6 @@ fn a_grid_is_chosen_stated_baked_and_verified() {
     let told = haptize(folder.0.path(), &["info", "a.haptize"]);
     let told = String::from_utf8_lossy(&told.stdout).into_owned();
     assert!(told.contains("accuracy") && told.contains(": kept"), "{told}");
-    assert!(dataset.status_counts().filled == 0 || told.contains("filled between"), "{told}");
 }
 
 #[test]
@@ -122,7 +121,7 @@ fn an_aim_that_was_missed_is_told_and_kept_in_the_file() {
         progress: &mut |_| (),
     };
     let report = bake.to_file(&folder.output(), false).unwrap();
-    assert!(report.points == choice.points && report.contact_points - report.filled_points <= choice.points);
+    assert!(report.points == choice.points && report.contact_points <= choice.points);
     let before = Dataset::load(&folder.output()).unwrap();
     pilot.aim /= 100.0;
     let achieved = verify(&folder.output(), &pilot, &choice).unwrap();

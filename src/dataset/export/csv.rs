@@ -9,7 +9,7 @@ use std::{
 };
 
 /// Header of the status column.
-const STATUS: &str = "status (0 free; 1 contact; 2 unconverged; 3 overflow; 4 outside; 5 filled)";
+const STATUS: &str = "status (0 free; 1 contact; 2 unconverged; 3 overflow; 4 outside)";
 
 pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut files = vec![path.to_path_buf()];

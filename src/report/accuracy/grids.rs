@@ -1,6 +1,6 @@
 //! Grids of other spacings over the scene's region, looked up by each interpolation: error, bake time, size, loops.
 
-use super::{Accuracy, AccuracyError, BACKEND, Cost, Loops, Row, Study, filled, timed};
+use super::{Accuracy, AccuracyError, BACKEND, Cost, Loops, Row, Study, timed};
 use crate::{
     JointVector,
     dataset::Dataset,
@@ -71,7 +71,7 @@ pub(super) fn spacing(
                 setting: format!("{:.4} {}", spacing_of(&spaced), study.unit),
                 value: spacing_of(&spaced),
                 points: count,
-                solved: report.contact_points - report.filled_points,
+                solved: report.contact_points,
                 bytes: dataset.summary().bytes,
                 cost: cost.over(own_cost.least),
                 unit: "N m",
@@ -81,7 +81,6 @@ pub(super) fn spacing(
             });
         }
     }
-    filled::rows(scene, reference, limit, own_cost.least, study)?;
     Ok(own)
 }
 

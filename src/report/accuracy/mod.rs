@@ -12,13 +12,11 @@ mod choice;
 mod dynamics;
 pub mod effects;
 mod figures;
-mod filled;
 mod grids;
 mod page;
 mod solver;
 
 pub use choice::{Offer, offers};
-pub use filled::Saving;
 pub use page::{describe, write_all};
 
 use crate::{

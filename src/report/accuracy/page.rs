@@ -1,10 +1,10 @@
 //! The files of a study: figures, one table of all rows as CSV, and one page that holds them all.
 
 use super::{
-    Accuracy, Saving, Study,
+    Accuracy, Study,
     choice::{TARGETS, offers},
     effects::{self, Effects},
-    figures, filled,
+    figures,
 };
 use crate::{
     report::{ReportError, canvas::Canvas, write, write_both},
@@ -156,24 +156,8 @@ pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
             100.0 * least
         )?;
     }
-    if let Some(filling) = filling(accuracy) {
-        writeln!(text, "  filled       {filling}")?;
-    }
     accuracy.notes.iter().try_for_each(|note| writeln!(text, "  note         {note}"))?;
     accuracy.effects.as_ref().map_or(Ok(()), |effects| effects::describe(text, effects))
-}
-
-/// What filling saves, where it was tried.
-fn filling(accuracy: &Accuracy) -> Option<String> {
-    if let Some(Saving { filled, uniform, times }) = accuracy.saving() {
-        return Some(format!(
-            "{} solved for a worst error of {:.4} N m ({}), {times:.1} times fewer than {} of a grid solved throughout; rms \
-             {:.4} and {:.4} N m",
-            filled.solved, filled.worst, filled.setting, uniform.solved, filled.rms, uniform.rms
-        ));
-    }
-    let tried = accuracy.of(Study::Spacing).any(|row| row.series == filled::SERIES);
-    tried.then(|| "no grid errs less at worst than one of fewer points that is solved throughout".into())
 }
 
 /// The smallest error on offer, where smaller ones were asked for in vain; the greatest that was asked for, where there is
@@ -237,9 +221,6 @@ fn page(
             "<p>Less than {:.0} % is out of reach of grids up to four times as fine as the finest here.</p>",
             100.0 * least
         )?;
-    }
-    if let Some(filling) = filling(accuracy) {
-        writeln!(html, "<p>Filled grids: {}.</p>", escaped(&filling))?;
     }
     for (_, canvas, caption) in sheets {
         writeln!(html, "<figure>{}<figcaption>{caption}</figcaption></figure>", canvas.svg())?;

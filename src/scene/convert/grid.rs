@@ -1,19 +1,17 @@
 //! `[grid]`: the uniform grid over C-space.
 //!
 //! Without `axes`, every joint's range between its limits is cut into steps of `spacing`. An axis gives its start and two
-//! of step (default: `spacing`), stop and count. With `fill` points between coarser grids may be filled instead of solved.
+//! of step (default: `spacing`), stop and count.
 
 use super::super::check::Checker;
 use super::super::error::SceneError;
-use super::super::file::{AxisTable, GridTable, Number};
+use super::super::file::{AxisTable, GridTable};
 use super::super::{AxisSpec, GridSpec, JointSpec};
 use crate::tolerances::GRID_STEP_SLACK;
 use toml::Spanned;
 
 /// Most grid points: `point * joints + joint` then fits 32 bits, as GPU kernels count.
 const MAX_POINTS: usize = 1 << 28;
-/// Steps of which each axis of a grid that is filled has a multiple: its lines are halved twice.
-const FILL_STEPS: usize = 4;
 /// Disk of one point beside its torques: energy, gap, status, residual, iterations, contact offset [B].
 const BYTES_PER_POINT: usize = 8 + 4 + 1 + 4 + 4 + 8;
 
@@ -48,26 +46,7 @@ pub(super) fn convert(
         return Err(checker.error(span, message));
     }
     check_size(checker, &axes, span)?;
-    let fill = table.fill.as_ref().map(|value| fill(checker, value, &axes)).transpose()?;
-    Ok(GridSpec { axes, fill })
-}
-
-/// The tolerance of filling, on a grid every second and every fourth of whose lines make grids, too.
-fn fill(checker: &Checker<'_>, value: &Number, axes: &[AxisSpec]) -> Result<f64, SceneError> {
-    for (number, axis) in axes.iter().enumerate() {
-        let steps = axis.count - 1;
-        if !steps.is_multiple_of(FILL_STEPS) {
-            let below = steps / FILL_STEPS * FILL_STEPS + 1;
-            let (fewer, more) = (below.max(FILL_STEPS + 1), below + FILL_STEPS);
-            let message = format!(
-                "fill needs a multiple of {FILL_STEPS} steps along each axis, and axis {} has {steps}: give it {fewer} or {more} \
-                 grid lines, or leave fill out",
-                number + 1
-            );
-            return Err(checker.error(value.span(), message));
-        }
-    }
-    checker.positive("fill", value)
+    Ok(GridSpec { axes })
 }
 
 /// Grid lines from the first to the second of `range`; as good as infinite where there are too many.

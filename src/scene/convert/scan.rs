@@ -19,11 +19,6 @@ pub(super) fn convert(
 ) -> Result<ScanSpec, SceneError> {
     let span = table.span();
     let table = table.get_ref();
-    if let Some(fill) = table.joints.as_ref().and_then(|joints| joints.get_ref().fill.as_ref()) {
-        return Err(
-            checker.error(fill.span(), "fill acts on the grid of a bake: a scan goes to every point; leave it out")
-        );
-    }
     let plan = match (&table.workspace, &table.joints) {
         (Some(plan), None) => PlanSpec::Workspace(workspace(checker, plan, proxy)?),
         (None, Some(grid)) => PlanSpec::Joints(super::grid::convert(checker, grid, &proxy.joints)?),

@@ -137,7 +137,7 @@ impl Tally {
                 Status::Free => result.gap >= 0.0 && result.energy == 0.0,
                 Status::Contact => result.gap < 0.0 && result.residual <= processor.residual(),
                 Status::Unconverged => true,
-                Status::Overflow | Status::Outside | Status::Filled => false,
+                Status::Overflow | Status::Outside => false,
             };
             self.all += 1;
             self.flagged += usize::from(result.status == Status::Unconverged);
