@@ -215,6 +215,18 @@ pub enum SurfaceDefect {
         /// The two ends of the edge at which orientation fails.
         nodes: [u32; 2],
     },
+    /// Two sheets of the surface cross or touch.
+    #[error(
+        "the surface crosses or touches itself: triangles {} and {} meet near ({:.4}, {:.4}, {:.4}) m: part the pieces, or join \
+         them into one surface (a boolean union in Blender or MeshLab)",
+        .triangles[0], .triangles[1], .place.x, .place.y, .place.z
+    )]
+    Crossing {
+        /// The two triangles, ascending.
+        triangles: [u32; 2],
+        /// Middle of the edge of one that meets the other [m].
+        place: DVec3,
+    },
     /// A surface that encloses nothing.
     #[error("the part of the surface around node {node} encloses no volume: it is folded flat")]
     NoVolume {

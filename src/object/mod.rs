@@ -6,6 +6,7 @@
 //! forms it from the factor; graphics never does.
 
 mod compliance;
+mod crossing;
 mod elasticity;
 mod error;
 mod factor;

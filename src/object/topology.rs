@@ -5,9 +5,10 @@
 //! merely point the wrong way is turned, with a warning; anything else is refused with the reason.
 //!
 //! A part inside another is the wall of a cavity, and faces into it; one inside a cavity is a body again, and so on: outward is
-//! away from the material, of which a point is part when an odd number of shells surround it.
+//! away from the material, of which a point is part when an odd number of shells surround it. Parts that cross or touch are refused
+//! (see [`super::crossing`]), so one node of a part tells for all of them which others surround it.
 
-use super::SurfaceDefect;
+use super::{SurfaceDefect, crossing};
 use crate::tolerances::MIN_TRIANGLE_ASPECT;
 use glam::DVec3;
 use std::{collections::HashMap, f64::consts::PI};
@@ -50,6 +51,7 @@ pub(super) fn close(nodes: &[DVec3], triangles: &mut [[u32; 3]]) -> Result<Close
         return Err(SurfaceDefect::UnusedNode { node: node as u32 });
     }
     let (edges, across) = pair_edges(triangles)?;
+    crossing::check(nodes, triangles)?;
     let parts = orient(triangles, &across)?;
     let mut warnings = Vec::new();
     turn_outward(nodes, triangles, &parts, &mut warnings)?;
