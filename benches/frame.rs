@@ -27,7 +27,8 @@ fn sphere(kind: SpringKind, rings: usize) -> Object {
     Object::build(&ObjectSpec {
         shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings, segments: rings },
         material: Material::Springs(SpringSpec { kind, stiffness: 300.0 }),
-        ground: GroundSpec { stiffness: 90.0, nodes: GroundNodes::All },
+        skin: None,
+        ground: Some(GroundSpec { stiffness: 90.0, nodes: GroundNodes::All }),
         node_mass: 1e-3,
         node_damping: 0.02,
     })

@@ -392,7 +392,8 @@ fn sphere(stiffness: f64, damping: f64) -> Object {
     Object::build(&ObjectSpec {
         shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings: 10, segments: 10 },
         material: Material::Springs(SpringSpec { kind: SpringKind::Isotropic, stiffness }),
-        ground: GroundSpec { stiffness: 0.3 * stiffness, nodes: GroundNodes::All },
+        skin: None,
+        ground: Some(GroundSpec { stiffness: 0.3 * stiffness, nodes: GroundNodes::All }),
         node_mass: 1e-3,
         node_damping: damping,
     })

@@ -36,7 +36,8 @@ fn sphere() -> Object {
     Object::build(&ObjectSpec {
         shape,
         material: Material::Springs(SpringSpec { kind: SpringKind::Isotropic, stiffness: 300.0 }),
-        ground: GroundSpec { stiffness: 100.0, nodes: GroundNodes::All },
+        skin: None,
+        ground: Some(GroundSpec { stiffness: 100.0, nodes: GroundNodes::All }),
         node_mass: 1e-3,
         node_damping: 0.1,
     })

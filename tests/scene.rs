@@ -83,7 +83,7 @@ fn mesh_scene_mixes_joints_and_names_a_file_beside_it() {
     assert_eq!(kinds.len(), 4);
     assert!(kinds.contains(&JointKind::Prismatic) && kinds.contains(&JointKind::Revolute));
     assert!(matches!(&scene.object.shape, Shape::Mesh { file, .. } if *file == dataset("bean.obj")));
-    assert!(matches!(scene.object.ground.nodes, GroundNodes::Below(_)));
+    assert!(matches!(scene.object.ground.unwrap().nodes, GroundNodes::Below(_)));
     let points: usize = scene.grid.axes.iter().map(|axis| axis.count).product();
     assert!((6_000..=10_000).contains(&points));
 }
@@ -93,7 +93,7 @@ fn what_is_not_said_takes_the_documented_default() {
     let scene = parse(LEAST).unwrap();
     assert_eq!((scene.name.as_str(), scene.text.as_str()), ("least", LEAST));
     assert_eq!((scene.object.node_mass, scene.object.node_damping), (0.005, 0.5));
-    assert_eq!(scene.object.ground.nodes, GroundNodes::All);
+    assert_eq!(scene.object.ground.unwrap().nodes, GroundNodes::All);
     let joint = &scene.proxy.joints[0];
     assert_eq!((joint.name.as_str(), joint.axis, joint.origin), ("q1", DVec3::Z, DVec3::ZERO));
     assert_eq!((joint.mass, joint.rotor_inertia, joint.nodes[0].radius), (0.0, 1e-3, 0.0));

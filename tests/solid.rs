@@ -16,7 +16,7 @@ const POISSON: f64 = 0.3;
 const LIGHT: f64 = 1e-4;
 
 fn spec(shape: Shape, material: Material, ground: GroundSpec) -> ObjectSpec {
-    ObjectSpec { shape, material, ground, node_mass: 0.01, node_damping: 0.1 }
+    ObjectSpec { shape, material, skin: None, ground: Some(ground), node_mass: 0.01, node_damping: 0.1 }
 }
 
 fn elastic(cell: Option<f64>) -> Material {

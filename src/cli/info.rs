@@ -1,7 +1,12 @@
 //! `haptize info`: what a dataset holds. The whole file is checked first.
 
 use super::{Failure, Report};
-use haptize::dataset::{Achieved, Axis, Dataset, Summary};
+use glam::DVec3;
+use haptize::{
+    dataset::{Achieved, Axis, Dataset, Summary},
+    object::Skin,
+    scene::Rendering,
+};
 use std::{
     fmt::{self, Write},
     path::PathBuf,
@@ -27,7 +32,20 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut text = String::new();
     writeln!(text, "{}: {} points, {:.1} MB, sound", path.display(), summary.points, file_bytes as f64 / 1e6)?;
     describe(&mut text, &summary, &dataset.absent())?;
+    if let Some(skin) = skin(&dataset) {
+        json["skin"] = serde_json::to_value(skin)?;
+        writeln!(text, "  skin         {skin}")?;
+    }
     Ok(Report { text, json, whole: true })
+}
+
+/// The skin of the object, where the dataset's scene has one.
+fn skin(dataset: &Dataset) -> Option<Skin> {
+    let spec = Rendering::parse(&dataset.scene, "scene").ok()?.object?.skin?;
+    let surface = dataset.surface.as_ref()?;
+    let nodes: Vec<DVec3> = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
+    let triangles: Vec<[u32; 3]> = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    Some(Skin::new(spec, &nodes, &triangles))
 }
 
 fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Result {

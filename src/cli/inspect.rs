@@ -48,6 +48,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut json = serde_json::to_value(&inspection)?;
     let mut text = String::new();
     describe(&mut text, &inspection)?;
+    if let Some(skin) = object.skin {
+        json["skin"] = serde_json::to_value(skin)?;
+        writeln!(text, "  skin         {skin}")?;
+    }
     if let Some(point) = dataset.as_ref().and_then(|dataset| dataset.grid.nearest(q).map(|point| (dataset, point))) {
         let (dataset, point) = point;
         let stored = dataset.grid.configuration(point);

@@ -388,7 +388,8 @@ mod tests {
         Object::build(&ObjectSpec {
             shape: Shape::Sphere { centre: DVec3::new(1.0, -2.0, 0.5), radius: 0.05, rings: 10, segments: 10 },
             material: Material::Springs(SpringSpec { kind: SpringKind::Isotropic, stiffness: 300.0 }),
-            ground: GroundSpec { stiffness: 100.0, nodes: GroundNodes::All },
+            skin: None,
+            ground: Some(GroundSpec { stiffness: 100.0, nodes: GroundNodes::All }),
             node_mass: 0.01,
             node_damping: 0.1,
         })

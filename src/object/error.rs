@@ -101,7 +101,7 @@ pub enum ObjectError {
     /// A connected part of the object floats.
     #[error(
         "the ground holds no node of the part of {nodes} nodes around node {node}, which would float away: \
-         ground at least one of its nodes"
+         ground at least one of its nodes, or give the skin a foundation"
     )]
     Ungrounded {
         /// A node of the part.
@@ -112,8 +112,8 @@ pub enum ObjectError {
     /// The stiffness is singular, though every part is grounded: springs and ground leave a motion free.
     #[error(
         "the stiffness is not positive definite (reciprocal condition {reciprocal_condition:.0e}): node {node} can move \
-         along ({:.2}, {:.2}, {:.2}) almost without force; axial springs leave such mechanisms: ground more nodes, \
-         stiffen the ground, or use isotropic springs", .direction.x, .direction.y, .direction.z
+         along ({:.2}, {:.2}, {:.2}) almost without force; axial springs leave such mechanisms, and a skin on sliver \
+         triangles comes near them: ground more nodes, stiffen the ground, use isotropic springs, or mesh evenly", .direction.x, .direction.y, .direction.z
     )]
     Mechanism {
         /// The node that moves most.

@@ -1,7 +1,7 @@
 //! The deformable virtual object: surface, springs, and the stiffness K with its factor.
 //!
 //! [`Object::build`] makes the surface that the scene names, checks it, joins its nodes by springs or fills it with an elastic
-//! solid, and proves K = Kn + Kg symmetric positive definite by factorising it (section 2.1, equation (2)). An object that the ground does not
+//! solid, adds its skin, and proves K = Kn + Kg symmetric positive definite by factorising it (section 2.1, equation (2)). An object that the ground does not
 //! hold, or a surface that is not closed, is refused with the reason. The [`Compliance`] C = K^-1 is for contact alone, which
 //! forms it from the factor; graphics never does.
 
@@ -12,9 +12,11 @@ mod error;
 mod factor;
 mod fill;
 mod ground;
+mod icosphere;
 mod import;
 mod ordering;
 mod settled;
+mod skin;
 mod sphere;
 mod springs;
 mod stiffening;
@@ -26,6 +28,7 @@ pub use compliance::Compliance;
 pub use error::{ObjectError, SurfaceDefect};
 pub use factor::{Factor, FactorError};
 pub use settled::settled;
+pub use skin::Skin;
 pub use stiffening::Stiffening;
 pub use stiffness::Stiffness;
 pub use topology::Topology;
@@ -34,6 +37,7 @@ use crate::scene::{ElasticSpec, Material, ObjectSpec, Shape};
 use elasticity::Solid;
 use glam::{DMat3, DVec3};
 use import::Body;
+use skin::Laplacian;
 
 /// A deformable object at rest.
 ///
@@ -48,7 +52,9 @@ pub struct Object {
     pub triangles: Vec<[u32; 3]>,
     /// Neighbours on the surface.
     pub topology: Topology,
-    /// K = Kn + Kg over all nodes [N/m].
+    /// The skin of the surface, where it has one.
+    pub skin: Option<Skin>,
+    /// K = Kn + Kg over all nodes, the skin's included [N/m].
     pub stiffness: Stiffness,
     /// Cholesky factor of K.
     pub factor: Factor,
@@ -73,6 +79,10 @@ impl Object {
                 check_count(rings.saturating_mul(*segments).saturating_add(2))?;
                 Body::shell(sphere::generate(*centre, *radius, *rings, *segments)?)
             }
+            Shape::Icosphere { centre, radius, divisions } => {
+                check_count(divisions.saturating_mul(*divisions).saturating_mul(10).saturating_add(2))?;
+                Body::shell(icosphere::generate(*centre, *radius, *divisions)?)
+            }
             Shape::Mesh { file, scale, centre } => Body::shell(import::read(file, *scale, *centre, &mut warnings)?),
             Shape::Tetrahedra { file, scale, centre } => import::read_tetrahedra(file, *scale, *centre, &mut warnings)?,
         };
@@ -87,7 +97,7 @@ impl Object {
     pub fn from_surface(spec: &ObjectSpec, nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, ObjectError> {
         match spec.shape {
             Shape::Tetrahedra { .. } => Self::build(spec),
-            Shape::Sphere { .. } | Shape::Mesh { .. } => {
+            Shape::Sphere { .. } | Shape::Icosphere { .. } | Shape::Mesh { .. } => {
                 Self::assemble(spec, Body::shell((nodes, triangles)), Vec::new())
             }
         }
@@ -106,23 +116,36 @@ impl Object {
             solid = fill::fill(&mut nodes, &triangles, cell)?;
             check_count(nodes.len())?;
         }
-        let edges = if solid.tetrahedra.is_empty() { surface.edges } else { solid.edges() };
-        let grounded = ground::select(&spec.ground, &nodes)?;
-        if solid.tetrahedra.is_empty() {
-            ground::check_components(&surface.components, &grounded)?;
-        }
-        let mut stiffness = Stiffness::with_pattern(nodes.len(), &edges);
+        let edges = match spec.material {
+            Material::Hollow => Vec::new(),
+            _ if solid.tetrahedra.is_empty() => surface.edges,
+            _ => solid.edges(),
+        };
+        let laplacian = spec.skin.map(|skin| (skin, Laplacian::new(&nodes[..surface_nodes], &triangles)));
+        let mut pattern = edges.clone();
+        pattern.extend(laplacian.iter().flat_map(|(skin, laplacian)| laplacian.pairs(*skin)));
+        let mut stiffness = Stiffness::with_pattern(nodes.len(), &pattern);
         stiffness.ordering = ordering::nested_dissection(&stiffness, &nodes);
-        for (node, _) in grounded.iter().enumerate().filter(|(_, held)| **held) {
-            stiffness.add(node, node, DMat3::from_diagonal(DVec3::splat(spec.ground.stiffness)));
+        let held_everywhere = spec.skin.is_some_and(|skin| skin.foundation > 0.0);
+        let grounded = spec.ground.as_ref().map(|ground| ground::select(ground, &nodes)).transpose()?;
+        if solid.tetrahedra.is_empty() && !held_everywhere {
+            ground::check_components(&surface.components, grounded.as_deref().unwrap_or_default())?;
+        }
+        for (ground, grounded) in spec.ground.iter().zip(&grounded) {
+            for (node, _) in grounded.iter().enumerate().filter(|(_, held)| **held) {
+                stiffness.add(node, node, DMat3::from_diagonal(DVec3::splat(ground.stiffness)));
+            }
         }
         match spec.material {
             Material::Springs(springs) => springs::add(spec, springs, &nodes, &edges, &mut stiffness)?,
             Material::Elastic(elastic) => solid.add(elastic, &nodes, &mut stiffness)?,
+            Material::Hollow => {}
         }
+        laplacian.iter().for_each(|(skin, laplacian)| laplacian.add(*skin, &mut stiffness));
         let factor = factor::prove_positive_definite(&stiffness)?;
         Ok(Self {
             surface_nodes,
+            skin: spec.skin.map(|skin| Skin::new(skin, &nodes[..surface_nodes], &triangles)),
             mass: vec![spec.node_mass; nodes.len()],
             damping: vec![spec.node_damping; nodes.len()],
             rest: nodes,
@@ -148,17 +171,25 @@ fn check_count(nodes: usize) -> Result<(), ObjectError> {
 
 /// Numbers that a scene file has had checked already, and a specification made in code has not.
 fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {
-    let positive = [
-        match spec.material {
-            Material::Springs(springs) => ("spring stiffness", springs.stiffness),
-            Material::Elastic(elastic) => ("Young's modulus", elastic.young),
-        },
-        ("ground stiffness", spec.ground.stiffness),
-        ("node mass", spec.node_mass),
-    ];
-    for (name, value) in positive {
+    let material = match spec.material {
+        Material::Springs(springs) => Some(("spring stiffness", springs.stiffness)),
+        Material::Elastic(elastic) => Some(("Young's modulus", elastic.young)),
+        Material::Hollow => None,
+    };
+    let ground = spec.ground.as_ref().map(|ground| ("ground stiffness", ground.stiffness));
+    let skin =
+        spec.skin.map(|skin| ("skin's greatest coefficient", skin.tension.max(skin.bending).max(skin.foundation)));
+    for (name, value) in material.into_iter().chain(ground).chain(skin).chain([("node mass", spec.node_mass)]) {
         if !(value > 0.0 && value.is_finite()) {
             return Err(ObjectError::Parameter { name, value, range: "positive and finite" });
+        }
+    }
+    let skin = spec.skin.map_or([0.0; 3], |skin| [skin.tension, skin.bending, skin.foundation]);
+    let names = ["tension of the skin", "bending stiffness of the skin", "foundation of the skin"];
+    let damping = ("node damping", spec.node_damping);
+    for (name, value) in names.into_iter().zip(skin).chain([damping]) {
+        if !(value >= 0.0 && value.is_finite()) {
+            return Err(ObjectError::Parameter { name, value, range: "zero or positive, and finite" });
         }
     }
     if let Material::Elastic(ElasticSpec { poisson: value, cell, .. }) = spec.material {
@@ -169,17 +200,13 @@ fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {
             return Err(ObjectError::Parameter { name: "cell", value, range: "positive and finite" });
         }
     }
-    if !(spec.node_damping >= 0.0 && spec.node_damping.is_finite()) {
-        let value = spec.node_damping;
-        return Err(ObjectError::Parameter { name: "node damping", value, range: "zero or positive, and finite" });
-    }
     Ok(())
 }
 
 /// How messages call the surface.
 fn surface_name(spec: &ObjectSpec) -> String {
     match &spec.shape {
-        Shape::Sphere { .. } => "sphere".to_owned(),
+        Shape::Sphere { .. } | Shape::Icosphere { .. } => "sphere".to_owned(),
         Shape::Mesh { file, .. } | Shape::Tetrahedra { file, .. } => file.display().to_string(),
     }
 }

@@ -121,7 +121,8 @@ mod tests {
         Object::build(&ObjectSpec {
             shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings: 4, segments: 6 },
             material: Material::Springs(SpringSpec { kind, stiffness: 300.0 }),
-            ground: GroundSpec { stiffness: 40.0, nodes: GroundNodes::All },
+            skin: None,
+            ground: Some(GroundSpec { stiffness: 40.0, nodes: GroundNodes::All }),
             node_mass: 1e-3,
             node_damping: 0.01,
         })

@@ -16,7 +16,7 @@ pub struct Stiffness {
 }
 
 impl Stiffness {
-    /// Zero blocks on the diagonal and at both halves of every edge. `edges`: each once, ends in range.
+    /// Zero blocks on the diagonal and at both halves of every edge. `edges`: ends in range; what is repeated counts once.
     pub(super) fn with_pattern(nodes: usize, edges: &[[u32; 2]]) -> Self {
         let mut rows: Vec<Vec<u32>> = (0..nodes as u32).map(|node| vec![node]).collect();
         for &[a, b] in edges {
@@ -27,6 +27,7 @@ impl Stiffness {
         let mut columns = Vec::with_capacity(nodes + 2 * edges.len());
         for mut row in rows {
             row.sort_unstable();
+            row.dedup();
             columns.extend(row);
             offsets.push(columns.len());
         }

@@ -51,8 +51,9 @@ pub(super) fn close(nodes: &[DVec3], triangles: &mut [[u32; 3]]) -> Result<Close
         return Err(SurfaceDefect::UnusedNode { node: node as u32 });
     }
     let (edges, across) = pair_edges(triangles)?;
-    crossing::check(nodes, triangles)?;
+    // First of all: a closed surface with one side has no place in space without crossing itself.
     let parts = orient(triangles, &across)?;
+    crossing::check(nodes, triangles)?;
     let mut warnings = Vec::new();
     turn_outward(nodes, triangles, &parts, &mut warnings)?;
     // Turning a triangle renumbers its edges, so the neighbours are found anew.

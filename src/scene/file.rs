@@ -34,7 +34,8 @@ pub(super) struct ObjectTable {
     pub tetrahedra: Option<MeshTable>,
     pub springs: Option<Spanned<SpringsTable>>,
     pub elasticity: Option<Spanned<ElasticityTable>>,
-    pub ground: GroundTable,
+    pub skin: Option<Spanned<SkinTable>>,
+    pub ground: Option<GroundTable>,
     pub node_mass: Option<Number>,
     pub node_damping: Option<Number>,
 }
@@ -44,8 +45,10 @@ pub(super) struct ObjectTable {
 pub(super) struct SphereTable {
     pub centre: Option<Vector>,
     pub radius: Number,
-    pub rings: Spanned<usize>,
-    pub segments: Spanned<usize>,
+    pub rings: Option<Spanned<usize>>,
+    pub segments: Option<Spanned<usize>>,
+    pub subdivisions: Option<Spanned<usize>>,
+    pub edge: Option<Number>,
 }
 
 #[derive(Deserialize)]
@@ -69,6 +72,18 @@ pub(super) struct ElasticityTable {
     pub young: Number,
     pub poisson: Number,
     pub cell: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SkinTable {
+    pub tension: Option<Number>,
+    pub bending: Option<Number>,
+    pub width: Option<Number>,
+    pub thickness: Option<Number>,
+    pub young: Option<Number>,
+    pub poisson: Option<Number>,
+    pub foundation: Option<Number>,
 }
 
 #[derive(Deserialize)]

@@ -18,8 +18,8 @@ pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, Spe
 pub use spec::{
     Algorithm, AxisSpec, ContactDampingSpec, ContactSpec, ElasticSpec, FourChannelSpec, FrictionSpec, GraphicsEffects,
     GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects, HapticsSpec, Interpolation, JointKind,
-    JointSpec, Material, MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
-    StiffeningSpec, Waypoint,
+    JointSpec, Material, MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec, Shape, SkinSpec, SpringKind,
+    SpringSpec, StiffeningSpec, Waypoint,
 };
 
 use check::Checker;

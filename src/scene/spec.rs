@@ -14,10 +14,12 @@ use std::path::PathBuf;
 pub struct ObjectSpec {
     /// Where the surface comes from.
     pub shape: Shape,
-    /// What resists deformation, Kn.
+    /// What resists deformation beside the skin, Kn.
     pub material: Material,
-    /// Springs Kg to the mechanical ground.
-    pub ground: GroundSpec,
+    /// The skin of the surface, where it has one.
+    pub skin: Option<SkinSpec>,
+    /// Springs Kg to the mechanical ground; none where the skin's foundation holds the object.
+    pub ground: Option<GroundSpec>,
     /// Mass of each node [kg].
     pub node_mass: f64,
     /// Damping of each node against the ground [N s/m].
@@ -37,6 +39,15 @@ pub enum Shape {
         rings: usize,
         /// Nodes of each ring.
         segments: usize,
+    },
+    /// An icosahedron whose faces are divided, on a sphere: nearly equal triangles.
+    Icosphere {
+        /// [m]
+        centre: DVec3,
+        /// [m]
+        radius: f64,
+        /// Parts n of each edge of the icosahedron: 10 n^2 + 2 nodes.
+        divisions: usize,
     },
     /// A closed triangle mesh: OBJ, STL or PLY by the file's extension. `scale` multiplies its coordinates (0.001 for
     /// millimetres), `centre` is then added [m].
@@ -66,6 +77,19 @@ pub enum Material {
     Springs(SpringSpec),
     /// A linearly elastic solid.
     Elastic(ElasticSpec),
+    /// Nothing: the skin alone.
+    Hollow,
+}
+
+/// A skin on the surface, per area: the same body on every mesh. At least one of the three is positive, none is negative.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SkinSpec {
+    /// Membrane tension T: resists a gradient of the displacement, in all directions alike [N/m].
+    pub tension: f64,
+    /// Bending stiffness b: resists a Laplacian of the displacement [N m].
+    pub bending: f64,
+    /// Foundation k: resists displacement [N/m^3].
+    pub foundation: f64,
 }
 
 /// A homogeneous, isotropic, linearly elastic solid.

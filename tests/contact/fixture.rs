@@ -30,7 +30,7 @@ pub fn object(nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Object {
 /// The same object held at every node by springs of this stiffness [N/m].
 pub fn grounded(object: &Object, stiffness: f64) -> Object {
     let mut spec = world::sphere_spec(PAPER, SPHERE_CENTRE, 1.0, 1.0);
-    spec.ground.stiffness = stiffness;
+    spec.ground.as_mut().unwrap().stiffness = stiffness;
     Object::from_surface(&spec, object.rest.clone(), object.triangles.clone()).unwrap()
 }
 

@@ -128,7 +128,8 @@ pub(super) fn nodes(
         let more = |count: usize| (count as f64 * finer).round() as usize;
         let (new_rings, new_segments) = (more(rings), more(segments));
         object.shape = Shape::Sphere { centre, radius, rings: new_rings, segments: new_segments };
-        object.ground.stiffness *= (rings * segments + 2) as f64 / (new_rings * new_segments + 2) as f64;
+        let share = (rings * segments + 2) as f64 / (new_rings * new_segments + 2) as f64;
+        object.ground.iter_mut().for_each(|ground| ground.stiffness *= share);
         object
     };
     let mut found = Vec::new();

@@ -33,7 +33,8 @@ fn sphere(kind: SpringKind, stiffness: f64, effort: Effort) -> Result<Object, Fa
     Ok(Object::build(&ObjectSpec {
         shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings, segments: rings },
         material: Material::Springs(SpringSpec { kind, stiffness }),
-        ground: GroundSpec { stiffness: 0.3 * stiffness, nodes: GroundNodes::All },
+        skin: None,
+        ground: Some(GroundSpec { stiffness: 0.3 * stiffness, nodes: GroundNodes::All }),
         node_mass: 1e-3,
         node_damping: 0.02,
     })?)

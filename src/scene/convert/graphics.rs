@@ -43,8 +43,9 @@ pub(super) fn convert(
                            out one of them";
             return Err(checker.error(value.span(), message));
         }
-        if object.is_some_and(|object| matches!(object.material, Material::Elastic(_))) {
-            let message = "stiffening acts on springs, and the object is an elastic solid: leave it out";
+        if object.is_some_and(|object| matches!(object.material, Material::Elastic(_)) || object.skin.is_some()) {
+            let message =
+                "stiffening acts on springs alone, and the object is an elastic solid or has a skin: leave it out";
             return Err(checker.error(value.span(), message));
         }
         let stiffening = value.get_ref();

@@ -7,6 +7,7 @@ mod motion;
 mod object;
 mod proxy;
 mod scan;
+mod skin;
 
 use super::check::Checker;
 use super::error::SceneError;

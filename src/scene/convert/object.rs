@@ -1,9 +1,10 @@
-//! `[object]`: shape, springs, ground.
+//! `[object]`: shape, material, ground.
 
 use super::super::check::Checker;
 use super::super::error::SceneError;
 use super::super::file::{GroundTable, MeshTable, ObjectTable, SphereTable};
 use super::super::{ElasticSpec, GroundNodes, GroundSpec, Material, ObjectSpec, Shape, SpringSpec};
+use super::skin;
 use glam::DVec3;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -17,6 +18,13 @@ const NODE_DAMPING: f64 = 0.5;
 /// Most rings, and most nodes of a ring: their product must fit the node numbers; what memory allows is far less, and
 /// checked when the object is built.
 const MAX_RINGS: usize = 1 << 15;
+
+/// Most halvings of an icosahedron's edges: more nodes than an object may have.
+const MAX_SUBDIVISIONS: usize = 9;
+
+/// Mean edge of an icosahedron on the unit sphere times the parts n that its edges are divided into: the edge of an equilateral
+/// triangle that has a share 1 / (20 n^2) of the sphere's area, sqrt(4 pi / (5 sqrt 3)) [1].
+const MEAN_EDGE: f64 = 1.2046;
 
 pub(super) fn convert(checker: &Checker<'_>, table: &Spanned<ObjectTable>) -> Result<ObjectSpec, SceneError> {
     let span = table.span();
@@ -40,25 +48,50 @@ pub(super) fn convert(checker: &Checker<'_>, table: &Spanned<ObjectTable>) -> Re
             return Err(checker.error(span, message));
         }
     };
-    let material = material(checker, table, span)?;
+    let material = material(checker, table, span.clone())?;
+    let skin = table.skin.as_ref().map(|skin| skin::convert(checker, skin, material)).transpose()?;
+    let ground = table.ground.as_ref().map(|own| ground(checker, own)).transpose()?;
+    if ground.is_none() && skin.is_none_or(|skin| skin.foundation == 0.0) {
+        let message = "nothing holds the object: add [object.ground], or a foundation to [object.skin]";
+        return Err(checker.error(span, message));
+    }
     let node_mass = table.node_mass.as_ref().map(|value| checker.positive("node_mass", value));
     let node_damping = table.node_damping.as_ref().map(|value| checker.not_negative("node_damping", value));
     Ok(ObjectSpec {
         shape,
         material,
-        ground: ground(checker, &table.ground)?,
+        skin,
+        ground,
         node_mass: node_mass.unwrap_or(Ok(NODE_MASS))?,
         node_damping: node_damping.unwrap_or(Ok(NODE_DAMPING))?,
     })
 }
 
 fn sphere_shape(checker: &Checker<'_>, table: &SphereTable) -> Result<Shape, SceneError> {
-    Ok(Shape::Sphere {
-        centre: checker.vector("centre", table.centre.as_ref())?,
-        radius: checker.positive("radius", &table.radius)?,
-        rings: checker.count("rings", &table.rings, 1, MAX_RINGS)?,
-        segments: checker.count("segments", &table.segments, 3, MAX_RINGS)?,
-    })
+    let centre = checker.vector("centre", table.centre.as_ref())?;
+    let radius = checker.positive("radius", &table.radius)?;
+    match (&table.rings, &table.segments, &table.subdivisions, &table.edge) {
+        (Some(rings), Some(segments), None, None) => Ok(Shape::Sphere {
+            centre,
+            radius,
+            rings: checker.count("rings", rings, 1, MAX_RINGS)?,
+            segments: checker.count("segments", segments, 3, MAX_RINGS)?,
+        }),
+        (None, None, Some(subdivisions), None) => {
+            let divisions = 1 << checker.count("subdivisions", subdivisions, 0, MAX_SUBDIVISIONS)?;
+            Ok(Shape::Icosphere { centre, radius, divisions })
+        }
+        (None, None, None, Some(edge)) => {
+            let least = MEAN_EDGE * radius / f64::from(1 << MAX_SUBDIVISIONS);
+            let edge = checker.between("edge", edge, least, 2.0 * radius)?;
+            Ok(Shape::Icosphere { centre, radius, divisions: (MEAN_EDGE * radius / edge).ceil() as usize })
+        }
+        _ => {
+            let message = "a sphere needs one of edge (length of its triangles' edges [m]), subdivisions (how often an \
+                           icosahedron's edges are halved), or rings with segments";
+            Err(checker.error(table.radius.span(), message))
+        }
+    }
 }
 
 fn mesh_file(checker: &Checker<'_>, table: &MeshTable) -> Result<(PathBuf, f64, DVec3), SceneError> {
@@ -96,8 +129,10 @@ fn material(checker: &Checker<'_>, table: &ObjectTable, span: Range<usize>) -> R
                 cell,
             }))
         }
+        (None, None) if table.skin.is_some() && table.tetrahedra.is_none() => Ok(Material::Hollow),
         (None, None) => {
-            Err(checker.error(span, "the object has no material: add [object.springs] or [object.elasticity]"))
+            let message = "the object has no material: add [object.springs] or [object.elasticity], or to a surface [object.skin]";
+            Err(checker.error(span, message))
         }
         (Some(_), Some(elasticity)) => {
             let message = "the object has two materials: keep either [object.springs] or [object.elasticity]";

@@ -64,10 +64,11 @@ pub fn sphere_spec(ball: Ball, centre: DVec3, scale: f64, stiffness: f64) -> Obj
     ObjectSpec {
         shape: Shape::Sphere { centre, radius, rings, segments: rings },
         material: Material::Springs(SpringSpec { kind: springs, stiffness: 300.0 * stiffness }),
-        ground: GroundSpec {
+        skin: None,
+        ground: Some(GroundSpec {
             stiffness: ground * stiffness,
             nodes: if patch { GroundNodes::Below(centre.z - 0.6 * radius) } else { GroundNodes::All },
-        },
+        }),
         node_mass: 0.01,
         node_damping: 0.1,
     }
