@@ -9,6 +9,7 @@ use haptize::{
     contact::Model,
     dataset::Dataset,
     device::{Motion, Recorded},
+    field::range::HaptizedRange,
     gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver},
     haptize::{BackendChoice, Bake},
     object::{Factor, Object},
@@ -190,9 +191,10 @@ fn a_tick_without_effects_is_the_papers_to_the_last_bit() {
         let limits: Vec<[f64; 2]> = plain.setup.chain.joints.iter().map(|joint| joint.limits).collect();
         npmi::Npmi::new(&plain.setup.chain.inertia(&pose), &limits).unwrap()
     };
+    let range = HaptizedRange::new(&plain.data, &plain.setup.chain).unwrap();
     let period = haptics.period();
     let trace = plain.felt();
-    let mut motion = npmi::Motion::at_rest(&trace.start);
+    let mut motion = npmi::Motion::at_rest(&range.nearest(&trace.start));
     let (mut before, mut v_hat) = (trace.start, JointVector::zeros(3));
     let mut touched = 0;
     for (k, tick) in trace.ticks.iter().enumerate() {
@@ -202,7 +204,8 @@ fn a_tick_without_effects_is_the_papers_to_the_last_bit() {
         let sample = haptics.field().sample(&motion.position);
         let torque = coupling.device_torque(&y, &w, &motion.position, &v_hat);
         assert_eq!(bits(&(motion.position, torque)), bits(&(tick.proxy, tick.device_torque)), "tick {k}");
-        v_hat = proxy.step(&mut motion, period, &coupling.proxy_load(&y, &w, &sample.torque)).velocity;
+        let stops = range.stops(&motion.position, &motion.velocity, period, proxy.limits());
+        v_hat = proxy.step(&mut motion, period, &coupling.proxy_load(&y, &w, &sample.torque, stops)).velocity;
         before = y;
         touched += usize::from(sample.contact);
     }

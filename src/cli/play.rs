@@ -233,7 +233,8 @@ pub fn describe(text: &mut String, s: &Summary) -> fmt::Result {
         s.max_relative_account_residual, s.leak, s.hold_gain
     )?;
     for (count, what) in [
-        (s.outside, "outside the grid"),
+        (s.outside, "in free space outside the haptized range"),
+        (s.held, "held at the border of the haptized range: for more room, bake a wider grid"),
         (s.absent, "beside absent grid points"),
         (s.unconverged, "beside unconverged grid points"),
         (s.limited, "with the device's torque limited"),

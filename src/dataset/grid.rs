@@ -106,6 +106,16 @@ impl Grid {
         })
     }
 
+    /// The configuration of the grid's range that is nearest to `q`, joint by joint.
+    #[must_use]
+    pub fn clamp(&self, q: &JointVector) -> JointVector {
+        let mut inside = *q;
+        for (x, axis) in inside.iter_mut().zip(&self.axes) {
+            *x = x.max(axis.start).min(axis.coordinate(axis.count.saturating_sub(1)));
+        }
+        inside
+    }
+
     /// Configuration q of grid point `point`.
     #[must_use]
     pub fn configuration(&self, point: usize) -> JointVector {

@@ -6,7 +6,7 @@ bitflags! {
     /// Remarks on one tick. None set: everything is as it should be.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub struct Flags: u8 {
-        /// The proxy is outside the grid: its torque is that of the nearest grid cell, faded out over one cell.
+        /// The proxy is outside the grid, in space that is known to be free.
         const OUTSIDE = 1;
         /// A grid point around the proxy was not computed or measured: it counts as zero torque.
         const ABSENT = 1 << 1;
@@ -20,5 +20,7 @@ bitflags! {
         const SIZE_LIMITED = 1 << 5;
         /// The torque on the device was cut to its greatest rate of change.
         const RATE_LIMITED = 1 << 6;
+        /// The proxy is held at the border of the haptized range.
+        const HELD = 1 << 7;
     }
 }

@@ -16,6 +16,7 @@ mod hermite;
 mod layered;
 mod points;
 mod potential;
+pub mod range;
 pub mod stencil;
 mod work;
 

@@ -21,6 +21,7 @@ pub struct Lattice {
 #[derive(Clone, Copy, Debug, Default)]
 struct Line {
     start: f64,
+    end: f64,
     step: f64,
     count: usize,
     stride: usize,
@@ -81,7 +82,8 @@ impl Lattice {
             if count == 0 || !start.is_finite() || !step.is_finite() || step <= 0.0 {
                 return Err(LatticeError::Axis { axis: axis.name.clone(), count, start, step });
             }
-            *line = Line { start, step, count, stride };
+            let end = start + (count - 1) as f64 * step;
+            *line = Line { start, end, step, count, stride };
             stride = stride.checked_mul(count).ok_or(LatticeError::Points)?;
         }
         Ok(Self { joints, points: stride, axes })
@@ -102,6 +104,11 @@ impl Lattice {
     /// Number of points, spacing [rad or m] and stride in the numbering of points of each axis.
     pub(super) fn lines(&self) -> impl Iterator<Item = (usize, f64, usize)> {
         self.axes[..self.joints].iter().map(|line| (line.count, line.step, line.stride))
+    }
+
+    /// First and last coordinate of each axis [rad or m].
+    pub(super) fn ends(&self) -> impl Iterator<Item = [f64; 2]> {
+        self.axes[..self.joints].iter().map(|line| [line.start, line.end])
     }
 
     /// Coordinates of the grid lines of each axis [rad or m].
@@ -133,10 +140,9 @@ impl Lattice {
         };
         stencil.weights[0] = 1.0;
         for ((line, &coordinate), kept) in self.axes[..self.joints].iter().zip(q).zip(&mut stencil.fractions) {
-            let cells = (coordinate - line.start) / line.step;
-            let last = (line.count - 1) as f64;
-            let inside = if cells.is_finite() { cells.clamp(0.0, last) } else { 0.0 };
-            let beyond = (cells - inside).abs();
+            let held = if coordinate.is_finite() { coordinate.clamp(line.start, line.end) } else { line.start };
+            let beyond = (coordinate - held).abs() / line.step;
+            let inside = ((held - line.start) / line.step).min((line.count - 1) as f64);
             stencil.fade = stencil.fade.min(if beyond < 1.0 { 1.0 - beyond } else { 0.0 });
             // The last point belongs to the last cell; an axis of one point is a cell without extent.
             let low = (inside as usize).min(line.count.saturating_sub(2));

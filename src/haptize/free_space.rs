@@ -21,8 +21,8 @@
 use crate::{
     JointVector, MAX_JOINTS,
     contact::{Model, Proximity},
-    dataset::Grid,
-    proxy::Chain,
+    dataset::{Axis, Grid},
+    proxy::{Chain, Joint},
     scene::JointKind,
     tolerances::FREE_SPACE_ROUNDING,
 };
@@ -219,42 +219,24 @@ struct Reach {
 
 impl Reach {
     fn new(chain: &Chain, grid: &Grid) -> Self {
-        let joints = chain.joints.len();
-        // How far a joint's frame can be from its parent's.
-        let offsets: Vec<f64> = chain
-            .joints
-            .iter()
-            .zip(&grid.axes)
-            .map(|(joint, axis)| {
-                let slide = match joint.kind {
-                    JointKind::Revolute => 0.0,
-                    // The margin reaches beyond the grid.
-                    JointKind::Prismatic => {
-                        let far = FreeSpace::MARGIN as f64 * axis.step;
-                        let ends = [axis.coordinate(0) - far, axis.coordinate(axis.count - 1) + far];
-                        ends[0].abs().max(ends[1].abs())
-                    }
-                };
-                joint.origin.length() + slide
-            })
-            .collect();
-        let mut greatest = JointVector::zeros(joints);
-        let bounds = chain.nodes.iter().map(|node| {
-            let mut bound = JointVector::zeros(joints);
-            let mut distance = node.position.length();
-            for j in (0..=node.link).rev() {
-                bound[j] = match chain.joints[j].kind {
-                    JointKind::Revolute => distance,
-                    JointKind::Prismatic => 1.0,
-                };
-                greatest[j] = greatest[j].max(bound[j]);
-                distance += offsets[j];
-            }
-            bound
-        });
-        let bounds = bounds.collect();
+        // The margin reaches beyond the grid.
+        let range = |axis: &Axis| {
+            let far = FreeSpace::MARGIN as f64 * axis.step;
+            [axis.coordinate(0) - far, axis.coordinate(axis.count - 1) + far]
+        };
+        let ranges: Vec<[f64; 2]> = grid.axes.iter().map(range).collect();
+        let bounds = chain.jacobian_bounds(&ranges);
+        let mut greatest = JointVector::zeros(chain.joints.len());
+        for bound in &bounds {
+            greatest.iter_mut().zip(bound.iter()).for_each(|(greatest, r)| *greatest = greatest.max(*r));
+        }
+        let slide = |(joint, range): (&Joint, &[f64; 2])| match joint.kind {
+            JointKind::Revolute => joint.origin.length(),
+            JointKind::Prismatic => joint.origin.length() + range[0].abs().max(range[1].abs()),
+        };
         let farthest = chain.nodes.iter().map(|node| node.position.length()).fold(0.0, f64::max);
-        Self { bounds, greatest, length: offsets.iter().sum::<f64>() + farthest }
+        let length = chain.joints.iter().zip(&ranges).map(slide).sum::<f64>() + farthest;
+        Self { bounds, greatest, length }
     }
 }
 

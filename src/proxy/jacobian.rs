@@ -25,6 +25,30 @@ impl Chain {
         }
     }
 
+    /// Upper bounds r_ij of `|J_ij|` for each contact node i, at all configurations whose prismatic joints are within `ranges`
+    /// [m/rad, or 1 for a prismatic joint]: the lengths of the links between joint j and the node, added up.
+    #[must_use]
+    pub fn jacobian_bounds(&self, ranges: &[[f64; 2]]) -> Vec<JointVector> {
+        let bounds = self.nodes.iter().map(|node| {
+            let mut bound = JointVector::zeros(self.joints.len());
+            let mut distance = node.position.length();
+            for j in (0..=node.link).rev() {
+                let joint = &self.joints[j];
+                let slide = match joint.kind {
+                    JointKind::Revolute => 0.0,
+                    JointKind::Prismatic => ranges[j][0].abs().max(ranges[j][1].abs()),
+                };
+                bound[j] = match joint.kind {
+                    JointKind::Revolute => distance,
+                    JointKind::Prismatic => 1.0,
+                };
+                distance += joint.origin.length() + slide;
+            }
+            bound
+        });
+        bounds.collect()
+    }
+
     /// Velocity, for a unit rate of `joint`, of a point that moves with a link beyond it.
     pub(super) fn point_velocity(&self, pose: &Pose, point: DVec3, joint: usize) -> DVec3 {
         let axis = pose.axes[joint];

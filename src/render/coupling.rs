@@ -7,7 +7,7 @@
 //! four channels, adds to these torques (`channels.rs`).
 
 use super::npmi::Load;
-use crate::{JointVector, MAX_JOINTS, scene::HapticsSpec};
+use crate::{JointVector, MAX_JOINTS, field::range::Stops, scene::HapticsSpec};
 
 /// The coupling's gains, one per joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,15 +52,21 @@ impl Coupling {
         torque
     }
 
-    /// What acts on the proxy: coupling, damping bv, and the `contact` torque tau_bar.
+    /// What acts on the proxy: coupling, damping bv, the `contact` torque tau_bar and `stops`.
     #[must_use]
-    pub fn proxy_load(&self, position: &JointVector, velocity: &JointVector, contact: &JointVector) -> Load {
+    pub fn proxy_load(
+        &self,
+        position: &JointVector,
+        velocity: &JointVector,
+        contact: &JointVector,
+        stops: Stops,
+    ) -> Load {
         let (mut damping, mut torque) = ([[0.0; MAX_JOINTS]; MAX_JOINTS], *contact);
         for a in 0..position.len() {
             damping[a][a] = self.proxy_damping[a] + self.damping[a];
             torque[a] += self.damping[a] * velocity[a];
         }
-        Load { stiffness: self.stiffness, target: *position, damping, torque }
+        Load { stiffness: self.stiffness, target: *position, damping, torque, stops }
     }
 
     /// 1/2 Kvc |x - y|^2 [J].

@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     JointVector,
-    field::{Sample, TorqueField},
+    field::{Sample, TorqueField, range::HaptizedRange},
     scene::HapticsSpec,
     tolerances::GREATEST_GIVEN_ENERGY,
 };
@@ -31,6 +31,7 @@ use crate::{
 /// Everything of the haptic loop that does not change from tick to tick.
 pub struct Haptics {
     field: TorqueField,
+    range: HaptizedRange,
     npmi: Npmi,
     coupling: Coupling,
     /// Absent unless the scene names them.
@@ -108,7 +109,7 @@ pub struct JointsError {
 }
 
 impl Haptics {
-    /// A loop over `field` with the proxy `npmi` and the gains of `spec`.
+    /// A loop over `field` with the proxy `npmi` and the gains of `spec`. The proxy stays in the grid.
     ///
     /// # Errors
     /// When they differ in their number of joints.
@@ -135,6 +136,7 @@ impl Haptics {
         let channels = spec.effects.four_channel.map(|channels| Channels::new(channels, spec));
         let control = PassivityControl::new(spec);
         Ok(Self {
+            range: HaptizedRange::of_grid(field.lattice()),
             field,
             npmi,
             coupling,
@@ -152,6 +154,12 @@ impl Haptics {
     #[must_use]
     pub fn with_effects(self, effects: Option<ContactEffects>) -> Self {
         Self { effects, ..self }
+    }
+
+    /// The same loop with a proxy that stays in `range`, a range of the same dataset.
+    #[must_use]
+    pub fn with_range(self, range: HaptizedRange) -> Self {
+        Self { range, ..self }
     }
 
     /// The effects at the contacts, if the scene names any.
@@ -178,7 +186,8 @@ impl Haptics {
         self.period
     }
 
-    /// The state before the first tick: device and proxy at rest at `position`, the proxy within its limits, no torque.
+    /// The state before the first tick: device and proxy at rest at `position`, the proxy within its limits and the haptized
+    /// range, no torque.
     ///
     /// # Errors
     /// When `position` is not a position of the device.
@@ -213,7 +222,7 @@ impl Haptics {
 
     /// Device and proxy at rest at `position`.
     fn begin(&self, state: &mut State, position: &JointVector) {
-        state.motion = Motion::at_rest(&self.npmi.within_limits(position));
+        state.motion = Motion::at_rest(&self.npmi.within_limits(&self.range.nearest(position)));
         state.proxy_velocity = JointVector::zeros(self.joints());
         state.device = *position;
         state.pace = self.watchdog.start();
@@ -269,15 +278,7 @@ impl Haptics {
 
         let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
         let stopped = self.move_proxy(state, interval, &velocity, &sample);
-        Output {
-            torque,
-            device: state.device,
-            proxy,
-            sample,
-            flags: sample.flags | limited | if stopped { Flags::STOPPED } else { Flags::empty() },
-            fault,
-            accounts,
-        }
+        Output { torque, device: state.device, proxy, sample, flags: sample.flags | limited | stopped, fault, accounts }
     }
 
     /// What the device should be told, moving at `velocity`: coupling, channels, controller [N m or N].
@@ -302,10 +303,12 @@ impl Haptics {
         torque
     }
 
-    /// One step of the proxy over `interval` [s], booked; whether it ended at a limit. The device moves at `velocity`.
-    fn move_proxy(&self, state: &mut State, interval: f64, velocity: &JointVector, sample: &Sample) -> bool {
+    /// One step of the proxy over `interval` [s], booked; what stopped it. The device moves at `velocity`.
+    fn move_proxy(&self, state: &mut State, interval: f64, velocity: &JointVector, sample: &Sample) -> Flags {
         let stage = self.npmi.stage(&state.motion, interval);
-        let mut load = self.coupling.proxy_load(&state.device, velocity, &sample.torque);
+        let limits = self.npmi.limits();
+        let stops = self.range.stops(&state.motion.position, &state.motion.velocity, interval, limits);
+        let mut load = self.coupling.proxy_load(&state.device, velocity, &sample.torque, stops);
         let mut extra = Extra {
             channels: JointVector::zeros(self.joints()),
             friction_work: 0.0,
@@ -334,7 +337,11 @@ impl Haptics {
         extra.control_dissipation = interval * rate * stage.twice_kinetic_energy(&step.velocity);
         state.proxy_velocity = step.velocity;
         state.accounts.stepped(&self.coupling, interval, velocity, &sample.torque, &step, &extra);
-        step.stopped.contains(&true)
+        let mut flags = Flags::empty();
+        for (a, &x) in state.motion.position.iter().enumerate().filter(|(a, _)| step.stopped[*a]) {
+            flags |= if limits[a].contains(&x) { Flags::STOPPED } else { Flags::HELD };
+        }
+        flags
     }
 
     /// `wanted`, limited in size and in rate of change from `before` over `elapsed` [s].

@@ -14,7 +14,7 @@ use crate::{
     JointVector,
     dataset::{Dataset, Grid},
     device::{HandError, Motion, SimulatedHand},
-    field::{FieldError, TorqueField},
+    field::{FieldError, TorqueField, range::HaptizedRange},
     object::{Object, ObjectError},
     proxy::Chain,
     scene::{HapticsSpec, ProxyInertia, Rendering, SceneError},
@@ -170,7 +170,8 @@ fn haptic_loop(
     };
     let bounds = passivity::bounds(gains, &field, &labels(&dataset.grid));
     let effects = ContactEffects::new(&gains.effects, dataset, chain, &scene.text, &scene.path)?;
-    Ok((Haptics::new(field, npmi, gains)?.with_effects(effects), bounds))
+    let range = HaptizedRange::new(dataset, chain)?;
+    Ok((Haptics::new(field, npmi, gains)?.with_range(range).with_effects(effects), bounds))
 }
 
 /// Names and units of the grid's joints.

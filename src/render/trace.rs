@@ -113,8 +113,10 @@ pub struct Summary {
     pub hold_gain: f64,
     /// Energy that the device's port took in, at the last tick [J].
     pub port_work: f64,
-    /// Ticks with the proxy outside the grid.
+    /// Ticks with the proxy outside the grid, in space that is known to be free.
     pub outside: usize,
+    /// Ticks with the proxy held at the border of the haptized range.
+    pub held: usize,
     /// Ticks with the proxy beside an absent grid point.
     pub absent: usize,
     /// Ticks with the proxy beside an unconverged grid point.
@@ -132,6 +134,7 @@ impl Trace {
         let mut s = Summary { ticks: self.ticks.len(), ..Summary::default() };
         let flagged = |flags: Flags| self.ticks.iter().filter(|tick| tick.flags.intersects(flags)).count();
         s.outside = flagged(Flags::OUTSIDE);
+        s.held = flagged(Flags::HELD);
         s.absent = flagged(Flags::ABSENT);
         s.unconverged = flagged(Flags::UNCONVERGED);
         s.limited = flagged(Flags::SIZE_LIMITED | Flags::RATE_LIMITED);

@@ -119,8 +119,9 @@ impl Cloud {
                 if point.status.is_failed() { palette.flagged } else { palette::egui_colour(map.colour(point.torque)) };
             painter.circle_filled(at, radius * share, colour);
         }
-        let (here, _) = show(place(dataset, q));
-        for (radius, colour) in palette::ring(&palette) {
+        let inside = grid.clamp(q);
+        let (here, _) = show(place(dataset, &inside));
+        for (radius, colour) in palette::ring(&palette, inside != *q) {
             painter.circle_filled(here, radius, colour);
         }
         if self.pitch > 1 {

@@ -99,11 +99,12 @@ pub fn grid(visuals: &Visuals) -> Color32 {
     visuals.weak_text_color().gamma_multiply(FAINT)
 }
 
-/// The current configuration wherever it is marked, as radius [points] and colour: a ring with a rim on both sides shows
-/// on any ground.
+/// The mark of the current configuration, as radius [points] and colour: a ring with a rim on both sides shows on any
+/// ground. It has the colour of failures where it stands at the grid's border for a configuration `outside`.
 #[must_use]
-pub fn ring(palette: &Palette) -> [(f32, Color32); 3] {
-    [(7.0, palette.here), (5.0, palette.stage), (2.5, palette.here)]
+pub fn ring(palette: &Palette, outside: bool) -> [(f32, Color32); 3] {
+    let colour = if outside { palette.flagged } else { palette.here };
+    [(7.0, colour), (5.0, palette.stage), (2.5, colour)]
 }
 
 /// egui's own colours on light ground.

@@ -17,7 +17,10 @@ use super::{
         SIDE_SHARE, SPACE_RANGE, TIME_WIDTH, WIDE_PROGRESS,
     },
 };
-use crate::{gpu::ADAPTER_VARIABLE, render::trace::Tick};
+use crate::{
+    gpu::ADAPTER_VARIABLE,
+    render::{flags::Flags, trace::Tick},
+};
 use eframe::egui::{
     self, Align, Button, CentralPanel, Color32, Frame, Grid, Label, Layout, Panel, ProgressBar, RichText, ScrollArea,
     Slider, TextStyle, Ui, vec2,
@@ -95,7 +98,9 @@ impl Viewer {
             if let Some(tick) = session.history.last() {
                 ui.separator();
                 let contact = contact(tick, session.loaded.knows_nodes());
-                ui.label(RichText::new(contact).small());
+                let held = tick.flags.contains(Flags::HELD);
+                let colour = if held { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
+                ui.colored_label(colour, RichText::new(contact).small());
                 ui.separator();
                 let unit =
                     theme::units(session.loaded.dataset.grid.axes.iter().map(|axis| axis.effort_unit().to_owned()));
@@ -338,6 +343,8 @@ fn bar(ui: &Ui) -> Frame {
 /// What is touched, in words; `known`: whether the dataset tells which nodes of the object are.
 fn contact(tick: &Tick, known: bool) -> String {
     match tick.contact {
+        _ if tick.flags.contains(Flags::HELD) => "held at the border of the haptized range".into(),
+        false if tick.flags.contains(Flags::OUTSIDE) => "free, outside the haptized range".into(),
         false => "free".into(),
         true if known => format!("{} nodes in contact", tick.contact_nodes),
         true => "in contact, nodes not stored".into(),

@@ -202,7 +202,8 @@ impl Slices {
             .filter(|&(_, point)| loaded.dataset.status(point).is_failed())
             .map(|(_, point)| place(&grid.configuration(point)))
             .collect();
-        let here = place(q);
+        let inside = grid.clamp(q);
+        let (here, outside) = (place(&inside), inside != *q);
         let dataset = &loaded.dataset;
         let column = self.column;
         let (axes, lines) = (self.axes, self.lines.clone());
@@ -236,7 +237,7 @@ impl Slices {
                 let marks = Points::new("not converged", flagged).shape(MarkerShape::Cross).radius(CROSS);
                 plot.points(marks.color(palette.flagged).allow_hover(false));
             }
-            for (radius, colour) in palette::ring(&palette) {
+            for (radius, colour) in palette::ring(&palette, outside) {
                 plot.points(Points::new("q", vec![here]).radius(radius).color(colour).allow_hover(false));
             }
         });

@@ -20,9 +20,10 @@
 //! the explicit torque acts like an implicit one with damping D - (T/2) K_tau, so that `b >= (T/2) K_tau` keeps the step
 //! passive, and no smaller b does for a linear spring. That is the paper's condition Ks <= mu bv / T with mu <= 2.
 //!
-//! *Joint limits.* lambda are the torques of unilateral stops (`stops.rs`): v_hat keeps x_{k+1} within the limits, and
-//! lambda acts inwards at limits that are reached, so that `v_hat . lambda <= 0`. The impact is plastic: afterwards v is
-//! projected, orthogonally in M, on zero speed of the stopped joints. Both only take energy.
+//! *Stops.* lambda are the torques of unilateral stops (`stops.rs`): v_hat keeps x_{k+1} within the stops of the step, the
+//! joint limits or, nearer, the border of the haptized range (`field/range.rs`). lambda acts inwards at stops that are reached,
+//! so that `v_hat . lambda <= 0`. The impact is plastic: afterwards v is projected, orthogonally in M, on zero speed of the
+//! stopped joints. Both only take energy, whatever the stops, as long as x_k lies between them.
 
 mod linear;
 mod stops;
@@ -31,6 +32,7 @@ mod tests;
 
 use crate::{
     JointVector, MAX_JOINTS,
+    field::range::Stops,
     proxy::{Chain, JointMatrix},
 };
 use linear::{cholesky, solve_held};
@@ -41,7 +43,7 @@ use stops::{Side, solve_in_box};
 pub struct Npmi {
     joints: usize,
     inertia: Inertia,
-    limits: [[f64; 2]; MAX_JOINTS],
+    limits: Stops,
 }
 
 /// How M is found, chosen once per scene.
@@ -83,6 +85,8 @@ pub struct Load {
     pub damping: JointMatrix,
     /// f [N m or N].
     pub torque: JointVector,
+    /// Least and greatest coordinate that each joint may reach; x_k lies between them [rad or m].
+    pub stops: Stops,
 }
 
 /// What happened in a step.
@@ -92,7 +96,7 @@ pub struct Step {
     pub velocity: JointVector,
     /// Work of the stops, impact included; never positive but for rounding [J].
     pub stop_work: f64,
-    /// Joints that ended at a limit.
+    /// Joints that ended at a stop.
     pub stopped: [bool; MAX_JOINTS],
 }
 
@@ -159,6 +163,12 @@ impl Npmi {
         self.joints
     }
 
+    /// The joint limits [rad or m].
+    #[must_use]
+    pub fn limits(&self) -> &Stops {
+        &self.limits
+    }
+
     /// The configuration within the limits that is closest to `q`, joint by joint.
     #[must_use]
     pub fn within_limits(&self, q: &JointVector) -> JointVector {
@@ -186,8 +196,8 @@ impl Npmi {
         }
     }
 
-    /// Moves the proxy by one step of `interval` T > 0 [s] under `load`. `motion.position` must lie within the limits
-    /// and lies there afterwards.
+    /// Moves the proxy by one step of `interval` T > 0 [s] under `load`. `motion.position` must lie between the stops
+    /// of `load` and lies there afterwards.
     pub fn step(&self, motion: &mut Motion, interval: f64, load: &Load) -> Step {
         self.advance(&self.stage(motion, interval), motion, interval, load)
     }
@@ -207,8 +217,8 @@ impl Npmi {
             matrix[a][a] += half * half * load.stiffness[a];
             let x = motion.position[a];
             right[a] += half * (load.torque[a] - load.stiffness[a] * (x - load.target[a]));
-            low[a] = (self.limits[a][0] - x) / interval;
-            high[a] = (self.limits[a][1] - x) / interval;
+            low[a] = (load.stops[a][0] - x) / interval;
+            high[a] = (load.stops[a][1] - x) / interval;
         }
         let solved = solve_in_box(&matrix, &right, &low, &high);
         let v_hat = solved.point;
@@ -217,9 +227,9 @@ impl Npmi {
             let moved = motion.position[a] + interval * v_hat[a];
             // A stop is reached exactly, and rounding must not push beyond one.
             motion.position[a] = match solved.side[a] {
-                Side::Low => self.limits[a][0],
-                Side::High => self.limits[a][1],
-                Side::Inside => moved.max(self.limits[a][0]).min(self.limits[a][1]),
+                Side::Low => load.stops[a][0],
+                Side::High => load.stops[a][1],
+                Side::Inside => moved.max(load.stops[a][0]).min(load.stops[a][1]),
             };
             motion.momentum[a] = 2.0 * twice[a] - motion.momentum[a];
             motion.velocity[a] = 2.0 * v_hat[a] - motion.velocity[a];
@@ -306,7 +316,7 @@ impl Stage {
 }
 
 /// Number of joints and their `limits`, checked.
-fn checked(limits: &[[f64; 2]]) -> Result<(usize, [[f64; 2]; MAX_JOINTS]), InertiaError> {
+fn checked(limits: &[[f64; 2]]) -> Result<(usize, Stops), InertiaError> {
     let joints = limits.len().min(MAX_JOINTS);
     for (joint, &[least, greatest]) in limits.iter().enumerate() {
         if !(least.is_finite() && greatest.is_finite() && least <= greatest) {

@@ -1,4 +1,4 @@
-//! The linear complementarity problem of the joint stops: the v with `A v = r + f`, each v_a within its bounds, and f_a
+//! The linear complementarity problem of the stops: the v with `A v = r + f`, each v_a within its bounds, and f_a
 //! zero inside, pushing inwards at a bound. A is positive definite, so that the solution is unique.
 //!
 //! Principal pivoting by one joint at a time, always the last that is wrong: it never comes to the same set of stops twice

@@ -51,6 +51,7 @@ impl Noise {
             target: self.vector(joints, 0.5),
             damping,
             torque: self.vector(joints, 3.0),
+            stops: WIDE,
         }
     }
 }
@@ -134,9 +135,16 @@ fn stops_hold_and_only_take_energy() {
             let interval = 1e-3 * 10_f64.powf(1.2 * noise.next());
             let mut load = noise.load(joints);
             load.torque.iter_mut().for_each(|tau| *tau *= 5.0);
+            load.stops = *npmi.limits();
+            if noise.next() > 0.5 {
+                // Stops of this step alone, anywhere on both sides.
+                for (stop, x) in load.stops.iter_mut().zip(motion.position.iter()) {
+                    *stop = [stop[0].max(x - 0.1 * noise.next().abs()), stop[1].min(x + 0.1 * noise.next().abs())];
+                }
+            }
             let (imbalance, scale) = imbalance(&npmi, &mut motion, interval, &load);
             assert!(imbalance.abs() < 1e-11 * scale, "{joints} joints: {imbalance} of {scale}");
-            assert!(motion.position.iter().all(|x| (-0.1..=0.15).contains(x)));
+            assert!(motion.position.iter().zip(load.stops).all(|(x, [low, high])| (low..=high).contains(x)));
             stops += motion.position.iter().filter(|x| **x == -0.1 || **x == 0.15).count();
         }
         assert!(stops > 500, "the stops were reached {stops} times only");
@@ -148,6 +156,7 @@ fn a_stop_pushes_and_never_holds_back() {
     let npmi = Npmi::new(&Noise::new(1).inertia(2), &[[-1.0, 0.0], [-1.0, 1.0]]).unwrap();
     let mut motion = Motion::at_rest(&JointVector::zeros(2));
     let mut load = Noise::new(1).load(2);
+    load.stops = *npmi.limits();
     load.stiffness = JointVector::zeros(2);
     load.torque = JointVector::from_slice(&[1.0, 0.0]);
     let step = npmi.step(&mut motion, 1e-3, &load);
@@ -178,6 +187,7 @@ fn an_explicit_spring_is_bounded_at_the_bound_and_diverges_below_it() {
                 target: one(0.0),
                 damping: only(share * stiffness * interval),
                 torque: one(-stiffness * motion.position[0]),
+                stops: WIDE,
             };
             npmi.step(&mut motion, interval, &load);
             greatest = greatest.max(motion.position[0].abs());
@@ -226,6 +236,7 @@ fn energy_balances_with_the_inertia_of_a_chain_too() {
             for _ in 0..1000 {
                 let interval = 1e-3 * 10_f64.powf(1.5 * noise.next() - 0.2);
                 let mut load = noise.load(joints);
+                load.stops = *npmi.limits();
                 load.torque.iter_mut().for_each(|tau| *tau *= 5.0);
                 let (imbalance, scale) = imbalance(&npmi, &mut motion, interval, &load);
                 assert!(imbalance.abs() < 1e-11 * scale, "{joints} joints: {imbalance} of {scale}");
@@ -243,7 +254,13 @@ fn flown(npmi: &Npmi, interval: f64, seconds: f64) -> Motion {
     let mut noise = Noise::new(5);
     let mut motion = npmi.moving(&noise.vector(joints, 0.5), &noise.vector(joints, 4.0));
     let zero = JointVector::zeros(joints);
-    let load = Load { stiffness: zero, target: zero, damping: [[0.0; MAX_JOINTS]; MAX_JOINTS], torque: zero };
+    let load = Load {
+        stiffness: zero,
+        target: zero,
+        damping: [[0.0; MAX_JOINTS]; MAX_JOINTS],
+        torque: zero,
+        stops: *npmi.limits(),
+    };
     for _ in 0..(seconds / interval).round() as usize {
         npmi.step(&mut motion, interval, &load);
     }
