@@ -85,7 +85,9 @@ pub mod viewer;
 
 pub mod tolerances;
 
+mod joint_matrix;
 mod joint_vector;
 mod random;
 
+pub use joint_matrix::JointMatrix;
 pub use joint_vector::{JointVector, MAX_JOINTS};

@@ -159,6 +159,10 @@ pub const GIVE_UP_LENGTH: f64 = 1e-12;
 /// residual itself, which keeps Newton's convergence quadratic (Dembo, Eisenstat & Steihaug 1982).
 pub const INNER_TOLERANCE: f64 = 1e-2;
 
+/// Relative residual of the linear solves behind a tangent d tau/d q [1]: the tangent errs by its square, relative to the response
+/// (conjugate gradients are stationary in the energy), far below the 1e-7 to which f32 stores it.
+pub const RESPONSE_TOLERANCE: f64 = 1e-7;
+
 /// Least relative residual the inner conjugate gradients are asked for [1]: eps times the about 1e3 by which rounding
 /// grows over some tens of iterations.
 pub const INNER_TOLERANCE_FLOOR: f64 = 1e-13;

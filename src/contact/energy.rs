@@ -25,6 +25,9 @@ use super::newton::{Care, Damping, Newton, Step};
 use super::series::share_out;
 use super::springs::{Bending, Springs, add_contact_forces};
 use super::support::{Support, dot, root};
+use super::tangent;
+use crate::JointMatrix;
+use crate::proxy::Pose;
 use crate::tolerances::{
     ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GIVE_UP_LENGTH,
     GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, STAGE_TOLERANCE, STALLED_LENGTH,
@@ -343,6 +346,16 @@ impl EnergySearch {
             row.depth -= linear_change(row, &state.displacement);
         }
         frozen_contacts(frozen, &state.displacement, &mut state.contacts);
+    }
+
+    /// The tangent d tau/d q at the current state, an equilibrium of the proxy in `pose`; see [`tangent`].
+    pub fn tangent(&mut self, model: &Model, pose: &Pose) -> Option<JointMatrix> {
+        let Self { state, slots, support, newton, kc, .. } = self;
+        for contact in &mut state.contacts {
+            contact.multiplier = *kc * contact.bears();
+        }
+        let springs = Springs { contacts: &state.contacts, slots, kc: *kc, bending: Bending::Exact };
+        tangent::tangent(model, pose, springs, support, newton)
     }
 
     /// Takes up a new contact stiffness at the current state; returns how far from rest any iterate can be in the energy norm:

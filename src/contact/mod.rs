@@ -2,7 +2,7 @@
 //!
 //! Prepare a [`Model`] once, give each thread a [`Solver`], and solve configuration after configuration.
 
-use crate::JointVector;
+use crate::{JointMatrix, JointVector};
 use glam::DVec3;
 
 mod bounding_volumes;
@@ -27,6 +27,7 @@ mod solvers;
 mod springs;
 pub(crate) mod support;
 pub(crate) mod surface;
+mod tangent;
 pub(crate) mod walls;
 mod wide;
 
@@ -88,6 +89,9 @@ pub struct Equilibrium {
     pub gap: f64,
     /// Contact torque on the proxy, tau = sum_i J_i^T (force on x_i) [N m].
     pub torque: JointVector,
+    /// Tangent d tau/d q [N m/rad], where the model asks for it ([`Model::with_tangent`]), the algorithm is `energy`, and the
+    /// equilibrium is a converged, strict minimum.
+    pub tangent: Option<JointMatrix>,
     /// Contact forces on the object's nodes, ascending by node, each node once [N].
     pub forces: Vec<NodeForce>,
     /// Contacts seen from the proxy.

@@ -26,6 +26,8 @@ pub struct Model<'a> {
     /// normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
     /// [`RIGID_STIFFNESS`] [N/m].
     pub kc: f64,
+    /// Whether each equilibrium comes with its tangent d tau/d q.
+    pub with_tangent: bool,
     /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
     /// loses no digits.
     pub centre: DVec3,
@@ -106,6 +108,7 @@ impl<'a> Model<'a> {
             compliance,
             contact,
             kc: 0.0,
+            with_tangent: false,
             centre,
             extent,
             rest,

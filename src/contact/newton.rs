@@ -28,7 +28,7 @@ use super::springs::{Bending, Springs, add_contact_hessian, add_on_nodes, nodes_
 use super::support::{Support, dot, root};
 use crate::tolerances::{
     CONVEX_TOLERANCE, CURVATURE_MARGIN, DAMPING_ATTEMPTS, DAMPING_DECAY, DAMPING_GROWTH, INNER_ITERATIONS_PER_UNKNOWN,
-    LEAST_DAMPING, MODEL_PASSES, STEP_BACK_HALVINGS, THOROUGH_MODEL_PASSES,
+    LEAST_DAMPING, MODEL_PASSES, RESPONSE_TOLERANCE, STEP_BACK_HALVINGS, THOROUGH_MODEL_PASSES,
 };
 use glam::DVec3;
 
@@ -162,6 +162,27 @@ impl Newton {
             }
         }
         Step { predicted: f64::NAN, length: 0.0, damping }
+    }
+
+    /// Prepares [`Newton::respond`] for the contacts of `springs` that touch.
+    pub fn factorise(&mut self, support: &Support, springs: Springs) {
+        self.stiffening = 1.0;
+        self.reset(support.order(), springs.contacts);
+        self.relief.set_up(support, springs, &self.touching, self.stiffening);
+    }
+
+    /// The displacement du on the support with which (K + B) du is the force `load` on the support, B the Hessian of the contacts given to
+    /// [`Newton::factorise`]; `None` where K + B is not positive definite [m].
+    pub fn respond(&mut self, support: &Support, springs: Springs, load: &[f64]) -> Option<&[f64]> {
+        self.force.fill(0.0);
+        self.displacement.fill(0.0);
+        self.residual.copy_from_slice(load);
+        support.multiply(&self.residual, &mut self.product);
+        self.relieve(springs);
+        let stop = RESPONSE_TOLERANCE * RESPONSE_TOLERANCE * dot(&self.residual, &self.relieved);
+        let mut left = INNER_ITERATIONS_PER_UNKNOWN * support.order();
+        self.conjugate_gradients(support, springs, stop, &mut left).ok()?;
+        Some(&self.displacement)
     }
 
     /// The least of the damped model, and by how much it is less than at the start [J]; or what damping lacks where it is not convex.

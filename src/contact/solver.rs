@@ -100,6 +100,9 @@ impl<'a> Solver<'a> {
         equilibrium.residual = outcome.residual;
         equilibrium.status = if outcome.converged { Status::Contact } else { Status::Unconverged };
         self.account(&mut equilibrium);
+        if model.with_tangent && outcome.converged && model.contact.algorithm == Algorithm::Energy {
+            equilibrium.tangent = self.energy.tangent(model, &self.pose);
+        }
         if is_finite(&equilibrium) && self.displacement.iter().all(|u| u.is_finite()) {
             if !reach::covers(model, &self.detection, &equilibrium, &self.displacement) {
                 equilibrium.status = Status::Overflow;
@@ -239,6 +242,7 @@ fn nothing(status: Status, joints: usize) -> Equilibrium {
         gap: 0.0,
         torque: JointVector::zeros(joints),
         forces: Vec::new(),
+        tangent: None,
         touches: Vec::new(),
     }
 }

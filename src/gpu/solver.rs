@@ -222,6 +222,7 @@ pub(super) fn free(gap: f64, joints: usize) -> Equilibrium {
         gap,
         torque: JointVector::zeros(joints),
         forces: Vec::new(),
+        tangent: None,
         touches: Vec::new(),
     }
 }

@@ -134,7 +134,8 @@ impl Columns {
     /// have or out of order) becomes an unconverged point without torque and forces, of residual 1: the empty answer, which
     /// balances nothing.
     pub fn push(&mut self, equilibrium: &Equilibrium, shape: Shape) {
-        let Equilibrium { status, iterations, residual, energy, gap, torque, forces, touches: _ } = equilibrium;
+        let Equilibrium { status, iterations, residual, energy, gap, torque, forces, tangent: _, touches: _ } =
+            equilibrium;
         let sound = torque.len() == shape.joints
             && torque.is_finite()
             && energy.is_finite()

@@ -101,6 +101,7 @@ pub fn answer(q: &[f64]) -> Equilibrium {
         gap: q[1].cos() - 1.0,
         torque: JointVector::from_slice(&[q[1] / 7.0, q[0] / 3.0]),
         forces: (0..touched).map(|node| NodeForce { node, force: DVec3::new(q[0], q[1], f64::from(node)) }).collect(),
+        tangent: None,
         touches: Vec::new(),
     }
 }

@@ -1,0 +1,155 @@
+//! The tangent d tau/d q of the contact torque at an equilibrium.
+//!
+//! The equilibrium u(q) minimises E(u; q), so that U(q) = E(u(q); q), tau = -dU/dq, and by implicit differentiation
+//! `d tau/d q = -(E_qq - E_qu E_uu^-1 E_uq)`:
+//! minus the Hessian of U, symmetric. E_uu = K + B is what a Newton step is made with, B being the Hessian of the contact springs.
+//!
+//! A depth depends on the difference of its proxy node and the surface alone. To move the proxy node by J_i dq is therefore to move
+//! the three nodes of its contact by v = -J_i dq, and B gives the other derivatives as well: E_uq dq = B v, and
+//! `dq . E_qq dq' = v . B v' - lambda_i N_i . x_i''(dq, dq')`, with the second derivative of the forward kinematics
+//! `d^2 x_i / dq_k dq_l = a_k x J_il` for k <= l where joint k is revolute, and zero where it is prismatic.
+
+use super::depth::{Contact, stiffness_product};
+use super::model::Model;
+use super::newton::Newton;
+use super::springs::{Springs, add_on_nodes};
+use super::support::{Support, dot};
+use crate::JointMatrix;
+use crate::proxy::Pose;
+use crate::scene::JointKind;
+use glam::DVec3;
+
+/// The tangent at the equilibrium that `springs` and `support` describe, multipliers being the forces of the contacts, with the proxy in `pose`; `None` where the equilibrium is no
+/// strict minimum, so that there is no derivative [N m/rad].
+pub(super) fn tangent(
+    model: &Model,
+    pose: &Pose,
+    springs: Springs,
+    support: &Support,
+    newton: &mut Newton,
+) -> Option<JointMatrix> {
+    let joints = model.chain.joints.len();
+    let order = support.order();
+    let mut tangent = JointMatrix::zeros(joints);
+    // E_uq, column by column.
+    let mut loads = vec![vec![0.0; order]; joints];
+    for (contact, &slots) in springs.contacts.iter().zip(springs.slots) {
+        let Contact { proxy_node, depth, normal, multiplier, .. } = contact;
+        if *depth <= 0.0 {
+            continue;
+        }
+        if contact.wall.is_some() {
+            return None;
+        }
+        let node = *proxy_node as usize;
+        let columns: Vec<DVec3> = (0..joints).map(|k| model.chain.jacobian_column(pose, node, k)).collect();
+        for (k, column) in columns.iter().enumerate() {
+            let resistance = stiffness_product(contact, springs.kc, [-*column; 3]);
+            add_on_nodes(resistance, slots, &mut loads[k]);
+            let whole = resistance[0] + resistance[1] + resistance[2];
+            for (l, other) in columns.iter().enumerate().take(k + 1) {
+                let turn = match model.chain.joints[l].kind {
+                    JointKind::Revolute => pose.axes[l].cross(*column),
+                    JointKind::Prismatic => DVec3::ZERO,
+                };
+                tangent.add(k, l, whole.dot(*other) + *multiplier * normal.dot(turn));
+            }
+        }
+    }
+    newton.factorise(support, springs);
+    for k in 0..joints {
+        let moved = newton.respond(support, springs, &loads[k])?;
+        for (l, load) in loads.iter().enumerate().take(k + 1) {
+            tangent.add(k, l, dot(load, moved));
+        }
+    }
+    Some(tangent)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::contact::{Model, Solver, Status};
+    use crate::object::Object;
+    use crate::proxy::Chain;
+    use crate::scene::Scene;
+
+    /// Two revolute joints and a slide press points of both links into a sphere.
+    const SCENE: &str = r#"
+        [object]
+        sphere = { radius = 0.05, rings = 9, segments = 10 }
+        springs = { kind = "isotropic", stiffness = 300.0 }
+        ground = { stiffness = 100.0 }
+        [contact]
+        stiffness = 300.0
+        tolerance = 1e-11
+        [grid]
+        axes = [{ start = -0.2, stop = 0.2, count = 3 }, { start = -0.2, stop = 0.2, count = 3 }, { start = 0.0, stop = 0.01, count = 3 }]
+        [[proxy.joint]]
+        kind = "revolute"
+        axis = [0.0, 1.0, 0.0]
+        limits = [-4.0, 4.0]
+        nodes = [{ from = [-0.004, 0.003, 0.049], to = [0.006, 0.003, 0.048], count = 3 }]
+        [[proxy.joint]]
+        kind = "revolute"
+        origin = [0.0, 0.0, 0.07]
+        axis = [0.6, 0.0, 0.8]
+        limits = [-4.0, 4.0]
+        [[proxy.joint]]
+        kind = "prismatic"
+        axis = [0.0, 0.0, -1.0]
+        limits = [-0.1, 0.1]
+        nodes = [{ from = [0.01, -0.01, -0.02], to = [0.012, 0.01, -0.022], count = 4 }]
+    "#;
+
+    /// Step of central differences of the torque [rad or m]: small beside the facets, large beside what the solver leaves of 1e-11.
+    const STEP: f64 = 1e-7;
+
+    #[test]
+    fn the_tangent_is_the_derivative_of_the_torque_and_symmetric() {
+        let scene = Scene::parse(SCENE, "tangent.toml").unwrap();
+        let object = Object::build(&scene.object).unwrap();
+        let chain = Chain::new(&scene.proxy);
+        let mut model = Model::new(&object, &chain, scene.contact);
+        model.with_tangent = true;
+        let mut solver = Solver::new(&model);
+        let (mut checked, mut contacts) = (0, 0);
+        for turn in 0..5 {
+            for depth in 0..5 {
+                let q = [0.03 * f64::from(turn) - 0.05, 0.2 - 0.05 * f64::from(turn), 0.0021 * f64::from(depth)];
+                let here = solver.solve(&q);
+                if here.status != Status::Contact {
+                    assert!(here.tangent.is_none());
+                    continue;
+                }
+                let tangent = here.tangent.unwrap();
+                let pressing = |solver: &mut Solver<'_>, l: usize, step: f64| {
+                    let mut moved = q;
+                    moved[l] += step;
+                    solver.solve(&moved)
+                };
+                let size = tangent.lower().fold(0.0_f64, |size, entry| size.max(entry.abs()));
+                for l in 0..3 {
+                    let (after, before) = (pressing(&mut solver, l, STEP), pressing(&mut solver, l, -STEP));
+                    // At a kink, where contacts come and go or a closest feature changes, there is no derivative.
+                    let touched = |e: &crate::contact::Equilibrium| {
+                        e.touches
+                            .iter()
+                            .map(|t| (t.proxy_node, t.nodes, t.weights.map(|w| w == 0.0)))
+                            .collect::<Vec<_>>()
+                    };
+                    if touched(&after) != touched(&before) {
+                        continue;
+                    }
+                    for k in 0..3 {
+                        let slope = (after.torque[k] - before.torque[k]) / (2.0 * STEP);
+                        assert!((slope - tangent.at(k, l)).abs() < 1e-4 * size, "{q:?} {k} {l}: {slope} {tangent:?}");
+                        assert_eq!(tangent.at(k, l), tangent.at(l, k));
+                        checked += 1;
+                    }
+                }
+                contacts = contacts.max(here.touches.len());
+            }
+        }
+        assert!(checked > 100 && contacts > 3, "{checked} {contacts}");
+    }
+}
