@@ -8,6 +8,8 @@ set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 PATH=$PATH:$HOME/.cargo/bin:/usr/sbin:/sbin
 export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-auto} RUST_BACKTRACE=1
+# Everything is compiled once: what makes the next build faster would only make this one slower.
+export CARGO_INCREMENTAL=${CARGO_INCREMENTAL:-0}
 
 summary=()
 failures=0
