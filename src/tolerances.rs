@@ -267,6 +267,10 @@ pub const STOP_ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// account or torque of the haptic loop can become infinite.
 pub const GREATEST_INPUT: f64 = 1e9;
 
+/// Size below which a decaying state of the haptic loop is set to zero, in its SI unit. It is far below anything that can be felt or
+/// changes a torque; what stays has squares that are normal numbers, and arithmetic on subnormal numbers takes tens of times as long.
+pub const NEGLIGIBLE_STATE: f64 = 1e-150;
+
 /// Greatest age of a device's position on which a torque may rest [s]: ten ticks at 1 kHz. A hand, which moves at below
 /// 10 Hz, has gone on by no more than half a radian of its phase.
 pub const GREATEST_POSITION_AGE: f64 = 0.01;

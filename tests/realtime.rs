@@ -14,15 +14,24 @@ use haptize::{
     dataset::Dataset,
     device::{Device, HandError, Motion, Pointer, SimulatedHand},
     field::TorqueField,
+    haptize::{BackendChoice, Bake},
     render::{
         flags::Fault,
+        graphics::Graphics,
         haptic::{Haptics, Inputs},
         realtime::{self, Ends, HapticLoop},
         recording::Recording,
         session::{Driver, Plan},
-        setup::labels,
+        setup::{Setup, labels},
     },
-    scene::Waypoint,
+    scene::{
+        ContactDampingSpec, FourChannelSpec, FrictionSpec, GraphicsEffects, GraphicsSpec, HapticEffects, HapticsSpec,
+        Interpolation, ProxyInertia, Scene, Waypoint,
+    },
+};
+use std::{
+    sync::atomic::AtomicBool,
+    time::{Duration, Instant},
 };
 use synthetic::{grid, half_space};
 
@@ -75,7 +84,7 @@ fn the_real_time_loop_allocates_nothing() {
     let data = object(3);
     let haptics = build(&data);
     let mut hand = hand(3);
-    let (mut body, Ends { mut ticks, mut latest, clear }) = HapticLoop::new(&haptics, &mut hand).unwrap();
+    let (mut body, Ends { mut ticks, mut latest, clear, .. }) = HapticLoop::new(&haptics, &mut hand).unwrap();
     assert_no_alloc(|| {
         for k in 0..300 {
             body.tick();
@@ -185,4 +194,121 @@ fn a_loop_that_keeps_missing_its_deadlines_lets_go_without_a_jump_and_says_why()
         assert!(greatest <= 500.0 * (1.0 + 1e-12), "{late} s: {greatest} N m/s");
     }
     assert_eq!(run(0.008).0, None);
+}
+
+/// The sphere over every third line of its grid, a little less than the joints can reach.
+fn sphere() -> Dataset {
+    let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
+    for axis in &mut scene.grid.axes {
+        (axis.step, axis.count) = (3.0 * axis.step, axis.count.div_ceil(3));
+    }
+    let bake = Bake {
+        scene: &scene,
+        backend: BackendChoice::Cpu,
+        date: "2000-01-01T00:00:00Z",
+        stop: &AtomicBool::new(false),
+        progress: &mut |_| {},
+    };
+    bake.in_memory().unwrap().0
+}
+
+#[test]
+fn no_interpolation_and_no_effect_allocates_in_a_tick() {
+    let data = sphere();
+    let setup = Setup::new(&data).unwrap();
+    let press = setup.scene.motion.press[2].q;
+    let friction =
+        FrictionSpec { coefficient: 0.3, static_coefficient: 0.4, stiffness: 500.0, damping: 1.0, place: 0..0 };
+    let channels = FourChannelSpec { channels: [0.5, 1.0, 1.0, 0.5], filter: 0.005 };
+    let damping = ContactDampingSpec { damping: 5.0, place: 0..0 };
+    let none = HapticEffects::default();
+    let effects = [
+        none.clone(),
+        HapticEffects { friction: Some(friction.clone()), ..none.clone() },
+        HapticEffects { contact_damping: Some(damping.clone()), ..none.clone() },
+        HapticEffects { four_channel: Some(channels), ..none.clone() },
+        HapticEffects { passivity_control: true, ..none },
+        HapticEffects {
+            friction: Some(friction),
+            contact_damping: Some(damping),
+            four_channel: Some(channels),
+            passivity_control: true,
+        },
+    ];
+    let mut touched = 0;
+    for interpolation in [Interpolation::Linear, Interpolation::GapField, Interpolation::Potential] {
+        for inertia in [ProxyInertia::Constant, ProxyInertia::Configuration] {
+            for effects in &effects {
+                let gains = HapticsSpec {
+                    interpolation,
+                    proxy_inertia: inertia,
+                    effects: effects.clone(),
+                    ..setup.scene.haptics.clone()
+                };
+                let (haptics, _) = setup.retuned(&data, &gains).unwrap();
+                let mut state = haptics.start(&setup.scene.motion.press[0].q).unwrap();
+                let mut before = setup.scene.motion.press[0].q;
+                assert_no_alloc(|| {
+                    // Into the object, along it, beyond the grid, and what no device should say.
+                    for k in 0..400 {
+                        let mut position = before;
+                        for (a, (x, to)) in position.iter_mut().zip(press.iter()).enumerate() {
+                            *x += 0.01 * (to - *x) + if k > 200 && a == 0 { 5e-3 } else { 0.0 };
+                        }
+                        before = position;
+                        if k == 398 {
+                            position[0] = f64::NAN;
+                        }
+                        let inputs = Inputs { position, age: 0.0, elapsed: 1e-3, interval: 1e-3 };
+                        touched += usize::from(haptics.tick(&mut state, &inputs).sample.contact);
+                    }
+                });
+            }
+        }
+    }
+    assert!(touched > 36 * 20, "{touched}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_that_another_program_cuts_short_does_not_stop_a_running_loop() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("sphere.haptize");
+    sphere().save(&file).unwrap();
+    let mut played = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"))
+        .args(["play", "--realtime", "--seconds", "1.5", "-o"])
+        .arg(folder.path().join("out"))
+        .arg(&file)
+        .spawn()
+        .unwrap();
+    // The loop runs once there is a thread for it.
+    let is_running = || {
+        let Ok(tasks) = std::fs::read_dir(format!("/proc/{}/task", played.id())) else { return false };
+        tasks
+            .flatten()
+            .any(|task| std::fs::read_to_string(task.path().join("comm")).is_ok_and(|name| name.trim() == "haptic"))
+    };
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !is_running() {
+        assert!(Instant::now() < deadline, "the loop never began");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::fs::OpenOptions::new().write(true).open(&file).unwrap().set_len(64).unwrap();
+    // Late ticks of a busy machine may end it with a fault, a cut file by no signal.
+    assert!(played.wait().unwrap().code().is_some());
+    assert!(folder.path().join("out/trace.csv").exists());
+}
+
+#[test]
+fn a_slow_frame_rate_does_not_hold_up_the_end_of_a_session() {
+    // Frames every twenty seconds, a session of a tenth of one.
+    let data = sphere();
+    let setup = Setup::new(&data).unwrap();
+    let slow = GraphicsSpec { rate: 0.05, effects: GraphicsEffects::default() };
+    let mut graphics = Graphics::new(&data, setup.object.as_ref().unwrap(), &slow).unwrap();
+    let mut hand = setup.hand(Motion::through(&setup.scene.motion.press, 3).unwrap()).unwrap();
+    let plan = setup.plan(&data, 0.1, 0);
+    let began = Instant::now();
+    realtime::run(&setup.haptics, &mut hand, Some(&mut graphics), &plan).unwrap();
+    assert!(began.elapsed().as_secs() < 10, "{:?}", began.elapsed());
 }

@@ -29,7 +29,7 @@ pub fn run() -> Result<Report, Failure> {
     let (baked, sweep) = bake::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
     bake::warn(&sweep);
     baked.save(&file)?;
-    let dataset = Dataset::open(&file)?;
+    let dataset = Dataset::load(&file)?;
 
     eprintln!("pressing it, as fast as it goes and against the clock ...");
     let setup = Setup::new(&dataset)?;

@@ -36,7 +36,7 @@ impl Felt {
 
     /// Has the dataset at `path` felt by the same motion.
     pub fn beside(&mut self, path: &Path, motion: Motion, seconds: f64) -> Result<(), Failure> {
-        let dataset = Dataset::open(path)?;
+        let dataset = Dataset::load(path)?;
         let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", path.display()))?;
         let played = play::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, false)?;
         self.forces.extend(EndForce::new(&name(path, &dataset), &setup.chain, &played.trace));

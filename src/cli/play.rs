@@ -9,6 +9,7 @@ use haptize::{
         recording::Recording,
         session::{self, SessionError},
         setup::{Setup, labels},
+        steal::Steal,
         timing::{Percentiles, Timing},
         trace::{Summary, Trace},
     },
@@ -59,7 +60,7 @@ const LONGEST: f64 = 3600.0;
 
 /// Plays the dataset.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
-    let dataset = Dataset::open(&arguments.dataset)?;
+    let dataset = Dataset::load(&arguments.dataset)?;
     let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
     for exceeded in &setup.exceeded {
         eprintln!("haptize: note: {exceeded}");
@@ -260,5 +261,21 @@ pub fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
     line("tick", timing.tick_cost)?;
     line("frame", timing.frame_cost)?;
     let Timing { missed_deadlines, missed_frames, unrecorded, .. } = timing;
-    writeln!(text, "  missed       {missed_deadlines} deadlines, {missed_frames} frames, {unrecorded} records")
+    writeln!(text, "  missed       {missed_deadlines} deadlines, {missed_frames} frames, {unrecorded} records")?;
+    let Some(Steal { late, late_beside_steal, seconds }) = timing.steal.filter(|steal| steal.late > 0) else {
+        return Ok(());
+    };
+    write!(text, "  late         {late} ticks by more than half a period")?;
+    if late_beside_steal > 0 {
+        write!(
+            text,
+            ", {late_beside_steal} of them while the hypervisor took the processor ({seconds:.2} s in all): give the virtual \
+             machine processors of its own"
+        )?;
+    }
+    if late > late_beside_steal {
+        let own = late - late_beside_steal;
+        write!(text, "; {own} by this system: give the loop real-time priority (haptize doctor) or an idle core")?;
+    }
+    writeln!(text)
 }

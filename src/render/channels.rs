@@ -20,7 +20,7 @@
 //! so that Colgate's condition counts `Kvc + c2 Ks` (`passivity.rs`). The accounts book their work, the passivity
 //! controller and the guard of `haptic.rs` act on it as on all else.
 
-use super::npmi::Stage;
+use super::npmi::{Stage, flush};
 use crate::{
     JointVector,
     scene::{FourChannelSpec, HapticsSpec},
@@ -93,7 +93,10 @@ impl Channels {
         for a in 0..device.len() {
             let acceleration = (device[a] - state.device_velocity[a]) / elapsed;
             let hand = self.device_inertia[a] * acceleration + self.device_damping[a] * device[a] - held[a];
-            let follow = |old: &mut f64, new: f64| *old += share * (new - *old);
+            let follow = |old: &mut f64, new: f64| {
+                *old += share * (new - *old);
+                flush(old);
+            };
             follow(&mut state.device_acceleration[a], acceleration);
             follow(&mut state.hand[a], hand);
             follow(&mut state.proxy_acceleration[a], (proxy[a] - state.proxy_velocity[a]) / elapsed);
@@ -124,5 +127,30 @@ impl Channels {
             *torque = c3 * state.hand[a] + c1 * (*torque + self.proxy_damping[a] * state.device_velocity[a]);
         }
         torque
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn filters_that_are_left_alone_reach_zero_and_no_subnormal_number() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml");
+        let haptics = Scene::load(path).unwrap().haptics;
+        let channels = Channels::new(FourChannelSpec { channels: [0.5, 1.0, 1.0, 0.5], filter: 0.005 }, &haptics);
+        let joints = haptics.device_inertia.len();
+        let (mut state, still) = (channels.start(), JointVector::zeros(joints));
+        let mut moving = still;
+        moving.fill(0.3);
+        channels.observe(&mut state, 1e-3, &moving, &moving, &still);
+        assert!(state.hand[0] != 0.0);
+        for _ in 0..20_000 {
+            channels.observe(&mut state, 1e-3, &still, &still, &still);
+            let filtered = [state.hand, state.device_acceleration, state.proxy_acceleration];
+            assert!(!filtered.iter().flat_map(|v| v.iter()).any(|x| x.is_subnormal()), "{state:?}");
+        }
+        assert_eq!(state.hand, still);
     }
 }

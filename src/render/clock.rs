@@ -39,6 +39,11 @@ pub fn ask_for_real_time() -> Vec<String> {
     refused
 }
 
+/// The counters of stolen time, processor by processor; empty where the system has none.
+pub fn stolen() -> Vec<u64> {
+    std::fs::read_to_string("/proc/stat").map(|text| super::steal::counters(&text)).unwrap_or_default()
+}
+
 #[cfg(target_os = "linux")]
 mod system {
     use std::{io, time::Duration};
@@ -99,6 +104,19 @@ mod system {
         }
     }
 
+    pub fn processor() -> usize {
+        // SAFETY: the call takes no arguments.
+        usize::try_from(unsafe { libc::sched_getcpu() }).unwrap_or(0)
+    }
+
+    pub fn counter_rate() -> f64 {
+        // SAFETY: the call takes a number.
+        match unsafe { libc::sysconf(libc::_SC_CLK_TCK) } {
+            rate if rate > 0 => rate as f64,
+            _ => 100.0,
+        }
+    }
+
     pub fn unlock_memory() {
         // SAFETY: the call takes no arguments. It fails for nothing that one could mend.
         unsafe { libc::munlockall() };
@@ -129,6 +147,14 @@ mod system {
 
     pub fn take_short_turns() {}
 
+    pub fn processor() -> usize {
+        0
+    }
+
+    pub fn counter_rate() -> f64 {
+        100.0
+    }
+
     pub fn lock_memory() -> io::Result<()> {
         Err(io::ErrorKind::Unsupported.into())
     }
@@ -136,5 +162,5 @@ mod system {
     pub fn unlock_memory() {}
 }
 
+pub use system::{counter_rate, now, processor, sleep_until, unlock_memory};
 use system::{lock_memory, raise_priority, take_short_turns};
-pub use system::{now, sleep_until, unlock_memory};

@@ -17,6 +17,7 @@ pub mod realtime;
 pub mod recording;
 pub mod session;
 pub mod setup;
+pub mod steal;
 pub mod timing;
 pub mod trace;
 pub mod watchdog;

@@ -9,6 +9,7 @@ use super::{
     graphics::Graphics,
     haptic::Haptics,
     session::{Driver, Frames, Latest, Plan, SessionError},
+    steal::{LateTick, StealObserver},
     timing::{Durations, Percentiles, Timing},
     trace::{Frame, Tick, Trace},
 };
@@ -25,6 +26,12 @@ use std::{
 /// Ticks that the ring to the recorder holds: four seconds at 1 kHz.
 const RING: usize = 4096;
 
+/// Late ticks that the ring to the recorder holds.
+const LATE_RING: usize = 1024;
+
+/// How long the graphics thread sleeps at most before it looks whether the session is over.
+const LONGEST_SLEEP: Duration = Duration::from_millis(20);
+
 /// How often the recorder empties the ring.
 const RECORDER_PERIOD: Duration = Duration::from_millis(5);
 
@@ -36,6 +43,7 @@ pub struct HapticLoop<'session> {
     driver: Driver<'session>,
     recorder: rtrb::Producer<Tick>,
     latest: triple_buffer::Input<Latest>,
+    late: rtrb::Producer<LateTick>,
     lateness: Durations,
     cost: Durations,
     period: Duration,
@@ -55,6 +63,8 @@ pub struct Ends {
     pub ticks: rtrb::Consumer<Tick>,
     /// The latest tick.
     pub latest: triple_buffer::Output<Latest>,
+    /// Ticks that began more than half a period late.
+    pub late: rtrb::Consumer<LateTick>,
     /// Clears a fault.
     pub clear: ClearFault,
 }
@@ -79,6 +89,7 @@ impl<'session> HapticLoop<'session> {
     pub fn new(haptics: &'session Haptics, device: &'session mut dyn Device) -> Result<(Self, Ends), SessionError> {
         let driver = Driver::new(haptics, device)?;
         let (recorder, ticks) = rtrb::RingBuffer::new(RING);
+        let (late, late_ticks) = rtrb::RingBuffer::new(LATE_RING);
         let start = crate::JointVector::zeros(haptics.joints());
         let (latest, reader) =
             triple_buffer::triple_buffer(&Latest { time: -1.0, proxy: start, device: start, share: 0.0 });
@@ -88,6 +99,7 @@ impl<'session> HapticLoop<'session> {
             driver,
             recorder,
             latest,
+            late,
             lateness: histogram()?,
             cost: histogram()?,
             period: Duration::from_secs_f64(haptics.period()),
@@ -98,14 +110,27 @@ impl<'session> HapticLoop<'session> {
             unrecorded: 0,
             clear: Arc::clone(&clear),
         };
-        Ok((this, Ends { ticks, latest: reader, clear: ClearFault(clear) }))
+        Ok((this, Ends { ticks, latest: reader, late: late_ticks, clear: ClearFault(clear) }))
+    }
+
+    /// Asks the system for a real-time priority for the calling thread, and sets the first deadline to now. Returns what was not
+    /// granted.
+    pub fn begin(&mut self) -> Vec<String> {
+        let refused = clock::ask_for_real_time();
+        self.began = clock::now();
+        refused
     }
 
     /// Waits for the next deadline and does its tick. Allocates, locks and prints nothing.
     pub fn tick(&mut self) {
         let deadline = self.began + self.period * self.next;
         let now = clock::wait_until(deadline);
-        self.lateness.record(now - deadline);
+        let by = now - deadline;
+        self.lateness.record(by);
+        if by > self.period / 2 {
+            // A full ring holds enough late ticks to tell what makes them late.
+            let _ = self.late.push(LateTick { at: now, by, processor: clock::processor() });
+        }
         // The next deadline that is at least half a period away.
         let mut skipped = 0;
         while self.began + self.period * (self.next + 1 + skipped) < now + self.period / 2 {
@@ -143,7 +168,7 @@ pub fn run(
     graphics: Option<&mut Graphics<'_>>,
     plan: &Plan,
 ) -> Result<(Trace, Timing), SessionError> {
-    let (mut body, Ends { mut ticks, latest, .. }) = HapticLoop::new(haptics, device)?;
+    let (mut body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device)?;
     let start = *body.driver.start();
     let frame_cost = Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()))?;
     let mut recorded = plan.new_ticks()?;
@@ -159,8 +184,7 @@ pub fn run(
         });
         let drawing = drawing.transpose().map_err(resources)?;
         let feeling = thread::Builder::new().name("haptic".into()).spawn_scoped(scope, move || {
-            let refused = clock::ask_for_real_time();
-            body.began = clock::now();
+            let refused = body.begin();
             while !body.is_over(plan.ticks) {
                 body.tick();
             }
@@ -173,11 +197,16 @@ pub fn run(
                 return Err(resources(error));
             }
         };
+        let mut observer = StealObserver::new(clock::now(), clock::stolen(), clock::counter_rate());
         loop {
             let last = feeling.is_finished();
             while let Ok(tick) = ticks.pop() {
                 recorded.push(tick);
             }
+            while let Ok(tick) = late.pop() {
+                observer.add(tick);
+            }
+            observer.read(clock::now(), clock::stolen());
             if last {
                 break;
             }
@@ -197,6 +226,7 @@ pub fn run(
             frame_cost,
             missed_deadlines,
             missed_frames,
+            steal: observer.finish(),
             unrecorded,
         };
         Ok((Trace { joints: plan.joints.clone(), start, ticks: recorded, frames, shown }, timing))
@@ -227,8 +257,11 @@ fn draw(
     let mut missed = 0;
     while !over.load(Ordering::Acquire) {
         let due = began + Duration::from_secs_f64(frames.due());
-        clock::sleep_until(due);
+        clock::sleep_until(due.min(clock::now() + LONGEST_SLEEP));
         let now = clock::now();
+        if now < due {
+            continue;
+        }
         let before = frames.due();
         frames.draw(latest.read());
         cost.record(clock::now() - now);

@@ -1,5 +1,6 @@
 //! How punctual a real-time session was: histograms of lateness and cost, filled without allocation.
 
+use super::steal::Steal;
 use hdrhistogram::Histogram;
 use serde::Serialize;
 use std::time::Duration;
@@ -59,6 +60,8 @@ pub struct Timing {
     pub missed_deadlines: u64,
     /// Frames that began more than a frame late.
     pub missed_frames: u64,
+    /// Late ticks, and what of them the hypervisor is to blame for; absent where the system does not count that.
+    pub steal: Option<Steal>,
     /// Ticks that ran but could not be recorded, because the recorder fell behind.
     pub unrecorded: u64,
 }

@@ -66,6 +66,11 @@ impl Checker<'_> {
         self.number(key, value, &format!("between {least} and {greatest}"), |x| x > least && x < greatest)
     }
 
+    /// A number from `least` to `greatest`, both included.
+    pub fn within(&self, key: &str, value: &Number, least: f64, greatest: f64) -> Result<f64, SceneError> {
+        self.number(key, value, &format!("between {least} and {greatest}"), |x| x >= least && x <= greatest)
+    }
+
     /// Finite numbers.
     pub fn all_finite(&self, key: &str, values: &[f64], span: Range<usize>) -> Result<(), SceneError> {
         values.iter().try_for_each(|x| self.value(key, *x, span.clone(), "finite numbers", |_| true).map(|_| ()))

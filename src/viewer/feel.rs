@@ -10,7 +10,6 @@ use crate::{
     JointVector,
     device::{Device, Pointer, PointerInput, Reading},
     render::{
-        clock,
         haptic::Haptics,
         realtime::{ClearFault, Ends, HapticLoop},
         session::{Driver, Latest},
@@ -189,7 +188,7 @@ impl Body {
             Err(error) => drop(report.send(Err(error.to_string()))),
             Ok((mut body, Ends { ticks, latest, clear, .. })) => {
                 drop(report.send(Ok((ticks, latest, Some(clear)))));
-                drop(refuse.send(clock::ask_for_real_time()));
+                drop(refuse.send(body.begin()));
                 while !self.stop.load(Ordering::Acquire) {
                     body.tick();
                 }

@@ -212,7 +212,7 @@ fn run(
     let loaded = match task {
         Task::Open(path) if is_scene(&path) => bake(Scene::load(&path)?, solver, context, stop, progress)?,
         Task::Open(path) => {
-            let dataset = Dataset::open(&path)?;
+            let dataset = Dataset::load(&path)?;
             Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
         }
         Task::Bake(scene) => bake((*scene).clone(), solver, context, stop, progress)?,

@@ -12,8 +12,9 @@
 //! cone: both only take energy.
 //!
 //! Every branch takes energy or keeps it, whatever T: friction is dissipative in every step, not on average. Each solve
-//! turns at least one node from stick to slip or from slip to held, so that there are at most twice as many as contacts,
-//! and one; in practice one or two.
+//! turns at least one node from stick to slip or from slip to held; in practice there are one or two. After [`MOST_SOLVES`] all
+//! nodes are held by their bristles for this step, so that the time of a tick is bounded: a held bristle takes energy whatever
+//! its force, and is shortened to the cone at the next tick.
 
 use super::{Bristle, EffectState, Patch, Pending, add};
 use crate::{
@@ -26,6 +27,9 @@ use crate::{
     scene::FrictionSpec,
 };
 use glam::DVec3;
+
+/// Solves of a step in which nodes may still change between stick and slip; one of some microseconds more follows.
+const MOST_SOLVES: usize = 8;
 
 /// The constants of friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,7 +79,9 @@ impl Friction {
         for patch in &mut state.patches {
             patch.bristle = patch.bristle.clamp_length_max(self.sticking_cone(patch) / self.stiffness);
         }
+        let mut solves = 0;
         let (end, step) = loop {
+            solves += 1;
             let mut trial = *motion;
             let step = npmi.advance(stage, &mut trial, interval, &self.loaded(load, &state.patches, interval));
             let mut settled = true;
@@ -85,8 +91,11 @@ impl Friction {
                 settled &= mode == patch.mode;
                 patch.mode = mode;
             }
-            if settled {
+            if settled || solves > MOST_SOLVES {
                 break (trial, step);
+            }
+            if solves == MOST_SOLVES {
+                state.patches.iter_mut().for_each(|patch| patch.mode = Mode::Held);
             }
         };
         *motion = end;

@@ -34,6 +34,7 @@ use crate::{
     JointVector, MAX_JOINTS,
     field::range::Stops,
     proxy::{Chain, JointMatrix},
+    tolerances::NEGLIGIBLE_STATE,
 };
 use linear::{cholesky, solve_held};
 use stops::{Side, solve_in_box};
@@ -220,7 +221,8 @@ impl Npmi {
             low[a] = (load.stops[a][0] - x) / interval;
             high[a] = (load.stops[a][1] - x) / interval;
         }
-        let solved = solve_in_box(&matrix, &right, &low, &high);
+        let mut solved = solve_in_box(&matrix, &right, &low, &high);
+        solved.point.iter_mut().for_each(flush);
         let v_hat = solved.point;
         let twice = stage.momentum_of(&v_hat);
         for a in 0..self.joints {
@@ -251,6 +253,7 @@ impl Npmi {
         } else if let Inertia::Chain(_) = self.inertia {
             motion.velocity = stage.velocity_of(&motion.momentum);
         }
+        motion.momentum.iter_mut().chain(motion.velocity.iter_mut()).for_each(flush);
         Step { velocity: v_hat, stop_work, stopped }
     }
 }
@@ -312,6 +315,13 @@ impl Stage {
         let mut velocity = *momentum;
         linear::solve_transposed(&self.factor, &mut velocity);
         velocity
+    }
+}
+
+/// Sets `state` to zero where it has decayed to nothing.
+pub(super) fn flush(state: &mut f64) {
+    if state.abs() < NEGLIGIBLE_STATE {
+        *state = 0.0;
     }
 }
 

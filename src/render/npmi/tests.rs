@@ -324,3 +324,19 @@ fn an_arm_moves_as_lagrange_s_equation_says() {
     assert!(fine < 5e-5, "{fine} rad off after 0.3 s");
     assert!(coarse / fine > 1.8, "{coarse} at twice the step, {fine}");
 }
+
+#[test]
+fn a_proxy_at_rest_at_zero_has_no_subnormal_state() {
+    // Pulled to zero and damped: everything decays for ever.
+    let npmi = Npmi::new(&Noise::new(3).inertia(2), &WIDE[..2]).unwrap();
+    let mut load = Noise::new(3).load(2);
+    (load.target, load.torque) = (JointVector::zeros(2), JointVector::zeros(2));
+    let mut motion = Motion::at_rest(&JointVector::from_slice(&[0.1, -0.2]));
+    for k in 0..200_000 {
+        let step = npmi.step(&mut motion, 1e-3, &load);
+        let states = motion.momentum.iter().chain(motion.velocity.iter()).chain(step.velocity.iter());
+        assert!(!states.chain(motion.position.iter()).any(|x| x.is_subnormal()), "step {k}: {motion:?}");
+        assert!(!motion.kinetic_energy().is_subnormal());
+    }
+    assert_eq!(motion.kinetic_energy(), 0.0);
+}

@@ -5,6 +5,10 @@ use super::super::error::SceneError;
 use super::super::file::GraphicsTable;
 use super::super::{GraphicsEffects, GraphicsSpec, Material, ObjectSpec, StiffeningSpec};
 
+/// Lowest frame rate [Hz]: motion is no longer seen long before.
+const LOWEST_RATE: f64 = 1.0;
+/// Highest frame rate [Hz].
+const HIGHEST_RATE: f64 = 1e4;
 /// Default frame rate [Hz].
 const RATE: f64 = 60.0;
 
@@ -17,7 +21,7 @@ pub(super) fn convert(
     table: &GraphicsTable,
     object: Option<&ObjectSpec>,
 ) -> Result<GraphicsSpec, SceneError> {
-    let rate = table.rate.as_ref().map(|value| checker.between("rate", value, 0.0, 1e4));
+    let rate = table.rate.as_ref().map(|value| checker.within("rate", value, LOWEST_RATE, HIGHEST_RATE));
     let quasi_static = table.quasi_static.as_ref().filter(|value| *value.get_ref());
     let named = [
         ("gravity", table.gravity.as_ref().map(|value| value.span())),

@@ -10,7 +10,10 @@ use super::super::{
     ContactDampingSpec, FourChannelSpec, FrictionSpec, HandSpec, HapticEffects, HapticsSpec, JointKind, JointSpec,
     ProxyInertia,
 };
-use crate::{JointVector, tolerances::LEVER_ARM};
+use crate::{
+    JointVector,
+    tolerances::{GREATEST_INTERVAL, LEVER_ARM},
+};
 use toml::Spanned;
 
 /// How a default changes from revolute to prismatic joints.
@@ -44,7 +47,10 @@ pub(super) fn convert(
             checker.per_joint(key, value.as_ref(), joints, strictly, |kind| default.of(kind))
         };
     use Quantity::{Gain, Speed, Torque};
-    let rate = table.rate.as_ref().map_or(Ok(1000.0), |value| checker.between("rate", value, 0.0, 1e6));
+    let rate = table
+        .rate
+        .as_ref()
+        .map_or(Ok(1000.0), |value| checker.within("rate", value, 1.0 / GREATEST_INTERVAL, HIGHEST_RATE));
     let threshold = table.threshold.as_ref().map_or(Ok(0.5), |value| checker.between("threshold", value, 0.0, 1.0));
     let factor = table.passivity_factor.as_ref().map_or(Ok(1.0), |value| checker.positive("passivity_factor", value));
     let hand = &table.hand;
@@ -74,6 +80,8 @@ pub(super) fn convert(
     })
 }
 
+/// Highest rate of the loop [Hz]: a tick takes some microseconds.
+const HIGHEST_RATE: f64 = 1e5;
 /// Default stiffness of a bristle [N/m]: a friction of 1 N builds up over 2 mm, below what a fingertip takes for a slip.
 const BRISTLE_STIFFNESS: f64 = 500.0;
 /// Default damping of a bristle [N s/m].
