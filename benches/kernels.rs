@@ -54,7 +54,7 @@ struct Adapter {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/sphere.toml"))?;
+    let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scenes/sphere.toml"))?;
     let plain = Context::open(AdapterChoice::Any)?;
     println!("{}", plain.adapter());
     let hardware = plain.adapter().hardware;

@@ -39,9 +39,9 @@ const AGREEMENT: f64 = 1e-6;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut scene = Scene::load(root.join("datasets/sphere.toml"))?;
+    let mut scene = Scene::load(root.join("tests/scenes/sphere.toml"))?;
     let cores = std::thread::available_parallelism()?.get();
-    println!("datasets/sphere.toml on {cores} cores\n");
+    println!("tests/scenes/sphere.toml on {cores} cores\n");
     scene.contact.algorithm = Algorithm::Paper;
     let paper = fastest(&scene)?;
     scene.contact.algorithm = Algorithm::Energy;

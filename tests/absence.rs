@@ -24,7 +24,7 @@ use std::{
 
 /// The sphere under the arm of three joints, every third line of its grid.
 fn sphere() -> Scene {
-    let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
+    let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml")).unwrap();
     for axis in &mut scene.grid.axes {
         (axis.count, axis.step) = (axis.count / 3, 3.0 * axis.step);
     }

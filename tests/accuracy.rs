@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// The sphere on a grid so many times as coarse, so that bakes take little time.
 fn sphere(coarser: usize) -> Scene {
-    let mut scene = Scene::load(Path::new("datasets/sphere.toml")).unwrap();
+    let mut scene = Scene::load(Path::new("tests/scenes/sphere.toml")).unwrap();
     for axis in &mut scene.grid.axes {
         let cells = axis.count - 1;
         (axis.count, axis.step) = (cells / coarser + 1, axis.step * cells as f64 / (cells / coarser) as f64);

@@ -40,7 +40,7 @@ impl Random {
 
 /// The paper's sphere, its grid `coarser` times as coarse over the same region.
 fn sphere(coarser: f64) -> Scene {
-    let mut scene = Scene::load(Path::new("datasets/sphere.toml")).unwrap();
+    let mut scene = Scene::load(Path::new("tests/scenes/sphere.toml")).unwrap();
     for axis in &mut scene.grid.axes {
         let length = axis.step * (axis.count - 1) as f64;
         let cells = ((axis.count - 1) as f64 / coarser).round();

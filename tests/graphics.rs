@@ -197,7 +197,7 @@ fn what_is_not_named_takes_no_memory() {
 
 #[test]
 fn scenes_name_effects_or_have_none_and_what_cannot_act_is_an_error_with_its_line() {
-    let sphere = include_str!("../datasets/sphere.toml");
+    let sphere = include_str!("scenes/sphere.toml");
     let parse = |graphics: &str| {
         let text = sphere.replace("rate = 60.0                             # Hz", graphics);
         assert_ne!(text, sphere);
@@ -229,7 +229,7 @@ fn scenes_name_effects_or_have_none_and_what_cannot_act_is_an_error_with_its_lin
     let solid = sphere.replace(springs, "[object.elasticity]\nyoung = 1e4\npoisson = 0.3\ncell = 0.01\n");
     let stiffening = "[graphics]\nstiffening = { factor = 4, strain = 0.2 }";
     let message = Rendering::parse(&solid.replace("[graphics]", stiffening), "solid.toml").unwrap_err().to_string();
-    assert!(message.contains("the object is an elastic solid: leave it out"), "{message}");
+    assert!(message.contains("the object is an elastic solid or has a skin: leave it out"), "{message}");
     let scan = include_str!("../datasets/sponge.toml");
     let message = Rendering::parse(&format!("{scan}\n[graphics]\nsmoothing = 0.1\n"), "scan.toml").unwrap_err();
     assert!(message.to_string().contains("the scene has none: leave it out"), "{message}");

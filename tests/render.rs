@@ -540,7 +540,7 @@ fn two_loops_run_at_two_rates_and_repeat_bit_for_bit() {
 
 /// The paper's sphere scene, baked.
 fn baked_sphere() -> Dataset {
-    let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
+    let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml")).unwrap();
     let bake = Bake {
         scene: &scene,
         backend: BackendChoice::Cpu,
@@ -591,7 +591,7 @@ fn datasets_that_cannot_be_rendered_say_why() {
     assert!(matches!(Setup::new(&data).err(), Some(SetupError::NoScene)));
     data.scene = "name = 3".into();
     assert!(matches!(Setup::new(&data).err(), Some(SetupError::Scene(_))));
-    data.scene = include_str!("../datasets/sphere.toml").into();
+    data.scene = include_str!("scenes/sphere.toml").into();
     assert!(matches!(Setup::new(&data).err(), Some(SetupError::Joints { grid: 2, chain: 3 })));
 }
 

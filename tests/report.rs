@@ -62,7 +62,12 @@ fn arm(joints: usize) -> Chain {
         inertia: DVec3::splat(1e-4),
         rotor_inertia: 1e-4,
     };
-    let node = |link: usize, k: usize| ProxyNode { link, position: DVec3::X * length * k as f64 / 5.0, radius: 0.0 };
+    let node = |link: usize, k: usize| ProxyNode {
+        link,
+        position: DVec3::X * length * k as f64 / 5.0,
+        radius: 0.0,
+        length: 0.0,
+    };
     let nodes = (joints.saturating_sub(2)..joints).flat_map(|link| (1..=5).map(move |k| node(link, k)));
     Chain { joints: (0..joints).map(joint).collect(), nodes: nodes.collect() }
 }

@@ -4,7 +4,9 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use glam::DVec3;
-use haptize::scene::{Algorithm, Diagnostic, GroundNodes, JointKind, Scene, SceneError, Shape};
+use haptize::scene::{
+    Algorithm, Diagnostic, GroundNodes, Interpolation, JointKind, Material, Rendering, Scene, SceneError, Shape,
+};
 use haptize::{JointVector, MAX_JOINTS};
 use std::path::{Path, PathBuf};
 
@@ -135,6 +137,61 @@ fn lines_of_nodes_include_both_ends() {
 }
 
 #[test]
+fn nodes_along_a_link_share_its_length_and_its_stiffness() {
+    let line = |how: &str| {
+        let nodes = format!("{{ from = [0, 0, 0], to = [0, 0, 0.3], {how} }}");
+        parse(&LEAST.replace("{ at = [0.1, 0, 0] }", &nodes).replace("stiffness = 1000", "stiffness_per_length = 6e4"))
+            .unwrap()
+    };
+    for (how, count) in [("spacing = 0.1", 4), ("spacing = 0.09", 5), ("spacing = 1", 2), ("count = 7", 7)] {
+        let scene = line(how);
+        let nodes = &scene.proxy.joints[0].nodes;
+        assert_eq!(nodes.len(), count, "{how}");
+        assert!((nodes[0].length * 2.0 - nodes[count - 1].length - nodes[0].length).abs() < 1e-15);
+        let length: f64 = nodes.iter().map(|node| node.length).sum();
+        // kc = 3 Kc of all nodes is the stiffness of the link, however many they are.
+        let kc: f64 = nodes.iter().map(|node| 3.0 * scene.contact.node_stiffness(node.length)).sum();
+        assert!((length - 0.3).abs() < 1e-15 && (kc - 6e4 * 0.3).abs() < 1e-9, "{how}: {length} {kc}");
+    }
+    // What stands for no length has a stiffness of its own.
+    let both = parse(&LEAST.replace("stiffness = 1000", "stiffness = 1000\nstiffness_per_length = 6e4")).unwrap();
+    assert_eq!(both.contact.node_stiffness(both.proxy.joints[0].nodes[0].length), 1000.0);
+}
+
+#[test]
+fn a_skin_is_told_by_what_one_knows_of_it() {
+    let skin = |keys: &str| {
+        let spheres = "rings = 4\nsegments = 6\n[object.springs]\nkind = \"axial\"\nstiffness = 300\n[object.ground]\nstiffness = 100\n";
+        assert!(LEAST.contains(spheres));
+        parse(&LEAST.replace(spheres, &format!("edge = 0.004\n{keys}\n"))).unwrap().object
+    };
+    let object = skin("[object.skin]\ntension = 260\nwidth = 0.0175\nfoundation = 1.6e5");
+    assert_eq!((&object.material, &object.ground), (&Material::Hollow, &None));
+    assert!(matches!(object.shape, Shape::Icosphere { divisions: 16, .. }));
+    let found = object.skin.unwrap();
+    assert_eq!((found.tension, found.foundation), (260.0, 1.6e5));
+    assert!((found.bending - 0.079_625).abs() < 1e-12);
+    // A plate of 2 mm that keeps its volume.
+    let plate = skin("[object.skin]\nthickness = 0.002\nyoung = 9e5\nfoundation = 1e5").skin.unwrap();
+    assert!((plate.bending - 8e-4).abs() < 1e-15 && (plate.tension - 600.0).abs() < 1e-9);
+    let foundation = skin("[object.skin]\nfoundation = 1e6\nwidth = 0.01").skin.unwrap();
+    assert!((foundation.bending - 0.01).abs() < 1e-15);
+    let solid = "[object.skin]\nwidth = 0.01\n[object.elasticity]\nyoung = 2e4\npoisson = 0.0\ncell = 0.01\n[object.ground]\nstiffness = 1";
+    assert!((skin(solid).skin.unwrap().bending - 0.01).abs() < 1e-15);
+}
+
+#[test]
+fn interpolation_is_smooth_where_there_is_an_energy_to_interpolate() {
+    let interpolation = |text: &str| parse(text).unwrap().haptics.interpolation;
+    assert_eq!(interpolation(LEAST), Interpolation::Potential);
+    let paper = LEAST.replace("stiffness = 1000", "stiffness = 1000\nalgorithm = \"paper\"");
+    assert_eq!(interpolation(&paper), Interpolation::Linear);
+    assert_eq!(interpolation(&format!("{LEAST}[haptics]\ninterpolation = \"gap-field\"")), Interpolation::GapField);
+    let scan = Rendering::load(dataset("sponge.toml")).unwrap();
+    assert_eq!(scan.haptics.interpolation, Interpolation::Linear);
+}
+
+#[test]
 fn an_axis_needs_any_two_of_step_stop_and_count() {
     let axis = |entry: &str| {
         let grid = format!("axes = [{{ start = -0.5, {entry} }}]\nspacing = 0.1");
@@ -173,13 +230,44 @@ const BROKEN: &[Broken] = &[
     ("stiffness = 1000", "stiffness = 1000\nmax_iterations = 0", "max_iterations", &["at least 1"]),
     ("stiffness = 1000", "stiffness = 1000\nalgorithm = \"magic\"", "magic", &["`energy`", "`paper`", "`linearised`"]),
     ("stiffness = 1000", "stiffness = 1000\nupdates = 2", "updates = 2", &["linearised"]),
-    ("stiffness = 1000", "", "[contact]", &["missing field `stiffness`"]),
+    ("stiffness = 1000", "", "[contact]", &["no stiffness", "stiffness_per_length"]),
+    ("stiffness = 1000", "stiffness_per_length = 1e5", "[contact]", &["{ at = .. }", "give their stiffness"]),
+    ("stiffness = 1000", "stiffness = \"rigid\"\nstiffness_per_length = 1e5", "rigid", &["leave out one"]),
+    ("stiffness = 1000", "stiffness = 1000\nstiffness_per_length = 0", "per_length = 0", &["positive"]),
     ("stiffness = 1000", "stiffness = 1,000", "1,000", &[]),
     ("stiffness = 1000", "stiffness = 1000\nstiffness = 2", "stiffness = 2", &["duplicate key"]),
     ("radius = 0.05", "radius = 0", "radius = 0", &["positive"]),
     ("rings = 4", "rings = 0", "rings = 0", &["at least 1"]),
     ("rings = 4", "rings = -4", "rings = -4", &["-4"]),
     ("segments = 6", "segments = 2", "segments = 2", &["at least 3"]),
+    ("segments = 6", "edge = 0.01", "radius = 0.05", &["one of edge", "rings with segments"]),
+    ("rings = 4\nsegments = 6", "edge = 0", "edge = 0", &["between"]),
+    ("rings = 4\nsegments = 6", "subdivisions = 40", "subdivisions = 40", &["at most 9"]),
+    ("[object.ground]\nstiffness = 100", "", "[object", &["nothing holds", "foundation"]),
+    ("[object.ground]", "[object.skin]\n[object.ground]", "[object.skin]", &["resists nothing", "bending or width"]),
+    ("[object.ground]", "[object.skin]\nthickness = 1e-3\n[object.ground]", "thickness", &["go together"]),
+    ("[object.ground]", "[object.skin]\npoisson = 0.4\nbending = 1\n[object.ground]", "poisson", &["goes with"]),
+    ("[object.ground]", "[object.skin]\nbending = -1\n[object.ground]", "bending = -1", &["positive"]),
+    ("[object.ground]", "[object.skin]\nbending = 1\nwidth = 0.01\n[object.ground]", "width", &["say the same"]),
+    ("[object.ground]", "[object.skin]\nwidth = 0.01\n[object.ground]", "width", &["give tension, or bending"]),
+    (
+        "[object.ground]",
+        "[object.skin]\nthickness = 1e-3\nyoung = 1e5\ntension = 10\n[object.ground]",
+        "tension",
+        &["follows from thickness"],
+    ),
+    (
+        "[object.ground]",
+        "[object.skin]\nthickness = 1e-3\nyoung = 1e5\npoisson = 0.6\n[object.ground]",
+        "poisson",
+        &["between"],
+    ),
+    (
+        "[contact]",
+        "[graphics]\nstiffening = { factor = 2, strain = 0.1 }\n[object.skin]\nbending = 1\n[contact]",
+        "stiffening",
+        &["has a skin"],
+    ),
     ("rings = 4", "rings = 100000000000", "rings", &["at most"]),
     ("[object.sphere]", "[object.mesh]\nfile = \"a.obj\"\n[object.sphere]", "[object.", &["two shapes"]),
     ("[object.sphere]\nradius = 0.05\nrings = 4\nsegments = 6\n", "", "[object.springs]", &["no shape"]),
@@ -195,6 +283,9 @@ const BROKEN: &[Broken] = &[
     ("limits = [-1, 1]", "limits = [-1, 1]\ninertia = [1, -1, 1]", "inertia", &["negative"]),
     ("limits = [-1, 1]", "limits = [-1, 1]\nname = \"a,b\"", "name", &["letters"]),
     ("{ at = [0.1, 0, 0] }", "{ at = [0.1, 0, 0], count = 3 }", "nodes", &["either"]),
+    ("{ at = [0.1, 0, 0] }", "{ from = [0, 0, 0], to = [0, 0, 1], count = 3, spacing = 0.1 }", "nodes", &["one of"]),
+    ("{ at = [0.1, 0, 0] }", "{ from = [0, 0, 0], to = [0, 0, 1], spacing = 0 }", "nodes", &["spacing", "positive"]),
+    ("{ at = [0.1, 0, 0] }", "{ from = [0, 0, 0], to = [0, 0, 1], spacing = 1e-9 }", "nodes", &["at most 4096"]),
     ("{ at = [0.1, 0, 0] }", "{ from = [0, 0, 0], to = [0, 0, 1], count = 1 }", "nodes", &["at least 2"]),
     ("{ at = [0.1, 0, 0] }", "{ at = [0.1, 0, 0], radius = -1 }", "nodes", &["radius", "zero or positive"]),
     ("{ at = [0.1, 0, 0] }", "", "[[proxy.joint]]", &["no link has contact nodes"]),

@@ -409,7 +409,7 @@ mod tests {
                 centre_of_mass: DVec3::ZERO,
                 inertia: DVec3::ONE,
                 rotor_inertia: 0.0,
-                nodes: vec![ProxyNodeSpec { position: DVec3::ZERO, radius }; count],
+                nodes: vec![ProxyNodeSpec { position: DVec3::ZERO, radius, length: 0.0 }; count],
             }],
         })
     }
@@ -442,6 +442,7 @@ mod tests {
             let chain = nodes(30, radius);
             let contact = ContactSpec {
                 stiffness: 1.0,
+                stiffness_per_length: None,
                 algorithm: Algorithm::Energy,
                 tolerance: 1e-8,
                 max_iterations: 1,

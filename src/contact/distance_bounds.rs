@@ -145,8 +145,8 @@ mod tests {
     /// and are idle only near the surface.
     #[test]
     fn bounds_hold_and_are_sharp_away_from_the_surface() {
-        for name in ["sphere.toml", "mesh.toml"] {
-            let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets").join(name)).unwrap();
+        for name in ["tests/scenes/sphere.toml", "datasets/mesh.toml"] {
+            let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
             let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
             let model = Model::new(&object, &chain, scene.contact);
             let bounds = &model.distance_bounds;

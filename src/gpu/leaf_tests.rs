@@ -272,7 +272,7 @@ fn proxy_nodes_are_placed_to_f32() {
 
 #[test]
 fn a_lost_device_is_opened_anew() {
-    let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
+    let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml")).unwrap();
     let object = Object::build(&scene.object).unwrap();
     let chain = Chain::new(&scene.proxy);
     let model = Model::new(&object, &chain, scene.contact);
@@ -290,7 +290,7 @@ fn a_lost_device_is_opened_anew() {
 
 #[test]
 fn one_number_for_a_pair_of_nodes_holds_the_compliance_of_isotropic_objects() {
-    let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
+    let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml")).unwrap();
     for (kind, numbers) in [(SpringKind::Isotropic, 1), (SpringKind::Axial, 9)] {
         scene.object.material = Material::Springs(SpringSpec { kind, stiffness: 150.0 });
         let object = Object::build(&scene.object).unwrap();
@@ -313,7 +313,7 @@ fn a_refused_shader_is_an_error_and_the_device_lives_on() {
 
 #[test]
 fn what_no_kernel_wrote_is_found_out() {
-    let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
+    let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml")).unwrap();
     let object = Object::build(&scene.object).unwrap();
     let chain = Chain::new(&scene.proxy);
     let model = Model::new(&object, &chain, scene.contact);

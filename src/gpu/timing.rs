@@ -143,7 +143,7 @@ mod tests {
 
     /// What is asked of a device, and the same on one that is not timed.
     fn sphere() -> (Scene, [Arc<Context>; 2]) {
-        let text = include_str!("../../datasets/sphere.toml").replace("count = 36", "count = 3");
+        let text = include_str!("../../tests/scenes/sphere.toml").replace("count = 36", "count = 3");
         let scene = Scene::parse(&text, "sphere.toml").unwrap();
         let open = [Context::open_timed, Context::open];
         (scene, open.map(|open| Arc::new(open(AdapterChoice::Any).unwrap())))

@@ -1,7 +1,7 @@
 //! The chain and its forward kinematics.
 
 use crate::JointVector;
-use crate::scene::{JointKind, ProxySpec};
+use crate::scene::{JointKind, ProxyNodeSpec, ProxySpec};
 use glam::{DMat3, DVec3};
 
 /// A serial chain.
@@ -45,6 +45,8 @@ pub struct Node {
     pub position: DVec3,
     /// Zero for the paper's point nodes [m].
     pub radius: f64,
+    /// Length of the link that the node stands for; zero for a node by itself [m].
+    pub length: f64,
 }
 
 /// The chain placed in the world at one configuration.
@@ -76,7 +78,13 @@ impl Chain {
             rotor_inertia: joint.rotor_inertia,
         });
         let nodes = spec.joints.iter().enumerate().flat_map(|(link, joint)| {
-            joint.nodes.iter().map(move |node| Node { link, position: node.position, radius: node.radius })
+            let node = move |node: &ProxyNodeSpec| Node {
+                link,
+                position: node.position,
+                radius: node.radius,
+                length: node.length,
+            };
+            joint.nodes.iter().map(node)
         });
         Self { joints: joints.collect(), nodes: nodes.collect() }
     }
@@ -165,7 +173,7 @@ mod tests {
             inertia: DVec3::ZERO,
             rotor_inertia: 1.0,
         };
-        let tip = Node { link: 1, position: DVec3::new(0.3, 0.0, 0.0), radius: 0.0 };
+        let tip = Node { link: 1, position: DVec3::new(0.3, 0.0, 0.0), radius: 0.0, length: 0.0 };
         let chain = Chain { joints: vec![joint(0.0), joint(0.5)], nodes: vec![tip] };
         let (a, b) = (0.4_f64, 1.1_f64);
         let pose = random::at(&chain, &[a, b], &[0.0, 0.0], 0.0);

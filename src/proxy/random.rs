@@ -22,7 +22,8 @@ pub fn chains() -> impl Iterator<Item = (Chain, JointVector, JointVector)> {
             rotor_inertia: 1e-3 * (1.1 + random.between(-1.0, 1.0)),
         });
         let joints: Vec<Joint> = joints.collect();
-        let nodes = (0..3 * count).map(|k| Node { link: k / 3, position: 0.2 * random.vector(), radius: 0.0 });
+        let nodes =
+            (0..3 * count).map(|k| Node { link: k / 3, position: 0.2 * random.vector(), radius: 0.0, length: 0.0 });
         let nodes = nodes.collect();
         let mut vector = |size: f64| {
             JointVector::from_slice(&(0..count).map(|_| size * random.between(-1.0, 1.0)).collect::<Vec<_>>())

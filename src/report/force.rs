@@ -144,7 +144,7 @@ mod tests {
             rotor_inertia: 1e-3,
             nodes,
         };
-        let end = vec![ProxyNodeSpec { position: DVec3::X * 0.15, radius: 0.0 }];
+        let end = vec![ProxyNodeSpec { position: DVec3::X * 0.15, radius: 0.0, length: 0.0 }];
         let joints = vec![
             joint(DVec3::Z, DVec3::ZERO, vec![]),
             joint(DVec3::Y, DVec3::ZERO, vec![]),

@@ -209,7 +209,7 @@ mod tests {
     use super::*;
 
     fn sphere() -> Scene {
-        Scene::parse(include_str!("../../datasets/sphere.toml"), "sphere.toml").unwrap()
+        Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap()
     }
 
     #[test]

@@ -16,7 +16,7 @@ pub(super) struct SceneTable {
     pub name: Option<String>,
     pub object: Option<Spanned<ObjectTable>>,
     pub proxy: ProxyTable,
-    pub contact: Option<ContactTable>,
+    pub contact: Option<Spanned<ContactTable>>,
     pub grid: Option<Spanned<GridTable>>,
     pub scan: Option<Spanned<ScanTable>>,
     #[serde(default)]
@@ -116,7 +116,7 @@ pub(super) struct JointTable {
     pub nodes: Vec<Spanned<NodesTable>>,
 }
 
-/// One node `at` a point, or `count` nodes on the line `from` .. `to`, both ends included.
+/// One node `at` a point, or nodes on the line `from` .. `to`, both ends included: `count` of them, or at most `spacing` apart.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NodesTable {
@@ -124,13 +124,15 @@ pub(super) struct NodesTable {
     pub from: Option<Vector>,
     pub to: Option<Vector>,
     pub count: Option<Spanned<usize>>,
+    pub spacing: Option<Number>,
     pub radius: Option<Number>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ContactTable {
-    pub stiffness: Spanned<NumberOr<Rigid>>,
+    pub stiffness: Option<Spanned<NumberOr<Rigid>>>,
+    pub stiffness_per_length: Option<Number>,
     pub algorithm: Option<Algorithm>,
     pub tolerance: Option<Number>,
     pub max_iterations: Option<Spanned<u32>>,

@@ -45,7 +45,7 @@ mod tests {
 
     #[test]
     fn the_text_says_what_the_scene_has_become() {
-        let mut scene = Scene::parse(include_str!("../../datasets/sphere.toml"), "sphere.toml").unwrap();
+        let mut scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
         scene.grid.axes[0] = AxisSpec { start: -0.9, step: 0.1 / 3.0, count: 9 };
         scene.grid.axes[1].count = 9;
         scene.grid.axes[2].count = 13;

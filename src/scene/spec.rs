@@ -192,14 +192,20 @@ pub struct ProxyNodeSpec {
     pub position: DVec3,
     /// Zero for the paper's point nodes [m].
     pub radius: f64,
+    /// Length of the link that the node stands for; zero for a node by itself [m].
+    pub length: f64,
 }
 
 /// Equation (2) and how it is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSpec {
     /// Contact stiffness: of one spring Kc between a proxy node and an object node; the energy form's stiffness at a
-    /// contact point is kc = 3 Kc (three nodes of a triangle). Infinity is rigid contact [N/m].
+    /// contact point is kc = 3 Kc (three nodes of a triangle). Infinity is rigid contact. Where the scene gives a stiffness per length
+    /// instead, that of a node that stands for the mean length [N/m].
     pub stiffness: f64,
+    /// Contact stiffness of a link per length of it, in the energy form; where given, nodes along links take theirs from it
+    /// [N/m^2].
+    pub stiffness_per_length: Option<f64>,
     /// How equation (2) is solved.
     pub algorithm: Algorithm,
     /// Relative residual at which a configuration counts as converged [1].
@@ -208,6 +214,19 @@ pub struct ContactSpec {
     pub max_iterations: u32,
     /// How often linearised contact takes its geometry anew, at the displacement found.
     pub updates: u32,
+}
+
+impl ContactSpec {
+    /// Returns Kc of a node that stands for `length` of a link [m], in [N/m]: with a stiffness per length k' the third part of
+    /// k' times the length, so that the contact point's kc = 3 Kc is k' times the length, and the whole link's does not depend on the
+    /// number of its nodes.
+    #[must_use]
+    pub fn node_stiffness(&self, length: f64) -> f64 {
+        match self.stiffness_per_length {
+            Some(per_length) if length > 0.0 => per_length * length / 3.0,
+            _ => self.stiffness,
+        }
+    }
 }
 
 /// How equation (2) is solved for one configuration.
@@ -347,11 +366,10 @@ pub enum ProxyInertia {
 }
 
 /// How the torque is interpolated between grid points.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, serde::Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, serde::Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Interpolation {
     /// Multilinear torque behind the boundary of the contact index (section 3.1).
-    #[default]
     Linear,
     /// Multilinear torque behind the boundary where the gap is zero.
     GapField,

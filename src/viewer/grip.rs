@@ -63,7 +63,7 @@ mod tests {
 
     #[test]
     fn a_gripped_node_follows_the_pointer() {
-        let scene = Scene::parse(include_str!("../../datasets/sphere.toml"), "sphere.toml").unwrap();
+        let scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
         let chain = Chain::new(&scene.proxy);
         let q = JointVector::from_slice(&[0.0, 1.4, -1.9]);
         let mut pose = chain.new_pose();

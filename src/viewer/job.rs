@@ -269,7 +269,7 @@ mod tests {
     #[test]
     fn an_adapter_that_does_not_answer_is_told_with_what_to_do() {
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-        let scene = Scene::parse(include_str!("../../datasets/sphere.toml"), "sphere.toml").unwrap();
+        let scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
         let gone = AdapterSummary { name: "Unplugged (1)".into(), ..context.adapter().clone() };
         let task = Task::Bake(Arc::new(scene));
         let Outcome::Failed(why) = Job::begin(task, Solver::Adapter(gone), Arc::clone(&context), || ()).unwrap().wait()

@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn what_is_felt_stays_until_another_loop_is_made() {
-        let text = include_str!("../../datasets/sphere.toml").replace("count = 36", "count = 3");
+        let text = include_str!("../../tests/scenes/sphere.toml").replace("count = 36", "count = 3");
         let scene = Scene::parse(&text, "sphere.toml").unwrap();
         let stop = AtomicBool::new(false);
         let bake = Bake { scene: &scene, backend: BackendChoice::Cpu, date: "", stop: &stop, progress: &mut |_| () };

@@ -52,7 +52,7 @@ fn row(from: f64, to: f64, count: usize, radius: f64) -> Vec<ProxyNodeSpec> {
     (0..count)
         .map(|k| {
             let position = DVec3::X * (from + (to - from) * k as f64 / (count - 1) as f64);
-            ProxyNodeSpec { position, radius }
+            ProxyNodeSpec { position, radius, length: 0.0 }
         })
         .collect()
 }

@@ -150,7 +150,7 @@ fn an_effect_that_cannot_act_is_refused_with_its_line() {
 #[test]
 fn forces_of_the_object_s_nodes_find_their_proxy_nodes() {
     // The sphere under the arm of three joints, at every third configuration.
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml");
     let mut text = std::fs::read_to_string(path).unwrap();
     for (fine, coarse) in [
         ("count = 36", "step = 0.157, count = 12"),

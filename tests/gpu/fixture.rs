@@ -6,7 +6,10 @@ use haptize::{
     proxy::Chain,
     scene::{Material, Scene},
 };
-use std::sync::{Arc, OnceLock};
+use std::{
+    path::Path,
+    sync::{Arc, OnceLock},
+};
 
 /// One device for all tests of this process: opening one costs a second, and drivers dislike many.
 pub fn context() -> Arc<Context> {
@@ -23,7 +26,12 @@ pub fn load(name: &str) -> (Scene, Object, Chain) {
 
 /// The same of another material.
 pub fn load_of(name: &str, material: Option<Material>) -> (Scene, Object, Chain) {
-    let mut scene = Scene::load(format!("{}/datasets/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let mut scene = {
+        // The tests' own scene of this name before the shipped one.
+        let folders = ["tests/scenes", "datasets"].map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder));
+        let path = folders.into_iter().map(|folder| folder.join(name)).find(|path| path.exists());
+        Scene::load(path.unwrap()).unwrap()
+    };
     scene.object.material = material.unwrap_or(scene.object.material);
     let object = Object::build(&scene.object).unwrap();
     let chain = Chain::new(&scene.proxy);

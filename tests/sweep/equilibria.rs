@@ -61,6 +61,6 @@ fn check_equilibria(scene: &Scene) -> usize {
 #[test]
 fn stored_forces_balance_the_object_and_make_the_torque() {
     assert!(check_equilibria(&scene()) > 5);
-    let sphere = concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml");
+    let sphere = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml");
     assert!(check_equilibria(&Scene::load(sphere).unwrap()) > 1000);
 }

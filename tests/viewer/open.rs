@@ -100,7 +100,7 @@ fn a_file_dropped_on_the_window_is_opened() {
 #[test]
 fn a_broken_file_is_an_error_in_the_window_that_says_what_to_do() {
     let mut window = Window::sphere();
-    let scene = std::fs::read_to_string("datasets/sphere.toml").unwrap();
+    let scene = std::fs::read_to_string("tests/scenes/sphere.toml").unwrap();
     let broken = window.folder.path().join("broken.toml");
     std::fs::write(&broken, scene.replace("stiffness = 150.0", "stiffness = -150.0")).unwrap();
     let cut = window.folder.path().join("cut.haptize");

@@ -32,7 +32,7 @@ pub static DEVICE_NAME: OnceLock<String> = OnceLock::new();
 pub static SPHERE: LazyLock<(tempfile::TempDir, PathBuf)> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("sphere.haptize");
-    bake(Path::new("datasets/sphere.toml")).save(&file).unwrap();
+    bake(Path::new("tests/scenes/sphere.toml")).save(&file).unwrap();
     (folder, file)
 });
 
@@ -150,7 +150,7 @@ impl Window {
 
 /// The sphere on a coarse grid of 168 configurations about its top, quickly baked.
 pub fn small_scene() -> String {
-    let mut text = std::fs::read_to_string("datasets/sphere.toml").unwrap();
+    let mut text = std::fs::read_to_string("tests/scenes/sphere.toml").unwrap();
     for (old, new) in [
         ("spacing = 0.05235987755982988", "spacing = 0.1"),
         ("start = -0.916297857297023, count = 36", "start = -0.1, count = 3"),

@@ -7,8 +7,8 @@ use super::super::check::Checker;
 use super::super::error::SceneError;
 use super::super::file::{FourChannelTable, FrictionTable, HapticsTable, PerJoint};
 use super::super::{
-    ContactDampingSpec, FourChannelSpec, FrictionSpec, HandSpec, HapticEffects, HapticsSpec, JointKind, JointSpec,
-    ProxyInertia,
+    ContactDampingSpec, FourChannelSpec, FrictionSpec, HandSpec, HapticEffects, HapticsSpec, Interpolation, JointKind,
+    JointSpec, ProxyInertia,
 };
 use crate::{
     JointVector,
@@ -37,10 +37,12 @@ impl Quantity {
     }
 }
 
+/// `interpolation`: the default.
 pub(super) fn convert(
     checker: &Checker<'_>,
     table: &HapticsTable,
     joints: &[JointSpec],
+    interpolation: Interpolation,
 ) -> Result<HapticsSpec, SceneError> {
     let vector =
         |key, value: &Option<Spanned<PerJoint>>, strictly, default: Quantity| -> Result<JointVector, SceneError> {
@@ -57,7 +59,7 @@ pub(super) fn convert(
     Ok(HapticsSpec {
         rate: rate?,
         threshold: threshold?,
-        interpolation: table.interpolation.unwrap_or_default(),
+        interpolation: table.interpolation.unwrap_or(interpolation),
         passivity_factor: factor?,
         boundary_slope: vector("boundary_slope", &table.boundary_slope, true, Gain(15.0))?,
         proxy_damping: vector("proxy_damping", &table.proxy_damping, false, Gain(0.02))?,

@@ -12,7 +12,7 @@ mod skin;
 use super::check::Checker;
 use super::error::SceneError;
 use super::file::{ContactTable, NumberOr, SceneTable};
-use super::{Algorithm, ContactSpec, Rendering, ScanScene, Scene};
+use super::{Algorithm, ContactSpec, Interpolation, ProxySpec, Rendering, ScanScene, Scene};
 use toml::Spanned;
 
 /// Default relative residual of the contact solver, in the energy norm [1]. Forces are promised to balance K u to 1e-6 of the
@@ -35,7 +35,7 @@ pub(super) fn scene(checker: &Checker<'_>, table: &SceneTable) -> Result<Scene, 
         text,
         name,
         object: object::convert(checker, object)?,
-        contact: contact(checker, contact_table)?,
+        contact: contact(checker, contact_table, &proxy)?,
         grid: grid::convert(checker, grid, &proxy.joints)?,
         haptics,
         graphics,
@@ -65,13 +65,16 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
     let joints = &proxy.joints;
     let object = table.object.as_ref().map(|object| object::convert(checker, object)).transpose()?;
     let graphics = table.graphics.as_ref().map(|own| graphics::convert(checker, own, object.as_ref())).transpose()?;
+    // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no energy.
+    let solved = table.contact.as_ref().is_some_and(|own| own.get_ref().algorithm != Some(Algorithm::Paper));
+    let interpolation = if object.is_some() && solved { Interpolation::Potential } else { Interpolation::Linear };
     let file_stem = checker.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     Ok(Rendering {
         path: checker.path.to_owned(),
         text: checker.text.to_owned(),
         name: table.name.clone().or(file_stem).unwrap_or_default(),
         object,
-        haptics: haptics::convert(checker, &table.haptics, joints)?,
+        haptics: haptics::convert(checker, &table.haptics, joints, interpolation)?,
         graphics,
         motion: motion::convert(checker, &table.motion, joints)?,
         proxy,
@@ -87,7 +90,48 @@ fn updates(checker: &Checker<'_>, table: &ContactTable) -> Result<u32, SceneErro
     Ok(*value.get_ref())
 }
 
-fn contact(checker: &Checker<'_>, table: &ContactTable) -> Result<ContactSpec, SceneError> {
+/// Kc of a node by itself [N/m], and the stiffness of links per length, where the scene gives it [N/m^2].
+fn stiffness(
+    checker: &Checker<'_>,
+    table: &Spanned<ContactTable>,
+    proxy: &ProxySpec,
+) -> Result<(f64, Option<f64>), SceneError> {
+    let span = table.span();
+    let table = table.get_ref();
+    let per_length = table.stiffness_per_length.as_ref();
+    let per_length = per_length.map(|value| checker.positive("stiffness_per_length", value)).transpose()?;
+    let lengths: Vec<f64> = proxy.joints.iter().flat_map(|joint| &joint.nodes).map(|node| node.length).collect();
+    match (&table.stiffness, per_length) {
+        (Some(value), per_length) => match value.get_ref() {
+            NumberOr::Number(number) => {
+                Ok((checker.positive("stiffness", &Spanned::new(value.span(), *number))?, per_length))
+            }
+            NumberOr::Word(_) if per_length.is_none() => Ok((f64::INFINITY, None)),
+            NumberOr::Word(_) => {
+                let message = "contact is rigid, or has a stiffness per length: leave out one of them";
+                Err(checker.error(value.span(), message))
+            }
+        },
+        (None, Some(_)) if lengths.iter().any(|length| *length == 0.0) => {
+            let message = "stiffness_per_length is of nodes along links, and the proxy has nodes { at = .. } besides: give their \
+                           stiffness as well";
+            Err(checker.error(span, message))
+        }
+        (None, Some(per_length)) => {
+            let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
+            Ok((per_length * mean / 3.0, Some(per_length)))
+        }
+        (None, None) => {
+            let message = "contact has no stiffness: add stiffness [N/m] of each node, or \"rigid\", or stiffness_per_length \
+                           [N/m^2] of links";
+            Err(checker.error(span, message))
+        }
+    }
+}
+
+fn contact(checker: &Checker<'_>, table: &Spanned<ContactTable>, proxy: &ProxySpec) -> Result<ContactSpec, SceneError> {
+    let (stiffness, stiffness_per_length) = stiffness(checker, table, proxy)?;
+    let table = table.get_ref();
     let tolerance = table.tolerance.as_ref().map(|value| checker.between("tolerance", value, 0.0, 1.0));
     let max_iterations = match &table.max_iterations {
         Some(value) if *value.get_ref() == 0 => {
@@ -97,10 +141,8 @@ fn contact(checker: &Checker<'_>, table: &ContactTable) -> Result<ContactSpec, S
         None => CONTACT_ITERATIONS,
     };
     Ok(ContactSpec {
-        stiffness: match table.stiffness.get_ref() {
-            NumberOr::Number(value) => checker.positive("stiffness", &Spanned::new(table.stiffness.span(), *value))?,
-            NumberOr::Word(_) => f64::INFINITY,
-        },
+        stiffness,
+        stiffness_per_length,
         algorithm: table.algorithm.unwrap_or(Algorithm::Energy),
         tolerance: tolerance.unwrap_or(Ok(CONTACT_TOLERANCE))?,
         max_iterations,

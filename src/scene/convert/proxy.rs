@@ -2,9 +2,9 @@
 
 use super::super::check::Checker;
 use super::super::error::SceneError;
-use super::super::file::{JointTable, NodesTable, ProxyTable};
+use super::super::file::{JointTable, NodesTable, Number, ProxyTable};
 use super::super::{JointKind, JointSpec, ProxyNodeSpec, ProxySpec};
-use crate::MAX_JOINTS;
+use crate::{MAX_JOINTS, tolerances::GRID_LINE};
 use toml::Spanned;
 
 /// Default reflected inertia of the actuator of a revolute joint, that of a desktop device [kg m^2].
@@ -100,21 +100,40 @@ fn add_nodes(
     let span = table.span();
     let table = table.get_ref();
     let radius = table.radius.as_ref().map_or(Ok(0.0), |value| checker.not_negative("radius", value))?;
-    match (&table.at, &table.from, &table.to, &table.count) {
-        (Some(at), None, None, None) => {
-            nodes.push(ProxyNodeSpec { position: checker.vector("at", Some(at))?, radius });
+    match (&table.at, &table.from, &table.to, &table.count, &table.spacing) {
+        (Some(at), None, None, None, None) => {
+            nodes.push(ProxyNodeSpec { position: checker.vector("at", Some(at))?, radius, length: 0.0 });
         }
-        (None, Some(from), Some(to), Some(count)) => {
+        (None, Some(from), Some(to), count, spacing) if count.is_some() != spacing.is_some() => {
             let (from, to) = (checker.vector("from", Some(from))?, checker.vector("to", Some(to))?);
-            let count = checker.count("count", count, 2, MAX_NODES)?;
-            let position = |k: usize| from.lerp(to, k as f64 / (count - 1) as f64);
-            nodes.extend((0..count).map(|k| ProxyNodeSpec { position: position(k), radius }));
+            let intervals = match (count, spacing) {
+                (Some(count), _) => checker.count("count", count, 2, MAX_NODES)? - 1,
+                (None, Some(spacing)) => intervals(checker, spacing, from.distance(to))?,
+                (None, None) => 1,
+            };
+            let step = from.distance(to) / intervals as f64;
+            nodes.extend((0..=intervals).map(|k| ProxyNodeSpec {
+                position: from.lerp(to, k as f64 / intervals as f64),
+                radius,
+                // The trapezoidal rule.
+                length: if k == 0 || k == intervals { 0.5 * step } else { step },
+            }));
         }
         _ => {
-            let message = "nodes need either { at = [x, y, z] } or { from = [x, y, z], to = [x, y, z], count = n }, \
-                           and may have a radius";
+            let message = "nodes need either { at = [x, y, z] } or { from = [x, y, z], to = [x, y, z] } with one of \
+                           count = n and spacing = s, and may have a radius";
             return Err(checker.error(span, message));
         }
     }
     Ok(())
+}
+
+/// Number of equal parts, each at most `spacing` long, of a line of `length` [m].
+fn intervals(checker: &Checker<'_>, spacing: &Number, length: f64) -> Result<usize, SceneError> {
+    let parts = (length / checker.positive("spacing", spacing)? - GRID_LINE).ceil().max(1.0);
+    if parts >= MAX_NODES as f64 {
+        let message = format!("spacing makes {parts:.0} parts of a line: a chain may have at most {MAX_NODES} nodes");
+        return Err(checker.error(spacing.span(), message));
+    }
+    Ok(parts as usize)
 }

@@ -46,7 +46,7 @@ fn at(place: DVec3) -> JointVector {
 /// vanish with the depth.
 pub fn exact_places(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     let object = sphere(PAPER)?;
-    let chain = gantry(vec![ProxyNodeSpec { position: DVec3::ZERO, radius: 0.0 }]);
+    let chain = gantry(vec![ProxyNodeSpec { position: DVec3::ZERO, radius: 0.0, length: 0.0 }]);
     let mut model = Model::new(&object, &chain, contact(1.0));
     let mut tried = Vec::new();
     for (kind, point, outward) in places(&object) {
@@ -91,7 +91,7 @@ pub fn coincident_nodes(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
         for radius in [0.0, BALL] {
             let pressed_in = |(_, point, outward): (&str, DVec3, DVec3)| at(point + outward * (radius - 0.004));
             let configurations: Vec<JointVector> = places(&object).into_iter().step_by(4).map(pressed_in).collect();
-            let node = ProxyNodeSpec { position: DVec3::ZERO, radius };
+            let node = ProxyNodeSpec { position: DVec3::ZERO, radius, length: 0.0 };
             let [one, two] = [1, 2].map(|count| gantry(vec![node; count]));
             let [mut one, mut two] = [&one, &two].map(|chain| Model::new(&object, chain, contact(1.0)));
             for stiffness in [1e2, 1e4] {
@@ -154,7 +154,7 @@ pub fn right_through(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     for mut processor in processors(setting) {
         let mut tally = Tally::default();
         for radius in [0.0, BALL] {
-            let chain = gantry(vec![ProxyNodeSpec { position: DVec3::ZERO, radius }]);
+            let chain = gantry(vec![ProxyNodeSpec { position: DVec3::ZERO, radius, length: 0.0 }]);
             let mut model = Model::new(&object, &chain, contact(1.0));
             let mut configurations = Vec::new();
             for axis in [DVec3::Z, DVec3::X, DVec3::new(0.3, -0.5, 0.8).normalize()] {
@@ -209,8 +209,11 @@ pub fn two_regions(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     for mut processor in processors(setting) {
         let (mut worst, mut unconverged) = (0.0f64, 0);
         for radius in [0.0, BALL] {
-            let nodes =
-                [1.0, -1.0].map(|side| ProxyNodeSpec { position: DVec3::Z * (side * (0.9 * RADIUS + radius)), radius });
+            let nodes = [1.0, -1.0].map(|side| ProxyNodeSpec {
+                position: DVec3::Z * (side * (0.9 * RADIUS + radius)),
+                radius,
+                length: 0.0,
+            });
             let chain = gantry(nodes.to_vec());
             let mut model = Model::new(&object, &chain, contact(1.0));
             for stiffness in STIFFNESSES {

@@ -22,7 +22,9 @@ fn revolute(origin: DVec3, nodes: Vec<ProxyNodeSpec>) -> JointSpec {
 }
 
 fn nodes(from: f64) -> Vec<ProxyNodeSpec> {
-    (0..10).map(|k| ProxyNodeSpec { position: DVec3::X * (from + 0.012 * f64::from(k)), radius: 0.0 }).collect()
+    (0..10)
+        .map(|k| ProxyNodeSpec { position: DVec3::X * (from + 0.012 * f64::from(k)), radius: 0.0, length: 0.0 })
+        .collect()
 }
 
 /// Equilibria of one posture by arms of one, two and three joints that put the same nodes in the same place.

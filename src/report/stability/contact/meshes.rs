@@ -199,7 +199,7 @@ fn slivers(mut processor: Processor<'_>) -> Result<Outcome, Failure> {
     let mut unconverged = 0;
     let mut tried = 0;
     for radius in [0.0, 0.004] {
-        let nodes = vec![ProxyNodeSpec { position: DVec3::new(0.0, 0.013, 0.0), radius }];
+        let nodes = vec![ProxyNodeSpec { position: DVec3::new(0.0, 0.013, 0.0), radius, length: 0.0 }];
         let chain = Chain::new(&ProxySpec {
             joints: vec![
                 joint(JointKind::Prismatic, DVec3::Z * (0.5 * size + radius), -DVec3::Z, vec![]),

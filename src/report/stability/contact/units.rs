@@ -79,7 +79,9 @@ pub fn units(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
 
 /// An arm of a slide and a turn with two links' nodes, its base at `base`.
 fn arm(base: DVec3, radius: f64) -> Chain {
-    let nodes = (0..12).map(|k| ProxyNodeSpec { position: DVec3::X * (0.01 * f64::from(k) - 0.05), radius }).collect();
+    let nodes = (0..12)
+        .map(|k| ProxyNodeSpec { position: DVec3::X * (0.01 * f64::from(k) - 0.05), radius, length: 0.0 })
+        .collect();
     Chain::new(&ProxySpec {
         joints: vec![
             joint(JointKind::Prismatic, base, -DVec3::Z, vec![]),

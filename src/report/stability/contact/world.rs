@@ -131,7 +131,7 @@ pub fn joint(kind: JointKind, origin: DVec3, axis: DVec3, nodes: Vec<ProxyNodeSp
 /// One node that slides from `from` along `axis`.
 #[must_use]
 pub fn probe(from: DVec3, axis: DVec3, radius: f64) -> Chain {
-    let nodes = vec![ProxyNodeSpec { position: DVec3::ZERO, radius }];
+    let nodes = vec![ProxyNodeSpec { position: DVec3::ZERO, radius, length: 0.0 }];
     Chain::new(&ProxySpec { joints: vec![joint(JointKind::Prismatic, from, axis, nodes)] })
 }
 
@@ -149,7 +149,7 @@ pub fn floating_bar(radius: f64) -> Chain {
     use JointKind::{Prismatic, Revolute};
     let straight = (0..11).map(|k| DVec3::X * (0.01 * f64::from(k) - 0.05));
     let bent = (1..7).map(|k| DVec3::new(0.05 - 0.004 * f64::from(k), 0.0, -0.01 * f64::from(k)));
-    let nodes = straight.chain(bent).map(|position| ProxyNodeSpec { position, radius }).collect();
+    let nodes = straight.chain(bent).map(|position| ProxyNodeSpec { position, radius, length: 0.0 }).collect();
     let plain = |kind, axis| joint(kind, DVec3::ZERO, axis, vec![]);
     Chain::new(&ProxySpec {
         joints: vec![
@@ -196,5 +196,12 @@ pub fn pressed(model: &Model<'_>, seed: u64, count: usize, least: f64, most: f64
 /// The energy form with contact springs Kc [N/m]; infinity is rigid.
 #[must_use]
 pub fn contact(stiffness: f64) -> ContactSpec {
-    ContactSpec { stiffness, algorithm: Algorithm::Energy, tolerance: 1e-8, max_iterations: ITERATIONS, updates: 0 }
+    ContactSpec {
+        stiffness,
+        stiffness_per_length: None,
+        algorithm: Algorithm::Energy,
+        tolerance: 1e-8,
+        max_iterations: ITERATIONS,
+        updates: 0,
+    }
 }
