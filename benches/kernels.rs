@@ -243,7 +243,15 @@ fn compare(scene: &Scene, finer: &[usize]) -> Result<(), Box<dyn Error>> {
         let scene = refined(scene, finer);
         let rate = |backend| -> Result<(usize, f64), Box<dyn Error>> {
             let stop = AtomicBool::new(false);
-            let bake = Bake { scene: &scene, backend, date: "", stop: &stop, progress: &mut |_| () };
+            let bake = Bake {
+                scene: &scene,
+                backend,
+                measured: Some(0),
+                aim: None,
+                date: "",
+                stop: &stop,
+                progress: &mut |_| (),
+            };
             let (_, report) = bake.in_memory()?;
             for warning in &report.warnings {
                 println!("  {warning}");

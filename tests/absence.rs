@@ -40,7 +40,15 @@ struct Baked {
 
 fn baked(scene: Scene) -> Baked {
     let stop = AtomicBool::new(false);
-    let bake = Bake { scene: &scene, backend: BackendChoice::Cpu, date: "", stop: &stop, progress: &mut |_| () };
+    let bake = Bake {
+        scene: &scene,
+        backend: BackendChoice::Cpu,
+        measured: Some(0),
+        aim: None,
+        date: "",
+        stop: &stop,
+        progress: &mut |_| (),
+    };
     let (data, _) = bake.in_memory().unwrap();
     let setup = Setup::new(&data).unwrap();
     Baked { scene, data, setup }

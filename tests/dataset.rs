@@ -71,7 +71,8 @@ fn sample() -> Dataset {
             backend: "cpu".into(),
             adapter: "none".into(),
             date: "2012-03-04T00:00:00Z".into(),
-            achieved: None,
+            error: None,
+            aim: None,
         },
     }
 }

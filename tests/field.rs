@@ -51,7 +51,15 @@ fn sphere(coarser: f64) -> Scene {
 
 fn baked(scene: &Scene) -> Dataset {
     let stop = AtomicBool::new(false);
-    let bake = Bake { scene, backend: BackendChoice::Cpu, date: "", stop: &stop, progress: &mut |_| () };
+    let bake = Bake {
+        scene,
+        backend: BackendChoice::Cpu,
+        measured: Some(0),
+        aim: None,
+        date: "",
+        stop: &stop,
+        progress: &mut |_| (),
+    };
     bake.in_memory().unwrap().0
 }
 

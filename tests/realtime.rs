@@ -205,6 +205,8 @@ fn sphere() -> Dataset {
     let bake = Bake {
         scene: &scene,
         backend: BackendChoice::Cpu,
+        measured: Some(0),
+        aim: None,
         date: "2000-01-01T00:00:00Z",
         stop: &AtomicBool::new(false),
         progress: &mut |_| {},

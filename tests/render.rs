@@ -544,6 +544,8 @@ fn baked_sphere() -> Dataset {
     let bake = Bake {
         scene: &scene,
         backend: BackendChoice::Cpu,
+        measured: Some(0),
+        aim: None,
         date: "2000-01-01T00:00:00Z",
         stop: &AtomicBool::new(false),
         progress: &mut |_| {},
@@ -642,6 +644,8 @@ fn the_proxy_leaves_the_grid_where_space_is_free_and_nowhere_else() {
     let bake = Bake {
         scene: &scene,
         backend: BackendChoice::Cpu,
+        measured: Some(0),
+        aim: None,
         date: "2000-01-01T00:00:00Z",
         stop: &AtomicBool::new(false),
         progress: &mut |_| {},

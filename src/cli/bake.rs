@@ -1,8 +1,8 @@
 //! `haptize bake`: a scene haptized into a dataset.
 
-use super::{Failure, Report, bar::bar, max_error};
+use super::{Failure, Report, bar::bar, info, max_error};
 use haptize::{
-    haptize::{Aim, BackendChoice, Bake, Bounds, Footprint, Iterations, Progress, SweepReport},
+    haptize::{Aim, BackendChoice, Bake, Bounds, Footprint, Iterations, Lowered, Progress, SweepReport},
     scene::{Algorithm, Scene},
 };
 use indicatif::ProgressBar;
@@ -34,6 +34,10 @@ pub struct Arguments {
     /// Continue a bake that was interrupted.
     #[arg(long)]
     resume: bool,
+    /// Random configurations at which the dataset's error is measured afterwards; 0 leaves it out. By default a tenth of the points in
+    /// contact, at least 100 and at most 1000.
+    #[arg(long, value_name = "COUNT", conflicts_with = "max_error")]
+    measure_error: Option<usize>,
     /// Choose grid spacing, interpolation and the solver's tolerance for this rms error of the torque, and verify it: a share of
     /// the torque's own rms over the grid's region (0.01), or a torque ("0.002 N m").
     #[arg(long, value_name = "ERROR", allow_negative_numbers = true)]
@@ -59,12 +63,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         return max_error::run(&scene, &wanted, arguments.backend);
     }
     let bake = |bake: Bake<'_>| bake.to_file(&output, arguments.resume);
-    let report = watched(&scene, arguments.backend, bake)?;
+    let report = watched(&scene, arguments.backend, |own| bake(Bake { measured: arguments.measure_error, ..own }))?;
     warn(&report);
     let mut json = serde_json::to_value(&report)?;
     json["file"] = output.display().to_string().into();
     let mut text = String::new();
-    describe(&mut text, &output, &report)?;
+    describe(&mut text, &output, &report, None)?;
     // Every point was solved and says what became of it: that is the whole work.
     Ok(Report { text, json, whole: true })
 }
@@ -92,7 +96,8 @@ pub fn watched<T, E: Into<Failure>>(
         show(&bar, progress);
     };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
-    let result = bake(Bake { scene, backend, date: &date, stop: &stop, progress: &mut progress });
+    let result =
+        bake(Bake { scene, backend, measured: None, aim: None, date: &date, stop: &stop, progress: &mut progress });
     bar.finish_and_clear();
     stop.store(true, Ordering::Relaxed);
     result.map_err(Into::into)
@@ -103,8 +108,8 @@ pub fn warn(report: &SweepReport) {
     report.warnings.iter().for_each(|warning| eprintln!("haptize: {warning}"));
 }
 
-/// What was baked into `file`, for people.
-pub fn describe(text: &mut String, file: &Path, report: &SweepReport) -> fmt::Result {
+/// What was baked into `file`, for an rms error of `aim` over the rms torque if there was one, for people.
+pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Option<f64>) -> fmt::Result {
     let SweepReport { points, contact_points, unconverged, overflowed, .. } = report;
     let SweepReport { seconds, configurations_per_second, algorithm, backend, adapter, left_to_cpu, .. } = report;
     let Iterations { mean, max } = report.iterations;
@@ -122,7 +127,16 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport) -> fmt::Re
         text,
         "  residual     at most {:.1e} where converged; iterations {mean:.1} on average, {max} at most",
         report.max_residual
-    )
+    )?;
+    if let Some(Lowered { points, converged, greatest, rounds, searches, seconds }) = report.lowered {
+        writeln!(
+            text,
+            "  lowered      {points} points by neighbours' equilibria, {converged} of them unconverged from rest, energy by at most {:.1} %; \
+             {rounds} rounds, {searches} searches, {seconds:.2} s",
+            100.0 * greatest
+        )?;
+    }
+    info::error(text, report.error.as_ref(), aim)
 }
 
 /// What the sweep is going to take, before it begins.

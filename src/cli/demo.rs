@@ -47,7 +47,7 @@ pub fn run() -> Result<Report, Failure> {
     let press = played.trace.summary();
     let held = dataset.summary();
     let mut text = String::new();
-    bake::describe(&mut text, &file, &sweep)?;
+    bake::describe(&mut text, &file, &sweep, None)?;
     let torque = held.torque.as_flattened().iter().fold(0.0_f64, |most, tau| most.max(tau.abs()));
     writeln!(text, "  torque       at most {torque:.3} N m at a joint")?;
     if let (Some(force), Some(nodes)) = (held.max_force, held.max_contacts) {

@@ -3,7 +3,7 @@
 use super::{Failure, Report};
 use glam::DVec3;
 use haptize::{
-    dataset::{Achieved, Axis, Dataset, Summary},
+    dataset::{Axis, Dataset, MeasuredError, Summary},
     object::Skin,
     scene::Rendering,
 };
@@ -85,7 +85,7 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
         writeln!(text, "  not there    {}", absent.join(", "))?;
     }
     let from = &summary.provenance;
-    from.achieved.as_ref().map_or(Ok(()), |found| achieved(text, found))?;
+    error(text, from.error.as_ref(), from.aim)?;
     write!(text, "  made         {} by haptize {}: {}", from.date, from.version, from.algorithm)?;
     // Measured torques were not solved for: they have no residual.
     if from.tolerance > 0.0 {
@@ -94,18 +94,19 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
     writeln!(text, " on {} ({})", from.backend, from.adapter)
 }
 
-/// The error that was aimed at, and the one that was found.
-pub fn achieved(text: &mut String, found: &Achieved) -> fmt::Result {
-    let Achieved { aim, rms, worst, torque, interpolation, configurations, in_contact } = found;
-    writeln!(
-        text,
-        "  accuracy     {rms:.2e} N m rms, {:.2} % of the torque's, where {aim:.2e} was to be kept: {}; `{interpolation}`",
-        100.0 * rms / torque,
-        if found.is_kept() { "kept" } else { "missed" }
-    )?;
-    writeln!(
-        text,
-        "  {:<12} at worst {worst:.2e} N m, at {configurations} random configurations, {in_contact} of them in contact",
-        ""
-    )
+/// The error that the bake measured, and the one that its grid was chosen for.
+pub fn error(text: &mut String, measured: Option<&MeasuredError>, aim: Option<f64>) -> fmt::Result {
+    let Some(measured) = measured else { return writeln!(text, "  error        not measured") };
+    for (number, line) in measured.lines().iter().enumerate() {
+        writeln!(text, "  {:<12} {line}", if number == 0 { "error" } else { "" })?;
+    }
+    let MeasuredError { configurations, left_out, torque, .. } = measured;
+    write!(text, "  {:<12} of the rms torque, {torque:.4} N m, at {configurations} random configurations", "")?;
+    if *left_out > 0 {
+        write!(text, "; {left_out} left out, which did not converge")?;
+    }
+    writeln!(text)?;
+    let Some(aim) = aim else { return Ok(()) };
+    let verdict = if measured.relative() <= aim { "kept" } else { "missed" };
+    writeln!(text, "  {:<12} asked for: {:.2} % rms, {verdict}", "", 100.0 * aim)
 }

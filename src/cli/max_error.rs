@@ -1,11 +1,15 @@
-//! `haptize bake --max-error`: a grid chosen for an error, baked and verified.
+//! `haptize bake --max-error`: a grid chosen for an error, and baked.
 
-use super::{Failure, Report, bake, info};
+use super::{Failure, Report, bake};
 use haptize::{
-    haptize::{Aim, BackendChoice, Bake, Choice, Pilot, PilotError, verify},
+    haptize::{Aim, BackendChoice, Bake, Choice, Pilot, PilotError},
     scene::Scene,
 };
 use std::{fmt::Write, path::Path};
+
+/// Configurations at which the error is measured [1]: the rms is to decide whether the aim was kept, and single large errors where the
+/// torque has kinks and jumps make it vary by a third with a hundred.
+const MEASURED: usize = 400;
 
 /// What is asked for.
 pub struct Wanted<'a> {
@@ -19,32 +23,31 @@ pub struct Wanted<'a> {
     pub resume: bool,
 }
 
-/// Chooses, states, bakes and verifies. Nothing is baked where no grid keeps the error; exit code 1 where one should and did not.
+/// Chooses, states and bakes. Nothing is baked where no grid keeps the error; exit code 1 where the error that the bake measures is larger.
 pub fn run(scene: &Scene, wanted: &Wanted<'_>, backend: BackendChoice) -> Result<Report, Failure> {
-    let (pilot, choice, report, achieved) = bake::watched(scene, backend, |bake| {
+    let (pilot, choice, report) = bake::watched(scene, backend, |bake| {
         eprintln!("haptize: pilot: coarse grids against random configurations ...");
         let pilot = Pilot::run(scene, wanted.aim, bake.backend, bake.stop)?;
         let choice = pilot.choose(scene, wanted.points, bake.backend)?;
         state(&pilot, &choice);
-        let bake = Bake { scene: &choice.scene, progress: &mut *bake.progress, ..bake };
+        let aim = Some(pilot.relative);
+        let bake = Bake { scene: &choice.scene, measured: Some(MEASURED), aim, progress: &mut *bake.progress, ..bake };
         let report = bake.to_file(wanted.output, wanted.resume)?;
-        eprintln!("haptize: verifying against other random configurations ...");
-        let achieved = verify(wanted.output, &pilot, &choice)?;
-        Ok::<_, PilotError>((pilot, choice, report, achieved))
+        Ok::<_, PilotError>((pilot, choice, report))
     })?;
     bake::warn(&report);
+    let is_kept = report.error.as_ref().is_some_and(|error| error.relative() <= pilot.relative);
     let mut json = serde_json::to_value(&report)?;
     json["file"] = wanted.output.display().to_string().into();
     json["pilot"] = serde_json::to_value(&pilot)?;
     json["choice"] = serde_json::to_value(&choice)?;
-    json["achieved"] = serde_json::to_value(&achieved)?;
+    json["kept"] = is_kept.into();
     let mut text = String::new();
-    bake::describe(&mut text, wanted.output, &report)?;
-    info::achieved(&mut text, &achieved)?;
-    if !achieved.is_kept() {
+    bake::describe(&mut text, wanted.output, &report, Some(pilot.relative))?;
+    if !is_kept {
         writeln!(text, "  the aim was missed: the dataset is whole, and errs by more; ask for a smaller error")?;
     }
-    Ok(Report { text, json, whole: achieved.is_kept() })
+    Ok(Report { text, json, whole: is_kept })
 }
 
 /// What was chosen, and what it is going to take, before it begins.

@@ -74,6 +74,13 @@ impl<'a> Solver<'a> {
         self.find(q, |solver, equilibrium| solver.minimise(geometry, Some(((forces, kc), limits)), equilibrium))
     }
 
+    /// The same by the energy form, from where `forces` on the object's nodes hold it, with the scene's tolerance and iterations.
+    #[must_use]
+    pub(crate) fn solve_from(&mut self, q: &[f64], forces: &[NodeForce]) -> Equilibrium {
+        let limits = Limits { tolerance: self.model.contact.tolerance, iterations: self.model.contact.max_iterations };
+        self.settle(q, forces, self.model.kc, limits)
+    }
+
     /// What `search` finds at `q`, where there is contact.
     fn find(&mut self, q: &[f64], search: impl FnOnce(&mut Self, &mut Equilibrium) -> Outcome) -> Equilibrium {
         let model = self.model;

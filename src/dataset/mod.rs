@@ -5,6 +5,7 @@
 //! those of point p are `contact_nodes[offsets[p]..offsets[p + 1]]` with `contact_forces` beside them.
 //! Points are numbered with the last axis fastest.
 
+mod accuracy;
 mod atomic;
 mod check;
 mod column;
@@ -16,6 +17,7 @@ mod known;
 mod read;
 mod summary;
 
+pub use accuracy::{InterpolationError, MeasuredError};
 pub(crate) use atomic::BUFFER;
 pub use atomic::{Target, replace_file};
 pub use column::Column;
@@ -92,36 +94,12 @@ pub struct Provenance {
     /// What happened on the way, such as a GPU that was lost and from which grid point on the CPU solved instead.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notices: Vec<String>,
-    /// Where the grid was chosen for an error, that error and the one that was found afterwards.
+    /// The error that the bake measured; absent where that was left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub achieved: Option<Achieved>,
-}
-
-/// The error that a dataset was made for, and the one that it has at random configurations.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Achieved {
-    /// Rms error of the torque that was to be kept [N m].
-    pub aim: f64,
-    /// Rms error that was found [N m].
-    pub rms: f64,
-    /// Greatest error that was found [N m].
-    pub worst: f64,
-    /// Rms of the torque itself [N m].
-    pub torque: f64,
-    /// Interpolation that it was found with, as the scene names it.
-    pub interpolation: String,
-    /// Random configurations, solved directly.
-    pub configurations: usize,
-    /// Of these, in contact.
-    pub in_contact: usize,
-}
-
-impl Achieved {
-    /// Whether the aim was kept.
-    #[must_use]
-    pub fn is_kept(&self) -> bool {
-        self.rms <= self.aim
-    }
+    pub error: Option<MeasuredError>,
+    /// Where the grid was chosen for an error, that error: rms, over the rms of the torque [1].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub aim: Option<f64>,
 }
 
 impl Dataset {

@@ -2,7 +2,7 @@
 //! with the grid.
 
 use super::{
-    columns::{Section, Shape},
+    columns::{Replaced, Section, Shape},
     part::{self, Part},
 };
 use crate::dataset::{self, Heading, Surface, Target, Tensor, TensorContents, write_file};
@@ -18,6 +18,10 @@ pub(super) const BUFFERS: usize = part::BUFFER + dataset::BUFFER;
 pub(super) struct Results<'a> {
     pub part: &'a Part,
     pub shape: Shape,
+    /// New results of single points.
+    pub replaced: &'a Replaced,
+    /// Contact forces of all points, the new results among them.
+    pub contacts: usize,
     /// When this becomes true putting them together ends soon, in an error.
     pub stop: &'a AtomicBool,
 }
@@ -36,7 +40,7 @@ impl Results<'_> {
             Tensor::new::<u32>("iterations", grid, of(Section::Iterations)),
         ];
         if self.shape.with_forces {
-            let forces = self.part.contacts();
+            let forces = self.contacts;
             let offsets = vec![heading.grid.points() + 1];
             tensors.push(Tensor::new::<u64>("contact_offsets", offsets, Contents::Offsets(self)));
             tensors.push(Tensor::new::<u32>("contact_nodes", vec![forces], of(Section::Nodes)));
@@ -58,7 +62,7 @@ impl Results<'_> {
 
     /// Hands a column of all points, block by block, to `take`.
     fn column(&self, section: Section, take: &mut dyn FnMut(&mut dyn Read) -> io::Result<()>) -> io::Result<()> {
-        self.part.column(section, self.shape.joints, &mut |column| {
+        self.part.column(section, self.shape.joints, self.replaced, &mut |column| {
             if self.stop.load(Ordering::Relaxed) { Err(io::Error::other("stopped")) } else { take(column) }
         })
     }
@@ -68,7 +72,7 @@ enum Contents<'a> {
     Held(&'a [u8]),
     /// A column of all points.
     Section(&'a Results<'a>, Section),
-    /// Sums of the points' numbers of contacts, from 0 on.
+    /// Ends of the points' contacts, behind a 0.
     Offsets(&'a Results<'a>),
 }
 
@@ -80,15 +84,17 @@ impl TensorContents for Contents<'_> {
                 results.column(*section, &mut |column| io::copy(column, writer).map(drop))
             }
             Self::Offsets(results) => {
-                let mut sum = 0_u64;
-                writer.write_all(&sum.to_le_bytes())?;
-                results.column(Section::Contacts, &mut |column| {
-                    let mut counts = Vec::new();
-                    column.read_to_end(&mut counts)?;
-                    for count in counts.as_chunks().0 {
-                        sum = sum.wrapping_add(u64::from_le_bytes(*count));
-                        writer.write_all(&sum.to_le_bytes())?;
+                let mut before = 0_u64;
+                writer.write_all(&before.to_le_bytes())?;
+                results.column(Section::Ends, &mut |column| {
+                    let mut ends = Vec::new();
+                    column.read_to_end(&mut ends)?;
+                    let mut end = before;
+                    for bytes in ends.as_chunks().0 {
+                        end = before.wrapping_add(u64::from_le_bytes(*bytes));
+                        writer.write_all(&end.to_le_bytes())?;
                     }
+                    before = end;
                     Ok(())
                 })
             }

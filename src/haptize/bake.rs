@@ -31,6 +31,11 @@ pub struct Bake<'a> {
     pub scene: &'a Scene,
     /// What solves.
     pub backend: BackendChoice,
+    /// Random configurations at which the dataset's error is measured; 0 leaves it out. By default a tenth of the points in contact, at
+    /// least 100 and at most 1,000.
+    pub measured: Option<usize>,
+    /// Rms error that the grid was chosen for, over the rms torque, where it was [1].
+    pub aim: Option<f64>,
     /// Date that the dataset bears, ISO 8601, UTC.
     pub date: &'a str,
     /// When this becomes true the sweep stops soon.
@@ -61,13 +66,16 @@ impl Bake<'_> {
         self,
         sweep_with: impl FnOnce(&Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, SweepError>,
     ) -> Result<T, BakeError> {
-        let Self { scene, backend, date, stop, progress } = self;
+        let Self { scene, backend, measured, aim, date, stop, progress } = self;
         let object = Object::build(&scene.object)?;
         let chain = Chain::new(&scene.proxy);
         let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
         let mut backend = ChosenBackend::open(backend, &model)?;
         let mut sweep = Sweep::new(scene, &object, backend.name(), &backend.adapter(), date)?;
         sweep.skip_free_space(&model)?;
+        sweep.find_lowest(&model)?;
+        sweep.measure_error(&model, &scene.haptics, measured)?;
+        sweep.aim_at(aim);
         let run = Run { chunk: backend.chunk(), stop, progress };
         Ok(sweep_with(&sweep, &mut backend, run)?)
     }

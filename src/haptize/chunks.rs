@@ -1,8 +1,8 @@
 //! The grid's points, chunk by chunk: free ones skipped, the others solved by the backend, all handed on to where they are kept.
 
 use super::{
-    Backend, Footprint, FreeSpace, Progress, Run, Sweep, SweepError, SweepReport, columns::Columns,
-    free_space::FreeGaps, part::Part, report::RunFacts, tally::Tally,
+    Backend, Footprint, FreeSpace, Progress, Run, Sweep, SweepError, columns::Columns, free_space::FreeGaps,
+    part::Part, report::RunFacts, tally::Tally,
 };
 use crate::{JointVector, contact::Equilibrium, dataset::Provenance};
 use std::{ops::Range, path::Path, sync::atomic::Ordering, time::Instant};
@@ -51,6 +51,13 @@ pub(super) struct Begun {
     pub provenance: Provenance,
 }
 
+/// What a run made of a sweep's points.
+pub(super) struct Solved {
+    pub tally: Tally,
+    pub facts: RunFacts,
+    pub provenance: Provenance,
+}
+
 /// Most points of a chunk of which `solved` are to be solved: skipped ones cost little time, but the store should not wait for
 /// millions of them.
 pub(super) fn together(solved: usize) -> usize {
@@ -65,15 +72,15 @@ struct Chunk {
 }
 
 impl Sweep<'_> {
-    /// Solves the points that `begun` lacks; says what all of them are like, and where they come from.
+    /// Solves the points that `begun` lacks.
     pub(super) fn solve<B: Backend>(
         &self,
         backend: &mut B,
-        run: Run<'_>,
+        run: &mut Run<'_>,
         begun: Begun,
         footprint: Footprint,
         store: &mut dyn Store,
-    ) -> Result<(SweepReport, Provenance), SweepError> {
+    ) -> Result<Solved, SweepError> {
         let Begun { mut tally, mut provenance } = begun;
         let (points, resumed, start) = (self.grid.points(), tally.points, Instant::now());
         let left_before = backend.left_to_cpu();
@@ -121,9 +128,10 @@ impl Sweep<'_> {
             resumed_points: resumed,
             solved_points: tally.points - resumed,
             left_to_cpu: backend.left_to_cpu() - left_before,
+            lowered: None,
             time: start.elapsed(),
         };
-        Ok((SweepReport::of(&tally, facts, &provenance, &self.warnings), provenance))
+        Ok(Solved { tally, facts, provenance })
     }
 
     pub(super) fn gaps(&self, free_space: &FreeSpace<'_>, slab: Range<usize>) -> Result<FreeGaps, SweepError> {

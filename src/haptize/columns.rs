@@ -2,13 +2,13 @@
 //!
 //! ```text
 //! u64 first point, u64 points p, u64 contacts c
-//! f64 torque[p][d], f64 energy[p], u64 contacts[p] of each point,
+//! f64 torque[p][d], f64 energy[p], u64 end[p] of each point's contacts among those of the block,
 //! f32 gap[p], f32 residual[p], u32 iterations[p], u32 node[c], f32 force[c][3], u8 status[p]
 //! ```
 
 use crate::contact::{Equilibrium, Status};
 use bytemuck::Pod;
-use std::collections::TryReserveError;
+use std::collections::{BTreeMap, TryReserveError};
 
 /// What every point of a sweep has.
 #[derive(Clone, Copy)]
@@ -28,8 +28,8 @@ pub(super) struct Columns {
     pub residual: Vec<f32>,
     pub iterations: Vec<u32>,
     pub status: Vec<u8>,
-    /// Number of contacts of each point.
-    pub contacts: Vec<u64>,
+    /// End of each point's contacts in `nodes`; they begin where those of the point before end.
+    pub ends: Vec<u64>,
     pub nodes: Vec<u32>,
     pub forces: Vec<f32>,
 }
@@ -39,7 +39,7 @@ pub(super) struct Columns {
 pub(super) enum Section {
     Torque,
     Energy,
-    Contacts,
+    Ends,
     Gap,
     Residual,
     Iterations,
@@ -47,6 +47,9 @@ pub(super) enum Section {
     Forces,
     Status,
 }
+
+/// New results of single points, by number of the grid point: one row of columns each.
+pub(super) type Replaced = BTreeMap<usize, Columns>;
 
 /// How a block begins.
 #[derive(Clone, Copy)]
@@ -85,6 +88,16 @@ impl Opening {
         (lengths[..section as usize].iter().sum(), lengths[section as usize])
     }
 
+    /// The columns behind it, `bytes` being all of them.
+    pub fn sections(self, bytes: &[u8], joints: usize) -> [&[u8]; 9] {
+        let mut rest = bytes;
+        self.lengths(joints).map(|length| {
+            let (section, behind) = rest.split_at(length);
+            rest = behind;
+            section
+        })
+    }
+
     /// Length of all columns behind it [bytes].
     pub fn columns(self, joints: usize) -> usize {
         self.lengths(joints).into_iter().fold(0, usize::saturating_add)
@@ -101,7 +114,7 @@ impl Columns {
         columns.residual.try_reserve_exact(points)?;
         columns.iterations.try_reserve_exact(points)?;
         columns.status.try_reserve_exact(points)?;
-        columns.contacts.try_reserve_exact(points)?;
+        columns.ends.try_reserve_exact(points)?;
         Ok(columns)
     }
 
@@ -123,7 +136,7 @@ impl Columns {
         self.residual.clear();
         self.iterations.clear();
         self.status.clear();
-        self.contacts.clear();
+        self.ends.clear();
         self.nodes.clear();
         self.forces.clear();
     }
@@ -159,11 +172,11 @@ impl Columns {
             self.status.push(Status::Unconverged as u8);
         }
         let stored = if sound && shape.with_forces { forces.as_slice() } else { &[] };
-        self.contacts.push(stored.len() as u64);
         for contact in stored {
             self.nodes.push(contact.node);
             self.forces.extend_from_slice(&contact.force.as_vec3().to_array());
         }
+        self.ends.push(self.nodes.len() as u64);
     }
 
     /// Adds a point at which nothing touches and nothing was solved, with a lower bound of its gap [m].
@@ -174,11 +187,12 @@ impl Columns {
         self.residual.push(0.0);
         self.iterations.push(0);
         self.status.push(Status::Free as u8);
-        self.contacts.push(0);
+        self.ends.push(self.nodes.len() as u64);
     }
 
     /// Adds the points of `chunk` behind these; an error where there is no memory for their contacts.
     pub fn append(&mut self, chunk: &Self) -> Result<(), TryReserveError> {
+        let before = self.nodes.len() as u64;
         self.nodes.try_reserve(chunk.nodes.len())?;
         self.forces.try_reserve(chunk.forces.len())?;
         self.torque.extend_from_slice(&chunk.torque);
@@ -187,9 +201,46 @@ impl Columns {
         self.residual.extend_from_slice(&chunk.residual);
         self.iterations.extend_from_slice(&chunk.iterations);
         self.status.extend_from_slice(&chunk.status);
-        self.contacts.extend_from_slice(&chunk.contacts);
+        self.ends.extend(chunk.ends.iter().map(|end| before + end));
         self.nodes.extend_from_slice(&chunk.nodes);
         self.forces.extend_from_slice(&chunk.forces);
+        Ok(())
+    }
+
+    /// Takes the results of the points that are in `replaced`, the first of these points being number `first`; an error where there is
+    /// no memory for their contacts.
+    pub fn replace(&mut self, first: usize, replaced: &Replaced) -> Result<(), TryReserveError> {
+        let mut rows = replaced.range(first..first + self.points()).peekable();
+        if rows.peek().is_none() {
+            return Ok(());
+        }
+        let (mut nodes, mut forces) = (Vec::new(), Vec::new());
+        nodes.try_reserve(self.nodes.len())?;
+        forces.try_reserve(self.forces.len())?;
+        let mut start = 0;
+        for point in 0..self.points() {
+            let end = self.ends[point] as usize;
+            match rows.next_if(|(number, _)| **number == first + point) {
+                Some((_, row)) => {
+                    let joints = row.torque.len();
+                    self.torque[point * joints..(point + 1) * joints].copy_from_slice(&row.torque);
+                    self.energy[point] = row.energy[0];
+                    self.gap[point] = row.gap[0];
+                    self.residual[point] = row.residual[0];
+                    self.iterations[point] = row.iterations[0];
+                    self.status[point] = row.status[0];
+                    nodes.extend_from_slice(&row.nodes);
+                    forces.extend_from_slice(&row.forces);
+                }
+                None => {
+                    nodes.extend_from_slice(&self.nodes[start..end]);
+                    forces.extend_from_slice(&self.forces[3 * start..3 * end]);
+                }
+            }
+            start = end;
+            self.ends[point] = nodes.len() as u64;
+        }
+        (self.nodes, self.forces) = (nodes, forces);
         Ok(())
     }
 
@@ -199,7 +250,7 @@ impl Columns {
         let columns = [
             bytemuck::cast_slice(&self.torque),
             bytemuck::cast_slice(&self.energy),
-            bytemuck::cast_slice(&self.contacts),
+            bytemuck::cast_slice(&self.ends),
             bytemuck::cast_slice(&self.gap),
             bytemuck::cast_slice(&self.residual),
             bytemuck::cast_slice(&self.iterations),
@@ -221,7 +272,7 @@ impl Columns {
         let columns = Self {
             torque: take(&mut rest, points * joints)?,
             energy: take(&mut rest, points)?,
-            contacts: take(&mut rest, points)?,
+            ends: take(&mut rest, points)?,
             gap: take(&mut rest, points)?,
             residual: take(&mut rest, points)?,
             iterations: take(&mut rest, points)?,
@@ -229,8 +280,8 @@ impl Columns {
             forces: take(&mut rest, 3 * contacts)?,
             status: take(&mut rest, points)?,
         };
-        let total = columns.contacts.iter().try_fold(0_u64, |sum, &count| sum.checked_add(count))?;
-        (total == contacts as u64).then_some(columns)
+        let fits = columns.ends.is_sorted() && columns.ends.last().copied().unwrap_or(0) == contacts as u64;
+        fits.then_some(columns)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The part: an unfinished sweep on disk, so that killing the process loses one chunk at most.
 //!
 //! ```text
-//! "haptize part 1\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
+//! "haptize part 2\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
 //! ```
 //!
 //! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`], or [`NOTICE`] and a text. Frames are only
@@ -10,10 +10,12 @@
 
 use super::{
     SweepError,
-    columns::{Columns, Opening, Section},
+    columns::{Columns, Opening, Replaced, Section},
+    table::{Block, Table},
     tally::Tally,
 };
 use crate::dataset::{Grid, Provenance};
+use memmap2::Mmap;
 use serde::{Deserialize, Serialize};
 use std::{
     fs::{File, OpenOptions, TryLockError},
@@ -21,7 +23,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-const MAGIC: &[u8] = b"haptize part 1\n";
+const MAGIC: &[u8] = b"haptize part 2\n";
 /// Length and checksum before each body [bytes].
 const FRAME: usize = 8 + 4;
 
@@ -148,36 +150,72 @@ impl Part {
         body.iter().try_for_each(|piece| self.file.write_all(piece))
     }
 
-    /// Hands the bytes of one column of all points, block by block, to `take`, which reads all of them.
+    /// Passes the bytes of one column of all points, block by block, to `take`, which reads all of them. Points in `replaced` have the
+    /// results given there.
     pub fn column(
         &self,
         section: Section,
         joints: usize,
+        replaced: &Replaced,
         take: &mut dyn FnMut(&mut dyn Read) -> io::Result<()>,
     ) -> io::Result<()> {
         let mut left = self.file.metadata()?.len().saturating_sub(self.results);
         let mut reader = BufReader::with_capacity(BUFFER, &self.file);
         reader.seek(SeekFrom::Start(self.results))?;
         while left > 0 {
-            let (mut length, mut opening) = ([0; 8], [0; Opening::BYTES]);
+            let (mut length, mut bytes) = ([0; 8], [0; Opening::BYTES]);
             reader.read_exact(&mut length)?;
             reader.seek_relative((FRAME - length.len()) as i64)?;
             let length = u64::from_le_bytes(length);
-            let (first, others) = opening.split_at_mut(NOTICE.len());
+            let (first, others) = bytes.split_at_mut(NOTICE.len());
             reader.read_exact(first)?;
             let mut done = NOTICE.len();
             if first != NOTICE {
                 reader.read_exact(others)?;
-                let opening = Opening::of(opening).ok_or(io::ErrorKind::InvalidData)?;
-                let (start, bytes) = opening.place(section, joints);
-                reader.seek_relative(start as i64)?;
-                take(&mut reader.by_ref().take(bytes as u64))?;
-                done = Opening::BYTES + start + bytes;
+                let opening = Opening::of(bytes).ok_or(io::ErrorKind::InvalidData)?;
+                if replaced.range(opening.first..opening.first + opening.points).next().is_some() {
+                    let mut block = bytes.to_vec();
+                    reader.by_ref().take(length - Opening::BYTES as u64).read_to_end(&mut block)?;
+                    let mut columns =
+                        Columns::decode(&block, opening.first, joints).ok_or(io::ErrorKind::InvalidData)?;
+                    columns.replace(opening.first, replaced).map_err(io::Error::other)?;
+                    take(&mut columns.block(opening.first).1[section as usize])?;
+                    done = length as usize;
+                } else {
+                    let (start, bytes) = opening.place(section, joints);
+                    reader.seek_relative(start as i64)?;
+                    take(&mut reader.by_ref().take(bytes as u64))?;
+                    done = Opening::BYTES + start + bytes;
+                }
             }
             reader.seek_relative(length as i64 - done as i64)?;
             left = left.checked_sub(FRAME as u64 + length).ok_or(io::ErrorKind::UnexpectedEof)?;
         }
         Ok(())
+    }
+
+    /// Maps the part's file into memory. The file is locked: no other bake changes it.
+    pub fn map(&self) -> io::Result<Mmap> {
+        // SAFETY: the mapping is read-only. Another program that truncates the file ends this process, as it would with any
+        // mapped file; the part is this bake's own, and no haptic loop reads it.
+        unsafe { Mmap::map(&self.file) }
+    }
+
+    /// The results in `map`, which is of this part, and all of whose frames are whole.
+    pub fn table<'m>(&self, map: &'m Mmap, joints: usize) -> io::Result<Table<'m>> {
+        let (mut blocks, mut rest) = (Vec::new(), map.get(self.results as usize..).unwrap_or(&[]));
+        while !rest.is_empty() {
+            let (length, behind) = rest.split_first_chunk().ok_or(io::ErrorKind::UnexpectedEof)?;
+            let length = usize::try_from(u64::from_le_bytes(*length)).map_err(io::Error::other)?;
+            let (body, behind) = behind[FRAME - 8..].split_at_checked(length).ok_or(io::ErrorKind::UnexpectedEof)?;
+            rest = behind;
+            if !body.starts_with(&NOTICE) {
+                let (opening, columns) = body.split_first_chunk().ok_or(io::ErrorKind::UnexpectedEof)?;
+                let opening = Opening::of(*opening).ok_or(io::ErrorKind::InvalidData)?;
+                blocks.push(Block { first: opening.first, sections: opening.sections(columns, joints) });
+            }
+        }
+        Ok(Table::new(joints, blocks))
     }
 
     /// The binding of the file that is there, which `reader` then stands behind with `left` bytes left; `None` when the file

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     contact::Model,
-    dataset::{Achieved, Dataset},
+    dataset::Dataset,
     field::{FieldError, TorqueField},
     object::{Object, ObjectError},
     proxy::Chain,
@@ -23,7 +23,7 @@ use crate::{
     tolerances::{FARTHEST_EXTRAPOLATION, SOLVER_SHARE, SPACING_SHARE},
 };
 use serde::Serialize;
-use std::{fmt, path::Path, str::FromStr, sync::atomic::AtomicBool, time::Instant};
+use std::{fmt, str::FromStr, sync::atomic::AtomicBool, time::Instant};
 
 /// Grid points of the pilot's finest grid, at most: some seconds of solving.
 const PILOT_POINTS: f64 = 10_000.0;
@@ -31,11 +31,11 @@ const PILOT_POINTS: f64 = 10_000.0;
 /// The pilot's grids, finest first, over its finest spacing: half an octave apart, as in `haptize accuracy`.
 const COARSER: [f64; 4] = [1.0, std::f64::consts::SQRT_2, 2.0, 2.0 * std::f64::consts::SQRT_2];
 
-/// Configurations in contact that the pilot, and that verification asks for: an rms over so many is good to a tenth.
+/// Configurations in contact that the pilot asks for: an rms over so many is good to a tenth.
 const CONTACTS: usize = 200;
 
-/// What draws the configurations of pilot and verification: neither sees the other's.
-const SEEDS: [u64; 2] = [0xbf58_476d_1ce4_e5b9, 0x94d0_49bb_1331_11eb];
+/// What draws the configurations: others than those at which a bake measures its error.
+const SEED: u64 = 0xbf58_476d_1ce4_e5b9;
 
 /// Tolerances of the solver that are tried, roughest first [1].
 const TOLERANCES: [f64; 6] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
@@ -136,7 +136,7 @@ pub struct Choice {
     pub footprint: Footprint,
 }
 
-/// No grid was chosen, or what was baked cannot be verified.
+/// No grid was chosen.
 #[derive(Debug, thiserror::Error)]
 pub enum PilotError {
     /// The object cannot be built.
@@ -154,9 +154,6 @@ pub enum PilotError {
     /// The scene cannot be changed as it should be.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The dataset cannot be read, or written again.
-    #[error(transparent)]
-    Dataset(#[from] crate::dataset::Error),
     /// No grid within reach has so small an error.
     #[error("{0}")]
     OutOfReach(String),
@@ -186,7 +183,7 @@ impl Pilot {
     pub fn run(scene: &Scene, aim: Aim, backend: BackendChoice, stop: &AtomicBool) -> Result<Self, PilotError> {
         let ground = Ground::new(scene)?;
         let model = ground.model(scene);
-        let reference = Reference::in_contact(scene, &model, SEEDS[0], CONTACTS)?;
+        let reference = Reference::in_contact(scene, &model, SEED, CONTACTS)?;
         let joints = scene.grid.axes.len();
         let finest = (spacing::points(scene) as f64 / PILOT_POINTS).powf(1.0 / joints as f64).max(1.0);
         let (mut trials, mut seconds_per_point) = (Vec::new(), 0.0);
@@ -197,7 +194,9 @@ impl Pilot {
                 continue;
             }
             let start = Instant::now();
-            let (dataset, _) = Bake { scene: &spaced, backend, date: "", stop, progress: &mut |_| () }.in_memory()?;
+            let bake =
+                Bake { scene: &spaced, backend, measured: Some(0), aim: None, date: "", stop, progress: &mut |_| () };
+            let (dataset, _) = bake.in_memory()?;
             if trials.is_empty() {
                 seconds_per_point = start.elapsed().as_secs_f64() / points as f64;
             }
@@ -334,30 +333,4 @@ fn footprint(scene: &Scene, backend: BackendChoice) -> Result<Footprint, PilotEr
     let backend = ChosenBackend::open(backend, &model).map_err(BakeError::from)?;
     let sweep = Sweep::new(scene, &ground.object, "", "", "").map_err(BakeError::from)?;
     Ok(sweep.footprint(backend.chunk(), false))
-}
-
-/// Holds the dataset `file`, baked from `choice`, against random configurations that the pilot has not seen, and writes into its
-/// provenance what was aimed at and achieved.
-///
-/// # Errors
-/// Any [`PilotError`] but [`PilotError::OutOfReach`]; the dataset is then as it was.
-pub fn verify(file: &Path, pilot: &Pilot, choice: &Choice) -> Result<Achieved, PilotError> {
-    let scene = &choice.scene;
-    let ground = Ground::new(scene)?;
-    let reference = Reference::in_contact(scene, &ground.model(scene), SEEDS[1], CONTACTS)?;
-    // Read, not mapped: it is about to be replaced.
-    let mut dataset = Dataset::load(file)?;
-    let (rms, worst) = errors(scene, &reference, &dataset, scene.haptics.interpolation)?;
-    let achieved = Achieved {
-        aim: pilot.aim,
-        rms,
-        worst,
-        torque: reference.torque,
-        interpolation: choice.interpolation.to_owned(),
-        configurations: reference.exact.len(),
-        in_contact: reference.in_contact,
-    };
-    dataset.provenance.achieved = Some(achieved.clone());
-    dataset.save(file)?;
-    Ok(achieved)
 }

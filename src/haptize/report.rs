@@ -1,7 +1,7 @@
 //! What a sweep did, in numbers.
 
-use super::{Footprint, tally::Tally};
-use crate::dataset::Provenance;
+use super::{Footprint, Lowered, tally::Tally};
+use crate::dataset::{MeasuredError, Provenance};
 use serde::Serialize;
 use std::time::Duration;
 
@@ -26,6 +26,12 @@ pub struct SweepReport {
     pub resumed_points: usize,
     /// Points that this run's GPU left to the CPU, because its precision or room did not decide them.
     pub left_to_cpu: usize,
+    /// What the search for lower equilibria found; absent where there was none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lowered: Option<Lowered>,
+    /// Error of the dataset; absent where it was not measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<MeasuredError>,
     /// Wall time of this run [s].
     pub seconds: f64,
     /// Points solved by this run, over its wall time [1/s].
@@ -53,7 +59,7 @@ pub struct Iterations {
 
 impl SweepReport {
     pub(super) fn of(tally: &Tally, run: RunFacts, provenance: &Provenance, object_warnings: &[String]) -> Self {
-        let RunFacts { footprint, skipped_points, resumed_points, solved_points, left_to_cpu, time } = run;
+        let RunFacts { footprint, skipped_points, resumed_points, solved_points, left_to_cpu, lowered, time } = run;
         let contact_points = tally.statuses.in_contact();
         let seconds = time.as_secs_f64();
         Self {
@@ -69,6 +75,8 @@ impl SweepReport {
             skipped_points,
             resumed_points,
             left_to_cpu,
+            lowered,
+            error: provenance.error.clone(),
             seconds,
             // A clock that did not move is taken for its own resolution.
             configurations_per_second: solved_points as f64 / time.max(Duration::from_nanos(1)).as_secs_f64(),
@@ -90,5 +98,6 @@ pub(super) struct RunFacts {
     pub solved_points: usize,
     /// By the backend.
     pub left_to_cpu: usize,
+    pub lowered: Option<Lowered>,
     pub time: Duration,
 }

@@ -6,23 +6,27 @@
 use super::{
     Backend, Footprint, FreeSpace, SweepError, SweepReport,
     assembly::{self, Results},
-    chunks::{Begun, together},
-    columns::{Columns, Shape},
+    chunks::{Begun, Solved, together},
+    columns::{Columns, Replaced, Shape},
     footprint::{self, Bounds},
+    lowest,
+    measured::ErrorCheck,
     part::{Binding, Part},
+    table::{Block, Table},
     tally::Tally,
 };
 use crate::{
     contact::Model,
     dataset::{Axis, Contacts, Dataset, Grid, Heading, Provenance, Surface, Target},
     object::Object,
-    scene::{JointKind, Scene},
+    scene::{HapticsSpec, JointKind, Scene},
 };
 use clap::ValueEnum;
 use std::{
     ffi::OsString,
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
 };
 
 /// How far a sweep has come.
@@ -56,11 +60,17 @@ pub struct Sweep<'a> {
     surface: Surface,
     scene: String,
     provenance: Provenance,
+    /// What is kept of each point until the dataset is whole.
     pub(super) shape: Shape,
+    /// Whether the dataset holds contact forces.
+    with_forces: bool,
     /// What was noticed about the object.
     pub(super) warnings: Vec<String>,
     /// By which free space is found; `None` where all points are solved.
     model: Option<&'a Model<'a>>,
+    /// Whose lowest equilibria are found; `None` where those from rest are taken.
+    lowest: Option<&'a Model<'a>>,
+    error: Option<ErrorCheck<'a>>,
     /// Number of nodes of the proxy.
     pub(super) proxy_nodes: usize,
 }
@@ -90,12 +100,10 @@ impl<'a> Sweep<'a> {
         }
         grid.check().map_err(SweepError::Grid)?;
         let surface = &object.rest[..object.surface_nodes];
+        let with_forces = scene.graphics.is_some() || scene.haptics.effects.at_contacts().is_some();
         Ok(Self {
-            shape: Shape {
-                joints: grid.joints(),
-                surface_nodes: object.surface_nodes,
-                with_forces: scene.graphics.is_some() || scene.haptics.effects.at_contacts().is_some(),
-            },
+            shape: Shape { joints: grid.joints(), surface_nodes: object.surface_nodes, with_forces },
+            with_forces,
             grid,
             surface: Surface {
                 nodes: surface.iter().flat_map(|node| node.to_array()).collect::<Vec<f64>>().into(),
@@ -114,10 +122,13 @@ impl<'a> Sweep<'a> {
                 adapter: adapter.into(),
                 date: date.into(),
                 notices: Vec::new(),
-                achieved: None,
+                error: None,
+                aim: None,
             },
             warnings: object.warnings.clone(),
             model: None,
+            lowest: None,
+            error: None,
             proxy_nodes: scene.proxy.joints.iter().map(|joint| joint.nodes.len()).sum(),
         })
     }
@@ -128,12 +139,51 @@ impl<'a> Sweep<'a> {
     /// # Errors
     /// [`SweepError::Grid`] when the model's proxy has other joints.
     pub fn skip_free_space(&mut self, model: &'a Model<'a>) -> Result<(), SweepError> {
+        self.model = Some(self.fitting(model)?);
+        Ok(())
+    }
+
+    /// Replaces equilibria by lower ones that are reached from those of neighbouring points, where the scene's algorithm minimises the
+    /// energy: U then has no jumps. `model` is that of the scene.
+    ///
+    /// # Errors
+    /// [`SweepError::Grid`] when the model's proxy has other joints.
+    pub fn find_lowest(&mut self, model: &'a Model<'a>) -> Result<(), SweepError> {
+        if lowest::applies(model.contact.algorithm) {
+            self.lowest = Some(self.fitting(model)?);
+            self.shape.with_forces = true;
+        }
+        Ok(())
+    }
+
+    /// Measures the dataset's error at random configurations; see [`super::Bake::measured`]. `model` and `haptics` are those of the scene.
+    ///
+    /// # Errors
+    /// [`SweepError::Grid`] when the model's proxy has other joints.
+    pub fn measure_error(
+        &mut self,
+        model: &'a Model<'a>,
+        haptics: &HapticsSpec,
+        configurations: Option<usize>,
+    ) -> Result<(), SweepError> {
+        let (threshold, slope) = (haptics.threshold, haptics.boundary_slope);
+        let (model, lowest) = (self.fitting(model)?, self.lowest.is_some());
+        let interpolation = haptics.interpolation;
+        self.error = Some(ErrorCheck { model, threshold, slope, interpolation, configurations, lowest });
+        Ok(())
+    }
+
+    /// Notes that the grid was chosen for an error; see [`super::Bake::aim`].
+    pub fn aim_at(&mut self, aim: Option<f64>) {
+        self.provenance.aim = aim;
+    }
+
+    fn fitting(&self, model: &'a Model<'a>) -> Result<&'a Model<'a>, SweepError> {
         let joints = model.chain.joints.len();
         if joints != self.grid.joints() {
             return Err(SweepError::Grid(format!("{} axes for {joints} joints", self.grid.joints())));
         }
-        self.model = Some(model);
-        Ok(())
+        Ok(model)
     }
 
     /// The grid.
@@ -155,7 +205,8 @@ impl<'a> Sweep<'a> {
             let chunk = footprint::chunk(solved, together, touching, self.shape).saturating_add(slab);
             chunk.saturating_add(if in_memory { results(touching) } else { assembly::BUFFERS })
         };
-        let disk = |touching| if in_memory { 0 } else { results(touching) };
+        let stored = Shape { with_forces: self.with_forces, ..self.shape };
+        let disk = |touching| if in_memory { 0 } else { footprint::results(points, touching, stored) };
         Footprint { memory: Bounds::of(self.proxy_nodes, memory), disk: Bounds::of(self.proxy_nodes, disk) }
     }
 
@@ -169,7 +220,7 @@ impl<'a> Sweep<'a> {
     ///
     /// # Errors
     /// [`SweepError::Memory`], [`SweepError::Backend`], [`SweepError::Stopped`].
-    pub fn run<B: Backend>(&self, backend: &mut B, run: Run<'_>) -> Result<(Dataset, SweepReport), SweepError> {
+    pub fn run<B: Backend>(&self, backend: &mut B, mut run: Run<'_>) -> Result<(Dataset, SweepReport), SweepError> {
         let footprint = self.footprint(run.chunk, true);
         let (points, bytes) = (self.grid.points(), footprint.memory.least);
         let mut columns = Columns::with_room(points, self.shape.joints).map_err(|source| SweepError::Memory {
@@ -178,7 +229,11 @@ impl<'a> Sweep<'a> {
             source,
         })?;
         let begun = Begun { tally: Tally::default(), provenance: self.provenance.clone() };
-        let (report, provenance) = self.solve(backend, run, begun, footprint, &mut columns)?;
+        let solved = self.solve(backend, &mut run, begun, footprint, &mut columns)?;
+        let mut table = Table::new(self.shape.joints, vec![Block::of(&columns, 0)]);
+        let (report, provenance) = self.complete(solved, &mut table, run.stop, None)?;
+        let replaced = std::mem::take(&mut table.replaced);
+        columns.replace(0, &replaced).map_err(|source| SweepError::Memory { points, bytes, source })?;
         Ok((self.dataset(columns, provenance), report))
     }
 
@@ -195,7 +250,7 @@ impl<'a> Sweep<'a> {
         backend: &mut B,
         output: &Path,
         resume: bool,
-        run: Run<'_>,
+        mut run: Run<'_>,
     ) -> Result<SweepReport, SweepError> {
         if output.is_dir() {
             return Err(SweepError::IsFolder { path: output.into() });
@@ -231,12 +286,60 @@ impl<'a> Sweep<'a> {
                 SweepError::Dataset { part: kept_in.clone(), source }
             }
         };
-        let (report, provenance) = self.solve(backend, run, begun, footprint, &mut part)?;
+        let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
+        let (report, provenance, replaced, contacts) = if self.lowest.is_none() && self.error.is_none() {
+            let (report, provenance) = self.report(solved);
+            (report, provenance, Replaced::new(), part.contacts())
+        } else {
+            let failed = |source| SweepError::Part { path: kept_in.clone(), source };
+            let map = part.map().map_err(failed)?;
+            let mut table = part.table(&map, self.shape.joints).map_err(failed)?;
+            let (report, provenance) = self.complete(solved, &mut table, run.stop, Some(&kept_in))?;
+            let contacts = part.contacts().saturating_add_signed(table.more_contacts());
+            (report, provenance, table.replaced, contacts)
+        };
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
-        let results = Results { part: &part, shape: self.shape, stop };
+        let shape = Shape { with_forces: self.with_forces, ..self.shape };
+        let results = Results { part: &part, shape, replaced: &replaced, contacts, stop };
         results.assemble(target, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
         part.remove()?;
         Ok(report)
+    }
+
+    /// Finds the lowest equilibria and measures the error, as far as the sweep was asked to.
+    fn complete(
+        &self,
+        mut solved: Solved,
+        table: &mut Table<'_>,
+        stop: &AtomicBool,
+        part: Option<&Path>,
+    ) -> Result<(SweepReport, Provenance), SweepError> {
+        let (start, points) = (Instant::now(), self.grid.points());
+        let stopped = || SweepError::Stopped { done: points, points, part: part.map(Into::into) };
+        if let Some(model) = self.lowest {
+            let lowered = lowest::correct(&self.grid, model, self.shape, table, stop).ok_or_else(stopped)?;
+            if lowered.points > 0 {
+                solved.tally = Tally::of(table, points);
+            }
+            solved.facts.lowered = Some(lowered);
+        }
+        if let Some(error) = self.error {
+            let contacts = solved.tally.statuses.in_contact();
+            match error.measure(&self.grid, table, contacts, stop) {
+                Ok(measured) => solved.provenance.error = measured,
+                Err(error) => solved.provenance.notices.push(format!("the error was not measured: {error}")),
+            }
+        }
+        if stop.load(Ordering::Relaxed) {
+            return Err(stopped());
+        }
+        solved.facts.time += start.elapsed();
+        Ok(self.report(solved))
+    }
+
+    fn report(&self, solved: Solved) -> (SweepReport, Provenance) {
+        let Solved { tally, facts, provenance } = solved;
+        (SweepReport::of(&tally, facts, &provenance, &self.warnings), provenance)
     }
 
     /// How free space is found, where it is.
@@ -245,12 +348,8 @@ impl<'a> Sweep<'a> {
     }
 
     fn dataset(&self, columns: Columns, provenance: Provenance) -> Dataset {
-        let offsets = std::iter::once(0).chain(columns.contacts.iter().scan(0, |sum, &count| {
-            *sum += count;
-            Some(*sum)
-        }));
-        let contacts = self.shape.with_forces.then(|| Contacts {
-            offsets: offsets.collect::<Vec<u64>>().into(),
+        let contacts = self.with_forces.then(|| Contacts {
+            offsets: std::iter::once(0).chain(columns.ends).collect::<Vec<u64>>().into(),
             nodes: columns.nodes.into(),
             forces: columns.forces.into(),
         });

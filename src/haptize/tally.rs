@@ -1,6 +1,9 @@
 //! What a sweep counts on the way, so that it need not keep its results to sum them up.
 
-use super::columns::Columns;
+use super::{
+    columns::Columns,
+    table::{PointResult, Table},
+};
 use crate::{contact::Status, dataset::StatusCounts};
 
 /// Sums over the points done.
@@ -16,19 +19,32 @@ pub(super) struct Tally {
 }
 
 impl Tally {
+    /// Counts the `points` points of `table`.
+    pub fn of(table: &Table<'_>, points: usize) -> Self {
+        let mut tally = Self { points, ..Self::default() };
+        (0..points).for_each(|point| {
+            let PointResult { status, iterations, residual, .. } = table.result(point);
+            tally.count(status, iterations, residual);
+        });
+        tally
+    }
+
     /// Counts the points of `chunk`.
     pub fn add(&mut self, chunk: &Columns) {
         self.points += chunk.points();
         for ((&number, &iterations), &residual) in chunk.status.iter().zip(&chunk.iterations).zip(&chunk.residual) {
-            let status = Status::from_number(number).unwrap_or(Status::Outside);
-            self.statuses.add(status);
-            if !matches!(status, Status::Free | Status::Outside) {
-                self.iterations += u64::from(iterations);
-                self.max_iterations = self.max_iterations.max(iterations);
-            }
-            if status == Status::Contact {
-                self.max_residual = self.max_residual.max(residual);
-            }
+            self.count(Status::from_number(number).unwrap_or(Status::Outside), iterations, residual);
+        }
+    }
+
+    fn count(&mut self, status: Status, iterations: u32, residual: f32) {
+        self.statuses.add(status);
+        if !matches!(status, Status::Free | Status::Outside) {
+            self.iterations += u64::from(iterations);
+            self.max_iterations = self.max_iterations.max(iterations);
+        }
+        if status == Status::Contact {
+            self.max_residual = self.max_residual.max(residual);
         }
     }
 }

@@ -183,6 +183,9 @@ impl Controls {
         let provenance = &loaded.dataset.provenance;
         let by = if provenance.adapter.is_empty() { &provenance.backend } else { &provenance.adapter };
         note(ui, format!("{} points, {} on {by}", loaded.dataset.grid.points(), provenance.algorithm));
+        if let Some(error) = provenance.error.as_ref().and_then(|error| error.lines().into_iter().next()) {
+            note(ui, format!("error: {error}"));
+        }
         let Some(scene) = &mut self.scene else {
             ui.label(RichText::new("Scanned: it cannot be baked again.").weak());
             return false;

@@ -164,7 +164,15 @@ mod tests {
         let text = include_str!("../../tests/scenes/sphere.toml").replace("count = 36", "count = 3");
         let scene = Scene::parse(&text, "sphere.toml").unwrap();
         let stop = AtomicBool::new(false);
-        let bake = Bake { scene: &scene, backend: BackendChoice::Cpu, date: "", stop: &stop, progress: &mut |_| () };
+        let bake = Bake {
+            scene: &scene,
+            backend: BackendChoice::Cpu,
+            measured: Some(0),
+            aim: None,
+            date: "",
+            stop: &stop,
+            progress: &mut |_| (),
+        };
         let loaded = Loaded::new(bake.in_memory().unwrap().0, None, None).unwrap();
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
         let mut session = Session::new(loaded, &context, &Gamepad::default(), Pace::Steps, || ()).unwrap();

@@ -6,6 +6,7 @@ mod equilibria;
 mod failure;
 mod fixture;
 mod inspection;
+mod lowest;
 mod max_error;
 mod memory;
 #[cfg(unix)]

@@ -2,10 +2,9 @@
 
 use crate::fixture::{Folder, SCENE};
 use haptize::{
-    contact::Status,
     dataset::Dataset,
     field::TorqueField,
-    haptize::{Aim, Backend, BackendChoice, CpuBackend, Pilot, PilotError, verify},
+    haptize::{Aim, Backend, BackendChoice, CpuBackend, Pilot, PilotError},
     object::Object,
     proxy::Chain,
     scene::Scene,
@@ -37,16 +36,16 @@ fn a_grid_is_chosen_stated_baked_and_verified() {
     assert!(told.contains("predicted: about") && told.contains("on the disk"), "{told}");
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
     let dataset = Dataset::open(&folder.output()).unwrap();
-    let achieved = dataset.provenance.achieved.clone().unwrap();
-    assert_eq!(json["achieved"], serde_json::to_value(&achieved).unwrap());
-    assert!(achieved.is_kept() && achieved.rms <= 0.005 * json["pilot"]["torque"].as_f64().unwrap());
-    assert!(achieved.worst >= achieved.rms && achieved.in_contact >= 200);
+    let measured = dataset.provenance.error.clone().unwrap();
+    assert_eq!(json["error"], serde_json::to_value(&measured).unwrap());
+    assert!(json["kept"] == true && dataset.provenance.aim == Some(0.005) && measured.relative() <= 0.005);
+    assert!(measured.configurations >= 100 && measured.left_out == 0);
 
     // The scene in the dataset says what was baked.
     let scene = Scene::parse(&dataset.scene, "a.toml").unwrap();
     let counts: Vec<usize> = scene.grid.axes.iter().map(|axis| axis.count).collect();
     assert_eq!(counts, dataset.grid.counts());
-    assert_eq!(scene.haptics.interpolation.name(), achieved.interpolation);
+    assert_eq!(scene.haptics.interpolation.name(), measured.interpolation);
     assert_eq!(scene.contact.tolerance, dataset.provenance.tolerance);
     let ends = |scene: &Scene| -> Vec<f64> {
         scene.grid.axes.iter().map(|axis| axis.start + axis.step * (axis.count - 1) as f64).collect()
@@ -54,7 +53,7 @@ fn a_grid_is_chosen_stated_baked_and_verified() {
     let own = ends(&Scene::parse(&text(), "a.toml").unwrap());
     assert!(ends(&scene).iter().zip(own).all(|(a, b)| (a - b).abs() < 1e-12), "the region is the scene's");
 
-    // Independent of what was verified: points of a grid in between.
+    // Independent of the bake's own measurement: points of a grid in between.
     let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
     let model = haptize::contact::Model::new(&object, &chain, scene.contact);
     let mut between = dataset.grid.clone();
@@ -71,12 +70,13 @@ fn a_grid_is_chosen_stated_baked_and_verified() {
         (found[0] - tau[0]).powi(2) + (0.1 * (found[1] - tau[1])).powi(2)
     };
     let sum: f64 = places.iter().zip(&exact).map(|(q, e)| square(q, &e.torque)).sum();
-    let rms = (sum / places.len() as f64).sqrt();
-    assert!((0.5..2.0).contains(&(rms / achieved.rms)), "{rms} and {}", achieved.rms);
+    let torques: f64 = exact.iter().map(|e| e.torque[0].powi(2) + (0.1 * e.torque[1]).powi(2)).sum();
+    let relative = (sum / torques).sqrt();
+    assert!((0.5..2.0).contains(&(relative / measured.relative())), "{relative} and {}", measured.relative());
 
     let told = haptize(folder.0.path(), &["info", "a.haptize"]);
     let told = String::from_utf8_lossy(&told.stdout).into_owned();
-    assert!(told.contains("accuracy") && told.contains(": kept"), "{told}");
+    assert!(told.contains("of the rms torque") && told.contains("0.50 % rms, kept"), "{told}");
 }
 
 #[test]
@@ -109,28 +109,40 @@ fn an_aim_that_was_missed_is_told_and_kept_in_the_file() {
     let folder = Folder::new();
     let scene = Scene::parse(&text(), "a.toml").unwrap();
     let stop = AtomicBool::new(false);
-    let mut pilot = Pilot::run(&scene, Aim::Relative(0.05), BackendChoice::Cpu, &stop).unwrap();
+    let pilot = Pilot::run(&scene, Aim::Relative(0.05), BackendChoice::Cpu, &stop).unwrap();
     let choice = pilot.choose(&scene, usize::MAX, BackendChoice::Cpu).unwrap();
     assert!(pilot.prospects.iter().all(|prospect| prospect.points >= pilot.prospects[0].points));
     assert!(matches!(pilot.choose(&scene, 10, BackendChoice::Cpu), Err(PilotError::OutOfReach(_))));
     let bake = haptize::haptize::Bake {
         scene: &choice.scene,
         backend: BackendChoice::Cpu,
+        measured: None,
+        aim: Some(1e-6),
         date: "",
         stop: &stop,
         progress: &mut |_| (),
     };
     let report = bake.to_file(&folder.output(), false).unwrap();
-    assert!(report.points == choice.points && report.contact_points <= choice.points);
-    let before = Dataset::load(&folder.output()).unwrap();
-    pilot.aim /= 100.0;
-    let achieved = verify(&folder.output(), &pilot, &choice).unwrap();
-    assert!(!achieved.is_kept() && achieved.rms > 0.0);
-    let after = Dataset::open(&folder.output()).unwrap();
-    assert_eq!(after.provenance.achieved, Some(achieved));
-    assert!(after.torque[..] == before.torque[..] && after.status[..] == before.status[..]);
-    assert_eq!(after.status_counts().unconverged, 0);
-    assert!((0..after.grid.points()).any(|point| after.status(point) == Status::Contact));
+    assert_eq!(report.points, choice.points);
+    let dataset = Dataset::open(&folder.output()).unwrap();
+    assert_eq!((dataset.provenance.aim, &dataset.provenance.error), (Some(1e-6), &report.error));
+    assert!(report.error.unwrap().relative() > 1e-6);
+    assert_eq!(dataset.status_counts().unconverged, 0);
     let told = haptize(folder.0.path(), &["info", "a.haptize"]);
-    assert!(String::from_utf8_lossy(&told.stdout).contains(": missed"));
+    assert!(String::from_utf8_lossy(&told.stdout).contains("rms, missed"));
+}
+
+#[test]
+fn an_error_that_was_not_measured_is_said_to_be_so() {
+    let folder = Folder::new();
+    std::fs::write(folder.0.path().join("a.toml"), text()).unwrap();
+    let arguments = ["bake", "a.toml", "--backend", "cpu", "--measure-error", "0"];
+    let baked = haptize(folder.0.path(), &arguments);
+    let told = haptize(folder.0.path(), &["info", "a.haptize"]);
+    for output in [baked, told] {
+        assert!(
+            output.status.success() && String::from_utf8_lossy(&output.stdout).contains("error        not measured")
+        );
+    }
+    assert_eq!(Dataset::open(&folder.output()).unwrap().provenance.error, None);
 }

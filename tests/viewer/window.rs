@@ -39,7 +39,15 @@ pub static SPHERE: LazyLock<(tempfile::TempDir, PathBuf)> = LazyLock::new(|| {
 fn bake(scene: &Path) -> Dataset {
     let scene = Scene::load(scene).unwrap();
     let (stop, date) = (AtomicBool::new(false), "2026-01-01T00:00:00Z");
-    let bake = Bake { scene: &scene, backend: BackendChoice::Cpu, date, stop: &stop, progress: &mut |_| () };
+    let bake = Bake {
+        scene: &scene,
+        backend: BackendChoice::Cpu,
+        measured: Some(0),
+        aim: None,
+        date,
+        stop: &stop,
+        progress: &mut |_| (),
+    };
     bake.in_memory().unwrap().0
 }
 

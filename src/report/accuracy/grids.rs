@@ -29,7 +29,8 @@ const LOOPS: usize = 24;
 /// The dataset of `scene`, and what became of its points.
 pub(super) fn baked(scene: &Scene) -> Result<(Dataset, SweepReport), AccuracyError> {
     let stop = AtomicBool::new(false);
-    let bake = Bake { scene, backend: BACKEND, date: "", stop: &stop, progress: &mut |_| () };
+    let measured = Some(0);
+    let bake = Bake { scene, backend: BACKEND, measured, aim: None, date: "", stop: &stop, progress: &mut |_| () };
     Ok(bake.in_memory()?)
 }
 

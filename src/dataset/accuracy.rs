@@ -1,0 +1,104 @@
+//! The error of a dataset, as its bake measured it.
+
+use serde::{Deserialize, Serialize};
+
+/// Errors of the torque at random configurations in the cells of the grid that have a corner in contact, against the lowest equilibrium
+/// that is found there directly. Torques are Euclidean norms over the joints; a prismatic joint's force counts with an arm of 0.1 m.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeasuredError {
+    /// Random configurations, solved directly.
+    pub configurations: usize,
+    /// Configurations left out, because the direct solution did not converge.
+    pub left_out: usize,
+    /// Rms of the torque at the configurations [N m].
+    pub torque: f64,
+    /// Interpolation that the scene names.
+    pub interpolation: String,
+    /// Errors of each interpolation.
+    pub errors: Vec<InterpolationError>,
+}
+
+/// Error of one interpolation.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct InterpolationError {
+    /// Name of the interpolation, as in the scene.
+    pub interpolation: String,
+    /// Median [N m].
+    pub median: f64,
+    /// Root mean square [N m].
+    pub rms: f64,
+    /// Greatest [N m].
+    pub worst: f64,
+}
+
+impl InterpolationError {
+    /// The error of `interpolation`, of which `errors` are samples [N m]; zero where there are none.
+    #[must_use]
+    pub fn of(interpolation: &str, mut errors: Vec<f64>) -> Self {
+        errors.sort_unstable_by(f64::total_cmp);
+        let squares: f64 = errors.iter().map(|error| error * error).sum();
+        Self {
+            interpolation: interpolation.to_owned(),
+            median: errors.get(errors.len() / 2).copied().unwrap_or(0.0),
+            rms: (squares / errors.len().max(1) as f64).sqrt(),
+            worst: errors.last().copied().unwrap_or(0.0),
+        }
+    }
+}
+
+impl MeasuredError {
+    /// Rms error of the scene's own interpolation over the rms of the torque [1]; zero where nothing touches.
+    #[must_use]
+    pub fn relative(&self) -> f64 {
+        let own = self.errors.iter().find(|error| error.interpolation == self.interpolation);
+        own.map_or(0.0, |error| error.rms / self.torque.max(f64::MIN_POSITIVE))
+    }
+
+    /// Errors of each interpolation in percent of the rms torque, a line each, the scene's own interpolation first.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        if self.configurations == 0 {
+            return vec!["nothing touches".to_owned()];
+        }
+        let mut errors: Vec<&InterpolationError> = self.errors.iter().collect();
+        errors.sort_by_key(|error| error.interpolation != self.interpolation);
+        let percent = |error: f64| {
+            let percent = 100.0 * error / self.torque.max(f64::MIN_POSITIVE);
+            if percent < 1.0 { format!("{percent:.2} %") } else { format!("{percent:.1} %") }
+        };
+        let line = |error: &InterpolationError| {
+            let InterpolationError { interpolation, median, rms, worst } = error;
+            let [median, rms, worst] = [*median, *rms, *worst].map(percent);
+            format!("`{interpolation}` {rms} rms, median {median}, worst {worst}")
+        };
+        errors.into_iter().map(line).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_summed_up_and_relative_to_the_torque() {
+        let error = InterpolationError::of("linear", vec![4.0, 0.0, 3.0]);
+        assert_eq!((error.median, error.worst), (3.0, 4.0));
+        assert!((error.rms - (25.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        assert_eq!(InterpolationError::of("linear", Vec::new()).rms, 0.0);
+        let other = InterpolationError::of("potential", vec![0.1; 3]);
+        let measured = MeasuredError {
+            configurations: 3,
+            torque: 10.0,
+            interpolation: "potential".into(),
+            errors: vec![error, other],
+            left_out: 0,
+        };
+        assert!((measured.relative() - 0.01).abs() < 1e-15);
+        let lines = measured.lines();
+        assert_eq!(
+            lines,
+            ["`potential` 1.0 % rms, median 1.0 %, worst 1.0 %", "`linear` 28.9 % rms, median 30.0 %, worst 40.0 %"]
+        );
+        assert_eq!(MeasuredError::default().lines(), ["nothing touches"]);
+    }
+}

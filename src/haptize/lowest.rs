@@ -1,0 +1,293 @@
+//! The lowest equilibrium: of those reached from rest and from the equilibria of the neighbouring grid points.
+//!
+//! Equilibrium (2) may have several solutions, and the search from rest finds one of them. If neighbouring points hold different ones,
+//! U jumps between them, and a torque that follows a jump is not passive. The minimum of U over the solutions has no jumps.
+//!
+//! After the sweep from rest, corrections go in rounds. For each point p in contact and each of its neighbours n on the grid, n predicts
+//! the energy of its own equilibrium at p by the trapezoidal rule, `U_n - 1/2 (tau_n + tau_p) . (q_p - q_n)`. If U_p exceeds that by more
+//! than [`EDGE_TOLERANCE`] times the work of one grid step, or if p did not converge, p is solved again from the forces of n. The lowest
+//! converged result replaces that of p if it is lower by more than the solver's own error. The first round looks at all neighbours, later
+//! ones at those that changed in the round before, until nothing changes.
+//!
+//! All reads of a round are of the state before it, and the starts of a point are taken in the order of their numbers. So the result
+//! depends on the results from rest alone: not on threads, chunks, or an interruption. Starts are the stored forces, in f32, in memory as
+//! in a part. The correction runs on the CPU, whatever backend solved from rest.
+//!
+//! Memory: the new results, and one stretch of points at a time.
+
+use super::{
+    columns::{Columns, Replaced, Shape},
+    table::{PointResult, Table},
+};
+use crate::{
+    JointVector,
+    contact::{Equilibrium, Model, NodeForce, Solver, Solvers, Status},
+    dataset::Grid,
+    scene::Algorithm,
+    tolerances::{EDGE_TOLERANCE, ENERGY_ERROR},
+};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::{
+    collections::BTreeSet,
+    sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
+};
+
+/// Points that are looked at together [1]: enough for all threads, few enough that what is known of them takes little memory.
+const STRETCH: usize = 1 << 14;
+
+/// What the correction did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Lowered {
+    /// Points with a new equilibrium, lower than that from rest.
+    pub points: usize,
+    /// Of these, those that had not converged from rest.
+    pub converged: usize,
+    /// Greatest decrease of U at a point that had converged, over U [1].
+    pub greatest: f64,
+    /// Rounds, the last of which changed nothing.
+    pub rounds: usize,
+    /// Searches from a neighbour's forces.
+    pub searches: usize,
+    /// Wall time [s].
+    pub seconds: f64,
+}
+
+/// Where results are compared.
+pub(super) struct Neighbourhood<'a> {
+    grid: &'a Grid,
+    table: &'a Table<'a>,
+}
+
+/// Whether `scene`s of this algorithm have several equilibria of which the lowest counts: the paper's steps define its result, and
+/// contact with the geometry at rest has one equilibrium.
+pub(super) fn applies(algorithm: Algorithm) -> bool {
+    algorithm == Algorithm::Energy
+}
+
+/// Replaces equilibria in `table` by lower ones. `None` when it was stopped.
+pub(super) fn correct(
+    grid: &Grid,
+    model: &Model<'_>,
+    shape: Shape,
+    table: &mut Table<'_>,
+    stop: &AtomicBool,
+) -> Option<Lowered> {
+    let (start, points) = (Instant::now(), grid.points());
+    let solvers = Solvers::new(model, rayon::current_num_threads());
+    let mut lowered = Lowered::default();
+    // Points that changed in the round before; all of them before the first round.
+    let mut changed: Option<BTreeSet<usize>> = None;
+    loop {
+        lowered.rounds += 1;
+        let around = Neighbourhood { grid, table };
+        let targets: Box<dyn Iterator<Item = Vec<usize>>> = match &changed {
+            None => Box::new((0..points).step_by(STRETCH).map(|first| (first..points.min(first + STRETCH)).collect())),
+            Some(changed) => {
+                let beside: BTreeSet<usize> = changed.iter().flat_map(|&point| neighbours(grid, point)).collect();
+                let beside: Vec<usize> = beside.into_iter().collect();
+                let stretches: Vec<Vec<usize>> = beside.chunks(STRETCH).map(<[usize]>::to_vec).collect();
+                Box::new(stretches.into_iter())
+            }
+        };
+        let mut found = Replaced::new();
+        for stretch in targets {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            let has_changed = |n: usize| changed.as_ref().is_none_or(|changed| changed.contains(&n));
+            let searches: Vec<(usize, Vec<usize>)> = stretch
+                .into_par_iter()
+                .map(|point| (point, around.starts(point, has_changed)))
+                .filter(|(_, starts)| !starts.is_empty())
+                .collect();
+            lowered.searches += searches.iter().map(|(_, starts)| starts.len()).sum::<usize>();
+            let results = solvers.map(&searches, |solver, (point, starts)| {
+                let before = around.table.result(*point);
+                let starts = starts.iter().map(|&n| around.table.forces(n));
+                let lowest = lower(solver, &grid.configuration(*point), Some(&before), starts)?;
+                let mut row = Columns::default();
+                row.push(&lowest, shape);
+                Some((*point, row))
+            });
+            found.extend(results.into_iter().flatten());
+        }
+        if found.is_empty() {
+            break;
+        }
+        changed = Some(found.keys().copied().collect());
+        table.replaced.extend(found);
+    }
+    lowered.points = table.replaced.len();
+    for (&point, row) in &table.replaced {
+        let before = table.before(point);
+        if before.status == Status::Contact {
+            lowered.greatest = lowered.greatest.max((before.energy - row.energy[0]) / before.energy);
+        } else {
+            lowered.converged += 1;
+        }
+    }
+    lowered.seconds = start.elapsed().as_secs_f64();
+    Some(lowered)
+}
+
+/// Searches at `q` from each of `starts`, forces on the object's nodes, in order. Returns the lowest equilibrium that is lower than
+/// `known`, the result there is, by more than the errors of both.
+pub(super) fn lower(
+    solver: &mut Solver<'_>,
+    q: &JointVector,
+    known: Option<&PointResult>,
+    starts: impl Iterator<Item = Vec<NodeForce>>,
+) -> Option<Equilibrium> {
+    let mut least =
+        known.filter(|known| known.status == Status::Contact).map(|known| (known.energy, known.residual.into()));
+    let mut lowest = None;
+    for forces in starts {
+        let found = solver.solve_from(q, &forces);
+        let is_lower = least.is_none_or(|(energy, residual): (f64, f64)| {
+            found.energy < energy * (1.0 - ENERGY_ERROR - residual.powi(2) - found.residual.powi(2))
+        });
+        if found.status == Status::Contact && is_lower {
+            least = Some((found.energy, found.residual));
+            lowest = Some(found);
+        }
+    }
+    lowest
+}
+
+impl<'a> Neighbourhood<'a> {
+    /// Results of the points of `grid` in `table`.
+    pub fn new(grid: &'a Grid, table: &'a Table<'a>) -> Self {
+        Self { grid, table }
+    }
+
+    /// Neighbours of `point` whose equilibria it may be lower in, ascending; of those that `may_start`.
+    fn starts(&self, point: usize, may_start: impl Fn(usize) -> bool) -> Vec<usize> {
+        let status = self.table.status(point);
+        if !matches!(status, Status::Contact | Status::Unconverged) {
+            return Vec::new();
+        }
+        let here = self.table.result(point);
+        let mut starts: Vec<usize> = neighbours(self.grid, point)
+            .filter(|&n| may_start(n) && self.table.status(n) == Status::Contact)
+            .filter(|&n| {
+                let (q, from) = (self.grid.configuration(point), self.grid.configuration(n));
+                self.is_promising(&q, &here, &from, &self.table.result(n))
+            })
+            .collect();
+        starts.sort_unstable();
+        starts
+    }
+
+    /// Whether the equilibrium `there`, at `from`, predicts a lower energy at `q` than that of `here`.
+    pub fn is_promising(&self, q: &JointVector, here: &PointResult, from: &JointVector, there: &PointResult) -> bool {
+        if here.status != Status::Contact {
+            return true;
+        }
+        let (mut predicted, mut work) = (there.energy, 0.0_f64);
+        for (a, axis) in self.grid.axes.iter().enumerate() {
+            let mean = 0.5 * (there.torque[a] + here.torque[a]);
+            predicted -= mean * (q[a] - from[a]);
+            work = work.max(0.5 * (there.torque[a].abs() + here.torque[a].abs()) * axis.step);
+        }
+        here.energy > predicted + EDGE_TOLERANCE * work
+    }
+}
+
+/// The neighbours of `point` on the grid: the points one step away along an axis.
+fn neighbours(grid: &Grid, point: usize) -> impl Iterator<Item = usize> + '_ {
+    let mut pitch = 1;
+    grid.axes.iter().rev().flat_map(move |axis| {
+        let (own, line) = (pitch, point / pitch % axis.count);
+        pitch *= axis.count;
+        let before = (line > 0).then(|| point - own);
+        let after = (line + 1 < axis.count).then(|| point + own);
+        before.into_iter().chain(after)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{field::synthetic, haptize::table::Block};
+
+    const SHAPE: Shape = Shape { joints: 1, surface_nodes: 9, with_forces: true };
+
+    /// An equilibrium in contact with as many node forces as its energy has joules.
+    fn equilibrium(energy: f64, torque: f64) -> Equilibrium {
+        let force = |node| NodeForce { node, force: glam::DVec3::splat(energy) };
+        Equilibrium {
+            status: Status::Contact,
+            iterations: 3,
+            residual: 1e-9,
+            energy,
+            gap: -1.0,
+            tangent: None,
+            torque: JointVector::from_slice(&[torque]),
+            forces: (0..energy as u32).map(force).collect(),
+            touches: Vec::new(),
+        }
+    }
+
+    fn columns(energies: &[f64]) -> Columns {
+        let mut columns = Columns::default();
+        energies.iter().for_each(|&energy| columns.push(&equilibrium(energy, -1.0), SHAPE));
+        columns
+    }
+
+    #[test]
+    fn neighbours_are_one_step_away() {
+        let grid = synthetic::grid(&[(0.0, 1.0, 2), (0.0, 1.0, 3)]);
+        let of = |point| {
+            let mut found: Vec<_> = neighbours(&grid, point).collect();
+            found.sort_unstable();
+            found
+        };
+        assert_eq!(of(0), [1, 3]);
+        assert_eq!(of(4), [1, 3, 5]);
+    }
+
+    #[test]
+    fn a_point_starts_from_neighbours_that_predict_less_energy() {
+        // U grows by 1 a step of 1 with torque -1; point 2 holds 0.5 too much.
+        let grid = synthetic::grid(&[(0.0, 1.0, 5)]);
+        let five = columns(&[1.0, 2.0, 3.5, 4.0, 5.0]);
+        let table = Table::new(1, vec![Block::of(&five, 0)]);
+        let around = Neighbourhood::new(&grid, &table);
+        let starts: Vec<_> = (0..5).map(|point| around.starts(point, |_| true)).collect();
+        assert_eq!(starts, [vec![], vec![], vec![1, 3], vec![], vec![]]);
+        assert_eq!(around.starts(2, |n| n == 3), [3]);
+        // Below the tolerance nothing is tried.
+        let near = columns(&[1.0, 2.0 + 0.5 * EDGE_TOLERANCE, 3.0]);
+        let table = Table::new(1, vec![Block::of(&near, 0)]);
+        let grid = synthetic::grid(&[(0.0, 1.0, 3)]);
+        assert!((0..3).all(|point| Neighbourhood::new(&grid, &table).starts(point, |_| true).is_empty()));
+    }
+
+    /// New results in a table, in columns, and in the count of contacts.
+    #[test]
+    fn replaced_results_are_read_and_written_in_place() {
+        let mut whole = columns(&[1.0, 2.0, 3.0, 0.0, 5.0]);
+        let (first, second) = (columns(&[1.0, 2.0]), columns(&[3.0, 0.0, 5.0]));
+        let mut table = Table::new(1, vec![Block::of(&first, 0), Block::of(&second, 2)]);
+        let new = || Replaced::from([(1, columns(&[4.0])), (3, columns(&[2.0]))]);
+        let replaced = new();
+        table.replaced = new();
+        whole.replace(0, &replaced).unwrap();
+        let expected = columns(&[1.0, 4.0, 3.0, 2.0, 5.0]);
+        assert_eq!(whole.block(0), expected.block(0));
+        assert_eq!(table.more_contacts(), 4);
+        for (point, energy) in [1.0, 4.0, 3.0, 2.0, 5.0].into_iter().enumerate() {
+            let found = table.result(point);
+            assert_eq!((found.energy, found.torque[0], found.iterations), (energy, -1.0, 3));
+            let forces = table.forces(point);
+            assert_eq!(forces, equilibrium(energy, -1.0).forces, "point {point}");
+        }
+        assert_eq!(table.before(1).energy, 2.0);
+        // A block on its own knows its numbers.
+        let mut block = columns(&[3.0, 0.0, 5.0]);
+        block.replace(2, &replaced).unwrap();
+        assert_eq!(block.block(2), columns(&[3.0, 2.0, 5.0]).block(2));
+    }
+}

@@ -1,0 +1,330 @@
+//! The error of a bake's own dataset: random configurations solved directly, beside what each interpolation gives there.
+//!
+//! The configurations are spread evenly over the cells of the grid that have a corner in contact, the same ones every time. Each is solved
+//! as a grid point is, from rest, and from those corners of its cell that predict a lower energy (`lowest.rs`). Errors are Euclidean norms
+//! over the joints; a prismatic joint counts with [`LEVER_ARM`].
+//!
+//! An interpolation is formed of the whole grid where that has at most [`WHOLE`] points, else of the grid lines around each
+//! configuration, so that memory does not grow with the grid. The boundary layer then knows the surroundings only.
+
+use super::{
+    lowest::{self, Neighbourhood},
+    table::{PointResult, Table},
+};
+use crate::{
+    JointVector,
+    contact::{Model, Solvers, Status},
+    dataset::{Dataset, Grid, InterpolationError, MeasuredError, Provenance},
+    field::{FieldError, TorqueField},
+    random::Random,
+    scene::Interpolation,
+    tolerances::LEVER_ARM,
+};
+use rayon::prelude::*;
+use std::{
+    ops::Range,
+    sync::atomic::{AtomicBool, Ordering},
+};
+
+/// Configurations that are solved unless a number is given: a tenth of the points in contact, and so a tenth of the time, within these
+/// limits. An rms over the fewest is good to a tenth, over the most to a thirtieth.
+const CONFIGURATIONS: Range<usize> = 100..1000;
+
+/// What draws the configurations: another seed than the pilot's.
+const SEED: u64 = 0x94d0_49bb_1331_11eb;
+
+/// Most grid points of which an interpolation is formed as a whole [1]: some 50 MB.
+const WHOLE: usize = 1 << 18;
+
+/// Most grid points around a configuration of which an interpolation is formed [1]: some milliseconds of time.
+const AROUND: usize = 1 << 10;
+
+/// How the error of a dataset is measured.
+#[derive(Clone, Copy)]
+pub(super) struct ErrorCheck<'a> {
+    pub model: &'a Model<'a>,
+    pub threshold: f64,
+    pub slope: JointVector,
+    /// Interpolation that the scene names.
+    pub interpolation: Interpolation,
+    /// Number of configurations; by default [`CONFIGURATIONS`].
+    pub configurations: Option<usize>,
+    /// Whether equilibria are the lowest that are found, here as at the grid points.
+    pub lowest: bool,
+}
+
+/// A random configuration, and the lowest corner of its cell.
+struct Place {
+    q: JointVector,
+    cell: Vec<usize>,
+}
+
+impl ErrorCheck<'_> {
+    /// Error of the dataset of `grid` in `table`, `contacts` of whose points are in contact. `None` where it is left out, or stopped.
+    pub fn measure(
+        &self,
+        grid: &Grid,
+        table: &Table<'_>,
+        contacts: usize,
+        stop: &AtomicBool,
+    ) -> Result<Option<MeasuredError>, FieldError> {
+        let count = self.configurations.unwrap_or((contacts / 10).clamp(CONFIGURATIONS.start, CONFIGURATIONS.end));
+        if count == 0 {
+            return Ok(None);
+        }
+        let places = places(grid, table, contacts, count);
+        let around = Neighbourhood::new(grid, table);
+        let solvers = Solvers::new(self.model, rayon::current_num_threads());
+        let solved = solvers.map(&places, |solver, place| {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            let from_rest = solver.solve(&place.q);
+            let known = PointResult::of(&from_rest);
+            let promising = corners(grid, &place.cell)
+                .filter(|&corner| {
+                    let may_start = self.lowest && known.status.is_in_contact();
+                    may_start && table.status(corner) == Status::Contact && {
+                        let from = grid.configuration(corner);
+                        around.is_promising(&place.q, &known, &from, &table.result(corner))
+                    }
+                })
+                .map(|corner| table.forces(corner));
+            let lowest = lowest::lower(solver, &place.q, Some(&known), promising).unwrap_or(from_rest);
+            Some((!lowest.status.is_failed()).then_some(lowest.torque))
+        });
+        let Some(solved) = solved.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
+        let exact: Vec<(&Place, JointVector)> =
+            places.iter().zip(solved).filter_map(|(place, torque)| Some((place, torque?))).collect();
+        let size = |tau: &[f64]| {
+            let lever = |unit: &str| if unit == "m" { LEVER_ARM } else { 1.0 };
+            tau.iter().zip(&grid.axes).map(|(tau, axis)| (lever(&axis.unit) * tau).powi(2)).sum::<f64>().sqrt()
+        };
+        let errors = Interpolation::ALL.into_iter().map(|interpolation| {
+            let found = interpolated(grid, table, &exact, (interpolation, self.threshold, &self.slope), WHOLE)?;
+            let errors = found.iter().zip(&exact).map(|(found, (_, exact))| {
+                let mut error = *found;
+                error.iter_mut().zip(exact.iter()).for_each(|(error, exact)| *error -= exact);
+                size(&error)
+            });
+            Ok(InterpolationError::of(interpolation.name(), errors.collect()))
+        });
+        let squares: f64 = exact.iter().map(|(_, tau)| size(tau).powi(2)).sum();
+        Ok(Some(MeasuredError {
+            configurations: exact.len(),
+            left_out: places.len() - exact.len(),
+            interpolation: self.interpolation.name().to_owned(),
+            torque: (squares / exact.len().max(1) as f64).sqrt(),
+            errors: errors.collect::<Result<_, FieldError>>()?,
+        }))
+    }
+}
+
+/// What an interpolation of the grid, with its threshold and slope, gives at each place; formed as a whole of at most `whole` points.
+fn interpolated(
+    grid: &Grid,
+    table: &Table<'_>,
+    places: &[(&Place, JointVector)],
+    (interpolation, threshold, slope): (Interpolation, f64, &JointVector),
+    whole: usize,
+) -> Result<Vec<JointVector>, FieldError> {
+    let field = |lines: &[Range<usize>]| {
+        TorqueField::interpolated(&window(grid, table, lines), interpolation, threshold, slope)
+    };
+    if grid.points() <= whole {
+        let all: Vec<_> = grid.counts().into_iter().map(|count| 0..count).collect();
+        let field = field(&all)?;
+        return Ok(places.iter().map(|(place, _)| field.sample(&place.q).torque).collect());
+    }
+    // As many lines on either side as there is room for, at least the next: differences reach so far.
+    let side = (AROUND as f64).powf(1.0 / grid.joints() as f64) as usize;
+    let reach = (side.max(4) - 2) / 2;
+    let around = |(place, _): &(&Place, JointVector)| {
+        let lines = place.cell.iter().zip(&grid.axes);
+        let lines: Vec<_> =
+            lines.map(|(line, axis)| line.saturating_sub(reach)..(line + 2 + reach).min(axis.count)).collect();
+        Ok(field(&lines)?.sample(&place.q).torque)
+    };
+    places.par_iter().map(around).collect()
+}
+
+/// Random configurations, evenly spread over the cells with a corner in contact, at most `count` of them.
+///
+/// A corner in contact is drawn, then one of the cells around it, which is taken with a probability of one over its corners in
+/// contact: so each such cell is as likely as any other.
+fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize) -> Vec<Place> {
+    struct Draw {
+        rank: usize,
+        side: usize,
+        chance: f64,
+        fractions: JointVector,
+    }
+    let joints = grid.joints();
+    let mut random = Random::new(SEED);
+    let draws: Vec<Draw> = (0..(2 * count) << joints)
+        .map(|_| {
+            let mut whole =
+                |below: usize| ((random.between(0.0, 1.0) * below as f64) as usize).min(below.saturating_sub(1));
+            let (rank, side) = (whole(contacts), whole(1 << joints));
+            let mut fractions = JointVector::zeros(joints);
+            fractions.iter_mut().for_each(|fraction| *fraction = random.between(0.0, 1.0));
+            Draw { rank, side, chance: random.between(0.0, 1.0), fractions }
+        })
+        .collect();
+    // The grid points of these ranks among those in contact, in one pass over the grid.
+    let mut by_rank: Vec<usize> = (0..draws.len()).collect();
+    by_rank.sort_by_key(|&draw| draws[draw].rank);
+    let mut points = vec![None; draws.len()];
+    let mut wanted = by_rank.into_iter().peekable();
+    let touching = (0..grid.points()).filter(|&point| table.status(point).is_in_contact());
+    for (rank, point) in touching.enumerate() {
+        while let Some(draw) = wanted.next_if(|&draw| draws[draw].rank == rank) {
+            points[draw] = Some(point);
+        }
+    }
+    let place = |(draw, point): (&Draw, Option<usize>)| {
+        let (mut rest, mut cell) = (point?, vec![0; joints]);
+        for (a, axis) in grid.axes.iter().enumerate().rev() {
+            let line = rest % axis.count;
+            rest /= axis.count;
+            cell[a] = line.checked_sub(draw.side >> a & 1).filter(|low| low + 1 < axis.count)?;
+        }
+        let in_contact = corners(grid, &cell).filter(|&corner| table.status(corner).is_in_contact()).count();
+        if draw.chance * in_contact as f64 >= 1.0 {
+            return None;
+        }
+        let mut q = JointVector::zeros(joints);
+        for (a, axis) in grid.axes.iter().enumerate() {
+            q[a] = axis.coordinate(cell[a]) + draw.fractions[a] * axis.step;
+        }
+        Some(Place { q, cell })
+    };
+    draws.iter().zip(points).filter_map(place).take(count).collect()
+}
+
+/// Corners of the cell whose lowest corner is on the lines `cell`, ascending.
+fn corners(grid: &Grid, cell: &[usize]) -> impl Iterator<Item = usize> {
+    let counts = grid.counts();
+    let cell = cell.to_vec();
+    (0..1_usize << counts.len()).map(move |sides| {
+        let line = |a: usize| cell[a] + (sides >> (counts.len() - 1 - a) & 1);
+        (0..counts.len()).fold(0, |point, a| point * counts[a] + line(a))
+    })
+}
+
+/// The dataset of the grid lines `lines` along each axis, contacts aside.
+fn window(grid: &Grid, table: &Table<'_>, lines: &[Range<usize>]) -> Dataset {
+    let mut part = grid.clone();
+    for (axis, lines) in part.axes.iter_mut().zip(lines) {
+        (axis.start, axis.count) = (axis.coordinate(lines.start), lines.len());
+    }
+    let counts = part.counts();
+    let (mut torque, mut energy, mut gap, mut status) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for number in 0..part.points() {
+        let (mut rest, mut point, mut pitch) = (number, 0, 1);
+        for (a, axis) in grid.axes.iter().enumerate().rev() {
+            point += (lines[a].start + rest % counts[a]) * pitch;
+            rest /= counts[a];
+            pitch *= axis.count;
+        }
+        let result = table.result(point);
+        torque.extend_from_slice(&result.torque);
+        energy.push(result.energy);
+        gap.push(result.gap);
+        status.push(result.status as u8);
+    }
+    Dataset {
+        grid: part,
+        torque: torque.into(),
+        energy: Some(energy.into()),
+        gap: Some(gap.into()),
+        status: status.into(),
+        residual: None,
+        iterations: None,
+        contacts: None,
+        surface: None,
+        scene: String::new(),
+        provenance: Provenance::default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        contact::Equilibrium,
+        field::synthetic,
+        haptize::{
+            columns::{Columns, Shape},
+            table::Block,
+        },
+    };
+
+    const SHAPE: Shape = Shape { joints: 2, surface_nodes: 0, with_forces: false };
+
+    /// A spring of 2 N m/rad beyond q0 = 0.35, and beside it one of 1 N m/rad.
+    fn columns(grid: &Grid) -> Columns {
+        let mut columns = Columns::default();
+        for point in 0..grid.points() {
+            let q = grid.configuration(point);
+            let depth = (q[0] - 0.35).max(0.0);
+            let status = if depth > 0.0 { Status::Contact } else { Status::Free };
+            columns.push(
+                &Equilibrium {
+                    status,
+                    iterations: 1,
+                    residual: 0.0,
+                    energy: depth * depth * (1.0 + 0.2 * q[1].sin()),
+                    gap: 0.35 - q[0],
+                    tangent: None,
+                    torque: JointVector::from_slice(&[
+                        -2.0 * depth * (1.0 + 0.2 * q[1].sin()),
+                        -0.2 * depth * depth * q[1].cos(),
+                    ]),
+                    forces: Vec::new(),
+                    touches: Vec::new(),
+                },
+                SHAPE,
+            );
+        }
+        columns
+    }
+
+    #[test]
+    fn configurations_are_spread_evenly_over_the_cells_in_contact() {
+        let grid = synthetic::grid(&[(0.0, 0.1, 8), (0.0, 0.1, 4)]);
+        let columns = columns(&grid);
+        let table = Table::new(2, vec![Block::of(&columns, 0)]);
+        // Lines 4 to 7 of the first axis are in contact: so are cells 3 to 6, three times along the second axis.
+        let places = places(&grid, &table, 16, 1200);
+        assert_eq!(places.len(), 1200);
+        let mut counts = [[0; 3]; 4];
+        for Place { q, cell } in &places {
+            counts[cell[0] - 3][cell[1]] += 1;
+            assert!(
+                (0..2).all(|a| (cell[a] as f64..(cell[a] + 1) as f64).contains(&(q[a] / 0.1))),
+                "{q:?} in {cell:?}"
+            );
+        }
+        // Binomial, of mean 100 and standard deviation 9.6.
+        assert!(counts.as_flattened().iter().all(|count| (60..140).contains(count)), "{counts:?}");
+        assert_eq!(corners(&grid, &[3, 1]).collect::<Vec<_>>(), [13, 14, 17, 18]);
+    }
+
+    #[test]
+    fn a_window_around_a_configuration_gives_what_the_whole_grid_gives() {
+        let grid = synthetic::grid(&[(0.0, 0.01, 90), (0.0, 0.02, 80)]);
+        let columns = columns(&grid);
+        let table = Table::new(2, vec![Block::of(&columns, 0)]);
+        let places = places(&grid, &table, 54 * 80, 50);
+        let exact: Vec<_> = places.iter().map(|place| (place, JointVector::zeros(2))).collect();
+        let slope = JointVector::from_slice(&[1e3, 1e3]);
+        for interpolation in Interpolation::ALL {
+            let of = |whole: usize| interpolated(&grid, &table, &exact, (interpolation, 0.5, &slope), whole).unwrap();
+            for (a, b) in of(usize::MAX).iter().zip(&of(0)) {
+                let apart = a.iter().zip(b.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(apart < 1e-12, "{interpolation:?}: {a:?} and {b:?}");
+            }
+        }
+    }
+}
