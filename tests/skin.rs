@@ -109,7 +109,8 @@ fn ratios(divisions: usize, degree: u32, mean_square: f64, harmonic: fn(DVec3) -
 
 #[test]
 fn spherical_harmonics_are_resisted_as_by_the_continuum_to_second_order() {
-    let harmonics: [(u32, f64, fn(DVec3) -> f64); 2] = [
+    type Harmonic = (u32, f64, fn(DVec3) -> f64);
+    let harmonics: [Harmonic; 2] = [
         (2, 1.0 / 15.0 + 0.09 * 0.8, |p| p.x * p.y + 0.3 * (3.0 * p.z * p.z - 1.0)),
         (3, 4.0 / 7.0 + 16.0 / 105.0, |p| 5.0 * p.z.powi(3) - 3.0 * p.z + 4.0 * p.x * p.y * p.z),
     ];

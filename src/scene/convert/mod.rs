@@ -112,7 +112,7 @@ fn stiffness(
                 Err(checker.error(value.span(), message))
             }
         },
-        (None, Some(_)) if lengths.iter().any(|length| *length == 0.0) => {
+        (None, Some(_)) if lengths.contains(&0.0) => {
             let message = "stiffness_per_length is of nodes along links, and the proxy has nodes { at = .. } besides: give their \
                            stiffness as well";
             Err(checker.error(span, message))
