@@ -22,7 +22,7 @@ fn sphere_spec(kind: SpringKind, nodes: GroundNodes) -> ObjectSpec {
 }
 
 fn mesh_spec(file: impl Into<PathBuf>) -> ObjectSpec {
-    let shape = Shape::Mesh { file: file.into(), scale: 0.5, centre: CENTRE };
+    let shape = Shape::Mesh { file: file.into(), scale: 0.5, centre: CENTRE, refine: None };
     ObjectSpec { shape, ..sphere_spec(SpringKind::Isotropic, GroundNodes::All) }
 }
 
@@ -310,6 +310,75 @@ fn numbers_out_of_range_are_refused_without_a_scene_file_as_well() {
     let mut spec = sphere_spec(SpringKind::Isotropic, GroundNodes::All);
     spec.shape = Shape::Sphere { centre: CENTRE, radius: 1.0, rings: usize::MAX, segments: 1000 };
     assert!(matches!(Object::build(&spec), Err(ObjectError::TooManyNodes { .. })));
+}
+
+// ---- refinement -----------------------------------------------------------------------------------------------------
+
+/// The bean, its edges halved `times` times.
+fn bean(times: i32) -> Object {
+    let edge = |object: &Object| {
+        let ends = object.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let lengths: Vec<f64> = ends.map(|[a, b]| object.rest[a as usize].distance(object.rest[b as usize])).collect();
+        lengths.iter().sum::<f64>() / lengths.len() as f64
+    };
+    let plain = Object::build(&mesh_spec(dataset("bean.obj"))).unwrap();
+    let mut spec = mesh_spec(dataset("bean.obj"));
+    let target = 1.05 * edge(&plain) * 0.5f64.powi(times);
+    if let Shape::Mesh { refine, .. } = &mut spec.shape {
+        *refine = Some(target);
+    }
+    let refined = Object::build(&spec).unwrap();
+    assert!(edge(&refined) <= target);
+    refined
+}
+
+/// Greatest angle between the normals of neighbouring triangles.
+fn greatest_fold(object: &Object) -> f64 {
+    let corners = object.triangles.iter().map(|t| t.map(|node| object.rest[node as usize]));
+    let normals: Vec<DVec3> = corners.map(|[a, b, c]| (b - a).cross(c - a).normalize()).collect();
+    let across = object.topology.across.iter().enumerate();
+    let angles = across.flat_map(|(t, across)| across.map(|other| normals[t].angle_between(normals[other as usize])));
+    angles.fold(0.0, f64::max)
+}
+
+#[test]
+fn refinement_keeps_the_nodes_and_the_volume_and_smooths_the_folds() {
+    let [plain, once, twice] = [0, 1, 2].map(bean);
+    assert_eq!([&plain, &once, &twice].map(|object| object.triangles.len()), [500, 2000, 8000]);
+    for refined in [&once, &twice] {
+        assert_eq!(refined.rest[..plain.rest.len()], plain.rest[..]);
+        assert!((six_volumes(refined) / six_volumes(&plain) - 1.0).abs() < 0.03);
+        assert!(refined.warnings.is_empty());
+    }
+    // Over a smooth surface folds halve with the edges; where edges were merely cut in two they would stay as they are.
+    let [first, second, third] = [&plain, &once, &twice].map(greatest_fold);
+    assert!(second < 0.7 * first && third < 0.7 * second, "{first} {second} {third}");
+}
+
+#[test]
+fn refinement_brings_a_sphere_near_and_refuses_what_it_cannot_refine() {
+    let mut spec = mesh_spec("sphere.obj");
+    spec.shape = Shape::Icosphere { centre: CENTRE, radius: 0.05, divisions: 8 };
+    let sphere = Object::build(&spec).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("sphere.obj");
+    let vertices = sphere.rest.iter().map(|n| *n - CENTRE).map(|n| format!("v {} {} {}\n", n.x, n.y, n.z));
+    let faces = sphere.triangles.iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
+    std::fs::write(&file, vertices.chain(faces).collect::<String>()).unwrap();
+    let refined = |edge: f64| {
+        let shape = Shape::Mesh { file: file.clone(), scale: 1.0, centre: CENTRE, refine: Some(edge) };
+        Object::build(&ObjectSpec { shape, ..spec.clone() })
+    };
+    let finer = refined(0.005).unwrap();
+    assert_eq!(finer.rest.len(), 2562);
+    let worst = finer.rest.iter().map(|node| (node.distance(CENTRE) / 0.05 - 1.0).abs()).fold(0.0, f64::max);
+    // The middle of a chord is 2.8e-3 of the radius below the sphere.
+    assert!(worst < 5e-4, "{worst}");
+    assert!(matches!(refined(0.0), Err(ObjectError::Parameter { name: "refine", .. })));
+    assert!(matches!(refined(1e-6), Err(ObjectError::TooManyNodes { .. })));
+    // What is refined must be closed.
+    std::fs::write(&file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n").unwrap();
+    assert!(matches!(refined(0.1), Err(ObjectError::Surface { defect: SurfaceDefect::Open { .. }, .. })));
 }
 
 // ---- mesh files -----------------------------------------------------------------------------------------------------

@@ -241,6 +241,12 @@ const BROKEN: &[Broken] = &[
     ("rings = 4", "rings = -4", "rings = -4", &["-4"]),
     ("segments = 6", "segments = 2", "segments = 2", &["at least 3"]),
     ("segments = 6", "edge = 0.01", "radius = 0.05", &["one of edge", "rings with segments"]),
+    (
+        "[object.sphere]\nradius = 0.05\nrings = 4\nsegments = 6",
+        "[object.mesh]\nfile = \"a.obj\"\nrefine = 0",
+        "refine",
+        &["positive"],
+    ),
     ("rings = 4\nsegments = 6", "edge = 0", "edge = 0", &["between"]),
     ("rings = 4\nsegments = 6", "subdivisions = 40", "subdivisions = 40", &["at most 9"]),
     ("[object.ground]\nstiffness = 100", "", "[object", &["nothing holds", "foundation"]),

@@ -135,7 +135,7 @@ fn cuboid(size: DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
 
 fn filled(size: DVec3, cell: f64, ground: GroundSpec) -> Object {
     let (nodes, triangles) = cuboid(size);
-    let shape = Shape::Mesh { file: "box".into(), scale: 1.0, centre: DVec3::ZERO };
+    let shape = Shape::Mesh { file: "box".into(), scale: 1.0, centre: DVec3::ZERO, refine: None };
     Object::from_surface(&spec(shape, elastic(Some(cell)), ground), nodes, triangles).unwrap()
 }
 

@@ -15,6 +15,7 @@ mod ground;
 mod icosphere;
 mod import;
 mod ordering;
+mod refine;
 mod settled;
 mod skin;
 mod sphere;
@@ -66,6 +67,9 @@ pub struct Object {
     pub warnings: Vec<String>,
 }
 
+/// Nodes [m] and triangles of a surface.
+type Shell = (Vec<DVec3>, Vec<[u32; 3]>);
+
 impl Object {
     /// The object that a scene asks for; reads the mesh file if the scene names one.
     ///
@@ -83,7 +87,14 @@ impl Object {
                 check_count(divisions.saturating_mul(*divisions).saturating_mul(10).saturating_add(2))?;
                 Body::shell(icosphere::generate(*centre, *radius, *divisions)?)
             }
-            Shape::Mesh { file, scale, centre } => Body::shell(import::read(file, *scale, *centre, &mut warnings)?),
+            Shape::Mesh { file, scale, centre, refine } => {
+                let mut shell = import::read(file, *scale, *centre, &mut warnings)?;
+                if let Some(edge) = refine {
+                    let refuse = |defect| ObjectError::Surface { surface: surface_name(spec), defect };
+                    shell = refine::refine(shell, *edge, &mut warnings, refuse)?;
+                }
+                Body::shell(shell)
+            }
             Shape::Tetrahedra { file, scale, centre } => import::read_tetrahedra(file, *scale, *centre, &mut warnings)?,
         };
         Self::assemble(spec, body, warnings)

@@ -8,7 +8,7 @@
 //! T, b and k belong to the body, not to the mesh: a finer mesh is the same body. Under a point force the displacement stays
 //! finite only because of b. Without it the dent is a cusp that deepens as the mesh is refined.
 
-use super::Stiffness;
+use super::{Stiffness, topology::mean_edge};
 use crate::scene::SkinSpec;
 use glam::{DMat3, DVec3};
 use serde::Serialize;
@@ -37,15 +37,13 @@ impl Skin {
     #[must_use]
     pub fn new(spec: SkinSpec, nodes: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let SkinSpec { tension, bending, foundation } = spec;
-        let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-        let lengths: f64 = edges.map(|ends| ends.map(|node| nodes[node as usize])).map(|[a, b]| a.distance(b)).sum();
         Self {
             tension,
             bending,
             foundation,
             rounding: (bending > 0.0 && tension > 0.0).then(|| (bending / tension).sqrt()),
             spreading: (foundation > 0.0).then(|| (bending / foundation).powf(0.25).max((tension / foundation).sqrt())),
-            mean_edge: lengths / (3 * triangles.len()).max(1) as f64,
+            mean_edge: mean_edge(nodes, triangles),
         }
     }
 }

@@ -64,6 +64,13 @@ pub(super) fn close(nodes: &[DVec3], triangles: &mut [[u32; 3]]) -> Result<Close
     Ok(ClosedSurface { topology, edges, components, warnings })
 }
 
+/// Mean length of the triangles' edges [m].
+pub(super) fn mean_edge(nodes: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
+    let ends = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let sum: f64 = ends.map(|ends| ends.map(|node| nodes[node as usize])).map(|[a, b]| a.distance(b)).sum();
+    sum / (3 * triangles.len()).max(1) as f64
+}
+
 fn check_nodes(nodes: &[DVec3]) -> Result<(), SurfaceDefect> {
     let mut places = HashMap::with_capacity(nodes.len());
     for (node, position) in nodes.iter().enumerate() {

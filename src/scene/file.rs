@@ -57,6 +57,7 @@ pub(super) struct MeshTable {
     pub file: Spanned<String>,
     pub scale: Option<Number>,
     pub centre: Option<Vector>,
+    pub refine: Option<Number>,
 }
 
 #[derive(Deserialize)]

@@ -58,6 +58,8 @@ pub enum Shape {
         scale: f64,
         /// [m]
         centre: DVec3,
+        /// Mean edge to which the surface is refined, where it is [m].
+        refine: Option<f64>,
     },
     /// The tetrahedra of a Gmsh file, whose surface is touched; otherwise as `Mesh`.
     Tetrahedra {

@@ -33,10 +33,14 @@ pub(super) fn convert(checker: &Checker<'_>, table: &Spanned<ObjectTable>) -> Re
         (Some(sphere), None, None) => sphere_shape(checker, sphere)?,
         (None, Some(mesh), None) => {
             let (file, scale, centre) = mesh_file(checker, mesh)?;
-            Shape::Mesh { file, scale, centre }
+            let refine = mesh.refine.as_ref().map(|edge| checker.positive("refine", edge)).transpose()?;
+            Shape::Mesh { file, scale, centre, refine }
         }
         (None, None, Some(mesh)) => {
             let (file, scale, centre) = mesh_file(checker, mesh)?;
+            if let Some(refine) = &mesh.refine {
+                return Err(checker.error(refine.span(), "tetrahedra are not refined: mesh the solid finer"));
+            }
             Shape::Tetrahedra { file, scale, centre }
         }
         (None, None, None) => {
