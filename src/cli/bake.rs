@@ -128,6 +128,9 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Optio
         "  residual     at most {:.1e} where converged; iterations {mean:.1} on average, {max} at most",
         report.max_residual
     )?;
+    if let Some(skin) = report.skin {
+        writeln!(text, "  skin         {skin}")?;
+    }
     if let Some(Lowered { points, converged, greatest, rounds, searches, seconds }) = report.lowered {
         writeln!(
             text,

@@ -2,6 +2,7 @@
 
 use super::{Footprint, Lowered, tally::Tally};
 use crate::dataset::{MeasuredError, Provenance};
+use crate::object::Skin;
 use serde::Serialize;
 use std::time::Duration;
 
@@ -44,6 +45,9 @@ pub struct SweepReport {
     pub algorithm: String,
     /// Memory and disk, as they were stated before the sweep.
     pub footprint: Footprint,
+    /// The object's skin beside its mesh; absent where it has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub skin: Option<Skin>,
     /// What was noticed about the object while it was built, and what happened on the way.
     pub warnings: Vec<String>,
 }
@@ -84,6 +88,7 @@ impl SweepReport {
             adapter: provenance.adapter.clone(),
             algorithm: provenance.algorithm.clone(),
             footprint,
+            skin: None,
             warnings: object_warnings.iter().chain(&provenance.notices).cloned().collect(),
         }
     }

@@ -18,7 +18,7 @@ use super::{
 use crate::{
     contact::Model,
     dataset::{Axis, Contacts, Dataset, Grid, Heading, Provenance, Surface, Target},
-    object::Object,
+    object::{Object, Skin},
     scene::{HapticsSpec, JointKind, Scene},
 };
 use clap::ValueEnum;
@@ -64,6 +64,8 @@ pub struct Sweep<'a> {
     pub(super) shape: Shape,
     /// Whether the dataset holds contact forces.
     with_forces: bool,
+    /// The object's skin.
+    skin: Option<Skin>,
     /// What was noticed about the object.
     pub(super) warnings: Vec<String>,
     /// By which free space is found; `None` where all points are solved.
@@ -125,6 +127,7 @@ impl<'a> Sweep<'a> {
                 error: None,
                 aim: None,
             },
+            skin: object.skin,
             warnings: object.warnings.clone(),
             model: None,
             lowest: None,
@@ -339,7 +342,8 @@ impl<'a> Sweep<'a> {
 
     fn report(&self, solved: Solved) -> (SweepReport, Provenance) {
         let Solved { tally, facts, provenance } = solved;
-        (SweepReport::of(&tally, facts, &provenance, &self.warnings), provenance)
+        let report = SweepReport::of(&tally, facts, &provenance, &self.warnings);
+        (SweepReport { skin: self.skin, ..report }, provenance)
     }
 
     /// How free space is found, where it is.
