@@ -23,8 +23,8 @@
 //!
 //! *Torque.* The interpolated torque is shortened, in its own direction, to at most s: `tau_bar = tau min(1, s / |tau|_K)`,
 //! the projection of tau onto the ball of radius s. Projections onto a ball move two points no further apart, nor by
-//! more than the change of radius, so that `|tau_bar(q) - tau_bar(q')|_K <= (L + 1) |q - q'|_K`, L the Lipschitz bound
-//! of tau in these measures. The layer's own slope is Ks / G and never above Ks; within the first cell it is less, Ks / d
+//! more than the change of radius. Where the torque is shortened these changes are at right angles, so that
+//! `|tau_bar(q) - tau_bar(q')|_K <= sqrt(L^2 + 1) |q - q'|_K`, L the Lipschitz bound of tau in these measures. The layer's own slope is Ks / G and never above Ks; within the first cell it is less, Ks / d
 //! at worst. Where the object is softer than that, the dataset's torque is untouched.
 //!
 //! *An object stiffer than Ks* is rendered with slope Ks to all depths, and not only where it begins. It is the paper's

@@ -11,7 +11,17 @@
 //! Nothing allocates, nothing branches.
 
 use super::stencil::{Lattice, Stencil};
-use crate::JointVector;
+use crate::{JointVector, MAX_JOINTS, proxy::JointMatrix};
+
+/// Bounds over one cell.
+pub(super) struct CellBounds {
+    /// The function is nowhere greater.
+    pub greatest: f64,
+    /// The size of the derivative along each axis is nowhere greater.
+    pub first: JointVector,
+    /// Nor that of the second derivatives along each pair of axes.
+    pub second: JointMatrix,
+}
 
 /// An interpolated function.
 pub(super) struct Hermite {
@@ -23,11 +33,17 @@ pub(super) struct Hermite {
 }
 
 impl Hermite {
-    /// The function with `values` and gradients `slopes` at the points of `lattice`.
+    /// The function with `values` and gradients `slopes` at the points of `lattice`, and the second derivative along axes a and b
+    /// that `mixed` gives for (point, a, b), where it gives one.
     ///
-    /// Mixed derivatives are differences of those of one order less: central ones, one-sided at the rim, and the mean over
-    /// the axis that comes last.
-    pub fn new(lattice: &Lattice, values: &[f64], slopes: &[JointVector]) -> Self {
+    /// All other mixed derivatives are differences of those of one order less: central ones, one-sided at the rim, and the mean
+    /// over the axis that comes last.
+    pub fn new(
+        lattice: &Lattice,
+        values: &[f64],
+        slopes: &[JointVector],
+        mixed: impl Fn(usize, usize, usize) -> Option<f64>,
+    ) -> Self {
         let joints = lattice.joints();
         let sets = 1_usize << joints;
         let mut per_step = JointVector::zeros(joints);
@@ -41,7 +57,14 @@ impl Hermite {
         }
         // A set without one of its axes has a smaller number: it is done before.
         for set in (0..sets).filter(|set: &usize| set.count_ones() > 1) {
+            let pair = (set.count_ones() == 2).then(|| [set.trailing_zeros() as usize, set.ilog2() as usize]);
             for point in 0..values.len() {
+                if let Some([a, b]) = pair
+                    && let Some(second) = mixed(point, a, b)
+                {
+                    derivatives[point * sets + set] = second / (per_step[a] * per_step[b]);
+                    continue;
+                }
                 let mut sum = 0.0;
                 for (a, (count, _, stride)) in lattice.lines().enumerate().filter(|(a, _)| set >> a & 1 == 1) {
                     let [before, after] = Lattice::neighbours(point, count, stride);
@@ -60,10 +83,60 @@ impl Hermite {
         self.derivatives[point << self.joints]
     }
 
-    /// Its derivative along the axes of `set` at grid point `point` [its unit over those of the axes].
-    pub fn derivative(&self, point: usize, set: usize) -> f64 {
-        let units = self.per_step.iter().enumerate().filter(|(a, _)| set >> a & 1 == 1).map(|(_, inverse)| inverse);
-        self.derivatives[(point << self.joints) + set] * units.product::<f64>()
+    /// Bounds on the function and its derivatives over the cell whose first corner is `point`, `None` where no cell begins there.
+    /// `work` is resized and overwritten.
+    ///
+    /// In Bernstein form a polynomial lies between its least and greatest coefficient, and the coefficients of its derivatives are
+    /// differences of its own (Farin 2002, Curves and Surfaces for CAGD, sections 5.3 and 6.3).
+    pub fn bounds(&self, lattice: &Lattice, point: usize, work: &mut Vec<f64>) -> Option<CellBounds> {
+        let joints = self.joints;
+        // An axis of one point has no extent: the cell is flat there.
+        let mut corners = vec![point];
+        for (count, _, stride) in lattice.lines() {
+            if count > 1 && Lattice::position(point, count, stride) + 1 == count {
+                return None;
+            }
+            let far: Vec<usize> = corners.iter().map(|corner| corner + if count > 1 { stride } else { 0 }).collect();
+            corners.extend(far);
+        }
+        work.clear();
+        work.resize(1 << (2 * joints), 0.0);
+        for (side, corner) in corners.iter().enumerate() {
+            for set in 0..1 << joints {
+                let digit = |a: usize| (2 * (side >> a & 1) + (set >> a & 1)) << (2 * a);
+                work[(0..joints).map(digit).sum::<usize>()] = self.derivatives[(corner << joints) + set];
+            }
+        }
+        for axis in 0..joints {
+            let stride = 1 << (2 * axis);
+            for block in work.chunks_exact_mut(4 * stride) {
+                for k in 0..stride {
+                    let [f, g, far, h] = [0, 1, 2, 3].map(|digit| block[k + digit * stride]);
+                    [f, f + g / 3.0, far - h / 3.0, far]
+                        .into_iter()
+                        .enumerate()
+                        .for_each(|(digit, coefficient)| block[k + digit * stride] = coefficient);
+                }
+            }
+        }
+        let flat = |axis: usize| lattice.lines().nth(axis).is_none_or(|(count, ..)| count == 1);
+        let mut bounds = CellBounds {
+            greatest: work.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            first: JointVector::zeros(joints),
+            second: [[0.0; MAX_JOINTS]; MAX_JOINTS],
+        };
+        for a in (0..joints).filter(|&a| !flat(a)) {
+            let along = differences(work, a);
+            let rate = 3.0 * self.per_step[a];
+            bounds.first[a] = rate * along.iter().fold(0.0, |most, x| f64::max(most, x.abs()));
+            let twice = |b: usize| differences(&along, b).iter().fold(0.0, |most, x| f64::max(most, x.abs()));
+            bounds.second[a][a] = 2.0 * self.per_step[a] * rate * twice(a);
+            for b in (0..a).filter(|&b| !flat(b)) {
+                let both = rate * 3.0 * self.per_step[b] * twice(b);
+                (bounds.second[a][b], bounds.second[b][a]) = (both, both);
+            }
+        }
+        Some(bounds)
     }
 
     /// The function and its gradient in the cell of `stencil`. `N = 4^(D-1)`.
@@ -101,9 +174,17 @@ impl Hermite {
     }
 }
 
-/// Second derivative at the start of a cubic that rises by `rise` over `length`, with derivatives `near` and `far`.
-pub(super) fn curvature_at_start(rise: f64, near: f64, far: f64, length: f64) -> f64 {
-    (6.0 * rise / length - 4.0 * near - 2.0 * far) / length
+/// Differences of neighbouring coefficients along `axis`, in an array of the same shape; those of the last along any axis, which
+/// has no neighbour, are not a number and count for nothing.
+fn differences(coefficients: &[f64], axis: usize) -> Vec<f64> {
+    let stride = 1 << (2 * axis);
+    let mut result = vec![f64::NAN; coefficients.len()];
+    for (to, from) in result.chunks_exact_mut(4 * stride).zip(coefficients.chunks_exact(4 * stride)) {
+        for ((to, near), far) in to.iter_mut().zip(from).zip(&from[stride..]) {
+            *to = far - near;
+        }
+    }
+    result
 }
 
 /// Weights of f_0, g_0 h, f_1, g_1 h at fraction `x` of a cell, and their derivatives by x.

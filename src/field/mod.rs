@@ -92,6 +92,17 @@ impl TorqueField {
         threshold: f64,
         slope: &JointVector,
     ) -> Result<Self, FieldError> {
+        Self::with_tangents(dataset, interpolation, threshold, slope, None)
+    }
+
+    /// [`TorqueField::interpolated`] with the lower triangles of d tau/d q at the grid points, row by row; zeros where it is not known.
+    fn with_tangents(
+        dataset: &Dataset,
+        interpolation: Interpolation,
+        threshold: f64,
+        slope: &JointVector,
+        tangents: Option<&[f32]>,
+    ) -> Result<Self, FieldError> {
         if !(0.0..1.0).contains(&threshold) {
             return Err(FieldError::Threshold(threshold));
         }
@@ -100,7 +111,7 @@ impl TorqueField {
             return Err(FieldError::Slope(*slope));
         }
         let (points, nearest) = points::survey(&lattice, dataset)?;
-        let data = Checked { lattice: &lattice, dataset, points: &points, nearest: &nearest };
+        let data = Checked { lattice: &lattice, dataset, points: &points, nearest: &nearest, tangents };
         let interpolant = match interpolation {
             Interpolation::Linear => Interpolant::Layered(Layered::linear(&data, threshold, slope)?),
             Interpolation::GapField => Interpolant::Layered(Layered::gap_field(&data, slope)?),
@@ -133,9 +144,9 @@ impl TorqueField {
         matches!(self.interpolant, Interpolant::Potential(_))
     }
 
-    /// Greatest stiffness of the interpolated torque inside the grid, before any boundary layer, relative to `slopes`,
-    /// one per joint [N m/rad]: the greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes). One or
-    /// less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
+    /// Upper bound of the stiffness of the interpolated torque inside the grid, before any boundary layer, relative to
+    /// `slopes`, one per joint [N m/rad]: no Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), is greater. One
+    /// or less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
     #[must_use]
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
         match &self.interpolant {

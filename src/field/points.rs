@@ -1,7 +1,7 @@
 //! What a field knows of each grid point beside numbers that are interpolated, and what is known where nothing was computed.
 
 use super::{FieldError, Flags, stencil::Lattice};
-use crate::{contact::Status, dataset::Dataset, tolerances::GREATEST_INPUT};
+use crate::{JointMatrix, contact::Status, dataset::Dataset, tolerances::GREATEST_INPUT};
 use std::collections::VecDeque;
 
 /// What is not interpolated.
@@ -51,6 +51,8 @@ pub(super) struct Checked<'a> {
     pub points: &'a [Point],
     /// For each point the nearest one that was computed; itself if it was.
     pub nearest: &'a [usize],
+    /// Lower triangles of d tau/d q, zeros where it is not known; absent where none is stored.
+    pub tangents: Option<&'a [f32]>,
 }
 
 impl Checked<'_> {
@@ -59,6 +61,13 @@ impl Checked<'_> {
         let torque = if self.points[point].in_contact { self.dataset.torque(point) } else { zeros };
         torque.iter().try_for_each(|&tau| plausible("torque", point, tau))?;
         Ok(torque)
+    }
+
+    /// Lower triangle of d tau/d q of `point` [N m/rad], where it is known and belongs to the energy.
+    pub fn tangent(&self, point: usize) -> Option<&[f32]> {
+        let entries = JointMatrix::entries(self.lattice.joints());
+        let tangent = self.tangents?.get(point * entries..(point + 1) * entries)?;
+        (self.points[point].is_converged() && tangent.iter().any(|entry| *entry != 0.0)).then_some(tangent)
     }
 
     /// U of `point`, or of the nearest that was computed; zero where the dataset has none [J].

@@ -1,8 +1,8 @@
 //! What must hold of the field whatever is interpolated, and of each interpolation.
 
 use super::*;
-use crate::contact::Status;
 use crate::field::synthetic::{grid, half_space};
+use crate::{JointMatrix, contact::Status};
 
 /// So steep a layer that it holds nothing back.
 const SOFT: f64 = 1e6;
@@ -92,7 +92,7 @@ fn torque_is_continuous_with_the_stated_bound_whatever_the_data() {
             let field = rendered(&wild, slope);
             let slopes = vector(&vec![slope; joints]);
             let stiffness = slope * field.relative_stiffness(&slopes);
-            let (steepest, bound) = (steepest(&field, count, 1.0), stiffness + slope);
+            let (steepest, bound) = (steepest(&field, count, 1.0), stiffness.hypot(slope));
             assert!(steepest <= bound * (1.0 + 1e-6), "{joints} joints: {steepest} of {bound}");
             assert!(steepest > 0.02 * stiffness.min(slope), "{joints} joints: {steepest} of {bound}");
         }
@@ -412,5 +412,100 @@ fn stiffness_of_a_potential_is_that_of_its_object() {
         let stiffness = field.relative_stiffness(&vector(&vec![1.5; joints]));
         assert!((stiffness - 2.0).abs() < 1e-9, "{joints} joints: {stiffness}");
         assert!(field.is_potential() && !field_of(&data, Interpolation::Linear).is_potential());
+    }
+}
+
+/// Root w, its gradient and its second derivatives at `q`, of the energy `1/2 max(0, w)^2`: curved along every joint and every pair.
+fn wavy_root(q: &[f64]) -> (f64, JointVector, JointMatrix) {
+    let (mut w, mut slope, mut second) = (0.1, JointVector::zeros(q.len()), JointMatrix::zeros(q.len()));
+    for wave in 0..3 {
+        let rate = |a: usize| 1.0 + (1.7 * (a as f64 + 1.0) * (f64::from(wave) + 1.0)).sin();
+        let phase = f64::from(wave) + q.iter().enumerate().map(|(a, x)| rate(a) * x).sum::<f64>();
+        w += 0.4 * phase.sin();
+        for a in 0..q.len() {
+            slope[a] += 0.4 * rate(a) * phase.cos();
+            (0..=a).for_each(|b| second.add(a, b, -0.4 * rate(a) * rate(b) * phase.sin()));
+        }
+    }
+    (w, slope, second)
+}
+
+/// Torque and energy of [`wavy_root`].
+fn wave(q: &[f64]) -> (JointVector, f64) {
+    let (w, mut tau, _) = wavy_root(q);
+    tau.iter_mut().for_each(|slope| *slope *= -w.max(0.0));
+    (tau, 0.5 * w.max(0.0).powi(2))
+}
+
+fn waves(grid: crate::dataset::Grid) -> Dataset {
+    Dataset::of_field(grid, |q| {
+        let (tau, energy) = wave(q);
+        (tau, energy, if energy > 0.0 { Status::Contact } else { Status::Free })
+    })
+}
+
+/// Frobenius norm of the slope of the torque at `q`, over `slope`, by central differences.
+fn steepness(field: &TorqueField, q: &JointVector, slope: f64) -> f64 {
+    let mut sum = 0.0;
+    for b in 0..q.len() {
+        let at = |step: f64| {
+            let mut q = *q;
+            q[b] += step;
+            field.sample(&q).torque
+        };
+        let (before, after) = (at(-1e-6), at(1e-6));
+        sum += before.iter().zip(after.iter()).map(|(a, b)| ((b - a) / 2e-6 / slope).powi(2)).sum::<f64>();
+    }
+    sum.sqrt()
+}
+
+#[test]
+fn the_stiffness_of_a_potential_is_nowhere_greater_than_its_bound() {
+    for (joints, count) in [(1, 9), (2, 7), (3, 5)] {
+        let axes = vec![(-0.401, 0.8 / (count - 1) as f64, count); joints];
+        for noise in [0.0, 0.5] {
+            let mut data = waves(grid(&axes));
+            let uneven = |column: Vec<f64>, seed: f64| -> Vec<f64> {
+                let factor = |k: usize| 1.0 + noise * (seed * (k * k) as f64 + k as f64).sin();
+                column.into_iter().enumerate().map(|(k, x)| x * factor(k)).collect()
+            };
+            data.torque = uneven(data.torque.to_vec(), 3.7).into();
+            data.energy = Some(uneven(data.energy.unwrap().to_vec(), 1.3).into());
+            let field = field_of(&data, Interpolation::Potential);
+            let bound = field.relative_stiffness(&vector(&vec![1.5; joints]));
+            let steepest = (0..4000).map(|k| steepness(&field, &place(joints, k), 1.5)).fold(0.0, f64::max);
+            assert!(steepest <= bound * (1.0 + 1e-6), "{joints} joints: {steepest} beyond {bound}");
+            // The bound is of use.
+            assert!(noise > 0.0 || bound < 2.0 * steepest, "{joints} joints: {steepest}, bound {bound}");
+        }
+    }
+}
+
+#[test]
+fn tangents_make_a_potential_more_accurate_than_differences() {
+    for (joints, count) in [(2, 9), (2, 17), (3, 7), (3, 13), (4, 9)] {
+        let data = waves(grid(&vec![(-0.401, 0.8 / (count - 1) as f64, count); joints]));
+        let mut tangents = Vec::new();
+        for point in 0..data.grid.points() {
+            let (w, slope, second) = wavy_root(&data.grid.configuration(point));
+            let entry = |a: usize, b: usize| (-slope[a] * slope[b] - w * second.at(a, b)) as f32;
+            tangents.extend((0..joints).flat_map(|a| (0..=a).map(move |b| (a, b))).map(|(a, b)| entry(a, b)));
+        }
+        let slope = vector(&vec![SOFT; joints]);
+        let error = |tangents: Option<&[f32]>| {
+            let field = TorqueField::with_tangents(&data, Interpolation::Potential, 0.5, &slope, tangents).unwrap();
+            let (mut sum, mut whole) = (0.0, 0.0);
+            for k in 0..3000 {
+                let q = place(joints, k);
+                let exact = wave(&q).0;
+                let found = field.sample(&q).torque;
+                sum += exact.iter().zip(found.iter()).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+                whole += exact.dot(&exact);
+            }
+            (sum / whole).sqrt()
+        };
+        let (with, without) = (error(Some(&tangents)), error(None));
+        // Measured: 0.21, 0.48, 0.26, 0.28 and 0.35.
+        assert!(with < 0.6 * without, "{joints} joints, {count} lines: {with} with tangents, {without} without");
     }
 }

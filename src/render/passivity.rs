@@ -2,7 +2,9 @@
 //! do.
 //!
 //! - Boundary layer and object, per joint: `Ks <= mu bv / T` (section 3.1); by the discrete energy balance of the step it
-//!   is sharp at mu = 2 (`npmi/mod.rs`). The same bound holds for the stiffness of the dataset's torque itself.
+//!   is sharp at mu = 2 (`npmi/mod.rs`). The same bound holds for the stiffness of the dataset's torque itself. Behind a boundary
+//!   layer both act at right angles: the slope of what is rendered is at most the root of the sum of their squares
+//!   (`field/boundary.rs`), and is compared with the sharp bound 2 bv / T.
 //! - Device, per joint, against its own damping: Colgate's wall, `bd > K T/2 + |Bvc|`, with `K = Kvc`, and `Kvc + c2 Ks` where
 //!   four channels hand the object's stiffness to the device. It does without the hand; a hand that holds the device adds
 //!   its damping to bd.
@@ -134,6 +136,16 @@ pub fn bounds(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) ->
             safe: 1.0,
             remedy: format!("raise the proxy's damping bv {ratio:.2}-fold, or keep to a slope Ks that is passive"),
         });
+        if !field.is_potential() {
+            let slopes = spec.boundary_slope.iter().zip(safe_slopes.iter()).map(|(slope, safe)| slope / safe);
+            let both = 0.5 * spec.passivity_factor * ratio.hypot(slopes.fold(0.0, f64::max));
+            found.push(Bound {
+                what: "stiffness of layer and object together over 2 bv / T".into(),
+                value: both,
+                safe: 1.0,
+                remedy: format!("raise the proxy's damping bv {both:.2}-fold, or lower the slope Ks"),
+            });
+        }
     }
     found
 }
