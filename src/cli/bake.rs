@@ -1,6 +1,6 @@
 //! `haptize bake`: a scene haptized into a dataset.
 
-use super::{Failure, Report, bar::bar, info, max_error};
+use super::{Failure, Report, bar::bar, info, interrupt::stop_flag, max_error};
 use haptize::{
     haptize::{Aim, BackendChoice, Bake, Bounds, Footprint, Iterations, Lowered, Progress, SweepReport},
     scene::{Algorithm, Scene},
@@ -9,12 +9,9 @@ use indicatif::ProgressBar;
 use std::{
     fmt::{self, Write},
     path::{Path, PathBuf},
-    sync::{Arc, atomic::AtomicBool, atomic::Ordering},
+    sync::atomic::Ordering,
     time::SystemTime,
 };
-
-/// Exit code of a program that Ctrl-C ended, as shells have it: 128 and the signal's number.
-const INTERRUPTED: i32 = 130;
 
 /// What to haptize, and how.
 #[derive(clap::Args)]
@@ -80,13 +77,7 @@ pub fn watched<T, E: Into<Failure>>(
     backend: BackendChoice,
     bake: impl FnOnce(Bake<'_>) -> Result<T, E>,
 ) -> Result<T, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = stop.clone();
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(INTERRUPTED);
-        }
-    })?;
+    let stop = stop_flag()?;
     let bar = bar(0, "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     let mut announced = false;
     let mut progress = |progress: Progress| {
@@ -96,8 +87,7 @@ pub fn watched<T, E: Into<Failure>>(
         show(&bar, progress);
     };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
-    let result =
-        bake(Bake { scene, backend, measured: None, aim: None, date: &date, stop: &stop, progress: &mut progress });
+    let result = bake(Bake { scene, backend, measured: None, aim: None, date: &date, stop, progress: &mut progress });
     bar.finish_and_clear();
     stop.store(true, Ordering::Relaxed);
     result.map_err(Into::into)

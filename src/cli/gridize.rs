@@ -63,11 +63,12 @@ pub struct Arguments {
 }
 
 /// What was read.
-struct Source {
-    samples: Samples,
+pub struct Source {
+    /// The measurements.
+    pub samples: Samples,
     scene: String,
     /// The torque threshold that the scan's scene names [N m].
-    epsilon: Option<f64>,
+    pub epsilon: Option<f64>,
     /// For the dataset's provenance: `scan`, `simulated scan` or `import`, and of what.
     kind: &'static str,
     of: String,
@@ -75,6 +76,18 @@ struct Source {
     /// Both directions of motion, and the joint whose direction it is.
     branches: Option<([Samples; 2], usize)>,
     left_out: usize,
+}
+
+impl Source {
+    /// Gridizes the samples; the dataset says where they come from, and that it was made now.
+    pub fn gridize(&self, options: &GridizeOptions) -> Result<(Dataset, GridizeReport), Failure> {
+        let (mut dataset, report) = gridize(&self.samples, options)?;
+        dataset.scene.clone_from(&self.scene);
+        dataset.provenance.backend = self.kind.to_owned();
+        dataset.provenance.adapter.clone_from(&self.of);
+        dataset.provenance.date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
+        Ok((dataset, report))
+    }
 }
 
 /// Reads the logs and writes the dataset.
@@ -92,16 +105,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         interpolation: arguments.interpolation,
         smooth: arguments.smooth,
     };
-    let (mut dataset, report) = gridize(&source.samples, &options)?;
+    let (dataset, report) = source.gridize(&options)?;
     let held_out = arguments.held_out.map(|share| held_out(&source.samples, &options, share)).transpose()?;
     let against = match arguments.against.as_slice() {
         [] => None,
         logs => Some(predict(&dataset, &read(logs, mapping.as_ref())?.samples)?),
     };
-    dataset.scene = source.scene.clone();
-    dataset.provenance.backend = source.kind.to_owned();
-    dataset.provenance.adapter.clone_from(&source.of);
-    dataset.provenance.date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
     let output = output(arguments)?;
     dataset.save(&output)?;
     let figures = figures(arguments, &source, &dataset)?;
@@ -159,7 +168,8 @@ fn read(logs: &[PathBuf], mapping: Option<&Mapping>) -> Result<Source, Failure> 
     mapping.map_or_else(|| scanned(logs), |mapping| imported(logs, mapping))
 }
 
-fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
+/// Reads the log of one scan.
+pub fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
     let [path] = logs else {
         return Err("several logs can be gridized together only with --columns".into());
     };

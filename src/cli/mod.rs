@@ -20,7 +20,9 @@ mod felt;
 mod gridize;
 mod info;
 mod inspect;
+mod interrupt;
 mod max_error;
+mod paper;
 mod play;
 mod scan;
 mod stability;
@@ -64,6 +66,8 @@ enum Command {
     Info(info::Arguments),
     /// Solve one configuration and tell all of it.
     Inspect(inspect::Arguments),
+    /// Remake the figures and numbers of the paper, with a table that compares them.
+    Paper(paper::Arguments),
     /// Feel a dataset through a simulated hand: traces and figures.
     Play(play::Arguments),
     /// Haptize a real object by touching it on a rig (the one that ships is simulated).
@@ -84,6 +88,7 @@ impl Command {
             Self::Gridize(arguments) => gridize::run(arguments),
             Self::Info(arguments) => info::run(arguments),
             Self::Inspect(arguments) => inspect::run(arguments),
+            Self::Paper(arguments) => paper::run(arguments),
             Self::Play(arguments) => play::run(arguments),
             Self::Scan(arguments) => scan::run(arguments),
             Self::Stability(arguments) => stability::run(arguments),

@@ -1,6 +1,6 @@
 //! `haptize scan`: a real object haptized by touching it. The rig that ships is simulated, and says so.
 
-use super::{Failure, Report, bar::bar};
+use super::{Failure, Report, bar::bar, interrupt::stop_flag};
 use haptize::{
     JointVector,
     haptize::scan::{
@@ -11,8 +11,8 @@ use haptize::{
     scene::ScanScene,
 };
 use std::{
-    path::PathBuf,
-    sync::{Arc, atomic::AtomicBool, atomic::Ordering},
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicBool, Ordering},
 };
 
 /// What to scan.
@@ -41,56 +41,25 @@ const SEED: u64 = 1;
 /// Scans. Ctrl-C stops after the point at hand and leaves a log that `--resume` continues.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let scene = ScanScene::load(&arguments.scene)?;
-    let chain = Chain::new(&scene.proxy);
-    let plan = Plan::new(&scene.scan.plan, &chain)?;
-    let first = plan.stops.first().map_or_else(|| JointVector::zeros(chain.joints.len()), |stop| stop.q);
     if let Some(seconds) = arguments.guided.filter(|seconds| !(*seconds > 0.0 && *seconds <= LONGEST)) {
         return Err(format!("cannot log for {seconds} s: give --guided between 0 and {LONGEST}").into());
     }
-    let mut rig = SimulatedRig::new(&scene.proxy, &scene.scan.simulated, first, SEED);
     let output = match &arguments.output {
         Some(output) => output.clone(),
         None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file; give -o")?)
             .with_extension("csv"),
     };
-    let header = LogHeader {
-        rig: rig.description(),
-        simulated: rig.is_simulated(),
-        guided: arguments.guided.is_some(),
-        joints: labels(&chain),
-        scene: scene.text.clone(),
-    };
-    let (mut log, logged): (LogWriter, Vec<ScanRow>) = if arguments.resume {
-        LogWriter::resume(&output, &header)?
-    } else {
-        (LogWriter::create(&output, &header)?, Vec::new())
-    };
-    if let Some(seconds) = arguments.guided {
-        rig = rig.led_by(Hand::new(plan.spread(logged.len(), Hand::visits_within(seconds))));
-    }
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = stop.clone();
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))?;
-    eprintln!("haptize: {}", rig.description());
+    let stop = stop_flag()?;
     let bar = bar(0, "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     let mut progress = |progress: ScanProgress| {
         bar.set_length(progress.points as u64);
         bar.set_position(progress.done as u64);
         bar.set_message(format!("{:.0} s on the rig", progress.time));
     };
-    let mut session = Session {
-        spec: &scene.scan,
-        chain: &chain,
-        rig: &mut rig,
-        log: &mut log,
-        stop: &stop,
-        progress: &mut progress,
-    };
-    let result = match arguments.guided {
-        Some(seconds) => session.guided(seconds, &logged),
-        None => session.scan(&plan, &logged),
-    };
+    let course = Course { resume: arguments.resume, guided: arguments.guided };
+    let result = measure(&scene, &output, course, stop, &mut progress);
     bar.finish_and_clear();
+    stop.store(true, Ordering::Relaxed);
     let report = result?;
     let mut json = serde_json::to_value(&report)?;
     json["file"] = output.display().to_string().into();
@@ -105,7 +74,51 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     Ok(Report { text, json, whole: report.whole })
 }
 
-fn describe(output: &std::path::Path, report: &ScanReport) -> String {
+/// How a scan goes: by default through the whole plan, into a new log.
+#[derive(Clone, Copy, Default)]
+pub struct Course {
+    /// Whether a log that is there is continued.
+    pub resume: bool,
+    /// Time for which a hand leads, instead of the plan [s].
+    pub guided: Option<f64>,
+}
+
+/// Scans `scene` on the simulated rig into the log `output`, until it is done or `stop` is raised.
+pub fn measure(
+    scene: &ScanScene,
+    output: &Path,
+    course: Course,
+    stop: &AtomicBool,
+    progress: &mut dyn FnMut(ScanProgress),
+) -> Result<ScanReport, Failure> {
+    let chain = Chain::new(&scene.proxy);
+    let plan = Plan::new(&scene.scan.plan, &chain)?;
+    let first = plan.stops.first().map_or_else(|| JointVector::zeros(chain.joints.len()), |stop| stop.q);
+    let mut rig = SimulatedRig::new(&scene.proxy, &scene.scan.simulated, first, SEED);
+    let header = LogHeader {
+        rig: rig.description(),
+        simulated: rig.is_simulated(),
+        guided: course.guided.is_some(),
+        joints: labels(&chain),
+        scene: scene.text.clone(),
+    };
+    let (mut log, logged): (LogWriter, Vec<ScanRow>) = if course.resume {
+        LogWriter::resume(output, &header)?
+    } else {
+        (LogWriter::create(output, &header)?, Vec::new())
+    };
+    if let Some(seconds) = course.guided {
+        rig = rig.led_by(Hand::new(plan.spread(logged.len(), Hand::visits_within(seconds))));
+    }
+    eprintln!("haptize: {}", rig.description());
+    let mut session = Session { spec: &scene.scan, chain: &chain, rig: &mut rig, log: &mut log, stop, progress };
+    Ok(match course.guided {
+        Some(seconds) => session.guided(seconds, &logged),
+        None => session.scan(&plan, &logged),
+    }?)
+}
+
+fn describe(output: &Path, report: &ScanReport) -> String {
     let mut text = format!(
         "{}: {} of {} points measured in {:.0} s on the rig's clock\n  rig          {}\n",
         output.display(),

@@ -76,7 +76,7 @@ pub fn gridized(samples: &Samples, dataset: &Dataset) -> Canvas {
         }
     }
     let bar = Area { x: WIDTH - 72.0, y: 140.0, width: 12.0, height: HEIGHT - 230.0 };
-    plot::colour_bar(&mut canvas, bar, map, &format!("‖τ‖ [{unit}]"), Anchor::Middle);
+    plot::colour_bar(&mut canvas, bar, map, &format!("‖τ‖ [{unit}]"), Anchor::Start);
     canvas
 }
 
@@ -104,7 +104,8 @@ fn caption(samples: &Samples, dataset: &Dataset, fixed: &[usize], shown: [usize;
         "" => String::new(),
         backend => format!(" ({backend})"),
     };
-    let mut text = format!("{} samples{from}, {inside} grid points inside the measured region", samples.len());
+    let [samples, inside] = [samples.len(), inside].map(ticks::thousands);
+    let mut text = format!("{samples} samples{from}, {inside} grid points inside the measured region");
     let axes = dataset.grid.axes.iter().enumerate().filter(|(axis, _)| !shown.contains(axis));
     let planes: Vec<String> = axes
         .map(|(axis, of)| {

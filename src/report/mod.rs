@@ -14,6 +14,7 @@ pub mod gridized;
 pub mod hysteresis;
 pub mod jitter;
 pub mod object;
+pub mod paper;
 pub mod plot;
 pub mod prediction;
 pub mod press;

@@ -206,30 +206,28 @@ impl<'a> Scene<'a> {
             self.rest.iter().zip(&instant.nodes).map(|pair| self.map.colour(displacement(pair))).collect();
         let nodes = &instant.nodes[..self.rest.len()];
         raster.mesh(nodes, self.triangles, &colours);
-        self.draw_proxy(&mut raster, &instant.pose);
+        draw_proxy(&mut raster, self.chain, &instant.pose, 0.032 * self.radius);
         for (tail, tip) in self.arrows(instant) {
             raster.arrow(tail, tip, 0.022 * self.radius, FORCE);
         }
         raster.edges(nodes, self.triangles, 1.2, EDGE);
         raster.picture()
     }
+}
 
-    /// Links from joint to joint, the last one to its farthest node, and the contact nodes on them.
-    fn draw_proxy(&self, raster: &mut Raster, pose: &Pose) {
-        let thickness = 0.032 * self.radius;
-        for (link, &from) in pose.origins.iter().enumerate() {
-            let own =
-                || self.chain.nodes.iter().zip(&pose.nodes).filter(|(node, _)| node.link == link).map(|(_, &x)| x);
-            let to = match pose.origins.get(link + 1) {
-                Some(&next) => next,
-                None => own().max_by(|a, b| a.distance(from).total_cmp(&b.distance(from))).unwrap_or(from),
-            };
-            raster.capsule([from, to], thickness, LINK);
-            raster.sphere(from, 2.0 * thickness, LINK);
-        }
-        for (node, &x) in self.chain.nodes.iter().zip(&pose.nodes) {
-            raster.sphere(x, node.radius.max(1.25 * thickness), PROXY_NODE);
-        }
+/// Draws the links from joint to joint, the last one to its farthest node, and the contact nodes on them.
+pub(super) fn draw_proxy(raster: &mut Raster, chain: &Chain, pose: &Pose, thickness: f64) {
+    for (link, &from) in pose.origins.iter().enumerate() {
+        let own = || chain.nodes.iter().zip(&pose.nodes).filter(|(node, _)| node.link == link).map(|(_, &x)| x);
+        let to = match pose.origins.get(link + 1) {
+            Some(&next) => next,
+            None => own().max_by(|a, b| a.distance(from).total_cmp(&b.distance(from))).unwrap_or(from),
+        };
+        raster.capsule([from, to], thickness, LINK);
+        raster.sphere(from, 2.0 * thickness, LINK);
+    }
+    for (node, &x) in chain.nodes.iter().zip(&pose.nodes) {
+        raster.sphere(x, node.radius.max(1.25 * thickness), PROXY_NODE);
     }
 }
 

@@ -17,6 +17,12 @@ use crate::{
 /// Joint contact torque, configuration and number of contacting object nodes against time, contact shaded (Fig. 5).
 #[must_use]
 pub fn press(trace: &Trace) -> Canvas {
+    titled("Multi-point contact felt through the 1 kHz loop", trace)
+}
+
+/// Draws the figure of [`press`] under another title.
+#[must_use]
+pub fn titled(headline: &str, trace: &Trace) -> Canvas {
     let mut lanes = per_joint(trace, ["Contact torque on the proxy", "Contact force on the proxy"], true, |tick| {
         &tick.contact_torque
     });
@@ -32,7 +38,7 @@ pub fn press(trace: &Trace) -> Canvas {
             counts: true,
         });
     }
-    stack("Multi-point contact felt through the 1 kHz loop".to_owned(), trace, lanes)
+    stack(headline, trace, lanes)
 }
 
 /// Where the energy of proxy and coupling comes from, is kept and goes, and what the balance leaves unexplained.
@@ -74,12 +80,12 @@ pub fn energy(trace: &Trace) -> Canvas {
         lanes.push(lane("Created by interpolating the torque [mJ]", &[("", |accounts| accounts.leak)]));
     }
     lanes.push(Lane { height: 70.0, ..lane("Unexplained in the balance [mJ]", &[("", Accounts::residual)]) });
-    stack("Energy accounts of proxy and coupling".to_owned(), trace, lanes)
+    stack("Energy accounts of proxy and coupling", trace, lanes)
 }
 
-fn stack(headline: String, trace: &Trace, lanes: Vec<Lane>) -> Canvas {
+fn stack(headline: &str, trace: &Trace, lanes: Vec<Lane>) -> Canvas {
     Stack {
-        headline,
+        headline: headline.to_owned(),
         across: "Time [s]".to_owned(),
         lanes,
         shaded: contact_intervals(&trace.ticks),

@@ -85,9 +85,10 @@ fn points_in_contact(dataset: &Dataset) -> Vec<usize> {
 fn caption(dataset: &Dataset, shown: &[usize]) -> String {
     let grid = &dataset.grid;
     let all = (0..grid.points()).filter(|&point| dataset.status(point).is_in_contact()).count();
-    let mut text = format!("{} of {} configurations in contact", thousands(all), thousands(grid.points()));
+    let mut text =
+        format!("{} of {} configurations in contact", ticks::thousands(all), ticks::thousands(grid.points()));
     if all == 0 {
-        text = format!("none of {} configurations in contact", thousands(grid.points()));
+        text = format!("none of {} configurations in contact", ticks::thousands(grid.points()));
     }
     if let (Some(&first), true) = (shown.first(), grid.joints() > 3) {
         let q = grid.configuration(first);
@@ -95,23 +96,10 @@ fn caption(dataset: &Dataset, shown: &[usize]) -> String {
             let axis = &grid.axes[joint];
             format!("q{} {} = {} {}", subscript(joint + 1), axis.name, ticks::number(q[joint], 3), axis.unit)
         });
-        text += &format!(", {} of them at {}", thousands(shown.len()), fixed.collect::<Vec<_>>().join(", "));
+        text += &format!(", {} of them at {}", ticks::thousands(shown.len()), fixed.collect::<Vec<_>>().join(", "));
     }
     if is_mixed(dataset) {
         text += "; torque of the revolute joints";
-    }
-    text
-}
-
-/// `8,064`.
-fn thousands(number: usize) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
     }
     text
 }

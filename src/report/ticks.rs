@@ -122,6 +122,19 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     }
 }
 
+/// Returns `number` with a comma before every third digit: `8,064`.
+pub(super) fn thousands(number: usize) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
 fn is_whole(value: f64) -> bool {
     (value - value.round()).abs() < TICK_STEP
 }

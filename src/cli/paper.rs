@@ -1,0 +1,233 @@
+//! `haptize paper`: the figures and numbers of the paper, remade with the scenes that are part of the program.
+
+use super::{
+    Failure, Report, bake,
+    bar::bar,
+    gridize::{self, Source},
+    interrupt::stop_flag,
+    play,
+    scan::{self, Course},
+};
+use haptize::{
+    dataset::{Dataset, replace_file},
+    haptize::{
+        BackendChoice,
+        gridize::{GridizeOptions, Interpolation},
+        scan::ScanProgress,
+    },
+    render::{setup::Setup, trace::Trace},
+    report::{
+        self,
+        canvas::Canvas,
+        force::{EndForce, force},
+        gridized::gridized,
+        object,
+        paper::{Comparison, Scanned, Scans, Sphere, procedure, specimen},
+        press,
+        slices::slices,
+        space::space,
+    },
+    scene::{ScanScene, Scene},
+};
+use indicatif::ProgressBar;
+use std::{
+    fmt::Write as _,
+    io::{ErrorKind, Write as _},
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
+};
+
+/// The virtual object of section 4.1.
+const SPHERE: &str = include_str!("../../datasets/paper.toml");
+/// The scans of section 4.2.
+const BARE: Specimen = Specimen { name: "sponge", scene: include_str!("../../datasets/sponge.toml") };
+const FABRIC: Specimen = Specimen { name: "sponge_fabric", scene: include_str!("../../datasets/sponge_fabric.toml") };
+const SIDE: Specimen = Specimen { name: "sponge_side", scene: include_str!("../../datasets/sponge_side.toml") };
+
+/// Interval of the gridized datasets, the paper's [rad].
+const STEP: f64 = 0.03;
+
+/// Instants of Fig. 6.
+const INSTANTS: usize = 6;
+
+/// Where the figures go.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The folder to write figures, tables, datasets and scan logs to; files of an earlier run are replaced.
+    #[arg(short, long, default_value = "out/paper")]
+    output: PathBuf,
+}
+
+/// Haptizes, scans, plays, draws and compares.
+pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    let started = Instant::now();
+    let folder = &arguments.output;
+    std::fs::create_dir_all(folder)
+        .map_err(|error| format!("cannot make the folder {}: {error}; give another by -o", folder.display()))?;
+    let scene = Scene::parse(SPHERE, "datasets/paper.toml")?;
+    eprintln!("section 4.1: haptizing and pressing the sphere ...");
+    let (dataset, sweep) = bake::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
+    bake::warn(&sweep);
+    dataset.save(&folder.join("paper.haptize"))?;
+    let (setup, pressed) = felt(&dataset, "press")?;
+    let (_, scraped) = felt(&dataset, "scrape")?;
+    let sphere = Sphere { scene: &scene, dataset: &dataset, press: &pressed };
+
+    eprintln!("section 4.2: scanning three simulated spongy blocks ...");
+    let [bare, fabric, side] = scan_all(folder)?;
+    let (on_bare, on_fabric, on_side) =
+        (felt(&bare.dataset, "scrape")?, felt(&fabric.dataset, "scrape")?, felt(&side.dataset, "press")?);
+    let scans = Scans { bare: bare.felt(&on_bare), fabric: fabric.felt(&on_fabric), side: side.felt(&on_side) };
+
+    eprintln!("drawing ...");
+    let figures = Figures { folder };
+    let instants = object::instants(&dataset, &setup.chain, &pressed, INSTANTS)?;
+    let mut files = figures.sheet("fig2-procedure", &procedure(sphere, scans))?;
+    files.extend(figures.picture("fig3-cspace", &space(&dataset))?);
+    files.extend(figures.sheet("fig4-gridization", &gridized(&bare.source.samples, &bare.dataset))?);
+    files.extend(figures.sheet("fig5-press", &press::press(&pressed))?);
+    files.extend(figures.picture("fig6-deformation", &object::object(&dataset, &setup.chain, &instants)?)?);
+    files.extend(figures.picture("fig7-sponge", &specimen(scans))?);
+    files.extend(figures.sheet("fig8-scrape", &forces(scans))?);
+    files.extend(
+        figures
+            .sheet("fig9-side-press", &press::titled("Press on the side of the simulated block", scans.side.trace))?,
+    );
+    files.extend(figures.sheet("torque", &slices(&dataset))?);
+    files.extend(figures.sheet("energy", &press::energy(&pressed))?);
+    files.extend(figures.sheet("scrape", &press::titled("Scraping over the sphere", &scraped))?);
+
+    let comparison = Comparison::new(sphere, scans);
+    let json = serde_json::json!({ "comparison": comparison, "bake": sweep, "press": pressed.summary(), "scrape": scraped.summary() });
+    let tables = [("table.md", comparison.markdown()), ("table.json", format!("{:#}\n", json["comparison"]))];
+    for (name, text) in tables {
+        let file = folder.join(name);
+        replace_file(&file, |out| out.write_all(text.as_bytes()))
+            .map_err(|error| format!("cannot write {}: {error}", file.display()))?;
+        files.push(file);
+    }
+    let seconds = started.elapsed().as_secs_f64();
+    describe(&comparison, folder, seconds, json, &files)
+}
+
+fn describe(
+    comparison: &Comparison,
+    folder: &Path,
+    seconds: f64,
+    mut json: serde_json::Value,
+    files: &[PathBuf],
+) -> Result<Report, Failure> {
+    json["seconds"] = seconds.into();
+    json["files"] = files.iter().map(|file| file.display().to_string()).collect();
+    let mut text = String::new();
+    let drawn = comparison.figures.iter().filter(|figure| !figure.file.is_empty()).count();
+    writeln!(text, "{drawn} of the paper's {} figures remade in {seconds:.0} s", comparison.figures.len())?;
+    writeln!(text, "{} numbers compared; those that differ:", comparison.rows.len())?;
+    for row in comparison.rows.iter().filter(|row| row.differs()) {
+        writeln!(text, "  {}: {} in the paper, {} here", row.quantity, row.paper, row.ours)?;
+    }
+    writeln!(text, "table, figures and datasets in {}; begin with table.md", folder.display())?;
+    Ok(Report { text, json, whole: true })
+}
+
+/// Plays the `motion` of the dataset's scene with a simulated hand, as fast as it goes.
+fn felt(dataset: &Dataset, motion: &str) -> Result<(Setup, Trace), Failure> {
+    let setup = Setup::new(dataset)?;
+    let motion = play::motion(&setup, motion)?;
+    let seconds = motion.duration();
+    let played = play::play(&setup, dataset, &mut setup.hand(motion)?, seconds, false)?;
+    Ok((setup, played.trace))
+}
+
+/// Draws the scrapes over both covers in one figure (Fig. 8).
+fn forces(scans: Scans<'_>) -> Canvas {
+    let covers = [("bare (simulated)", scans.bare), ("under a fabric (simulated)", scans.fabric)];
+    let felt: Vec<EndForce> =
+        covers.into_iter().filter_map(|(name, of)| EndForce::new(name, of.chain, of.trace)).collect();
+    force(&felt, scans.bare.trace)
+}
+
+/// A scene to scan.
+struct Specimen {
+    name: &'static str,
+    scene: &'static str,
+}
+
+/// An object that was scanned and gridized.
+struct Measured {
+    scene: ScanScene,
+    source: Source,
+    dataset: Dataset,
+}
+
+impl Measured {
+    /// What was measured, and what was felt of it.
+    fn felt<'a>(&'a self, (setup, trace): &'a (Setup, Trace)) -> Scanned<'a> {
+        let Self { scene, source, dataset } = self;
+        Scanned { scene, samples: &source.samples, dataset, chain: &setup.chain, trace }
+    }
+}
+
+/// Scans and gridizes all specimens, side by side.
+fn scan_all(folder: &Path) -> Result<[Measured; 3], Failure> {
+    let stop = stop_flag()?;
+    let bar = bar(0, "{wide_bar} {pos}/{len} points, {eta} left");
+    let measure = |specimen: Specimen| specimen.measure(folder, stop, &bar);
+    let (bare, (fabric, side)) = rayon::join(|| measure(BARE), || rayon::join(|| measure(FABRIC), || measure(SIDE)));
+    bar.finish_and_clear();
+    stop.store(true, Ordering::Relaxed);
+    Ok([bare?, fabric?, side?])
+}
+
+impl Specimen {
+    /// Scans, and gridizes what was measured.
+    fn measure(self, folder: &Path, stop: &AtomicBool, bar: &ProgressBar) -> Result<Measured, Failure> {
+        let scene = ScanScene::parse(self.scene, Path::new("datasets").join(self.name).with_extension("toml"))?;
+        let log = folder.join(self.name).with_extension("csv");
+        match std::fs::remove_file(&log) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(format!("cannot replace {}: {error}", log.display()).into());
+            }
+            _ => {}
+        }
+        let mut announced = false;
+        let mut progress = |progress: ScanProgress| {
+            if !std::mem::replace(&mut announced, true) {
+                bar.inc_length(progress.points as u64);
+            }
+            bar.inc(1);
+        };
+        let report = scan::measure(&scene, &log, Course::default(), stop, &mut progress)?;
+        if !report.whole {
+            return Err("interrupted while scanning; nothing is drawn, run it again".into());
+        }
+        let source = gridize::scanned(std::slice::from_ref(&log))?;
+        let options = GridizeOptions {
+            steps: vec![STEP],
+            epsilon: source.epsilon,
+            interpolation: Interpolation::Linear,
+            smooth: false,
+        };
+        let (dataset, _) = source.gridize(&options)?;
+        dataset.save(&folder.join(self.name).with_extension("haptize"))?;
+        Ok(Measured { scene, source, dataset })
+    }
+}
+
+/// Where figures are written.
+struct Figures<'a> {
+    folder: &'a Path,
+}
+
+impl Figures<'_> {
+    /// Writes a figure of lines and text, as SVG and PNG.
+    fn sheet(&self, name: &str, canvas: &Canvas) -> Result<Vec<PathBuf>, Failure> {
+        Ok(report::write_both(self.folder, name, canvas)?.to_vec())
+    }
+
+    /// Writes a figure with pictures in it, as PNG.
+    fn picture(&self, name: &str, canvas: &Canvas) -> Result<Vec<PathBuf>, Failure> {
+        Ok(vec![report::write_png(self.folder, name, canvas)?])
+    }
+}

@@ -1,0 +1,57 @@
+//! What the paper shows, remade: its procedure as a drawing (Fig. 2), the specimen (Fig. 7), and its numbers beside ours.
+//!
+//! The other figures are those of any dataset and session: [`space`](super::space) (Fig. 3), [`gridized`](super::gridized)
+//! (Fig. 4), [`press`](super::press) (Figs. 5 and 9), [`object`](super::object) (Fig. 6) and [`force`](super::force) (Fig. 8).
+
+mod comparison;
+mod procedure;
+mod specimen;
+
+pub use comparison::{Comparison, FIGURES, FigureNote, Row, Value};
+pub use procedure::procedure;
+pub use specimen::specimen;
+
+use crate::{
+    dataset::Dataset,
+    haptize::gridize::Samples,
+    proxy::Chain,
+    render::trace::Trace,
+    scene::{ScanScene, Scene},
+};
+
+/// The virtual object of section 4.1.
+#[derive(Clone, Copy)]
+pub struct Sphere<'a> {
+    /// Its scene.
+    pub scene: &'a Scene,
+    /// What it was haptized to.
+    pub dataset: &'a Dataset,
+    /// The press (Figs. 5 and 6).
+    pub press: &'a Trace,
+}
+
+/// A scanned object of section 4.2.
+#[derive(Clone, Copy)]
+pub struct Scanned<'a> {
+    /// Its scene.
+    pub scene: &'a ScanScene,
+    /// What was measured.
+    pub samples: &'a Samples,
+    /// The measurements on the uniform grid.
+    pub dataset: &'a Dataset,
+    /// The proxy that scanned, which is the proxy that feels.
+    pub chain: &'a Chain,
+    /// The motion of Fig. 8 or Fig. 9.
+    pub trace: &'a Trace,
+}
+
+/// The three scans of section 4.2.
+#[derive(Clone, Copy)]
+pub struct Scans<'a> {
+    /// From above, bare: scraped.
+    pub bare: Scanned<'a>,
+    /// From above, under a fabric: scraped.
+    pub fabric: Scanned<'a>,
+    /// From the side: pressed.
+    pub side: Scanned<'a>,
+}
