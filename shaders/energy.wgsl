@@ -10,6 +10,9 @@
 // Geometry frozen at rest: linearised contact.
 override FROZEN: bool = false;
 
+// What displaces the surface.
+const MOVING: u32 = DIRECTION_FORCE;
+
 // Brings support, contact forces and residual force up to date with a contact of each invocation; returns r . C r and
 // c . C c.
 fn balance(contact: Contact, kc: f32, local: u32) -> vec2<f32> {
@@ -18,19 +21,17 @@ fn balance(contact: Contact, kc: f32, local: u32) -> vec2<f32> {
     workgroupBarrier();
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
         let force = gather(slot);
-        vectors[at(IMAGE, slot)] = force;
-        vectors[at(BALANCE, slot)] = force - vectors[at(FORCES, slot)];
+        put(IMAGE, slot, force);
+        put(BALANCE, slot, force - entry(FORCES, slot));
     }
     workgroupBarrier();
     var squares = vec4<f32>(0.0);
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
         let product = multiply(BALANCE, slot);
-        // C c = C f + C r.
-        let whole = displaced(support_nodes[slot]) + product;
-        squares.x += dot(vectors[at(BALANCE, slot)], product);
-        squares.y += dot(vectors[at(IMAGE, slot)], whole);
+        squares.x += dot(entry(BALANCE, slot), product);
+        squares.y += dot(entry(IMAGE, slot), multiply(IMAGE, slot));
     }
-    return max(add_up(squares, local).xy, vec2<f32>(0.0));
+    return max(add_up(squares, busy(), local).xy, vec2<f32>(0.0));
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -43,10 +44,11 @@ fn main(
     if place >= parameters.configurations {
         return;
     }
-    displacement_base = place * parameters.covered;
+    workspace_base = place * (parameters.covered + 2u * parameters.clusters);
     position_base = list[1u + parameters.first + place] * parameters.proxy_nodes;
+    begin_trials(local);
     for (var slot = local; slot < SUPPORT; slot += WORKGROUP) {
-        vectors[at(FORCES, slot)] = vec3<f32>(0.0);
+        put(FORCES, slot, vec3<f32>(0.0));
     }
     // Of the frozen problem: nodes farther from the surface than this can never touch (see the twin).
     var reach = 0.0;
@@ -56,7 +58,7 @@ fn main(
             let depth = max(-positions[position_base + node].w, 0.0);
             square += depth * depth;
         }
-        square = add_up(vec4<f32>(square, 0.0, 0.0, 0.0), local).x;
+        square = add_up(vec4<f32>(square, 0.0, 0.0, 0.0), parameters.proxy_nodes, local).x;
         reach = sqrt(parameters.kc * square * parameters.softest);
     }
 
@@ -69,7 +71,7 @@ fn main(
             let radius = proxy_radius(node);
             radii = max(radii, select(0.0, -positions[position_base + node].w / max(radius, LEAST_DIVISOR), radius > 0.0));
         }
-        kc = min(kc, CONTINUATION_START / parameters.softest * greatest(radii, local));
+        kc = min(kc, CONTINUATION_START / parameters.softest * greatest(radii, parameters.proxy_nodes, local));
     }
     var outcome = Outcome();
     var contact = Contact();
@@ -91,12 +93,18 @@ fn main(
         let at_rest = outcome.iterations == 0u && !new_stage;
         var accepted = true;
         var trial = contact;
-        let moved = displace(DIRECTION_FORCE, local);
+        trial_number += 1.0;
+        var work_done = vec4<f32>(0.0);
+        for (var slot = local; slot < support_count; slot += WORKGROUP) {
+            work_done.x += dot(entry(DIRECTION_FORCE, slot), multiply(DIRECTION_FORCE, slot));
+        }
+        let twice_elastic = max(add_up(work_done, support_count, local).x, 0.0);
         if new_stage {
             kc = min(parameters.kc, CONTINUATION_FACTOR * kc);
         } else {
             if !FROZEN || at_rest {
-                trial = deformed(moved, reach, local);
+                // |u_j|^2 <= |C_jj| |u|^2, the last in the energy norm.
+                trial = deformed(sqrt(parameters.mobility * twice_elastic) * (1.0 + SEARCH_SLACK), reach, local);
             }
             if FROZEN {
                 if at_rest {
@@ -108,14 +116,11 @@ fn main(
             trial.multiplier = kc * max(contact.depth + step.deepening, 0.0);
         }
         var sums = vec4<f32>(0.0);
-        for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            sums.x += dot(vectors[at(DIRECTION_FORCE, slot)], displaced(support_nodes[slot]));
-        }
         let trial_depth = max(trial.depth, 0.0);
         sums.y = trial_depth * trial_depth;
         sums.z = max(contact.depth, 0.0) * length(proxy_position(contact.proxy_node));
-        sums = add_up(sums, local);
-        let trial_energy = 0.5 * sums.x + 0.5 * kc * sums.y;
+        sums = add_up(sums, contact_count, local);
+        let trial_energy = 0.5 * twice_elastic + 0.5 * kc * sums.y;
         if at_rest || new_stage {
             // 1/2 |u|^2 in the energy norm never exceeds E.
             first_radius = sqrt(2.0 * trial_energy);
@@ -135,10 +140,10 @@ fn main(
         }
         if accepted {
             contact = trial;
-            elastic = 0.5 * sums.x;
+            elastic = 0.5 * twice_elastic;
             energy = trial_energy;
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
-                vectors[at(FORCES, slot)] = vectors[at(DIRECTION_FORCE, slot)];
+                put(FORCES, slot, entry(DIRECTION_FORCE, slot));
             }
             workgroupBarrier();
             let squares = balance(contact, kc, local);
@@ -151,7 +156,7 @@ fn main(
         if new_stage {
             // The state as it is, as a trial at the next stiffness.
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
-                vectors[at(DIRECTION_FORCE, slot)] = vectors[at(FORCES, slot)];
+                put(DIRECTION_FORCE, slot, entry(FORCES, slot));
             }
             workgroupBarrier();
             continue;
@@ -167,16 +172,16 @@ fn main(
         let inner = clamp(outcome.residual, INNER_TOLERANCE_FLOOR, INNER_TOLERANCE);
         step = trust_region_step(contact, kc, square, radius, inner, local);
         let after = max(contact.depth + step.deepening, 0.0);
-        let felt = greatest(select(0.0, abs(step.deepening), max(contact.depth, after) > 0.0), local);
+        let felt = greatest(select(0.0, abs(step.deepening), max(contact.depth, after) > 0.0), contact_count, local);
         var work = vec4<f32>(0.0);
         work.y = after;
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            let forces = vectors[at(FORCES, slot)];
-            let step_force = vectors[at(STEP_FORCE, slot)];
-            vectors[at(DIRECTION_FORCE, slot)] = forces + step_force;
-            work.x += dot(forces + 0.5 * step_force, vectors[at(STEP, slot)]);
+            let forces = entry(FORCES, slot);
+            let step_force = entry(STEP_FORCE, slot);
+            put(DIRECTION_FORCE, slot, forces + step_force);
+            work.x += dot(forces + 0.5 * step_force, entry(STEP, slot));
         }
-        work = add_up(work, local);
+        work = add_up(work, busy(), local);
         let settled_before = settled;
         settled = felt <= parameters.depth_rounding;
         let small = step.length <= parameters.tolerance * scale || (settled && settled_before);
@@ -185,7 +190,7 @@ fn main(
                 // f32 can tell no more at this stage.
                 new_stage = true;
                 for (var slot = local; slot < support_count; slot += WORKGROUP) {
-                    vectors[at(DIRECTION_FORCE, slot)] = vectors[at(FORCES, slot)];
+                    put(DIRECTION_FORCE, slot, entry(FORCES, slot));
                 }
                 workgroupBarrier();
                 continue;

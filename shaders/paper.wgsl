@@ -13,6 +13,8 @@ const IMAGE: u32 = 6u;
 // Forces of the pass that later ones are compared with: a repetition is a cycle.
 const MARKED_FORCES: u32 = 7u;
 const VECTORS: u32 = 8u;
+// What displaces the surface, where `displace_all` has not.
+const MOVING: u32 = FORCES;
 
 // Number of ties on each slot.
 var<workgroup> multiplicity: array<f32, SUPPORT>;
@@ -61,6 +63,19 @@ fn vertex_normal(node: u32, x: vec3<f32>) -> vec3<f32> {
     return unit_or_zero(sum);
 }
 
+// Displaces all covered nodes by C v, v a vector on the support; returns the greatest length.
+fn displace_all(vector: u32, local: u32) -> f32 {
+    trial_number += 1.0;
+    var most = 0.0;
+    for (var place = local; place < parameters.covered; place += WORKGROUP) {
+        let u = response(vector, place);
+        workspace[workspace_base + place] = vec4<f32>(u, trial_number);
+        most = max(most, length(u));
+    }
+    storageBarrier();
+    return greatest(most, parameters.covered, local);
+}
+
 // Step 1: proxy nodes inside, each tied to the three closest object nodes.
 fn tie_nodes(moved: f32, local: u32) -> Tie {
     // Ties are found anew in every pass.
@@ -68,6 +83,7 @@ fn tie_nodes(moved: f32, local: u32) -> Tie {
         contact_count = 0u;
         support_count = 0u;
     }
+    workgroupBarrier();
     let contact = deformed(moved, 0.0, local);
     var tie = Tie();
     tie.nodes = vec3<u32>(ABSENT);
@@ -100,24 +116,24 @@ fn solve_tied(tie: Tie, local: u32) {
             count += dot(vec3<f32>(slots[k] == vec3<u32>(slot)), vec3<f32>(1.0));
         }
         multiplicity[slot] = max(count, 1.0);
-        vectors[at(WANTED, slot)] = gather(slot) / multiplicity[slot];
+        put(WANTED, slot, gather(slot) / multiplicity[slot]);
     }
     workgroupBarrier();
     conjugate_gradients(local);
-    displace(TIED_FORCES, local);
+    displace_all(TIED_FORCES, local);
 }
 
 // TIED_FORCES with (C_AA + D^-1) TIED_FORCES = WANTED.
 fn conjugate_gradients(local: u32) {
     var squares = vec4<f32>(0.0);
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
-        let wanted = vectors[at(WANTED, slot)];
-        vectors[at(TIED_FORCES, slot)] = vec3<f32>(0.0);
-        vectors[at(RESIDUAL, slot)] = wanted;
-        vectors[at(DIRECTION, slot)] = wanted;
+        let wanted = entry(WANTED, slot);
+        put(TIED_FORCES, slot, vec3<f32>(0.0));
+        put(RESIDUAL, slot, wanted);
+        put(DIRECTION, slot, wanted);
         squares.x += dot(wanted, wanted);
     }
-    var square = add_up(squares, local).x;
+    var square = add_up(squares, support_count, local).x;
     let stop = max(PAPER_INNER_TOLERANCE * PAPER_INNER_TOLERANCE * square, LEAST_DIVISOR);
     let most = INNER_ITERATIONS_PER_UNKNOWN * 3u * support_count;
     for (var iteration = 0u; iteration < most; iteration += 1u) {
@@ -126,26 +142,26 @@ fn conjugate_gradients(local: u32) {
         }
         var curvature = 0.0;
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            let direction = vectors[at(DIRECTION, slot)];
+            let direction = entry(DIRECTION, slot);
             let softness = 1.0 / (parameters.stiffness * multiplicity[slot]);
             let image = multiply(DIRECTION, slot) + softness * direction;
-            vectors[at(IMAGE, slot)] = image;
+            put(IMAGE, slot, image);
             curvature += dot(direction, image);
         }
-        curvature = add_up(vec4<f32>(curvature, 0.0, 0.0, 0.0), local).x;
+        curvature = add_up(vec4<f32>(curvature, 0.0, 0.0, 0.0), support_count, local).x;
         let share = square / max(curvature, LEAST_DIVISOR);
         var next = 0.0;
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            vectors[at(TIED_FORCES, slot)] += share * vectors[at(DIRECTION, slot)];
-            let residual = vectors[at(RESIDUAL, slot)] - share * vectors[at(IMAGE, slot)];
-            vectors[at(RESIDUAL, slot)] = residual;
+            put(TIED_FORCES, slot, entry(TIED_FORCES, slot) + share * entry(DIRECTION, slot));
+            let residual = entry(RESIDUAL, slot) - share * entry(IMAGE, slot);
+            put(RESIDUAL, slot, residual);
             next += dot(residual, residual);
         }
-        next = add_up(vec4<f32>(next, 0.0, 0.0, 0.0), local).x;
+        next = add_up(vec4<f32>(next, 0.0, 0.0, 0.0), support_count, local).x;
         let ratio = next / square;
         square = next;
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            vectors[at(DIRECTION, slot)] = vectors[at(RESIDUAL, slot)] + ratio * vectors[at(DIRECTION, slot)];
+            put(DIRECTION, slot, entry(RESIDUAL, slot) + ratio * entry(DIRECTION, slot));
         }
         workgroupBarrier();
     }
@@ -161,8 +177,8 @@ fn project(tie: Tie, local: u32) -> mat3x3<f32> {
     for (var k = 0u; k < 3u; k += 1u) {
         let slot = slots[local][k];
         // Kc (x - n_j) = Kc (xbar - n_j) + Kc (x - xbar), the first being the node's force over its ties.
-        let pull = vectors[at(TIED_FORCES, slot)] / multiplicity[slot]
-            + parameters.stiffness * (reach[k] - vectors[at(WANTED, slot)]);
+        let pull = entry(TIED_FORCES, slot) / multiplicity[slot]
+            + parameters.stiffness * (reach[k] - entry(WANTED, slot));
         let normal = vertex_normal(tie.nodes[k], tie.target_point);
         forces[k] = normal * min(dot(pull, normal), 0.0);
     }
@@ -179,12 +195,9 @@ fn main(
     if place >= parameters.configurations {
         return;
     }
-    displacement_base = place * parameters.covered;
+    workspace_base = place * (parameters.covered + 2u * parameters.clusters);
     position_base = list[1u + parameters.first + place] * parameters.proxy_nodes;
-    for (var node = local; node < parameters.covered; node += WORKGROUP) {
-        displacement[displacement_base + node] = vec4<f32>(0.0);
-    }
-    storageBarrier();
+    begin_trials(local);
     workgroupBarrier();
 
     var outcome = Outcome();
@@ -198,7 +211,7 @@ fn main(
     while !converged && !given_up && outcome.iterations < parameters.max_iterations && overflow == 0u {
         outcome.iterations += 1u;
         for (var slot = local; slot < SUPPORT; slot += WORKGROUP) {
-            vectors[at(PREVIOUS_FORCES, slot)] = vectors[at(FORCES, slot)];
+            put(PREVIOUS_FORCES, slot, entry(FORCES, slot));
         }
         let previous = tie;
         tie = tie_nodes(moved, local);
@@ -212,25 +225,26 @@ fn main(
         shares[local] = tie.forces;
         workgroupBarrier();
         for (var slot = local; slot < SUPPORT; slot += WORKGROUP) {
-            vectors[at(FORCES, slot)] = gather(slot);
+            put(FORCES, slot, gather(slot));
         }
         workgroupBarrier();
-        moved = displace(FORCES, local);
+        moved = displace_all(FORCES, local);
         // Relative change of the forces, in the energy norm; one when S changed.
         let changed = any(tie.nodes != previous.nodes) || tie.proxy_node != previous.proxy_node;
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            vectors[at(RESIDUAL, slot)] = vectors[at(FORCES, slot)] - vectors[at(PREVIOUS_FORCES, slot)];
+            put(RESIDUAL, slot, entry(FORCES, slot) - entry(PREVIOUS_FORCES, slot));
         }
         workgroupBarrier();
         var sums = vec4<f32>(0.0);
         sums.z = select(0.0, 1.0, changed);
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            let force = vectors[at(FORCES, slot)];
-            sums.x += dot(vectors[at(RESIDUAL, slot)], multiply(RESIDUAL, slot));
+            let force = entry(FORCES, slot);
+            sums.x += dot(entry(RESIDUAL, slot), multiply(RESIDUAL, slot));
             sums.y += dot(force, displaced(support_nodes[slot]));
             sums.w += dot(abs(force), vec3<f32>(1.0));
         }
-        sums = add_up(sums, local);
+        // No tie is kept beyond as many invocations as there are proxy nodes.
+        sums = add_up(sums, max(parameters.proxy_nodes, support_count), local);
         outcome.elastic = 0.5 * sums.y;
         outcome.residual = select(sqrt(max(sums.x, 0.0)) / max(sqrt(max(sums.y, 0.0)), RESIDUAL_FLOOR), 1.0, sums.z > 0.0);
         // Contact was lost: nothing inside, or no force left that compresses.
@@ -241,19 +255,19 @@ fn main(
         // A pass that repeats an earlier one to the last bit will do so for ever.
         var differs = any(tie.nodes != marked.nodes) || tie.proxy_node != marked.proxy_node;
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            differs = differs || any(vectors[at(FORCES, slot)] != vectors[at(MARKED_FORCES, slot)]);
+            differs = differs || any(entry(FORCES, slot) != entry(MARKED_FORCES, slot));
         }
-        let repeats = greatest(select(0.0, 1.0, differs), local) == 0.0;
+        let repeats = greatest(select(0.0, 1.0, differs), max(parameters.proxy_nodes, support_count), local) == 0.0;
         given_up = given_up || (outcome.iterations > 1u && repeats);
         if (outcome.iterations & (outcome.iterations - 1u)) == 0u {
             marked = tie;
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
-                vectors[at(MARKED_FORCES, slot)] = vectors[at(FORCES, slot)];
+                put(MARKED_FORCES, slot, entry(FORCES, slot));
             }
         }
     }
 
-    let used = u32(greatest(select(0.0, f32(local + 1u), tie.nodes.x != ABSENT), local));
+    let used = u32(greatest(select(0.0, f32(local + 1u), tie.nodes.x != ABSENT), contact_count, local));
     if local < used {
         write_touch(place, local, tie.nodes, tie.proxy_node, tie.forces);
     }

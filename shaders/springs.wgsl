@@ -1,31 +1,44 @@
-// Contact: the closest facet pushes, a spring a contact (twins: src/contact/detection.rs and
-// springs.rs). Invocation k keeps contact k. Vectors on the support are in the workgroup's memory.
+// Contact: the closest facet pushes, a spring a contact (twin: src/contact/springs.rs). Invocation k keeps contact k. Vectors on the support are in the workgroup's memory.
 
 // A size that follows; named, because naga 30 loses count of overrides in array sizes that are expressions.
-override VECTOR_ENTRIES: u32 = VECTORS * SUPPORT;
+override VECTOR_NUMBERS: u32 = 3u * VECTORS * SUPPORT;
 
 // Slots of each contact's three nodes, ABSENT for nodes that it does not act on.
 var<workgroup> slots: array<vec3<u32>, WORKGROUP>;
 // What each contact gives to its three nodes.
 var<workgroup> shares: array<mat3x3<f32>, WORKGROUP>;
-// Vectors on the support, one behind the other.
-var<workgroup> vectors: array<vec3<f32>, VECTOR_ENTRIES>;
+// Vectors on the support, one behind the other, three numbers a slot.
+var<workgroup> vectors: array<f32, VECTOR_NUMBERS>;
 
-// Place of a vector's entry.
-fn at(vector: u32, slot: u32) -> u32 {
-    return vector * SUPPORT + slot;
+// A vector's entry.
+fn entry(vector: u32, slot: u32) -> vec3<f32> {
+    let at = 3u * (vector * SUPPORT + slot);
+    return vec3<f32>(vectors[at], vectors[at + 1u], vectors[at + 2u]);
 }
+
+fn put(vector: u32, slot: u32, value: vec3<f32>) {
+    let at = 3u * (vector * SUPPORT + slot);
+    vectors[at] = value.x;
+    vectors[at + 1u] = value.y;
+    vectors[at + 2u] = value.z;
+}
+
+// Nodes of each contact that have no slot yet.
+var<workgroup> newcomers: array<vec3<u32>, WORKGROUP>;
 
 // Gives slots to the nodes of every contact; `nodes` is ABSENT where the contact does not act.
 fn assign_slots(nodes: vec3<u32>, local: u32) {
-    slots[local] = nodes;
+    let mine = vec3<u32>(slot_of(nodes.x), slot_of(nodes.y), slot_of(nodes.z));
+    slots[local] = mine;
+    newcomers[local] = select(vec3<u32>(ABSENT), nodes, mine == vec3<u32>(ABSENT));
     workgroupBarrier();
     if local == 0u {
-        for (var k = 0u; k < parameters.lanes; k += 1u) {
-            let nodes_k = slots[k];
-            let slot_0 = support_add(nodes_k.x);
-            let slot_1 = support_add(nodes_k.y);
-            slots[k] = vec3<u32>(slot_0, slot_1, support_add(nodes_k.z));
+        for (var k = 0u; k < contact_count; k += 1u) {
+            for (var j = 0u; j < 3u; j += 1u) {
+                if newcomers[k][j] != ABSENT {
+                    slots[k][j] = support_add(newcomers[k][j]);
+                }
+            }
         }
     }
     workgroupBarrier();
@@ -34,7 +47,7 @@ fn assign_slots(nodes: vec3<u32>, local: u32) {
 // Sum of all contacts' shares on one slot.
 fn gather(slot: u32) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
-    for (var k = 0u; k < parameters.lanes; k += 1u) {
+    for (var k = 0u; k < contact_count; k += 1u) {
         let mine = vec3<f32>(slots[k] == vec3<u32>(slot));
         sum += shares[k] * mine;
     }
@@ -45,82 +58,10 @@ fn gather(slot: u32) -> vec3<f32> {
 fn entries(vector: u32, contact_slots: vec3<u32>) -> mat3x3<f32> {
     // ABSENT slots read slot 0: what is read there is multiplied by zero.
     let safe = select(contact_slots, vec3<u32>(0u), contact_slots == vec3<u32>(ABSENT));
-    return mat3x3<f32>(vectors[at(vector, safe.x)], vectors[at(vector, safe.y)], vectors[at(vector, safe.z)]);
+    return mat3x3<f32>(entry(vector, safe.x), entry(vector, safe.y), entry(vector, safe.z));
 }
 
-// --- Detection ---
-
-// Closest triangle of each contact, ABSENT while the node is far outside.
-var<workgroup> contact_triangles: array<u32, WORKGROUP>;
-// Proxy nodes near the surface, with their closest triangles, on their way to the contacts.
-var<workgroup> near: array<vec2<u32>, WORKGROUP>;
-
-// Brings the contacts up to date with `waiting` near nodes, of which `partial` says which touch. For one invocation.
-fn sift(waiting: u32) {
-    for (var k = 0u; k < waiting; k += 1u) {
-        let place = near[k];
-        var contact = 0u;
-        while contact < contact_count && contact_nodes[contact] != place.x {
-            contact += 1u;
-        }
-        if contact == contact_count {
-            if partial[k].x == 0.0 {
-                continue;
-            }
-            if contact == CONTACTS {
-                overflow = 1u;
-                continue;
-            }
-            contact_nodes[contact] = place.x;
-            contact_count += 1u;
-        }
-        contact_triangles[contact] = place.y;
-    }
-}
-
-// This invocation's contact with the surface as displaced, at most by `moved`: of every node that touches, or comes within
-// `reach`, now or did so before in this configuration (then with a depth below zero, as it may touch again). Without one,
-// depth and weights are zero.
-fn deformed(moved: f32, reach: f32, local: u32) -> Contact {
-    contact_triangles[local] = ABSENT;
-    var contact = Contact();
-    var proxy_node = 0u;
-    var finished = false;
-    // Passes over as many near nodes as there are invocations; a last one, without any, turns to the contacts.
-    while !finished {
-        var waiting = 0u;
-        while proxy_node < parameters.proxy_nodes && waiting < WORKGROUP {
-            // A node outside at rest by more than the surface moves is outside still.
-            if positions[position_base + proxy_node].w <= moved + reach + parameters.least_distance {
-                let triangle = closest_triangle(proxy_node, moved, local);
-                if local == 0u {
-                    near[waiting] = vec2<u32>(proxy_node, triangle);
-                }
-                waiting += 1u;
-            }
-            proxy_node += 1u;
-        }
-        workgroupBarrier();
-        finished = waiting == 0u;
-        var place = near[local];
-        var taking_part = local < waiting;
-        if finished {
-            place = vec2<u32>(contact_nodes[local], contact_triangles[local]);
-            taking_part = local < contact_count && place.y != ABSENT;
-        }
-        contact = Contact();
-        if taking_part {
-            contact = contact_at(place.x, place.y);
-        }
-        partial[local].x = select(0.0, 1.0, contact.depth > -reach);
-        workgroupBarrier();
-        if local == 0u {
-            sift(waiting);
-        }
-        workgroupBarrier();
-    }
-    return contact;
-}
+// --- Frozen geometry ---
 
 // A contact that changes in proportion to displacements.
 fn freeze(contact: Contact) -> Contact {
@@ -197,7 +138,7 @@ fn write_touch(place: u32, k: u32, nodes: vec3<u32>, proxy_node: u32, forces: ma
 
 // Writes the contacts with their forces; number of touches in use.
 fn write_contacts(contact: Contact, kc: f32, vector: u32, place: u32, local: u32) -> u32 {
-    let used = u32(greatest(select(0.0, f32(local + 1u), contact.depth > 0.0), local));
+    let used = u32(greatest(select(0.0, f32(local + 1u), contact.depth > 0.0), contact_count, local));
     if local < used {
         write_touch(place, local, contact.nodes, contact.proxy_node, contact_forces(contact, kc));
     }

@@ -1,10 +1,10 @@
-// What the equilibrium stages share: one workgroup a configuration, the object nodes A that carry contact force, the
-// compliance among them, and the closest triangle of the deformed surface (twins: src/contact/support.rs and detection.rs).
+// What the equilibrium stages share: one workgroup a configuration, the object nodes A that carry contact force, and the
+// compliance among them (twin: src/contact/support.rs).
 //
 // Forces live on A only and displacement is u = C f. Every sum runs in the same order in every invocation, so that all
 // agree to the bit on what to do next, and barriers stay in uniform control flow.
 //
-// How contacts act on A is told by springs.wgsl, which also keeps the vectors on A.
+// How contacts act on A is told by springs.wgsl, which also keeps the vectors on A; what they are, by deformed.wgsl.
 
 // Invocations of the workgroup, and most proxy nodes in contact at a time: invocation k keeps contact k.
 override WORKGROUP: u32 = 32u;
@@ -18,7 +18,8 @@ override PARTIAL: bool = false;
 override ISOTROPIC: bool = false;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
-// Surface nodes at rest; then the bounding sphere (centre, radius) of each triangle; then each proxy node's radius in x.
+// Surface nodes at rest; then the bounding sphere (centre, radius) of each triangle; then each proxy node's radius in x; then
+// the bounding sphere of each cluster of triangles.
 @group(0) @binding(1) var<storage, read> rest: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> mesh: array<u32>;
 // C over the surface nodes that it covers, row-major: 3 x 3 numbers for each pair, or one [m/N].
@@ -30,39 +31,44 @@ override ISOTROPIC: bool = false;
 @group(0) @binding(6) var<storage, read_write> outcomes: array<Outcome>;
 // CONTACTS a configuration.
 @group(0) @binding(7) var<storage, read_write> touches: array<Touch>;
-// Displacement of the covered surface nodes, one configuration behind the other; w is unused.
-@group(0) @binding(8) var<storage, read_write> displacement: array<vec4<f32>>;
+// One configuration behind the other: what deformed.wgsl keeps of the covered surface nodes and the clusters of triangles.
+@group(0) @binding(8) var<storage, read_write> workspace: array<vec4<f32>>;
 
 const ABSENT: u32 = 0xffffffffu;
 
-// First displacement and first proxy node of this workgroup's configuration.
-var<private> displacement_base: u32;
+// First entry of the workspace and first proxy node of this workgroup's configuration.
+var<private> workspace_base: u32;
 var<private> position_base: u32;
 
 var<workgroup> partial: array<vec4<f32>, WORKGROUP>;
 
-// Sum of `value` over the workgroup, in every invocation.
-fn add_up(value: vec4<f32>, local: u32) -> vec4<f32> {
+// Sum of `value` over the first `count` invocations, in every invocation.
+fn add_up(value: vec4<f32>, count: u32, local: u32) -> vec4<f32> {
     partial[local] = value;
     workgroupBarrier();
     var sum = vec4<f32>(0.0);
-    for (var k = 0u; k < parameters.lanes; k += 1u) {
+    for (var k = 0u; k < min(count, WORKGROUP); k += 1u) {
         sum += partial[k];
     }
     workgroupBarrier();
     return sum;
 }
 
-// Greatest `value` of the workgroup, in every invocation.
-fn greatest(value: f32, local: u32) -> f32 {
+// Greatest `value` of the first `count` invocations, in every invocation.
+fn greatest(value: f32, count: u32, local: u32) -> f32 {
     partial[local].x = value;
     workgroupBarrier();
     var most = partial[0].x;
-    for (var k = 1u; k < parameters.lanes; k += 1u) {
+    for (var k = 1u; k < min(count, WORKGROUP); k += 1u) {
         most = max(most, partial[k].x);
     }
     workgroupBarrier();
     return most;
+}
+
+// How many invocations have a contact or a slot of the support.
+fn busy() -> u32 {
+    return max(contact_count, support_count);
 }
 
 // --- Support ---
@@ -81,28 +87,25 @@ fn place_of(node: u32) -> u32 {
     return node;
 }
 
-// Displacement of a surface node.
-fn displaced(node: u32) -> vec3<f32> {
-    let place = place_of(node);
-    if PARTIAL && place == ABSENT {
-        return vec3<f32>(0.0);
-    }
-    return displacement[displacement_base + place].xyz;
-}
-
-// Slot of `node`, which is added if it has none. For one invocation.
-fn support_add(node: u32) -> u32 {
-    if node == ABSENT {
-        return ABSENT;
-    }
-    if PARTIAL && place_of(node) == ABSENT {
-        overflow = 1u;
-        return ABSENT;
-    }
+// Slot of `node`, or ABSENT.
+fn slot_of(node: u32) -> u32 {
     for (var slot = 0u; slot < support_count; slot += 1u) {
         if support_nodes[slot] == node {
             return slot;
         }
+    }
+    return ABSENT;
+}
+
+// Slot of `node`, which is added if it has none. For one invocation.
+fn support_add(node: u32) -> u32 {
+    if PARTIAL && place_of(node) == ABSENT {
+        overflow = 1u;
+        return ABSENT;
+    }
+    let slot = slot_of(node);
+    if slot != ABSENT {
+        return slot;
     }
     if support_count == SUPPORT {
         overflow = 1u;
@@ -117,7 +120,7 @@ fn support_add(node: u32) -> u32 {
 fn response(vector: u32, place: u32) -> vec3<f32> {
     var u = vec3<f32>(0.0);
     for (var slot = 0u; slot < support_count; slot += 1u) {
-        let v = vectors[at(vector, slot)];
+        let v = entry(vector, slot);
         // C is symmetric: along a row of the other node, neighbouring invocations read neighbouring entries.
         let row = place_of(support_nodes[slot]) * parameters.covered;
         if ISOTROPIC {
@@ -137,89 +140,6 @@ fn response(vector: u32, place: u32) -> vec3<f32> {
 // Entry `slot` of C_AA times a vector.
 fn multiply(vector: u32, slot: u32) -> vec3<f32> {
     return response(vector, place_of(support_nodes[slot]));
-}
-
-// Displacement C v of all covered nodes, v a vector on the support; returns its greatest length.
-fn displace(vector: u32, local: u32) -> f32 {
-    var most = 0.0;
-    for (var place = local; place < parameters.covered; place += WORKGROUP) {
-        let u = response(vector, place);
-        displacement[displacement_base + place] = vec4<f32>(u, 0.0);
-        most = max(most, length(u));
-    }
-    storageBarrier();
-    return greatest(most, local);
-}
-
-// --- Detection ---
-
-// Node j's position less x.
-fn node_from(node: u32, x: vec3<f32>) -> vec3<f32> {
-    return (rest[node].xyz - x) + displaced(node);
-}
-
-fn proxy_position(proxy_node: u32) -> vec3<f32> {
-    return positions[position_base + proxy_node].xyz;
-}
-
-fn proxy_radius(proxy_node: u32) -> f32 {
-    return rest[parameters.surface_nodes + parameters.triangles + proxy_node].x;
-}
-
-// Proxy node of each contact. Invocation k keeps contact k from the first touch on, also as a near miss.
-var<workgroup> contact_nodes: array<u32, WORKGROUP>;
-var<workgroup> contact_count: u32;
-// Closest triangle among each invocation's.
-var<workgroup> candidates: array<u32, WORKGROUP>;
-
-// The contact (or near miss, with depth <= 0) of a proxy node with the closest point of a triangle.
-fn contact_at(proxy_node: u32, triangle: u32) -> Contact {
-    let x = proxy_position(proxy_node);
-    let nodes = vec3<u32>(corner(triangle, 0u), corner(triangle, 1u), corner(triangle, 2u));
-    let a = node_from(nodes.x, x);
-    let b = node_from(nodes.y, x);
-    let c = node_from(nodes.z, x);
-    let closest = closest_point(vec3<f32>(0.0), a, b, c);
-    let normal = pseudonormal(triangle, closest.feature, x);
-    var contact = measure(proxy_radius(proxy_node), a, b, c, closest, normal);
-    contact.nodes = nodes;
-    contact.proxy_node = proxy_node;
-    return contact;
-}
-
-// Triangle of the deformed surface closest to a proxy node, by the whole workgroup; ties go to the lower number.
-fn closest_triangle(proxy_node: u32, moved: f32, local: u32) -> u32 {
-    let x = proxy_position(proxy_node);
-    var least = FAR_AWAY;
-    var best = 0u;
-    for (var triangle = local; triangle < parameters.triangles; triangle += WORKGROUP) {
-        let sphere = rest[parameters.surface_nodes + triangle];
-        if distance(x, sphere.xyz) - sphere.w - moved > least {
-            continue;
-        }
-        let a = node_from(corner(triangle, 0u), x);
-        let b = node_from(corner(triangle, 1u), x);
-        let c = node_from(corner(triangle, 2u), x);
-        let closest = closest_point(vec3<f32>(0.0), a, b, c);
-        let offset = closest.weights.x * a + closest.weights.y * b + closest.weights.z * c;
-        if length(offset) < least {
-            least = length(offset);
-            best = triangle;
-        }
-    }
-    partial[local].x = least;
-    candidates[local] = best;
-    workgroupBarrier();
-    var nearest = partial[0].x;
-    var triangle = candidates[0];
-    for (var k = 1u; k < parameters.lanes; k += 1u) {
-        if partial[k].x < nearest || (partial[k].x == nearest && candidates[k] < triangle) {
-            nearest = partial[k].x;
-            triangle = candidates[k];
-        }
-    }
-    workgroupBarrier();
-    return triangle;
 }
 
 // --- Results ---

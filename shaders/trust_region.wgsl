@@ -47,9 +47,9 @@ fn share_to_boundary(radius: f32, step_square: f32, mixed: f32, direction_square
 // it; the step is left in STEP_FORCE and STEP.
 fn trust_region_step(contact: Contact, kc: f32, square: f32, radius: f32, tolerance: f32, local: u32) -> Step {
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
-        vectors[at(RESIDUAL, slot)] = vectors[at(BALANCE, slot)];
-        vectors[at(STEP_FORCE, slot)] = vec3<f32>(0.0);
-        vectors[at(STEP, slot)] = vec3<f32>(0.0);
+        put(RESIDUAL, slot, entry(BALANCE, slot));
+        put(STEP_FORCE, slot, vec3<f32>(0.0));
+        put(STEP, slot, vec3<f32>(0.0));
     }
     workgroupBarrier();
     let stop = tolerance * tolerance * square;
@@ -57,8 +57,8 @@ fn trust_region_step(contact: Contact, kc: f32, square: f32, radius: f32, tolera
     var result = Step();
     for (var pass_number = 0u; pass_number < MODEL_PASSES; pass_number += 1u) {
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            vectors[at(PREVIOUS_FORCE, slot)] = vectors[at(STEP_FORCE, slot)];
-            vectors[at(PREVIOUS_STEP, slot)] = vectors[at(STEP, slot)];
+            put(PREVIOUS_FORCE, slot, entry(STEP_FORCE, slot));
+            put(PREVIOUS_STEP, slot, entry(STEP, slot));
         }
         let stopped = conjugate_gradients(contact, select(0.0, kc, touching), radius, stop, local);
 
@@ -74,17 +74,17 @@ fn trust_region_step(contact: Contact, kc: f32, square: f32, radius: f32, tolera
         var sums = vec4<f32>(-0.5 * (kc * stretch + contact.multiplier * change.y), 0.0, 0.0, 0.0);
         sums.y = select(0.0, 1.0, touches != touching);
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            let step = vectors[at(STEP, slot)];
-            let step_square = dot(step, vectors[at(STEP_FORCE, slot)]);
-            sums.x += dot(step, vectors[at(BALANCE, slot)]) - 0.5 * step_square;
+            let step = entry(STEP, slot);
+            let step_square = dot(step, entry(STEP_FORCE, slot));
+            sums.x += dot(step, entry(BALANCE, slot)) - 0.5 * step_square;
             sums.z += step_square;
         }
-        sums = add_up(sums, local);
+        sums = add_up(sums, busy(), local);
         if pass_number > 0u && !(sums.x > result.predicted) {
             // Contacts came and went to no avail: the pass before was better.
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
-                vectors[at(STEP_FORCE, slot)] = vectors[at(PREVIOUS_FORCE, slot)];
-                vectors[at(STEP, slot)] = vectors[at(PREVIOUS_STEP, slot)];
+                put(STEP_FORCE, slot, entry(PREVIOUS_FORCE, slot));
+                put(STEP, slot, entry(PREVIOUS_STEP, slot));
             }
             workgroupBarrier();
             break;
@@ -99,7 +99,7 @@ fn trust_region_step(contact: Contact, kc: f32, square: f32, radius: f32, tolera
         press_on(contact, kc * (after - before), local);
         workgroupBarrier();
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            vectors[at(RESIDUAL, slot)] = vectors[at(BALANCE, slot)] - vectors[at(STEP_FORCE, slot)] + gather(slot);
+            put(RESIDUAL, slot, entry(BALANCE, slot) - entry(STEP_FORCE, slot) + gather(slot));
         }
         workgroupBarrier();
     }
@@ -118,24 +118,24 @@ fn conjugate_gradients(contact: Contact, kc: f32, radius: f32, stop: f32, local:
             workgroupBarrier();
             var products = vec4<f32>(0.0);
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
-                let direction_force = vectors[at(DIRECTION_FORCE, slot)];
-                let direction = vectors[at(DIRECTION, slot)];
-                let step_force = vectors[at(STEP_FORCE, slot)];
+                let direction_force = entry(DIRECTION_FORCE, slot);
+                let direction = entry(DIRECTION, slot);
+                let step_force = entry(STEP_FORCE, slot);
                 let image = direction_force + gather(slot);
-                vectors[at(IMAGE, slot)] = image;
+                put(IMAGE, slot, image);
                 products += vec4<f32>(dot(direction, image), dot(step_force, direction),
-                    dot(direction_force, direction), dot(step_force, vectors[at(STEP, slot)]));
+                    dot(direction_force, direction), dot(step_force, entry(STEP, slot)));
             }
-            products = add_up(products, local);
+            products = add_up(products, support_count, local);
             let curvature = products.x;
             let to_boundary = share_to_boundary(radius, products.w, products.y, products.z);
             let newton = square / max(curvature, LEAST_DIVISOR);
             let inside = curvature > 0.0 && newton < to_boundary;
             let share = select(to_boundary, newton, inside);
             for (var slot = local; slot < support_count; slot += WORKGROUP) {
-                vectors[at(STEP_FORCE, slot)] += share * vectors[at(DIRECTION_FORCE, slot)];
-                vectors[at(STEP, slot)] += share * vectors[at(DIRECTION, slot)];
-                vectors[at(RESIDUAL, slot)] -= share * vectors[at(IMAGE, slot)];
+                put(STEP_FORCE, slot, entry(STEP_FORCE, slot) + share * entry(DIRECTION_FORCE, slot));
+                put(STEP, slot, entry(STEP, slot) + share * entry(DIRECTION, slot));
+                put(RESIDUAL, slot, entry(RESIDUAL, slot) - share * entry(IMAGE, slot));
             }
             workgroupBarrier();
             if !inside {
@@ -145,16 +145,15 @@ fn conjugate_gradients(contact: Contact, kc: f32, radius: f32, stop: f32, local:
         var next = 0.0;
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
             let preconditioned = multiply(RESIDUAL, slot);
-            vectors[at(PRECONDITIONED, slot)] = preconditioned;
-            next += dot(vectors[at(RESIDUAL, slot)], preconditioned);
+            put(PRECONDITIONED, slot, preconditioned);
+            next += dot(entry(RESIDUAL, slot), preconditioned);
         }
-        next = add_up(vec4<f32>(next, 0.0, 0.0, 0.0), local).x;
+        next = add_up(vec4<f32>(next, 0.0, 0.0, 0.0), support_count, local).x;
         let ratio = select(0.0, next / max(square, LEAST_DIVISOR), iteration > 0u);
         square = next;
         for (var slot = local; slot < support_count; slot += WORKGROUP) {
-            vectors[at(DIRECTION_FORCE, slot)] =
-                vectors[at(RESIDUAL, slot)] + ratio * vectors[at(DIRECTION_FORCE, slot)];
-            vectors[at(DIRECTION, slot)] = vectors[at(PRECONDITIONED, slot)] + ratio * vectors[at(DIRECTION, slot)];
+            put(DIRECTION_FORCE, slot, entry(RESIDUAL, slot) + ratio * entry(DIRECTION_FORCE, slot));
+            put(DIRECTION, slot, entry(PRECONDITIONED, slot) + ratio * entry(DIRECTION, slot));
         }
         workgroupBarrier();
         if square <= stop {

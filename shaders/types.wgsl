@@ -23,12 +23,12 @@ struct Parameters {
     least_distance: f32,
     // What a depth is rounded by [m].
     depth_rounding: f32,
-    // Invocations of a workgroup of the equilibrium stages: read, not known to the compiler, so that reductions stay
-    // loops; unrolled at each of their places they make programs that take minutes to compile.
-    lanes: u32,
     // Surface nodes that the compliance covers.
     covered: u32,
-    padding: u32,
+    // Clusters of triangles.
+    clusters: u32,
+    // Largest eigenvalue of a covered node's own block of C [m/N].
+    mobility: f32,
 }
 
 // One joint of the chain; axis is a unit vector.

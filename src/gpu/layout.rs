@@ -20,9 +20,9 @@ pub struct Parameters {
     pub softest: f32,
     pub least_distance: f32,
     pub depth_rounding: f32,
-    pub lanes: u32,
     pub covered: u32,
-    pub padding: u32,
+    pub clusters: u32,
+    pub mobility: f32,
 }
 
 /// `Joint` of `shaders/types.wgsl`.
@@ -120,7 +120,7 @@ mod tests {
     fn every_shared_struct_is_laid_out_as_in_wgsl() {
         let reflected = reflect();
         let expected = [
-            layout!(Parameters: configurations, first, joints, proxy_nodes, surface_nodes, triangles, max_iterations, stiffness, kc, tolerance, softest, least_distance, depth_rounding, lanes, covered, padding),
+            layout!(Parameters: configurations, first, joints, proxy_nodes, surface_nodes, triangles, max_iterations, stiffness, kc, tolerance, softest, least_distance, depth_rounding, covered, clusters, mobility),
             layout!(Joint: origin, kind, axis, padding),
             layout!(ProxyNode: position, link),
             layout!(Outcome: status, iterations, residual, elastic, touches, padding_0, padding_1, padding_2),

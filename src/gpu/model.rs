@@ -53,7 +53,8 @@ impl DeviceModel {
             return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });
         }
         let extent = model.rest.iter().map(|n| n.length()).fold(0.0, f64::max);
-        let gap_band = tolerances::GPU_GAP_BAND_PER_EXTENT * extent;
+        let gap_band = tolerances::GPU_GAP_BAND_PER_EXTENT * extent
+            + tolerances::GPU_GAP_BAND_PER_JOINT * chain.joints.len() as f64 * reach(chain, model.centre);
         let corners = |t: &[u32; 3]| t.map(|j| model.rest[j as usize]);
         let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
         let longest_edge = object.triangles.iter().map(|t| edge(corners(t))).fold(0.0, f64::max);
@@ -73,18 +74,24 @@ impl DeviceModel {
                 softest: model.softest as f32,
                 least_distance: (tolerances::GPU_LEAST_DISTANCE_PER_EXTENT * extent) as f32,
                 depth_rounding: (tolerances::GPU_DEPTH_ROUNDING_PER_EDGE * longest_edge) as f32,
-                lanes: LANES,
+                clusters: clusters.len().div_ceil(CLUSTER) as u32,
+                mobility: mobility(model) as f32,
                 ..bytemuck::Zeroable::zeroed()
             },
             kinds: chain.joints.iter().map(|joint| joint.kind).collect(),
             joints: StorageBuffer::from_slice(context, "joints", &joints(chain, model.centre))?,
             proxy_nodes: StorageBuffer::from_slice(context, "proxy nodes", &proxy_nodes(chain))?,
             rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, &clusters, extent))?,
-            mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(model))?,
+            mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(model, &clusters))?,
             clusters: StorageBuffer::from_slice(context, "clusters", &clusters)?,
             compliance: StorageBuffer::from_slice(context, "compliance", &entries)?,
             gap_band,
         })
+    }
+
+    /// Entries of the workspace of one configuration, four f32 each (see `shaders/deformed.wgsl`).
+    pub(super) fn workspace(&self) -> u64 {
+        u64::from(self.parameters.covered) + 2 * u64::from(self.parameters.clusters)
     }
 
     /// Size of what places the proxy [B].
@@ -114,6 +121,24 @@ impl DeviceModel {
 
 fn padded(v: DVec3) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]
+}
+
+/// Distance from the object's centre that no proxy node ever exceeds [m].
+fn reach(chain: &proxy::Chain, centre: DVec3) -> f64 {
+    let mut length = 0.0;
+    let lengths: Vec<f64> = (chain.joints.iter().enumerate())
+        .map(|(k, joint)| {
+            let slide = match joint.kind {
+                JointKind::Revolute => 0.0,
+                JointKind::Prismatic => joint.limits[0].abs().max(joint.limits[1].abs()),
+            };
+            let origin = if k == 0 { joint.origin - centre } else { joint.origin };
+            length += origin.length() + slide;
+            length
+        })
+        .collect();
+    let tip = |node: &proxy::Node| lengths[node.link] + node.position.length();
+    chain.nodes.iter().map(tip).fold(0.0, f64::max)
 }
 
 /// The first joint's origin carries the shift to the centre; all others are relative to their parents anyway.
@@ -157,8 +182,15 @@ fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 
     nodes.chain(spheres).chain(radii).chain(clusters.chunks(CLUSTER).map(cluster)).collect()
 }
 
-/// Corners, neighbours, lists around nodes and places, one behind the other: see `shaders/surface.wgsl`.
-fn mesh(model: &contact::Model<'_>) -> Vec<u32> {
+/// Largest eigenvalue of a covered node's own block of C, or a bound of it [m/N]. That of an isotropic object is a number times
+/// the identity.
+fn mobility(model: &contact::Model<'_>) -> f64 {
+    if model.compliance.rows_per_node == 1 { model.softest / 3.0 } else { model.softest }
+}
+
+/// Corners, neighbours, lists around nodes and places, then the clusters' triangles and nodes, one behind the other: see
+/// `shaders/surface.wgsl` and `shaders/deformed.wgsl`.
+fn mesh(model: &contact::Model<'_>, clusters: &[u32]) -> Vec<u32> {
     let object = model.object;
     let topology = &object.topology;
     let mut mesh = Vec::new();
@@ -170,5 +202,16 @@ fn mesh(model: &contact::Model<'_>) -> Vec<u32> {
         let place = |node| model.compliance.place(node).map_or(u32::MAX, |place| place as u32);
         mesh.extend((0..object.surface_nodes as u32).map(place));
     }
+    mesh.extend(clusters);
+    let (mut starts, mut nodes) = (vec![0], Vec::new());
+    for cluster in clusters.chunks(CLUSTER) {
+        let mut own: Vec<u32> = cluster.iter().flat_map(|&t| object.triangles[t as usize]).collect();
+        own.sort_unstable();
+        own.dedup();
+        nodes.extend(own);
+        starts.push(nodes.len() as u32);
+    }
+    mesh.extend(starts);
+    mesh.extend(nodes);
     mesh
 }

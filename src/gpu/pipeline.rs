@@ -41,9 +41,11 @@ impl Room {
         let nodes = model.chain.nodes.len();
         // A proxy node has one contact.
         let contacts = self.contacts.clamp(1, 32).min(nodes);
+        let clusters = model.object.triangles.len().div_ceil(shaders::CLUSTER);
+        let workspace = 16 * (model.compliance.nodes.len() + 2 * clusters);
         Self {
             chunk: self.chunk.clamp(1, fit(16 * nodes.max(model.chain.joints.len()))),
-            batch: self.batch.clamp(1, fit((16 * model.compliance.nodes.len()).max(size_of::<Touch>() * contacts))),
+            batch: self.batch.clamp(1, fit(workspace.max(size_of::<Touch>() * contacts))),
             contacts,
         }
     }
@@ -118,7 +120,7 @@ impl Pipeline {
         let positions = buffer("proxy positions", 16 * chunk * nodes)?;
         let gaps = buffer("gaps", 4 * chunk)?;
         let list = buffer("list of contacts", 4 * (chunk + 1))?;
-        let displacement = buffer("displacement", 16 * room.batch as u64 * u64::from(device.parameters.covered))?;
+        let workspace = buffer("workspace", 16 * room.batch as u64 * device.workspace())?;
         let stage = |shader, bindings: &[(Access, &StorageBuffer)]| Stage::new(context, shader, &[], bindings);
         let kinematics = stage(
             &shaders::KINEMATICS,
@@ -159,8 +161,8 @@ impl Pipeline {
         }
         let accesses = [Uniform, Read, Read, Read, Read, Read, Write, Write, Write];
         let equilibrium = Kernel::new(context, shader, &overrides, &accesses)?;
-        // Its number and places are read, its displacement is written and read.
-        let own_bytes = 4 + 16 * nodes + 2 * displacement.size() / room.batch as u64;
+        // Its number and places are read, its workspace is written and read.
+        let own_bytes = 4 + 16 * nodes + 2 * 16 * device.workspace();
         let result_set = || -> Result<ResultSet, GpuError> {
             let parameters = StorageBuffer::uniform(context, "parameters", &device.parameters)?;
             let outcomes = buffer("outcomes", (size_of::<Outcome>() * room.batch) as u64)?;
@@ -175,7 +177,7 @@ impl Pipeline {
                 &list,
                 &outcomes,
                 &touches,
-                &displacement,
+                &workspace,
             ];
             let bound = equilibrium.bind(context, &buffers)?;
             Ok(ResultSet { parameters, outcomes, touches, staging, bound })

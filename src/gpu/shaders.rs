@@ -22,6 +22,7 @@ pub(super) const CLOSEST_POINT: &str = include_str!("../../shaders/closest_point
 pub(super) const SURFACE: &str = include_str!("../../shaders/surface.wgsl");
 pub(super) const DEPTH: &str = include_str!("../../shaders/depth.wgsl");
 const SUPPORT: &str = include_str!("../../shaders/support.wgsl");
+const DEFORMED: &str = include_str!("../../shaders/deformed.wgsl");
 const SPRINGS: &str = include_str!("../../shaders/springs.wgsl");
 const TRUST_REGION: &str = include_str!("../../shaders/trust_region.wgsl");
 const ENERGY_SEARCH: &str = include_str!("../../shaders/energy.wgsl");
@@ -61,8 +62,8 @@ pub static COMPACTION: Shader = Shader {
     overrides: &[&[]],
 };
 
-/// Triangles that share a bounding sphere in the search for the closest one at rest.
-pub(super) const CLUSTER: usize = 16;
+/// Triangles that share a bounding sphere in searches for the closest one.
+pub(super) const CLUSTER: usize = 8;
 
 /// The compliance covers a part of a large object.
 const PARTIAL: &[(&str, f64)] = &[("PARTIAL", 1.0)];
@@ -77,7 +78,7 @@ const CRAMPED: &[(&str, f64)] = &[("CONTACTS", 2.0)];
 pub static ENERGY: Shader = Shader {
     name: "energy",
     entry: "main",
-    parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, SUPPORT, SPRINGS, TRUST_REGION, ENERGY_SEARCH],
+    parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, SUPPORT, DEFORMED, SPRINGS, TRUST_REGION, ENERGY_SEARCH],
     overrides: &[&[], &[("FROZEN", 1.0)], PARTIAL, ISOTROPIC, CRAMPED],
 };
 
@@ -85,7 +86,16 @@ pub static ENERGY: Shader = Shader {
 pub static PAPER: Shader = Shader {
     name: "paper",
     entry: "main",
-    parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, SUPPORT, SPRINGS, include_str!("../../shaders/paper.wgsl")],
+    parts: &[
+        TYPES,
+        CLOSEST_POINT,
+        SURFACE,
+        DEPTH,
+        SUPPORT,
+        DEFORMED,
+        SPRINGS,
+        include_str!("../../shaders/paper.wgsl"),
+    ],
     overrides: &[&[], ISOTROPIC, CRAMPED],
 };
 
@@ -180,6 +190,7 @@ fn constants() -> String {
     for (name, value) in [
         ("FAR_AWAY", tolerances::GPU_FAR_AWAY),
         ("LEAST_DIVISOR", tolerances::GPU_LEAST_DIVISOR),
+        ("SEARCH_SLACK", tolerances::GPU_SEARCH_SLACK),
         ("RESIDUAL_FLOOR", tolerances::RESIDUAL_FLOOR as f32),
         ("ACCEPTED_SHARE", tolerances::ACCEPTED_SHARE as f32),
         ("POOR_SHARE", tolerances::POOR_SHARE as f32),

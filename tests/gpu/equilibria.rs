@@ -269,6 +269,47 @@ fn contact_within_rounding_of_none_is_decided_in_f64() {
     }
 }
 
+/// An arm whose placement f32 rounds by more than the object's size suggests: contact that is shallower than that rounding is
+/// found all the same.
+#[test]
+fn an_arm_much_longer_than_the_object_touches_where_the_cpus_does() {
+    let scene = Scene::parse(LONG_ARM, "long_arm.toml").unwrap();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, scene.contact);
+    let mut cpu = Solver::new(&model);
+    let mut gpu = GpuSolver::new(context(), &model).unwrap();
+    let path = configurations(&scene, 0, 1);
+    for wanted in [-4e-8, -1.5e-8, 1.5e-8, 4e-8] {
+        let near = grazing(&mut cpu, &path, wanted);
+        assert!(near.len() >= 100, "only {} configurations", near.len());
+        let results = gpu.solve(&near).unwrap();
+        let wrong = results.iter().filter(|result| (result.status == Status::Free) != (wanted > 0.0)).count();
+        assert_eq!(wrong, 0, "of {} at {wanted:e} m", near.len());
+    }
+}
+
+/// Two links of half a metre over a sphere of 20 mm.
+const LONG_ARM: &str = r#"
+    [object]
+    sphere = { centre = [0.7, 0.5, 0.3], radius = 0.01, rings = 8, segments = 10 }
+    springs = { kind = "isotropic", stiffness = 300.0 }
+    ground = { stiffness = 100.0 }
+    [contact]
+    stiffness = 300.0
+    [grid]
+    axes = [{ start = 0.60, stop = 0.64, count = 101 }, { start = -0.03, stop = 0.03, count = 31 }]
+    [[proxy.joint]]
+    kind = "revolute"
+    axis = [0.0, 0.0, 1.0]
+    limits = [-3.0, 3.0]
+    [[proxy.joint]]
+    kind = "revolute"
+    origin = [0.5, 0.0, 0.3]
+    axis = [0.0, 1.0, 0.0]
+    limits = [-3.0, 3.0]
+    nodes = [{ from = [0.34, 0.0, 0.0], to = [0.38, 0.0, 0.0], count = 9 }]
+"#;
+
 #[test]
 fn the_comparators_reject_perturbed_results() {
     let (scene, object, chain) = load("sphere.toml");
