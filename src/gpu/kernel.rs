@@ -234,6 +234,11 @@ impl StorageBuffer {
         context.queue.write_buffer(&self.raw, 0, &vec![POISON; bytes]);
     }
 
+    /// Records that the first `bytes` bytes become zero.
+    pub fn clear(&self, encoder: &mut wgpu::CommandEncoder, bytes: u64) {
+        encoder.clear_buffer(&self.raw, 0, Some(bytes));
+    }
+
     /// Reads the first `count` elements. Submits, and waits.
     ///
     /// # Errors

@@ -249,9 +249,8 @@ impl Pipeline {
         let (outcome_bytes, touch_bytes) = self.result_bytes(count);
         let parameters = Parameters { configurations: count as u32, first: first as u32, ..self.model.parameters };
         results.parameters.write(context, &[parameters]);
-        results.outcomes.poison(context, outcome_bytes);
-        results.touches.poison(context, touch_bytes);
         let mut encoder = context.device.create_command_encoder(&Default::default());
+        results.outcomes.clear(&mut encoder, outcome_bytes);
         let bytes = self.model.object_bytes() + self.own_bytes * count as u64 + outcome_bytes + touch_bytes;
         let workgroups = count as u32;
         let dispatch = Dispatch { kernel: &self.equilibrium, bound: &results.bound, workgroups, bytes };

@@ -6,7 +6,6 @@
 //! that owes nothing to f32. The paper's iteration is taken as it is: what it leads to is defined by its steps.
 
 use super::{
-    kernel::POISON,
     layout::{Outcome, Touch},
     model::stiffness,
     solver::free,
@@ -18,10 +17,8 @@ use crate::{
 };
 use glam::DVec3;
 
-/// As a number that no kernel writes.
-const UNWRITTEN: u32 = u32::from_ne_bytes([POISON; 4]);
-
-/// The equilibrium at `q` by what the kernel wrote; `None` when it wrote nothing. Of the paper's iteration the gap is left at zero, and
+/// The equilibrium at `q` by what the kernel wrote; `None` when it wrote nothing: outcomes are zero before, which is the status of free
+/// configurations, and no kernel is given these. Of the paper's iteration the gap is left at zero, and
 /// what the kernel gave up is left to the CPU but for its status.
 pub(super) fn unpack(
     model: &contact::Model<'_>,
@@ -31,13 +28,13 @@ pub(super) fn unpack(
     list: &[Touch],
 ) -> Option<Equilibrium> {
     let status = Status::from_number(u8::try_from(outcome.status).ok()?)?;
+    if status == Status::Free {
+        return None;
+    }
     if status == Status::Overflow || status == Status::Unconverged && model.contact.algorithm != Algorithm::Paper {
         return Some(Equilibrium { status, iterations: outcome.iterations, residual: 1.0, ..free(0.0, q.len()) });
     }
     let list = list.get(..outcome.touches as usize)?;
-    if list.iter().any(|touch| touch.proxy_node == UNWRITTEN) {
-        return None;
-    }
     Some(match model.contact.algorithm {
         Algorithm::Paper => iterated(model, q, status, outcome, list),
         Algorithm::Energy | Algorithm::Linearised => settled(model, solver, q, outcome, list),
