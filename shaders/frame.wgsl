@@ -1,7 +1,10 @@
 // Frame update of small objects: the inverse of the matrix on the left was computed beforehand. Two stages, because the
 // second needs the whole of the first's result.
 
-// Inverse of 2M/T + B + (T/2) K, row-major, three rows a node.
+// Whether the three coordinates are alike and independent: then the inverse has one number for a pair of nodes.
+override ISOTROPIC: bool = false;
+
+// Inverse of 2M/T + B + (T/2) K, row-major: 3 x 3 numbers for each pair of nodes, or one.
 @group(0) @binding(6) var<storage, read> inverse: array<f32>;
 // Right-hand side, three numbers a node [N].
 @group(0) @binding(7) var<storage, read_write> right: array<f32>;
@@ -35,11 +38,18 @@ fn advance(
     // A workgroup of the fold's tail repeats the last node, and writes nothing.
     let index = unfold(group, groups);
     let node = min(index, parameters.nodes - 1u);
-    let order = 3u * parameters.nodes;
-    let row = 3u * node * order;
     var sum = vec3<f32>(0.0);
-    for (var k = local; k < order; k += WORKGROUP) {
-        sum += vec3<f32>(inverse[row + k], inverse[row + order + k], inverse[row + 2u * order + k]) * right[k];
+    if ISOTROPIC {
+        let row = node * parameters.nodes;
+        for (var k = local; k < parameters.nodes; k += WORKGROUP) {
+            sum += inverse[row + k] * vec3<f32>(right[3u * k], right[3u * k + 1u], right[3u * k + 2u]);
+        }
+    } else {
+        let order = 3u * parameters.nodes;
+        let row = 3u * node * order;
+        for (var k = local; k < order; k += WORKGROUP) {
+            sum += vec3<f32>(inverse[row + k], inverse[row + order + k], inverse[row + 2u * order + k]) * right[k];
+        }
     }
     partial[local] = sum;
     workgroupBarrier();

@@ -30,14 +30,14 @@ const VECTOR: u64 = 16;
 /// Which solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameMethod {
-    /// Inverse computed beforehand: 36 N^2 bytes, two dispatches a frame.
+    /// Inverse computed beforehand: 4 N^2 bytes where springs and ground are isotropic, else 36 N^2; two dispatches a frame.
     Inverse,
     /// This many iterations of conjugate gradients a frame, at least one.
     Iterations(u32),
 }
 
 impl FrameMethod {
-    /// Most nodes whose inverse is worth its memory: 36 MB, read once a frame.
+    /// Most nodes whose inverse is worth its memory: up to 36 MB, read once a frame.
     pub const MOST_NODES_INVERTED: usize = 1000;
 
     /// Enough iterations for objects whose springs reach a few dozen edges in one period.
@@ -178,11 +178,22 @@ impl FrameUpdate {
         }
         match method {
             FrameMethod::Inverse => {
-                let inverse = inverse(object, stiffness, period, effects)?;
+                let (inverse, is_shared) = inverse(object, stiffness, period, effects)?;
+                let mut overrides = overrides.to_vec();
+                if is_shared {
+                    overrides.push(("ISOTROPIC", 1.0));
+                }
                 let inverse = StorageBuffer::from_slice(gpu, "inverse", &inverse)?;
                 let right = StorageBuffer::new(gpu, "right-hand side", 12 * nodes as u64)?;
                 buffers.extend([inverse.size(), right.size()]);
-                stages.extend(dense_stages(gpu, &even, common, [&inverse, &right], [groups, nodes as u32], overrides)?);
+                stages.extend(dense_stages(
+                    gpu,
+                    &even,
+                    common,
+                    [&inverse, &right],
+                    [groups, nodes as u32],
+                    &overrides,
+                )?);
             }
             FrameMethod::Iterations(iterations) => {
                 let odd = StorageBuffer::uniform(gpu, "frame parameters", &parameters(1))?;
@@ -260,13 +271,14 @@ impl FrameUpdate {
     }
 }
 
-/// Inverse of 2M/T + B + (T/2) K, row-major; of (T/2) K in quasi-static graphics.
+/// Inverse of 2M/T + B + (T/2) K, row-major; of (T/2) K in quasi-static graphics. One number for a pair of nodes where the three
+/// coordinates are alike, which the flag tells, else 3 x 3.
 fn inverse(
     object: &Object,
     stiffness: &Stiffness,
     period: f64,
     effects: &GraphicsEffects,
-) -> Result<Vec<f32>, FactorError> {
+) -> Result<(Vec<f32>, bool), FactorError> {
     let nodes = object.rest.len();
     let inertia = object.mass.iter().zip(&object.damping);
     let mut diagonal: Vec<f64> = inertia.map(|(mass, damping)| 2.0 * mass / period + damping).collect();
@@ -274,8 +286,18 @@ fn inverse(
         diagonal.fill(0.0);
     }
     let factor = Factor::of(stiffness, period / 2.0, &diagonal)?;
-    let mut inverse = Vec::with_capacity(9 * nodes * nodes);
     let mut unit = vec![DVec3::ZERO; nodes];
+    if factor.is_shared() {
+        let mut inverse = Vec::with_capacity(nodes * nodes);
+        for row in 0..nodes {
+            unit.fill(DVec3::ZERO);
+            unit[row].x = 1.0;
+            factor.solve(&mut unit);
+            inverse.extend(unit.iter().map(|v| v.x as f32));
+        }
+        return Ok((inverse, true));
+    }
+    let mut inverse = Vec::with_capacity(9 * nodes * nodes);
     for row in 0..3 * nodes {
         unit.fill(DVec3::ZERO);
         unit[row / 3][row % 3] = 1.0;
@@ -283,7 +305,7 @@ fn inverse(
         // Column `row` of a symmetric matrix.
         inverse.extend(unit.iter().flat_map(|v| v.as_vec3().to_array()));
     }
-    Ok(inverse)
+    Ok((inverse, false))
 }
 
 const DENSE: [Access; 8] = {

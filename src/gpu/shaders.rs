@@ -102,6 +102,10 @@ pub static PAPER: Shader = Shader {
 /// Graphics with dynamics, and without.
 const MOTIONS: &[&[(&str, f64)]] = &[&[], &[("QUASI_STATIC", 1.0)]];
 
+/// The same for the inverse, with nine numbers for a pair of nodes and with one.
+const INVERSES: &[&[(&str, f64)]] =
+    &[&[], &[("QUASI_STATIC", 1.0)], ISOTROPIC, &[("QUASI_STATIC", 1.0), ("ISOTROPIC", 1.0)]];
+
 /// Frame update: what stiffening springs add to the loads.
 pub static FRAME_STIFFENING: Shader = Shader {
     name: "frame_stiffening",
@@ -112,11 +116,11 @@ pub static FRAME_STIFFENING: Shader = Shader {
 
 /// Frame update by the inverse: right-hand side.
 pub static FRAME_LOAD: Shader =
-    Shader { name: "frame", entry: "load", parts: &[TYPES, FRAME_COMMON, FRAME], overrides: MOTIONS };
+    Shader { name: "frame", entry: "load", parts: &[TYPES, FRAME_COMMON, FRAME], overrides: INVERSES };
 
 /// Frame update by the inverse: new state.
 pub static FRAME_ADVANCE: Shader =
-    Shader { name: "frame", entry: "advance", parts: &[TYPES, FRAME_COMMON, FRAME], overrides: MOTIONS };
+    Shader { name: "frame", entry: "advance", parts: &[TYPES, FRAME_COMMON, FRAME], overrides: INVERSES };
 
 /// Frame update by conjugate gradients: first residual and direction.
 pub static FRAME_BEGIN: Shader = Shader {
