@@ -48,7 +48,7 @@ pub const GPU_GAP_BAND_PER_EXTENT: f64 = 1e-6;
 
 /// The other part of the band, for each joint, relative to the chain's reach [1]: a joint turns a lever no longer than the
 /// reach by a cosine and a sine that are rounded by 6e-8 each, and rounds products and sums as often again; six of these
-/// roundings in all. The greatest error of 1e5 random placements of an arm of two links was a tenth of this bound.
+/// roundings in all.
 pub const GPU_GAP_BAND_PER_JOINT: f64 = 4e-7;
 
 /// Widening of bounding spheres, relative to the object's extent [1]: coordinates of up to ten extents (a proxy node far
