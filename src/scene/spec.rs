@@ -205,8 +205,7 @@ pub struct ContactSpec {
     /// contact point is kc = 3 Kc (three nodes of a triangle). Infinity is rigid contact. Where the scene gives a stiffness per length
     /// instead, that of a node that stands for the mean length [N/m].
     pub stiffness: f64,
-    /// Contact stiffness of a link per length of it, in the energy form; where given, nodes along links take theirs from it
-    /// [N/m^2].
+    /// Contact stiffness of a link per length of it, in the energy form, where the scene gives that [N/m^2].
     pub stiffness_per_length: Option<f64>,
     /// How equation (2) is solved.
     pub algorithm: Algorithm,

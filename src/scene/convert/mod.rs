@@ -90,7 +90,7 @@ fn updates(checker: &Checker<'_>, table: &ContactTable) -> Result<u32, SceneErro
     Ok(*value.get_ref())
 }
 
-/// Kc of a node by itself [N/m], and the stiffness of links per length, where the scene gives it [N/m^2].
+/// Kc of a node [N/m], that of the mean node where the scene gives the stiffness of links per length, and that [N/m^2].
 fn stiffness(
     checker: &Checker<'_>,
     table: &Spanned<ContactTable>,
@@ -102,19 +102,19 @@ fn stiffness(
     let per_length = per_length.map(|value| checker.positive("stiffness_per_length", value)).transpose()?;
     let lengths: Vec<f64> = proxy.joints.iter().flat_map(|joint| &joint.nodes).map(|node| node.length).collect();
     match (&table.stiffness, per_length) {
-        (Some(value), per_length) => match value.get_ref() {
+        (Some(value), None) => match value.get_ref() {
             NumberOr::Number(number) => {
-                Ok((checker.positive("stiffness", &Spanned::new(value.span(), *number))?, per_length))
+                Ok((checker.positive("stiffness", &Spanned::new(value.span(), *number))?, None))
             }
-            NumberOr::Word(_) if per_length.is_none() => Ok((f64::INFINITY, None)),
-            NumberOr::Word(_) => {
-                let message = "contact is rigid, or has a stiffness per length: leave out one of them";
-                Err(checker.error(value.span(), message))
-            }
+            NumberOr::Word(_) => Ok((f64::INFINITY, None)),
         },
+        (Some(value), Some(_)) => {
+            let message = "contact has a stiffness of each node and one per length: leave out one of them";
+            Err(checker.error(value.span(), message))
+        }
         (None, Some(_)) if lengths.contains(&0.0) => {
-            let message = "stiffness_per_length is of nodes along links, and the proxy has nodes { at = .. } besides: give their \
-                           stiffness as well";
+            let message = "stiffness_per_length is of nodes along links, and the proxy has nodes { at = .. } besides: give \
+                           stiffness [N/m] of each node instead";
             Err(checker.error(span, message))
         }
         (None, Some(per_length)) => {
