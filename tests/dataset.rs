@@ -53,6 +53,7 @@ fn sample() -> Dataset {
         status: vec![0, 1, 1, 2, 3, 4].into(),
         residual: Some(vec![0.0, 1e-9, 3e-8, 0.5, 0.0, 0.0].into()),
         iterations: Some(vec![0, 3, 4, 100, 7, 0].into()),
+        tangent: Some((0..18).map(|k| (k as f32 - 9.0) * 0.37).collect::<Vec<_>>().into()),
         contacts: Some(Contacts {
             offsets: vec![0, 0, 2, 3, 5, 5, 5].into(),
             nodes: vec![0, 3, 1, 1, 2].into(),
@@ -79,7 +80,16 @@ fn sample() -> Dataset {
 
 /// The least that a dataset can be: what a scanned object has.
 fn bare() -> Dataset {
-    Dataset { energy: None, gap: None, residual: None, iterations: None, contacts: None, surface: None, ..sample() }
+    Dataset {
+        energy: None,
+        tangent: None,
+        gap: None,
+        residual: None,
+        iterations: None,
+        contacts: None,
+        surface: None,
+        ..sample()
+    }
 }
 
 fn bits<T: bytemuck::Pod>(column: &[T]) -> Vec<u8> {

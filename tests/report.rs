@@ -131,6 +131,7 @@ fn dataset(chain: &Chain, object: &Object, counts: &[usize]) -> Dataset {
         status: statuses.into(),
         residual: None,
         iterations: None,
+        tangent: None,
         contacts: Some(Contacts { offsets: offsets.into(), nodes: nodes.into(), forces: forces.into() }),
         surface: Some(Surface {
             nodes: object.rest.iter().flat_map(|n| n.to_array()).collect::<Vec<f64>>().into(),

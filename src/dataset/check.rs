@@ -4,7 +4,7 @@
 //! order in which no check relies on one that comes later, and without allocating, so that hostile counts cost nothing.
 
 use super::{Column, Contacts, Dataset, Surface};
-use crate::contact::Status;
+use crate::{JointMatrix, contact::Status};
 
 /// `Err` says what is wrong.
 pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
@@ -20,6 +20,11 @@ pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
     if let Some(energy) = &dataset.energy {
         length("energy", energy, points)?;
         finite("energy", energy, |x: &f64| x.is_finite())?;
+    }
+    if let Some(tangent) = &dataset.tangent {
+        let entries = points.checked_mul(JointMatrix::entries(dataset.grid.joints()));
+        length("tangent", tangent, entries.ok_or("the grid has too many points")?)?;
+        finite("tangent", tangent, |x: &f32| x.is_finite())?;
     }
     for (name, column) in [("gap", &dataset.gap), ("residual", &dataset.residual)] {
         if let Some(column) = column {

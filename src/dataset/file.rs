@@ -11,6 +11,7 @@
 //! |---|---|---|---|
 //! | `torque` | f64 | n1 .. nd, d | tau [N m; N at prismatic joints] |
 //! | `energy` | f64 | n1 .. nd | U [J] |
+//! | `tangent` | f32 | n1 .. nd, d (d + 1) / 2 | d tau/d q, lower triangle, where the interpolation uses it [N m/rad] |
 //! | `gap` | f32 | n1 .. nd | smallest signed distance at rest, or farther than two grid steps from contact a positive lower bound of it [m] |
 //! | `residual`, `iterations` | f32, u32 | n1 .. nd | of the contact solver |
 //! | `status` | u8 | n1 .. nd | [`crate::contact::Status`] |
@@ -28,6 +29,7 @@
 //! of this crate never do that, they rename; the haptic loop reads through [`Dataset::load`], which copies.
 
 use super::{Column, Contacts, Dataset, Error, Grid, Provenance, Surface, Target, check, replace_file};
+use crate::JointMatrix;
 use bytemuck::Pod;
 use safetensors::{Dtype, tensor::TensorInfo};
 use serde::Serialize;
@@ -128,6 +130,8 @@ pub(super) fn tensors(dataset: &Dataset) -> Vec<Tensor<&[u8]>> {
     let torque_shape = [&grid[..], &[dataset.grid.joints()]].concat();
     let mut tensors = vec![tensor("torque", &torque_shape, &dataset.torque), tensor("status", &grid, &dataset.status)];
     tensors.extend(dataset.energy.as_ref().map(|column| tensor("energy", &grid, column)));
+    let tangent_shape = [&grid[..], &[JointMatrix::entries(dataset.grid.joints())]].concat();
+    tensors.extend(dataset.tangent.as_ref().map(|column| tensor("tangent", &tangent_shape, column)));
     tensors.extend(dataset.gap.as_ref().map(|column| tensor("gap", &grid, column)));
     tensors.extend(dataset.residual.as_ref().map(|column| tensor("residual", &grid, column)));
     tensors.extend(dataset.iterations.as_ref().map(|column| tensor("iterations", &grid, column)));

@@ -22,6 +22,7 @@ impl Dataset {
             status: status.into(),
             residual: None,
             iterations: None,
+            tangent: None,
             contacts: None,
             surface: None,
             scene: String::new(),

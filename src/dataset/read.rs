@@ -4,6 +4,7 @@ use super::{
     Column, Contacts, Dataset, Error, Grid, Provenance, Surface, check,
     file::{CHECKSUM, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, digits},
 };
+use crate::JointMatrix;
 use memmap2::{Mmap, MmapMut};
 use safetensors::tensor::{Metadata as Tensors, TensorInfo};
 use std::{
@@ -125,11 +126,13 @@ impl Windows {
     ) -> Result<Dataset, String> {
         let counts: Vec<_> = grid.counts().into_iter().map(Some).collect();
         let with_joints: Vec<_> = counts.iter().copied().chain([Some(grid.joints())]).collect();
+        let with_tangent: Vec<_> = counts.iter().copied().chain([Some(JointMatrix::entries(grid.joints()))]).collect();
         let missing = |name: &str| format!("tensor {name} is missing");
         Ok(Dataset {
             torque: self.column(tensors, "torque", &with_joints)?.ok_or_else(|| missing("torque"))?,
             status: self.column(tensors, "status", &counts)?.ok_or_else(|| missing("status"))?,
             energy: self.column(tensors, "energy", &counts)?,
+            tangent: self.column(tensors, "tangent", &with_tangent)?,
             gap: self.column(tensors, "gap", &counts)?,
             residual: self.column(tensors, "residual", &counts)?,
             iterations: self.column(tensors, "iterations", &counts)?,

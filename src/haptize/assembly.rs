@@ -39,6 +39,10 @@ impl Results<'_> {
             Tensor::new::<f32>("residual", grid.clone(), of(Section::Residual)),
             Tensor::new::<u32>("iterations", grid, of(Section::Iterations)),
         ];
+        if self.shape.with_tangent {
+            let shape = [&heading.grid.counts()[..], &[self.shape.width().tangent]].concat();
+            tensors.push(Tensor::new::<f32>("tangent", shape, of(Section::Tangent)));
+        }
         if self.shape.with_forces {
             let forces = self.contacts;
             let offsets = vec![heading.grid.points() + 1];
@@ -62,7 +66,7 @@ impl Results<'_> {
 
     /// Hands a column of all points, block by block, to `take`.
     fn column(&self, section: Section, take: &mut dyn FnMut(&mut dyn Read) -> io::Result<()>) -> io::Result<()> {
-        self.part.column(section, self.shape.joints, self.replaced, &mut |column| {
+        self.part.column(section, self.shape.width(), self.replaced, &mut |column| {
             if self.stop.load(Ordering::Relaxed) { Err(io::Error::other("stopped")) } else { take(column) }
         })
     }

@@ -69,7 +69,8 @@ impl Bake<'_> {
         let Self { scene, backend, measured, aim, date, stop, progress } = self;
         let object = Object::build(&scene.object)?;
         let chain = Chain::new(&scene.proxy);
-        let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
+        let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
+        model.with_tangent = scene.uses_tangent();
         let mut backend = ChosenBackend::open(backend, &model)?;
         let mut sweep = Sweep::new(scene, &object, backend.name(), &backend.adapter(), date)?;
         sweep.skip_free_space(&model)?;

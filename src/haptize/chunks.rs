@@ -1,8 +1,12 @@
 //! The grid's points, chunk by chunk: free ones skipped, the others solved by the backend, all handed on to where they are kept.
 
 use super::{
-    Backend, Footprint, FreeSpace, Progress, Run, Sweep, SweepError, columns::Columns, free_space::FreeGaps,
-    part::Part, report::RunFacts, tally::Tally,
+    Backend, Footprint, FreeSpace, Progress, Run, Sweep, SweepError,
+    columns::{Columns, Width},
+    free_space::FreeGaps,
+    part::Part,
+    report::RunFacts,
+    tally::Tally,
 };
 use crate::{JointVector, contact::Equilibrium, dataset::Provenance};
 use std::{ops::Range, path::Path, sync::atomic::Ordering, time::Instant};
@@ -33,8 +37,9 @@ impl Store for Part {
 impl Store for Columns {
     fn append(&mut self, _first: usize, chunk: &Columns) -> Result<(), SweepError> {
         let points = self.status.capacity();
-        let joints = chunk.torque.len() / chunk.points().max(1);
-        let bytes = Columns::bytes(points, joints, self.nodes.len() + chunk.nodes.len());
+        let each = |numbers: usize| numbers / chunk.points().max(1);
+        let width = Width { joints: each(chunk.torque.len()), tangent: each(chunk.tangent.len()) };
+        let bytes = Columns::bytes(points, width, self.nodes.len() + chunk.nodes.len());
         self.append(chunk).map_err(|source| SweepError::Memory { points, bytes, source })
     }
     fn note(&mut self, _notice: &str) -> Result<(), SweepError> {

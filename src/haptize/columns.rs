@@ -3,9 +3,10 @@
 //! ```text
 //! u64 first point, u64 points p, u64 contacts c
 //! f64 torque[p][d], f64 energy[p], u64 end[p] of each point's contacts among those of the block,
-//! f32 gap[p], f32 residual[p], u32 iterations[p], u32 node[c], f32 force[c][3], u8 status[p]
+//! f32 tangent[p][d (d + 1) / 2] or none, f32 gap[p], f32 residual[p], u32 iterations[p], u32 node[c], f32 force[c][3], u8 status[p]
 //! ```
 
+use crate::JointMatrix;
 use crate::contact::{Equilibrium, Status};
 use bytemuck::Pod;
 use std::collections::{BTreeMap, TryReserveError};
@@ -17,13 +18,43 @@ pub(super) struct Shape {
     pub surface_nodes: usize,
     /// Whether contact forces are stored.
     pub with_forces: bool,
+    /// Whether tangents are stored.
+    pub with_tangent: bool,
 }
+
+impl Shape {
+    /// What every point has a fixed number of.
+    pub fn width(self) -> Width {
+        Width::new(self.joints, self.with_tangent)
+    }
+}
+
+/// Numbers that each point has in the columns that do not have one a point.
+#[derive(Clone, Copy)]
+pub(super) struct Width {
+    /// Torques.
+    pub joints: usize,
+    /// Entries of the tangent; 0 where tangents are not stored.
+    pub tangent: usize,
+}
+
+impl Width {
+    /// Of `joints` joints.
+    pub fn new(joints: usize, with_tangent: bool) -> Self {
+        Self { joints, tangent: if with_tangent { JointMatrix::entries(joints) } else { 0 } }
+    }
+}
+
+/// Number of columns.
+pub(super) const SECTIONS: usize = 10;
 
 /// Results of consecutive grid points. Field by field as in [`crate::dataset::Dataset`].
 #[derive(Default)]
 pub(super) struct Columns {
     pub torque: Vec<f64>,
     pub energy: Vec<f64>,
+    /// Lower triangles; empty where tangents are not stored.
+    pub tangent: Vec<f32>,
     pub gap: Vec<f32>,
     pub residual: Vec<f32>,
     pub iterations: Vec<u32>,
@@ -40,6 +71,7 @@ pub(super) enum Section {
     Torque,
     Energy,
     Ends,
+    Tangent,
     Gap,
     Residual,
     Iterations,
@@ -76,22 +108,22 @@ impl Opening {
     }
 
     /// Lengths of the columns behind it, by [`Section`] [bytes].
-    fn lengths(self, joints: usize) -> [usize; 9] {
+    fn lengths(self, width: Width) -> [usize; SECTIONS] {
         let Self { points: p, contacts: c, .. } = self;
-        [(p, joints * 8), (p, 8), (p, 8), (p, 4), (p, 4), (p, 4), (c, 4), (c, 12), (p, 1)]
+        [(p, width.joints * 8), (p, 8), (p, 8), (p, width.tangent * 4), (p, 4), (p, 4), (p, 4), (c, 4), (c, 12), (p, 1)]
             .map(|(count, size)| count.saturating_mul(size))
     }
 
     /// Where a column begins behind it, and its length [bytes].
-    pub fn place(self, section: Section, joints: usize) -> (usize, usize) {
-        let lengths = self.lengths(joints);
+    pub fn place(self, section: Section, width: Width) -> (usize, usize) {
+        let lengths = self.lengths(width);
         (lengths[..section as usize].iter().sum(), lengths[section as usize])
     }
 
     /// The columns behind it, `bytes` being all of them.
-    pub fn sections(self, bytes: &[u8], joints: usize) -> [&[u8]; 9] {
+    pub fn sections(self, bytes: &[u8], width: Width) -> [&[u8]; SECTIONS] {
         let mut rest = bytes;
-        self.lengths(joints).map(|length| {
+        self.lengths(width).map(|length| {
             let (section, behind) = rest.split_at(length);
             rest = behind;
             section
@@ -99,16 +131,17 @@ impl Opening {
     }
 
     /// Length of all columns behind it [bytes].
-    pub fn columns(self, joints: usize) -> usize {
-        self.lengths(joints).into_iter().fold(0, usize::saturating_add)
+    pub fn columns(self, width: Width) -> usize {
+        self.lengths(width).into_iter().fold(0, usize::saturating_add)
     }
 }
 
 impl Columns {
-    /// Room for `points` points of `joints` joints, contacts aside; an error where there is no such memory.
-    pub fn with_room(points: usize, joints: usize) -> Result<Self, TryReserveError> {
+    /// Room for `points` points of `width`, contacts aside; an error where there is no such memory.
+    pub fn with_room(points: usize, width: Width) -> Result<Self, TryReserveError> {
         let mut columns = Self::default();
-        columns.torque.try_reserve_exact(points.saturating_mul(joints))?;
+        columns.torque.try_reserve_exact(points.saturating_mul(width.joints))?;
+        columns.tangent.try_reserve_exact(points.saturating_mul(width.tangent))?;
         columns.energy.try_reserve_exact(points)?;
         columns.gap.try_reserve_exact(points)?;
         columns.residual.try_reserve_exact(points)?;
@@ -123,15 +156,16 @@ impl Columns {
         self.status.len()
     }
 
-    /// Bytes of `points` points of `joints` joints with `contacts` contacts in all.
-    pub fn bytes(points: usize, joints: usize, contacts: usize) -> usize {
-        Opening { first: 0, points, contacts }.columns(joints)
+    /// Bytes of `points` points of `width` with `contacts` contacts in all.
+    pub fn bytes(points: usize, width: Width, contacts: usize) -> usize {
+        Opening { first: 0, points, contacts }.columns(width)
     }
 
     /// No points, in the room there is.
     pub fn clear(&mut self) {
         self.torque.clear();
         self.energy.clear();
+        self.tangent.clear();
         self.gap.clear();
         self.residual.clear();
         self.iterations.clear();
@@ -147,7 +181,7 @@ impl Columns {
     /// have or out of order) becomes an unconverged point without torque and forces, of residual 1: the empty answer, which
     /// balances nothing.
     pub fn push(&mut self, equilibrium: &Equilibrium, shape: Shape) {
-        let Equilibrium { status, iterations, residual, energy, gap, torque, forces, tangent: _, touches: _ } =
+        let Equilibrium { status, iterations, residual, energy, gap, torque, forces, tangent, touches: _ } =
             equilibrium;
         let sound = torque.len() == shape.joints
             && torque.is_finite()
@@ -158,6 +192,10 @@ impl Columns {
             && forces.is_sorted_by(|a, b| a.node < b.node)
             && forces.last().is_none_or(|last| (last.node as usize) < shape.surface_nodes);
         self.iterations.push(*iterations);
+        let tangent = tangent.filter(|tangent| sound && tangent.is_finite());
+        let entries = self.tangent.len() + shape.width().tangent;
+        self.tangent.extend(tangent.iter().flat_map(JointMatrix::lower).map(|entry| entry as f32));
+        self.tangent.resize(entries, 0.0);
         if sound {
             self.torque.extend_from_slice(torque);
             self.energy.push(*energy);
@@ -183,6 +221,7 @@ impl Columns {
     pub fn push_free(&mut self, gap: f32, shape: Shape) {
         self.torque.resize(self.torque.len() + shape.joints, 0.0);
         self.energy.push(0.0);
+        self.tangent.resize(self.tangent.len() + shape.width().tangent, 0.0);
         self.gap.push(gap);
         self.residual.push(0.0);
         self.iterations.push(0);
@@ -197,6 +236,7 @@ impl Columns {
         self.forces.try_reserve(chunk.forces.len())?;
         self.torque.extend_from_slice(&chunk.torque);
         self.energy.extend_from_slice(&chunk.energy);
+        self.tangent.extend_from_slice(&chunk.tangent);
         self.gap.extend_from_slice(&chunk.gap);
         self.residual.extend_from_slice(&chunk.residual);
         self.iterations.extend_from_slice(&chunk.iterations);
@@ -225,6 +265,8 @@ impl Columns {
                     let joints = row.torque.len();
                     self.torque[point * joints..(point + 1) * joints].copy_from_slice(&row.torque);
                     self.energy[point] = row.energy[0];
+                    let entries = row.tangent.len();
+                    self.tangent[point * entries..(point + 1) * entries].copy_from_slice(&row.tangent);
                     self.gap[point] = row.gap[0];
                     self.residual[point] = row.residual[0];
                     self.iterations[point] = row.iterations[0];
@@ -245,12 +287,13 @@ impl Columns {
     }
 
     /// The opening of the block of these points, of which the first has number `first`, and its columns.
-    pub fn block(&self, first: usize) -> ([[u8; 8]; 3], [&[u8]; 9]) {
+    pub fn block(&self, first: usize) -> ([[u8; 8]; 3], [&[u8]; SECTIONS]) {
         let opening = Opening { first, points: self.points(), contacts: self.nodes.len() };
         let columns = [
             bytemuck::cast_slice(&self.torque),
             bytemuck::cast_slice(&self.energy),
             bytemuck::cast_slice(&self.ends),
+            bytemuck::cast_slice(&self.tangent),
             bytemuck::cast_slice(&self.gap),
             bytemuck::cast_slice(&self.residual),
             bytemuck::cast_slice(&self.iterations),
@@ -262,17 +305,18 @@ impl Columns {
     }
 
     /// Reads the block of the points from number `first` on; `None` when it is none.
-    pub fn decode(block: &[u8], first: usize, joints: usize) -> Option<Self> {
+    pub fn decode(block: &[u8], first: usize, width: Width) -> Option<Self> {
         let (opening, mut rest) = block.split_first_chunk()?;
         let opening = Opening::of(*opening)?;
-        if opening.first != first || rest.len() != opening.columns(joints) {
+        if opening.first != first || rest.len() != opening.columns(width) {
             return None;
         }
         let Opening { points, contacts, .. } = opening;
         let columns = Self {
-            torque: take(&mut rest, points * joints)?,
+            torque: take(&mut rest, points * width.joints)?,
             energy: take(&mut rest, points)?,
             ends: take(&mut rest, points)?,
+            tangent: take(&mut rest, points * width.tangent)?,
             gap: take(&mut rest, points)?,
             residual: take(&mut rest, points)?,
             iterations: take(&mut rest, points)?,

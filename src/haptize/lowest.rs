@@ -212,7 +212,7 @@ mod tests {
     use super::*;
     use crate::{field::synthetic, haptize::table::Block};
 
-    const SHAPE: Shape = Shape { joints: 1, surface_nodes: 9, with_forces: true };
+    const SHAPE: Shape = Shape { joints: 1, surface_nodes: 9, with_forces: true, with_tangent: false };
 
     /// An equilibrium in contact with as many node forces as its energy has joules.
     fn equilibrium(energy: f64, torque: f64) -> Equilibrium {

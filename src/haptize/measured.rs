@@ -241,6 +241,7 @@ fn window(grid: &Grid, table: &Table<'_>, lines: &[Range<usize>]) -> Dataset {
         status: status.into(),
         residual: None,
         iterations: None,
+        tangent: None,
         contacts: None,
         surface: None,
         scene: String::new(),
@@ -260,7 +261,7 @@ mod tests {
         },
     };
 
-    const SHAPE: Shape = Shape { joints: 2, surface_nodes: 0, with_forces: false };
+    const SHAPE: Shape = Shape { joints: 2, surface_nodes: 0, with_forces: false, with_tangent: false };
 
     /// A spring of 2 N m/rad beyond q0 = 0.35, and beside it one of 1 N m/rad.
     fn columns(grid: &Grid) -> Columns {

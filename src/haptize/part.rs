@@ -1,7 +1,7 @@
 //! The part: an unfinished sweep on disk, so that killing the process loses one chunk at most.
 //!
 //! ```text
-//! "haptize part 2\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
+//! "haptize part 3\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
 //! ```
 //!
 //! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`], or [`NOTICE`] and a text. Frames are only
@@ -10,7 +10,7 @@
 
 use super::{
     SweepError,
-    columns::{Columns, Opening, Replaced, Section},
+    columns::{Columns, Opening, Replaced, Section, Width},
     table::{Block, Table},
     tally::Tally,
 };
@@ -23,7 +23,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-const MAGIC: &[u8] = b"haptize part 2\n";
+const MAGIC: &[u8] = b"haptize part 3\n";
 /// Length and checksum before each body [bytes].
 const FRAME: usize = 8 + 4;
 
@@ -38,12 +38,19 @@ const NOTICE: [u8; 8] = [u8::MAX; 8];
 pub(super) struct Binding {
     pub grid: Grid,
     pub scene: String,
-    /// CRC-32 of the object's surface at rest: it may come from a mesh file, whose contents the scene does not hold.
-    pub surface: u32,
+    /// CRC-32 of the object: all its nodes at rest, its surface and its stiffness. It may come from a mesh file, whose contents the
+    /// scene does not hold.
+    pub object: u32,
+    /// Whether tangents are stored.
+    pub with_tangent: bool,
     pub provenance: Provenance,
 }
 
 impl Binding {
+    fn width(&self) -> Width {
+        Width::new(self.grid.joints(), self.with_tangent)
+    }
+
     /// What differs from `other` so that its numbers cannot be continued; the date may differ.
     fn difference(&self, other: &Self) -> Option<&'static str> {
         let (mine, its) = (&self.provenance, &other.provenance);
@@ -54,8 +61,9 @@ impl Binding {
             ("another adapter", mine.adapter != its.adapter),
             ("another tolerance", mine.tolerance != its.tolerance),
             ("another grid", self.grid != other.grid),
-            ("another mesh", self.surface != other.surface),
             ("another text of the scene", self.scene != other.scene),
+            ("another object, such as a mesh that changed meanwhile", self.object != other.object),
+            ("another interpolation, for which tangents are stored or not", self.with_tangent != other.with_tangent),
         ];
         differences.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
     }
@@ -155,7 +163,7 @@ impl Part {
     pub fn column(
         &self,
         section: Section,
-        joints: usize,
+        width: Width,
         replaced: &Replaced,
         take: &mut dyn FnMut(&mut dyn Read) -> io::Result<()>,
     ) -> io::Result<()> {
@@ -177,12 +185,12 @@ impl Part {
                     let mut block = bytes.to_vec();
                     reader.by_ref().take(length - Opening::BYTES as u64).read_to_end(&mut block)?;
                     let mut columns =
-                        Columns::decode(&block, opening.first, joints).ok_or(io::ErrorKind::InvalidData)?;
+                        Columns::decode(&block, opening.first, width).ok_or(io::ErrorKind::InvalidData)?;
                     columns.replace(opening.first, replaced).map_err(io::Error::other)?;
                     take(&mut columns.block(opening.first).1[section as usize])?;
                     done = length as usize;
                 } else {
-                    let (start, bytes) = opening.place(section, joints);
+                    let (start, bytes) = opening.place(section, width);
                     reader.seek_relative(start as i64)?;
                     take(&mut reader.by_ref().take(bytes as u64))?;
                     done = Opening::BYTES + start + bytes;
@@ -202,7 +210,7 @@ impl Part {
     }
 
     /// The results in `map`, which is of this part, and all of whose frames are whole.
-    pub fn table<'m>(&self, map: &'m Mmap, joints: usize) -> io::Result<Table<'m>> {
+    pub fn table<'m>(&self, map: &'m Mmap, width: Width) -> io::Result<Table<'m>> {
         let (mut blocks, mut rest) = (Vec::new(), map.get(self.results as usize..).unwrap_or(&[]));
         while !rest.is_empty() {
             let (length, behind) = rest.split_first_chunk().ok_or(io::ErrorKind::UnexpectedEof)?;
@@ -212,10 +220,10 @@ impl Part {
             if !body.starts_with(&NOTICE) {
                 let (opening, columns) = body.split_first_chunk().ok_or(io::ErrorKind::UnexpectedEof)?;
                 let opening = Opening::of(*opening).ok_or(io::ErrorKind::InvalidData)?;
-                blocks.push(Block { first: opening.first, sections: opening.sections(columns, joints) });
+                blocks.push(Block { first: opening.first, sections: opening.sections(columns, width) });
             }
         }
-        Ok(Table::new(joints, blocks))
+        Ok(Table::new(width.joints, blocks))
     }
 
     /// The binding of the file that is there, which `reader` then stands behind with `left` bytes left; `None` when the file
@@ -261,7 +269,7 @@ impl Part {
         if let Some(difference) = found.difference(binding) {
             return Err(SweepError::OtherPart { path: self.path.clone(), difference });
         }
-        let (points, joints) = (binding.grid.points(), binding.grid.joints());
+        let (points, width) = (binding.grid.points(), binding.width());
         let (results, mut tally, mut contacts) = (whole, Tally::default(), 0);
         loop {
             let before = whole;
@@ -270,7 +278,7 @@ impl Part {
                 binding.provenance.notices.push(String::from_utf8_lossy(notice).into_owned());
                 continue;
             }
-            match Columns::decode(&body, tally.points, joints) {
+            match Columns::decode(&body, tally.points, width) {
                 Some(chunk) if chunk.points() <= points - tally.points => {
                     tally.add(&chunk);
                     contacts += chunk.nodes.len();

@@ -58,6 +58,8 @@ pub struct Run<'a> {
 pub struct Sweep<'a> {
     pub(super) grid: Grid,
     surface: Surface,
+    /// See [`Binding::object`].
+    object: u32,
     scene: String,
     provenance: Provenance,
     /// What is kept of each point until the dataset is whole.
@@ -104,9 +106,15 @@ impl<'a> Sweep<'a> {
         let surface = &object.rest[..object.surface_nodes];
         let with_forces = scene.graphics.is_some() || scene.haptics.effects.at_contacts().is_some();
         Ok(Self {
-            shape: Shape { joints: grid.joints(), surface_nodes: object.surface_nodes, with_forces },
+            shape: Shape {
+                joints: grid.joints(),
+                surface_nodes: object.surface_nodes,
+                with_forces,
+                with_tangent: false,
+            },
             with_forces,
             grid,
+            object: content(object),
             surface: Surface {
                 nodes: surface.iter().flat_map(|node| node.to_array()).collect::<Vec<f64>>().into(),
                 triangles: object.triangles.as_flattened().to_vec().into(),
@@ -181,11 +189,13 @@ impl<'a> Sweep<'a> {
         self.provenance.aim = aim;
     }
 
-    fn fitting(&self, model: &'a Model<'a>) -> Result<&'a Model<'a>, SweepError> {
+    /// Tangents are stored where the model that solves gives them.
+    fn fitting(&mut self, model: &'a Model<'a>) -> Result<&'a Model<'a>, SweepError> {
         let joints = model.chain.joints.len();
         if joints != self.grid.joints() {
             return Err(SweepError::Grid(format!("{} axes for {joints} joints", self.grid.joints())));
         }
+        self.shape.with_tangent = model.with_tangent;
         Ok(model)
     }
 
@@ -226,7 +236,7 @@ impl<'a> Sweep<'a> {
     pub fn run<B: Backend>(&self, backend: &mut B, mut run: Run<'_>) -> Result<(Dataset, SweepReport), SweepError> {
         let footprint = self.footprint(run.chunk, true);
         let (points, bytes) = (self.grid.points(), footprint.memory.least);
-        let mut columns = Columns::with_room(points, self.shape.joints).map_err(|source| SweepError::Memory {
+        let mut columns = Columns::with_room(points, self.shape.width()).map_err(|source| SweepError::Memory {
             points,
             bytes,
             source,
@@ -258,13 +268,11 @@ impl<'a> Sweep<'a> {
         if output.is_dir() {
             return Err(SweepError::IsFolder { path: output.into() });
         }
-        let mut surface = crc32fast::Hasher::new();
-        surface.update(bytemuck::cast_slice(&self.surface.nodes));
-        surface.update(bytemuck::cast_slice(&self.surface.triangles));
         let mut binding = Binding {
             grid: self.grid.clone(),
             scene: self.scene.clone(),
-            surface: surface.finalize(),
+            object: self.object,
+            with_tangent: self.shape.with_tangent,
             provenance: self.provenance.clone(),
         };
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
@@ -296,7 +304,7 @@ impl<'a> Sweep<'a> {
         } else {
             let failed = |source| SweepError::Part { path: kept_in.clone(), source };
             let map = part.map().map_err(failed)?;
-            let mut table = part.table(&map, self.shape.joints).map_err(failed)?;
+            let mut table = part.table(&map, self.shape.width()).map_err(failed)?;
             let (report, provenance) = self.complete(solved, &mut table, run.stop, Some(&kept_in))?;
             let contacts = part.contacts().saturating_add_signed(table.more_contacts());
             (report, provenance, table.replaced, contacts)
@@ -361,6 +369,7 @@ impl<'a> Sweep<'a> {
             grid: self.grid.clone(),
             torque: columns.torque.into(),
             energy: Some(columns.energy.into()),
+            tangent: self.shape.with_tangent.then(|| columns.tangent.into()),
             gap: Some(columns.gap.into()),
             status: columns.status.into(),
             residual: Some(columns.residual.into()),
@@ -371,6 +380,16 @@ impl<'a> Sweep<'a> {
             provenance,
         }
     }
+}
+
+/// CRC-32 of all that contact knows of `object`.
+fn content(object: &Object) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    object.rest.iter().for_each(|node| hasher.update(bytemuck::cast_slice(&node.to_array())));
+    hasher.update(bytemuck::cast_slice(&object.triangles));
+    hasher.update(bytemuck::cast_slice(&object.stiffness.columns));
+    object.stiffness.blocks.iter().for_each(|block| hasher.update(bytemuck::cast_slice(&block.to_cols_array())));
+    hasher.finalize()
 }
 
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {

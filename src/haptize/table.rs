@@ -1,6 +1,6 @@
 //! The results of all grid points, read point by point in any order: in memory, or in the part on the disk.
 
-use super::columns::{Columns, Replaced, Section};
+use super::columns::{Columns, Replaced, SECTIONS, Section};
 use crate::{
     JointVector,
     contact::{Equilibrium, NodeForce, Status},
@@ -20,7 +20,7 @@ pub(super) struct Table<'a> {
 pub(super) struct Block<'a> {
     /// Number of the first point.
     pub first: usize,
-    pub sections: [&'a [u8]; 9],
+    pub sections: [&'a [u8]; SECTIONS],
 }
 
 /// The result of one point.

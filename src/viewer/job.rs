@@ -235,7 +235,8 @@ fn bake(
 ) -> Result<Loaded, Failure> {
     let object = Object::build(&scene.object)?;
     let chain = Chain::new(&scene.proxy);
-    let model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
+    let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
+    model.with_tangent = scene.uses_tangent();
     let on_device =
         solver.device(context).and_then(|device| device.map(|device| GpuSolver::new(device, &model)).transpose());
     let mut backend = match on_device {

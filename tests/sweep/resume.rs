@@ -3,6 +3,7 @@
 use crate::fixture::{Folder, MadeUp, POINTS, SCENE, bake, scene, stopped_after, sweep, sweep_of, uninterrupted};
 use haptize::{
     haptize::{Run, Sweep, SweepError},
+    object::Object,
     scene::Scene,
 };
 use std::sync::atomic::AtomicBool;
@@ -81,7 +82,10 @@ fn a_part_of_another_sweep_is_refused_with_the_difference() {
         "another text of the scene"
     );
     assert_eq!(refused(&sweep_of(&changed("count = 7", "count = 6"), "none", date)), "another grid");
-    assert_eq!(refused(&sweep_of(&changed("radius = 0.05", "radius = 0.051"), "none", date)), "another mesh");
+    // The same scene, but what it names is not what it was: an inner node of a mesh moved, say.
+    let other = Object::build(&changed("stiffness = 300.0", "stiffness = 300.1").object).unwrap();
+    let elsewhere = Sweep::new(&scene(), &other, "cpu", "none", date).unwrap();
+    assert_eq!(refused(&elsewhere), "another object, such as a mesh that changed meanwhile");
     let mut paper = scene();
     paper.contact.algorithm = haptize::scene::Algorithm::Paper;
     assert_eq!(refused(&sweep_of(&paper, "none", date)), "another algorithm");
