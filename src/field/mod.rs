@@ -82,7 +82,8 @@ impl TorqueField {
         Self::interpolated(dataset, Interpolation::Linear, threshold, slope)
     }
 
-    /// Any interpolation over `dataset`. `threshold` counts for `linear` alone, `slope` for all but `potential`.
+    /// Any interpolation over `dataset`. `threshold` counts for `linear` alone, `slope` for all but `potential`, which takes its mixed
+    /// derivatives from the dataset's tangents where it has them.
     ///
     /// # Errors
     /// As [`TorqueField::new`]; also when the dataset lacks the column that `interpolation` needs.
@@ -92,17 +93,6 @@ impl TorqueField {
         threshold: f64,
         slope: &JointVector,
     ) -> Result<Self, FieldError> {
-        Self::with_tangents(dataset, interpolation, threshold, slope, None)
-    }
-
-    /// [`TorqueField::interpolated`] with the lower triangles of d tau/d q at the grid points, row by row; zeros where it is not known.
-    fn with_tangents(
-        dataset: &Dataset,
-        interpolation: Interpolation,
-        threshold: f64,
-        slope: &JointVector,
-        tangents: Option<&[f32]>,
-    ) -> Result<Self, FieldError> {
         if !(0.0..1.0).contains(&threshold) {
             return Err(FieldError::Threshold(threshold));
         }
@@ -111,7 +101,7 @@ impl TorqueField {
             return Err(FieldError::Slope(*slope));
         }
         let (points, nearest) = points::survey(&lattice, dataset)?;
-        let data = Checked { lattice: &lattice, dataset, points: &points, nearest: &nearest, tangents };
+        let data = Checked { lattice: &lattice, dataset, points: &points, nearest: &nearest };
         let interpolant = match interpolation {
             Interpolation::Linear => Interpolant::Layered(Layered::linear(&data, threshold, slope)?),
             Interpolation::GapField => Interpolant::Layered(Layered::gap_field(&data, slope)?),

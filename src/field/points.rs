@@ -51,8 +51,6 @@ pub(super) struct Checked<'a> {
     pub points: &'a [Point],
     /// For each point the nearest one that was computed; itself if it was.
     pub nearest: &'a [usize],
-    /// Lower triangles of d tau/d q, zeros where it is not known; absent where none is stored.
-    pub tangents: Option<&'a [f32]>,
 }
 
 impl Checked<'_> {
@@ -66,7 +64,7 @@ impl Checked<'_> {
     /// Lower triangle of d tau/d q of `point` [N m/rad], where it is known and belongs to the energy.
     pub fn tangent(&self, point: usize) -> Option<&[f32]> {
         let entries = JointMatrix::entries(self.lattice.joints());
-        let tangent = self.tangents?.get(point * entries..(point + 1) * entries)?;
+        let tangent = self.dataset.tangent.as_ref()?.get(point * entries..(point + 1) * entries)?;
         (self.points[point].is_converged() && tangent.iter().any(|entry| *entry != 0.0)).then_some(tangent)
     }
 
@@ -86,6 +84,9 @@ pub(super) fn survey(lattice: &Lattice, dataset: &Dataset) -> Result<(Vec<Point>
     expect("status", count, dataset.status.len())?;
     if let Some(energy) = &dataset.energy {
         expect("energy", count, energy.len())?;
+    }
+    if let Some(tangent) = &dataset.tangent {
+        expect("tangent", count.saturating_mul(JointMatrix::entries(lattice.joints())), tangent.len())?;
     }
     if let Some(gap) = &dataset.gap {
         expect("gap", count, gap.len())?;
