@@ -34,7 +34,9 @@ pub struct Contact {
     pub normal: DVec3,
     /// r + s, positive in contact [m].
     pub depth: f64,
-    /// Force lambda by which the curvature counts; kc depth at the solution [N].
+    /// Stiffness of the proxy node's spring over that of [`super::Model::kc`] [1].
+    pub share: f64,
+    /// Force lambda by which the curvature counts; share kc depth at the solution [N].
     pub multiplier: f64,
     /// Second derivative of s.
     pub curvature: Curvature,
@@ -144,19 +146,19 @@ pub fn stiffness_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3
 }
 
 impl Contact {
-    /// What it bears, over kc: the depth, or of a wall its part of the ball's [m].
+    /// The force that it bears, over kc: the depth, or of a wall its part of the ball's, times the node's share [m].
     #[inline]
     #[must_use]
     pub fn bears(&self) -> f64 {
-        self.wall.as_ref().map_or(self.depth.max(0.0), |wall| wall.push)
+        self.share * self.wall.as_ref().map_or(self.depth.max(0.0), |wall| wall.push)
     }
 
-    /// A spring of its own on the feature that [`measure`] found.
+    /// A spring of the stiffness kc on the feature that [`measure`] found.
     #[inline]
     #[must_use]
     pub fn new(proxy_node: u32, nodes: [u32; 3], weights: [f64; 3], measured: (DVec3, f64, Curvature)) -> Self {
         let (normal, depth, curvature) = measured;
-        Self { proxy_node, nodes, weights, normal, depth, multiplier: 0.0, curvature, wall: None }
+        Self { proxy_node, nodes, weights, normal, depth, share: 1.0, multiplier: 0.0, curvature, wall: None }
     }
 
     /// What displacements `v` of its nodes bring the feature nearer by, to first order [m].

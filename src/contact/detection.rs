@@ -292,7 +292,8 @@ impl Detection {
                 let nodes = triangles[facet.triangle as usize];
                 let place = (nodes, surface::corners(positions, nodes));
                 let inside = inside && k == nearest;
-                contacts.push(wall((i as u32, x, radius), place, facet.point, inside, contact.normal, rounding));
+                let wall = wall((i as u32, x, radius), place, facet.point, inside, contact.normal, rounding);
+                contacts.push(Contact { share: model.shares[i], ..wall });
             }
             share_out(&mut contacts[first..], &mut self.pushes);
         }
@@ -370,7 +371,7 @@ fn contact_at(
     let ClosestPoint { weights, feature } = point;
     let pseudonormal = surface::pseudonormal(positions, &model.object.triangles, &model.object.topology, t, feature);
     let measured = measure(x, radius, surface::corners(positions, nodes), weights, feature, pseudonormal);
-    Some(Contact::new(i as u32, nodes, weights, measured))
+    Some(Contact { share: model.shares[i], ..Contact::new(i as u32, nodes, weights, measured) })
 }
 
 #[cfg(test)]

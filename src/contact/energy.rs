@@ -495,7 +495,7 @@ fn foresee(contacts: &mut [Contact], before: &[Contact], force: impl Fn(&Contact
     }
 }
 
-/// 1/2 kc sum_i depth_i^2, or of a ball that touches walls what [`super::series`] says [J].
+/// 1/2 kc sum_i share_i depth_i^2, or of a ball that touches walls what [`super::series`] says [J].
 #[must_use]
 pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
     let mut sum = 0.0;

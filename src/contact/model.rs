@@ -26,6 +26,9 @@ pub struct Model<'a> {
     /// normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
     /// [`RIGID_STIFFNESS`] [N/m].
     pub kc: f64,
+    /// Stiffness of each proxy node's spring over kc, in the algorithms but `paper`, whose springs are all alike: more than one where the
+    /// node stands for more than the mean length of link, see [`ContactSpec::node_stiffness`] [1].
+    pub shares: Vec<f64>,
     /// Whether each equilibrium comes with its tangent d tau/d q.
     pub with_tangent: bool,
     /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
@@ -108,6 +111,7 @@ impl<'a> Model<'a> {
             compliance,
             contact,
             kc: 0.0,
+            shares: chain.nodes.iter().map(|node| contact.share(node.length)).collect(),
             with_tangent: false,
             centre,
             extent,

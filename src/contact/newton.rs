@@ -1,7 +1,7 @@
 //! One damped Newton step of the energy form (Levenberg 1944, Marquardt 1963), by conjugate gradients.
 //!
 //! The energy along a displacement du = C df of the object, f being the forces that hold the displacement u = C f:
-//! `m(df) = u . df + 1/2 (1 + mu) df . C df + 1/2 kc sum_i max(0, depth_i + g_i . du)^2 + 1/2 sum_i lambda_i d2s_i(du, du)`,
+//! `m(df) = u . df + 1/2 (1 + mu) df . C df + 1/2 sum_i kc_i max(0, depth_i + g_i . du)^2 + 1/2 sum_i lambda_i d2s_i(du, du)`,
 //! with g_i the depth's gradient and mu the damping, a multiple of the object's own stiffness: so stiff springs are met first, however
 //! short the step. Two things make it a better model than the plain second derivative of the energy, and neither costs a detection:
 //! - the maximum is kept, so contacts may come and go within a step: a pass of conjugate gradients for the contacts that
@@ -124,10 +124,10 @@ pub struct Newton {
     direction_force: Vec<f64>,
     direction: Vec<f64>,
     image: Vec<f64>,
-    /// Of each depth on the way back: kc times its change, where it starts, and its change.
+    /// Of each depth on the way back: its spring's stiffness times its change, where it starts, and its change.
     springs_on_the_way: Vec<[f64; 3]>,
-    /// Of each wall: where its depth starts, and its change; and how many walls each ball has.
-    walls_on_the_way: Vec<[f64; 2]>,
+    /// The same of each wall; and how many walls each ball has.
+    walls_on_the_way: Vec<[f64; 3]>,
     walls: Vec<usize>,
 }
 
@@ -320,6 +320,7 @@ impl Newton {
                     }
                 }
                 bear(|k| rows[k].depth + changes[k], bears);
+                bears.iter_mut().zip(rows).for_each(|(bears, row)| *bears *= row.share);
                 let same = rows.iter().zip(&*bears).all(|(row, bears)| (row.bears() > 0.0) == (*bears > 0.0));
                 let stretch = |((row, bears), change): ((&Contact, &f64), &f64)| {
                     if same {
@@ -331,10 +332,10 @@ impl Newton {
                 decrease -= 0.5 * springs.kc * rows.iter().zip(&*bears).zip(&*changes).map(stretch).sum::<f64>();
                 return;
             }
-            let Contact { depth, multiplier, .. } = rows[0];
+            let Contact { depth, share, multiplier, .. } = rows[0];
             let deepening = rows[0].deepening(v(0));
             all[first] = deepening;
-            bears[first] = (depth + deepening).max(0.0);
+            bears[first] = share * (depth + deepening).max(0.0);
             let before = depth.max(0.0);
             let after = (depth + deepening).max(0.0);
             // The part of 1/2 kc depth^2 that is of first order is in the residual.
@@ -344,7 +345,7 @@ impl Newton {
                 after * after - before * (before + 2.0 * deepening)
             };
             let bending = inner(v(0), second_variation(&rows[0], v(0)));
-            decrease -= 0.5 * (springs.kc * stretch + multiplier * bending);
+            decrease -= 0.5 * (springs.kc * share * stretch + multiplier * bending);
         });
         decrease
     }
@@ -377,7 +378,8 @@ impl Newton {
                         slope -= inner(before(k), turned);
                         bend += inner(along(k), turned);
                     }
-                    walls_on_the_way.push([row.depth + row.deepening(before(k)), change]);
+                    let start = row.depth + row.deepening(before(k));
+                    walls_on_the_way.push([springs.kc * row.share * change, start, change]);
                 }
                 return;
             }
@@ -386,7 +388,7 @@ impl Newton {
             slope -= multiplier * inner(before(0), turned);
             bend += multiplier * inner(along(0), turned);
             let (start, change) = (depth + rows[0].deepening(before(0)), rows[0].deepening(along(0)));
-            let weight = springs.kc * change;
+            let weight = springs.kc * rows[0].share * change;
             slope += weight * depth.max(0.0);
             springs_on_the_way.push([weight, start, change]);
         });
@@ -397,9 +399,8 @@ impl Newton {
             for &count in walls.iter() {
                 let (walls, others) = rest.split_at(count);
                 rest = others;
-                bear(|k| walls[k][0] + t * walls[k][1], &mut pushes[..count]);
-                let work = walls.iter().zip(&*pushes).map(|([_, change], push)| change * push);
-                sum += springs.kc * work.sum::<f64>();
+                bear(|k| walls[k][1] + t * walls[k][2], &mut pushes[..count]);
+                sum += walls.iter().zip(&*pushes).map(|([weight, ..], push)| weight * push).sum::<f64>();
             }
             slope - bend * t > sum
         };
@@ -448,8 +449,8 @@ impl Newton {
                 }
                 return;
             }
-            let Contact { depth, multiplier, .. } = rows[0];
-            let push = springs.kc * ((depth + rows[0].deepening(v(0))).max(0.0) - depth.max(0.0));
+            let Contact { depth, share, multiplier, .. } = rows[0];
+            let push = springs.kc * share * ((depth + rows[0].deepening(v(0))).max(0.0) - depth.max(0.0));
             let (spread, bend) = (rows[0].spread(push), second_variation(&rows[0], v(0)));
             add_on_nodes([0, 1, 2].map(|j| -(spread[j] + bend[j] * multiplier)), springs.slots[first], residual);
         });

@@ -67,7 +67,7 @@ impl Relief {
             }
             support.respond(forces, column);
             for (b, other) in taken[..=a].iter().enumerate() {
-                let given = compliance(springs, spring, other) / springs.kc;
+                let given = compliance(springs, spring, other) / (springs.kc * springs.contacts[spring.start].share);
                 factor[a * count + b] = change(springs, other, column) + stiffening * given;
             }
         }

@@ -70,7 +70,7 @@ pub fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], produ
                 if touches || row.multiplier != 0.0 {
                     let change = if touches { (row.deepening(v(k)) - common) / WALL_COMPLIANCE } else { 0.0 };
                     add_on_nodes(
-                        springs.wall_forces(row, springs.kc * change, v(k)),
+                        springs.wall_forces(row, springs.kc * row.share * change, v(k)),
                         springs.slots[first + k],
                         product,
                     );
@@ -81,13 +81,13 @@ pub fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], produ
         if !touching[first] && multiplier == 0.0 {
             return;
         }
-        let kc = if touching[first] { springs.kc } else { 0.0 };
+        let kc = if touching[first] { springs.kc * rows[0].share } else { 0.0 };
         let slots = springs.slots[first];
         add_on_nodes(stiffness_product(&rows[0], kc, nodes_of(p, slots)), slots, product);
     });
 }
 
-/// Adds the forces of the contact springs on the object's nodes, -kc depth_i w_ij N_i, to `forces` on the support.
+/// Adds the forces of the contact springs on the object's nodes, -kc share_i depth_i w_ij N_i, to `forces` on the support.
 pub fn add_contact_forces(springs: Springs, forces: &mut [f64]) {
     for (contact, &slots) in springs.contacts.iter().zip(springs.slots) {
         add_on_nodes(contact.spread(-springs.kc * contact.bears()), slots, forces);

@@ -34,7 +34,7 @@ pub(super) fn tangent(
     // E_uq, column by column.
     let mut loads = vec![vec![0.0; order]; joints];
     for (contact, &slots) in springs.contacts.iter().zip(springs.slots) {
-        let Contact { proxy_node, depth, normal, multiplier, .. } = contact;
+        let Contact { proxy_node, depth, share, normal, multiplier, .. } = contact;
         if *depth <= 0.0 {
             continue;
         }
@@ -44,7 +44,7 @@ pub(super) fn tangent(
         let node = *proxy_node as usize;
         let columns: Vec<DVec3> = (0..joints).map(|k| model.chain.jacobian_column(pose, node, k)).collect();
         for (k, column) in columns.iter().enumerate() {
-            let resistance = stiffness_product(contact, springs.kc, [-*column; 3]);
+            let resistance = stiffness_product(contact, springs.kc * share, [-*column; 3]);
             add_on_nodes(resistance, slots, &mut loads[k]);
             let whole = resistance[0] + resistance[1] + resistance[2];
             for (l, other) in columns.iter().enumerate().take(k + 1) {
@@ -80,7 +80,7 @@ mod tests {
         springs = { kind = "isotropic", stiffness = 300.0 }
         ground = { stiffness = 100.0 }
         [contact]
-        stiffness = 300.0
+        stiffness_per_length = 1.8e5
         tolerance = 1e-11
         [grid]
         axes = [{ start = -0.2, stop = 0.2, count = 3 }, { start = -0.2, stop = 0.2, count = 3 }, { start = 0.0, stop = 0.01, count = 3 }]

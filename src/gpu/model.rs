@@ -34,7 +34,8 @@ pub struct DeviceModel {
     pub(super) gap_band: f64,
 }
 
-/// Contact stiffness of the energy form in f32 [N/m].
+/// Contact stiffness of the energy form in f32 [N/m]. The kernels give it to every proxy node; each node's own, which differs where a link
+/// has a stiffness per length, enters when the result is settled in f64.
 pub(super) fn stiffness(model: &contact::Model<'_>) -> f64 {
     model.kc.min(tolerances::GPU_STIFFNESS / model.softest)
 }

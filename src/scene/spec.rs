@@ -203,7 +203,7 @@ pub struct ProxyNodeSpec {
 pub struct ContactSpec {
     /// Contact stiffness: of one spring Kc between a proxy node and an object node; the energy form's stiffness at a
     /// contact point is kc = 3 Kc (three nodes of a triangle). Infinity is rigid contact. Where the scene gives a stiffness per length
-    /// instead, that of a node that stands for the mean length [N/m].
+    /// instead, that of a node that stands for the mean length; [`ContactSpec::node_stiffness`] gives each node's own [N/m].
     pub stiffness: f64,
     /// Contact stiffness of a link per length of it, in the energy form, where the scene gives that [N/m^2].
     pub stiffness_per_length: Option<f64>,
@@ -227,6 +227,12 @@ impl ContactSpec {
             Some(per_length) if length > 0.0 => per_length * length / 3.0,
             _ => self.stiffness,
         }
+    }
+
+    /// The same over [`ContactSpec::stiffness`] [1].
+    #[must_use]
+    pub fn share(&self, length: f64) -> f64 {
+        if self.stiffness_per_length.is_some() { self.node_stiffness(length) / self.stiffness } else { 1.0 }
     }
 }
 

@@ -9,3 +9,4 @@ mod convex;
 mod fixture;
 mod invariance;
 mod oracle;
+mod refinement;

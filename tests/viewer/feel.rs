@@ -85,7 +85,7 @@ fn keys_press_the_arm_onto_the_object_and_off_it() {
         window.advance(seconds);
         (tip(window) - before).length() > 0.5
     };
-    window.harness.key_down(Key::W);
+    window.harness.key_down(Key::S);
     window.harness.step();
     for _ in 0..4 {
         assert!(goes_on(&mut window, 0.2), "the arm stands between two frames");
@@ -93,8 +93,8 @@ fn keys_press_the_arm_onto_the_object_and_off_it() {
     window.advance(1.0);
     assert!(!goes_on(&mut window, 0.2), "the arm goes on in a window that draws no frames");
     // Nor where the window loses the keyboard meanwhile, and is never told that the key is let go.
-    window.harness.key_up(Key::W);
-    window.harness.key_down(Key::S);
+    window.harness.key_up(Key::S);
+    window.harness.key_down(Key::W);
     window.harness.step();
     assert!(goes_on(&mut window, 0.2));
     window.harness.input_mut().focused = false;
@@ -102,7 +102,7 @@ fn keys_press_the_arm_onto_the_object_and_off_it() {
     window.advance(0.5);
     assert!(!goes_on(&mut window, 0.2), "the arm goes on without the keyboard");
     window.harness.input_mut().focused = true;
-    window.harness.key_up(Key::S);
+    window.harness.key_up(Key::W);
     window.harness.step();
     // Elsewhere, keys are not meant for the arm.
     window.pass(0.5);

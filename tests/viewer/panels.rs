@@ -52,7 +52,15 @@ fn nothing_overlaps_in_the_least_window_however_long_the_name_and_however_many_t
     window.pass(1.0);
     let screen = Rect::from_min_size(pos2(0.0, 0.0), LEAST_WINDOW.into());
     let apart = |window: &Window, labels: &[&str], within: Rect| {
-        let rects: Vec<Rect> = labels.iter().map(|label| window.harness.get_by_label_contains(label).rect()).collect();
+        let rects: Vec<Rect> = labels
+            .iter()
+            .map(|label| {
+                // The title is a word of other labels, too.
+                let is_title = *label == "haptize";
+                let harness = &window.harness;
+                if is_title { harness.get_by_label(label) } else { harness.get_by_label_contains(label) }.rect()
+            })
+            .collect();
         for (number, rect) in rects.iter().enumerate() {
             assert!(within.contains_rect(*rect), "{} at {rect}", labels[number]);
             for (other, label) in rects.iter().zip(labels).skip(number + 1) {

@@ -162,8 +162,8 @@ pub fn small_scene() -> String {
     for (old, new) in [
         ("spacing = 0.05235987755982988", "spacing = 0.1"),
         ("start = -0.916297857297023, count = 36", "start = -0.1, count = 3"),
-        ("count = 16 },     #  54", "count = 8 },     #  54"),
-        ("count = 14 }", "count = 7 }"),
+        ("count = 16 },     #  54", "count = 9 },     #  54"),
+        ("count = 14 }", "count = 8 }"),
     ] {
         assert!(text.contains(old), "{old}");
         text = text.replace(old, new);

@@ -54,6 +54,8 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
     }
     share_out(&mut contacts, &mut Vec::new());
     for contact in &mut contacts {
+        // Springs of different stiffness.
+        contact.share = 0.5 + 0.25 * f64::from(contact.proxy_node);
         contact.multiplier = bending * kc * contact.bears();
     }
     let mut support = Support::new(object.surface_nodes);
