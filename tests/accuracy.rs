@@ -41,6 +41,15 @@ fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
         assert!(steps.is_sorted_by(|a, b| a > b) && steps[4] < 0.4 * steps[3], "{series}: {steps:?}");
         assert!(iterations[0] > 1e-2 && iterations[6] < 1e-4, "{series}: {iterations:?}");
     }
+    // Mesh, contact nodes and contact stiffness in four steps, each row against the next; stiffer contact changes ever less.
+    let changes = |study: Study| found.of(study).map(|row| row.rms).collect::<Vec<f64>>();
+    for study in [Study::Mesh, Study::Links, Study::Stiffness] {
+        assert!(changes(study).len() == 3 && changes(study).iter().all(|change| *change > 0.0), "{study:?}");
+        assert_eq!(found.of(study).filter(|row| row.value == 1.0 && row.cost.least == 1.0).count(), 1, "{study:?}");
+    }
+    assert!(changes(Study::Stiffness).is_sorted_by(|a, b| a > b), "{:?}", changes(Study::Stiffness));
+    let limits = accuracy::limits(&found);
+    assert!(limits.len() == 3 && limits.is_sorted_by(|a, b| a.error >= b.error), "{limits:?}");
     // Nothing on the front is beaten, and everything beside it is.
     let front = found.front();
     assert!(front.windows(2).all(|pair| pair[0].solved <= pair[1].solved && pair[0].rms >= pair[1].rms));

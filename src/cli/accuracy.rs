@@ -46,6 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let files = accuracy::write_all(&arguments.output, &found)?;
     let mut json = serde_json::to_value(&found)?;
     json["offers"] = serde_json::to_value(accuracy::offers(&found))?;
+    json["limits"] = serde_json::to_value(accuracy::limits(&found))?;
     json["files"] = files.iter().map(|file| Value::from(file.display().to_string())).collect();
     let mut text = String::new();
     accuracy::describe(&mut text, &found)?;

@@ -45,11 +45,49 @@ impl Accuracy {
         front
     }
 
+    /// Observed order p of a study of refinement: differences between one setting and the next fall as h^p.
+    #[must_use]
+    pub fn refinement_order(&self, study: Study) -> Option<f64> {
+        order(self.of(study).map(|row| (row.value, row.rms)))
+    }
+
     /// Measured order p of `series`, error ~ h^p. `None` for less than two spacings.
     #[must_use]
     pub fn order(&self, series: &str) -> Option<f64> {
         order(self.of(Study::Spacing).filter(|row| row.series == series).map(|row| (row.value, row.rms)))
     }
+}
+
+/// What limits the accuracy of a scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Limit {
+    /// `grid`, `mesh` or `link nodes`.
+    pub of: String,
+    /// Estimated rms error at the scene's own setting, relative to the rms torque [1].
+    pub error: f64,
+    /// Observed order p, error ~ h^p; absent where errors do not fall.
+    pub order: Option<f64>,
+}
+
+/// Errors of the scene's own grid, mesh and contact nodes, greatest first. That of the grid is measured with the scene's interpolation; those of mesh
+/// and nodes follow from what halving them changes, `d / (1 - 2^-p)`, or are that change where no order is observed.
+#[must_use]
+pub fn limits(accuracy: &Accuracy) -> Vec<Limit> {
+    let own_grid = |row: &&Row| row.series == accuracy.interpolation && row.points == accuracy.points;
+    let grid = accuracy.of(Study::Spacing).find(own_grid).map(|row| Limit {
+        of: "grid".to_owned(),
+        error: row.rms / row.size,
+        order: accuracy.order(accuracy.interpolation).filter(|order| *order > 0.0),
+    });
+    let refined = [Study::Mesh, Study::Links].into_iter().filter_map(|study| {
+        let row = accuracy.of(study).find(|row| row.value == 1.0)?;
+        let order = accuracy.refinement_order(study).filter(|order| *order > 0.0);
+        let share = order.map_or(1.0, |order| 1.0 - 0.5_f64.powf(order));
+        Some(Limit { of: row.series.clone(), error: row.rms / row.size / share, order })
+    });
+    let mut limits: Vec<Limit> = grid.into_iter().chain(refined).collect();
+    limits.sort_by(|a, b| b.error.total_cmp(&a.error));
+    limits
 }
 
 /// The cheapest way to each target: measured where a measured grid reaches it, else from the finest grid by the measured

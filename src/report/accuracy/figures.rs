@@ -166,12 +166,13 @@ pub(super) fn loops(accuracy: &Accuracy) -> Canvas {
     canvas
 }
 
-/// The contact solver: error against time over tolerances, algorithms and arithmetic; and against the object's nodes.
+/// The contact solver: error against time over tolerances, algorithms and arithmetic; and change of the torque by mesh, contact nodes, skin
+/// and contact stiffness.
 #[must_use]
 pub(super) fn solver(accuracy: &Accuracy) -> Canvas {
     let mut canvas = sheet(
         "Error of a solved configuration against its time",
-        "left: tolerance, updates, algorithm, arithmetic, time relative to the scene's own; right: nodes of the object",
+        "left: tolerance, updates, algorithm, arithmetic, time relative to the scene's own; right: edge of the mesh, spacing of nodes, bending, compliance",
     );
     let place = |row: &Row| (row.cost.least, row.rms);
     let mut curves = series(accuracy, Study::Tolerance, place);
@@ -185,8 +186,12 @@ pub(super) fn solver(accuracy: &Accuracy) -> Canvas {
     // The tolerance of the energy form is the curve of the algorithm of that name.
     curves.retain(|curve| curve.name != "energy" && curve.name != "cpu");
     panel(&mut canvas, 0, "Time of a configuration [1]", "Rms error [N m]", &curves, &[]);
-    let nodes = series(accuracy, Study::Nodes, |row| (row.value, row.rms));
-    panel(&mut canvas, 1, "Nodes of the object [1]", "Rms distance from the finest object [N m]", &nodes, &[]);
+    let refined = [Study::Mesh, Study::Links, Study::Skin, Study::Stiffness].into_iter();
+    let mut refined: Vec<Series> =
+        refined.flat_map(|study| series(accuracy, study, |row| (row.value, row.rms))).collect();
+    refined.iter_mut().zip(curves.len()..).for_each(|(curve, colour)| curve.colour = colour);
+    panel(&mut canvas, 1, "Relative to the scene's own [1]", "Rms change by the next step [N m]", &refined, &[]);
+    curves.extend(refined);
     legend(&mut canvas, &curves, Vec::new());
     canvas
 }

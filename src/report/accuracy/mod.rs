@@ -14,9 +14,10 @@ pub mod effects;
 mod figures;
 mod grids;
 mod page;
+mod refinement;
 mod solver;
 
-pub use choice::{Offer, offers};
+pub use choice::{Limit, Offer, limits, offers};
 pub use page::{describe, write_all};
 
 use crate::{
@@ -24,7 +25,7 @@ use crate::{
     device::MotionError,
     field::FieldError,
     gpu::FrameError,
-    haptize::{BackendChoice, BackendError, BakeError, ReferenceError, reference::Reference},
+    haptize::{BackendChoice, BackendError, BakeError, ReferenceError, reference::Reference, spacing},
     object::{Object, ObjectError},
     proxy::Chain,
     render::{graphics::GraphicsError, session::SessionError, setup::SetupError},
@@ -50,8 +51,14 @@ pub enum Study {
     Algorithm,
     /// f64 on the CPU against f32 on the GPU; cost is a configuration.
     Arithmetic,
-    /// Nodes of the object; cost is a configuration.
-    Nodes,
+    /// Mean edge of the object's mesh; cost is a configuration.
+    Mesh,
+    /// Spacing of contact nodes along links; cost is a configuration.
+    Links,
+    /// Bending stiffness of the skin; cost is a configuration.
+    Skin,
+    /// Contact compliance; cost is a configuration.
+    Stiffness,
     /// Interpolation; cost is a look-up.
     Lookup,
     /// Frame step of the graphics; cost is the same simulated time.
@@ -131,6 +138,10 @@ pub struct Accuracy {
     pub reference_error: f64,
     /// Joints.
     pub joints: usize,
+    /// Interpolation that the scene names.
+    pub interpolation: &'static str,
+    /// Points of the scene's own grid.
+    pub points: usize,
     /// Unit of spacings: `rad`, `m`, or `rad, m` where joints of both kinds mix.
     pub unit: &'static str,
     /// Greatest energy of the scene's own dataset [J].
@@ -213,6 +224,8 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
         torque: reference.torque,
         reference_error: reference.error,
         joints: chain.joints.len(),
+        interpolation: scene.haptics.interpolation.name(),
+        points: spacing::points(scene),
         unit: unit(scene),
         greatest_energy: 0.0,
         rows: Vec::new(),
@@ -229,7 +242,8 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
     progress("contact solver");
     solver::settings(scene, &model, &reference, &mut study)?;
     solver::arithmetic(&model, &reference, &mut study)?;
-    solver::nodes(scene, &chain, &reference, &mut study)?;
+    progress("mesh, contact nodes, skin, contact stiffness");
+    refinement::studies(scene, &reference, &mut study)?;
     progress("graphics");
     dynamics::graphics(scene, &object, &own, &mut study)?;
     Ok(study)

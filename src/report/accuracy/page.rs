@@ -2,7 +2,7 @@
 
 use super::{
     Accuracy, Study,
-    choice::{TARGETS, offers},
+    choice::{TARGETS, limits, offers},
     effects::{self, Effects},
     figures,
 };
@@ -43,8 +43,8 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
             figures::solver(accuracy),
             "A tolerance below the knee buys nothing that interpolation does not throw away. Linearised contact freezes the \
              geometry, at rest and again at each update (0 to 8 along its curve); the paper's iteration has its own fixed point, or none: the table counts what did not converge. \
-             Objects of other nodes are other facets for a point to touch: where the right curve does not fall, the \
-             finest object is no better than the others.",
+             Right: what one more step of refinement changes. Where such a curve does not fall to the left, torque \
+             does not converge.",
         ),
         (
             "accuracy-graphics",
@@ -105,7 +105,10 @@ fn study_name(study: Study) -> &'static str {
         Study::Updates => "updates",
         Study::Algorithm => "algorithm",
         Study::Arithmetic => "arithmetic",
-        Study::Nodes => "nodes",
+        Study::Mesh => "mesh",
+        Study::Links => "link nodes",
+        Study::Skin => "skin",
+        Study::Stiffness => "contact stiffness",
         Study::Lookup => "look-up",
         Study::Frame => "frame",
         Study::Iterations => "iterations",
@@ -155,6 +158,19 @@ pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
             "  below {:2.0} %   out of reach: no grid up to four times as fine as the finest here",
             100.0 * least
         )?;
+    }
+    for study in [Study::Mesh, Study::Links, Study::Skin, Study::Stiffness] {
+        let Some(own) = accuracy.of(study).find(|row| row.value == 1.0) else { continue };
+        write!(text, "  {:<12} the next step changes {:.2} %", own.series, 100.0 * own.rms / own.size)?;
+        match accuracy.refinement_order(study).filter(|order| *order > 0.0) {
+            Some(order) => writeln!(text, "; changes fall with the power {order:.2}")?,
+            None => writeln!(text, "; changes do not fall")?,
+        }
+    }
+    let limits = limits(accuracy);
+    let limits: Vec<String> = limits.iter().map(|limit| format!("{} {:.2} %", limit.of, 100.0 * limit.error)).collect();
+    if !limits.is_empty() {
+        writeln!(text, "  limited by   {}", limits.join(", "))?;
     }
     accuracy.notes.iter().try_for_each(|note| writeln!(text, "  note         {note}"))?;
     accuracy.effects.as_ref().map_or(Ok(()), |effects| effects::describe(text, effects))

@@ -1,4 +1,4 @@
-//! How contact is solved, away from any grid: tolerance, algorithm, arithmetic, nodes of the object.
+//! How contact is solved, away from any grid: tolerance, algorithm, arithmetic.
 
 use super::{Accuracy, AccuracyError, Cost, Row, Study, timed};
 use crate::{
@@ -8,9 +8,7 @@ use crate::{
         Backend, BackendChoice, ChosenBackend,
         reference::{Reference, equilibria},
     },
-    object::Object,
-    proxy::Chain,
-    scene::{Algorithm, ContactSpec, Scene, Shape},
+    scene::{Algorithm, ContactSpec, Scene},
 };
 
 /// Relative residuals that are asked for.
@@ -21,9 +19,6 @@ const UPDATES: [u32; 5] = [0, 1, 2, 4, 8];
 
 /// Configurations on the GPU: as many as a software adapter solves in some seconds.
 const GPU_CONFIGURATIONS: usize = 256;
-
-/// Rings and segments of a sphere, relative to the scene's own.
-const FINER: [f64; 4] = [0.7, 1.0, 1.5, 2.0];
 
 fn row(
     study: Study,
@@ -107,45 +102,6 @@ pub(super) fn arithmetic(model: &Model<'_>, reference: &Reference, study: &mut A
             study.rows.push(row(Study::Arithmetic, "gpu", setting, 32.0, cost, &part, &found));
         }
         Err(error) => study.notes.push(format!("f32 on a GPU is not measured: {error}")),
-    }
-    Ok(())
-}
-
-/// The scene's sphere with other numbers of nodes; the finest is the reference of this study. Springs keep the stiffness of
-/// a continuous shell: between nodes as they are, to the ground in proportion to the area of a node.
-pub(super) fn nodes(
-    scene: &Scene,
-    chain: &Chain,
-    reference: &Reference,
-    study: &mut Accuracy,
-) -> Result<(), AccuracyError> {
-    let Shape::Sphere { centre, radius, rings, segments } = scene.object.shape else {
-        study.notes.push("the number of object nodes is varied for spheres alone: a mesh is what it is".to_owned());
-        return Ok(());
-    };
-    let of = |finer: f64| {
-        let mut object = scene.object.clone();
-        let more = |count: usize| (count as f64 * finer).round() as usize;
-        let (new_rings, new_segments) = (more(rings), more(segments));
-        object.shape = Shape::Sphere { centre, radius, rings: new_rings, segments: new_segments };
-        let share = (rings * segments + 2) as f64 / (new_rings * new_segments + 2) as f64;
-        object.ground.iter_mut().for_each(|ground| ground.stiffness *= share);
-        object
-    };
-    let mut found = Vec::new();
-    for finer in FINER {
-        let object = Object::build(&of(finer))?;
-        let model = Model::new(&object, chain, scene.contact);
-        let (cost, equilibria) = timed(study.rounds, || equilibria(&model, scene.contact, &reference.places))?;
-        found.push((finer, object.rest.len(), cost, equilibria));
-    }
-    let Some((_, _, _, finest)) = found.last() else { return Ok(()) };
-    let finest = reference.with(finest.iter().map(|e| e.torque).collect());
-    let baseline = found.iter().find(|(finer, ..)| *finer == 1.0).map_or(0.0, |(_, _, cost, _)| cost.least);
-    for (_, nodes, cost, equilibria) in &found[..found.len() - 1] {
-        let setting = format!("{nodes} nodes");
-        let cost = cost.over(baseline);
-        study.rows.push(row(Study::Nodes, "sphere", setting, *nodes as f64, cost, &finest, equilibria));
     }
     Ok(())
 }
