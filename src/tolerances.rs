@@ -156,10 +156,6 @@ pub const CURVATURE_MARGIN: f64 = 5.0;
 /// is 1e9, a thousand times what rigid contact is stiffer than the object ([`RIGID_STIFFNESS`]).
 pub const DAMPING_ATTEMPTS: u32 = 30;
 
-/// Least relative residual at which conjugate gradients stop where negative curvature is left out [1]: the model is then too rough to be
-/// solved well. Twelve hard balls on 2,027 nodes take 150 s with [`INNER_TOLERANCE`], 99 with 0.1 and 103 with 0.3.
-pub const CONVEX_TOLERANCE: f64 = 0.1;
-
 /// Length of a refused step, relative to the greatest there can be, at which a configuration is given up [1]: the energy of a step scales with
 /// its length, so below 1e-12 nothing measurable can be gained any more.
 pub const GIVE_UP_LENGTH: f64 = 1e-12;
@@ -171,6 +167,18 @@ pub const INNER_TOLERANCE: f64 = 1e-2;
 /// Relative residual of the linear solves behind a tangent d tau/d q [1]: the tangent errs by its square, relative to the response
 /// (conjugate gradients are stationary in the energy), far below the 1e-7 to which f32 stores it.
 pub const RESPONSE_TOLERANCE: f64 = 1e-7;
+
+/// Relative residual of the linear solve that looks for negative curvature at an equilibrium [1]. Its random load has a share of one over
+/// the root of the number of unknowns, a tenth or so, in a direction of negative curvature, which conjugate gradients meet before the
+/// residual is as small as this.
+pub const PROBE_TOLERANCE: f64 = 1e-2;
+
+/// First length of the step away from a saddle, over the length of the displacement there, in the energy norm [1]; it is halved
+/// until the energy falls by more than its rounding, at most [`NUDGE_HALVINGS`] times.
+pub const NUDGE: f64 = 0.1;
+
+/// See [`NUDGE`]: after these, the fall of the energy, of second order, would be below rounding.
+pub const NUDGE_HALVINGS: u32 = 20;
 
 /// Least relative residual the inner conjugate gradients are asked for [1]: eps times the about 1e3 by which rounding
 /// grows over some tens of iterations.
@@ -184,55 +192,15 @@ pub const INNER_ITERATIONS_PER_UNKNOWN: usize = 4;
 /// settle in two or three; more are cut off by a decrease that no longer grows.
 pub const MODEL_PASSES: usize = 6;
 
-/// The same where a configuration is approached from outside [1]: a ball on a fine mesh touches ten facets that come and go by
-/// nanometres, and with 6 passes, none of them followed back, the model's minimum was often missed. The sum of iterations is
-/// bounded by [`INNER_ITERATIONS_PER_UNKNOWN`].
-pub const THOROUGH_MODEL_PASSES: usize = 30;
-
-/// Halvings in the search for the least energy along a pass [1]: all digits of a share between zero and one.
-pub const STEP_BACK_HALVINGS: u32 = 53;
-
 /// Part e of a ball's compliance 1/kc that lies at each wall it touches [1]: on an edge, where it touches two facets at once, its
 /// spring is 5 per cent stiffer than on one, on a vertex of six 9, and never more than 11. Of 29 of the hardest balls on 2,027 nodes
 /// 28 converge with 0.1 and 0.2, 29 with 0.3; with 0.02 the walls' springs are so stiff that conjugate gradients take ten times as long.
-pub const WALL_COMPLIANCE: f64 = 0.1;
-
-/// How much facets are rounded for balls, k in `|x - p| sqrt(1 + k |w|^2)` [1]: a ball of radius r is smaller by k r / 6 (its closest point
-/// in a facet's middle) to k r / 2 (on a vertex), 0.4 to 1.2 micrometres where r is 8 mm. Of 29 of the hardest balls on 2,027 nodes
-/// 23, 26, 28, 29 and 29 converge with 0, 1e-5, 1e-4, 1e-3 and 1e-2 (and [`WALL_COMPLIANCE`] 0.3).
-pub const FACET_ROUNDING: f64 = 3e-4;
-
-/// Passes in which a rounded closest point is found [1]: each lessens its error by the rounding, [`GENTLE_ROUNDING`] at most, and the
-/// distance is least there, so that it feels the square of what is left: 1e-12.
-pub const ROUNDING_PASSES: u32 = 3;
+pub const FACET_COMPLIANCE: f64 = 0.1;
 
 /// How far beyond the walls that may bear it a ball knows of others, in radii [1]: they may be the next that do. Without, a rigid ball
 /// rattles between facets: of 100 configurations on 102 nodes (axial springs, Kg 1e4 N/m on a patch, to half a radius deep) 96 converged, with
 /// 0.3 98, while every wall within the radius pushed by itself.
-pub const KNOWN_WALLS: f64 = 0.3;
-
-/// Steps in which a configuration that does not converge from the rest state is approached from outside [1]: of 20 on 2,027
-/// nodes 15 then converge, 13 with 4 or with 16 steps, and 16 cost twice the iterations.
-pub const APPROACH_STEPS: u32 = 8;
-
-/// Contact stiffness of a gentle approach from outside, in units of the stiffness of the object's softest node [1]: a ball sinks in by
-/// about a hundredth of what the surface gives way. Of 20 rigid balls on 2,027 nodes 18 converge after it with 100, 1e3 and 1e4, in
-/// times as 3 to 4 to 5, and 11 if they come in rigid.
-pub const GENTLE_STIFFNESS: f64 = 100.0;
-
-/// Depth to which a ball may sink in on a gentle approach, in radii [1]: contact stiffens beyond it. A ball whose centre passes the
-/// surface pushes it out to the wrong side, and an object held at a few nodes only may be far stiffer where it is touched than at its
-/// softest node ([`GENTLE_STIFFNESS`]).
-pub const GENTLE_DEPTH: f64 = 0.1;
-
-/// How much facets are rounded on a gentle approach, [`FACET_ROUNDING`] in the end [1]: of 16 balls on 2,027 nodes (Kc 1e6 N/m and
-/// rigid, Kg 1e4 N/m, up to half the object's radius deep) none converges where they are rounded by 3e-4 all along, 13 with 1e-2. Of 80 on
-/// softer ground (Kg 100 N/m) all do with 3e-4 and 1e-2, 79 with 3e-2.
-pub const GENTLE_ROUNDING: f64 = 1e-2;
-
-/// Attempts to find the place outside from which a configuration is approached [1]: each goes on by what is missing to the
-/// surface, and around a convex object two or three do.
-pub const RETREATS: u32 = 20;
+pub const KNOWN_FACETS: f64 = 0.3;
 
 /// First contact stiffness of the energy form, in units of the stiffness of the object's softest node (one over the trace of its
 /// compliance) [1]: soft contact, as stiff as the object itself, converges within a few steps from anywhere.

@@ -4,7 +4,7 @@
 //! 2005, section 5.1.5). The point is returned as barycentric weights, p = sum_k w_k corner_k, because contact spreads
 //! its force by them; weights of corners that the feature does not touch are exactly zero.
 
-use crate::tolerances::{MINIMUM_SQUARE, ROUNDING_PASSES};
+use crate::tolerances::MINIMUM_SQUARE;
 use glam::DVec3;
 
 /// Part of a triangle. Edge k joins corners k and (k + 1) % 3.
@@ -31,32 +31,24 @@ pub struct ClosestPoint {
 #[inline]
 #[must_use]
 pub fn closest_point(x: DVec3, corners: [DVec3; 3]) -> ClosestPoint {
-    closest_lifted(x, corners, 0.0)
-}
-
-/// The same where the corners are lifted by the root of `square` [m^2], each along an axis of its own beside those of space: the
-/// weights w for which |x - p|^2 + square |w|^2 is least, which are unique however the triangle is pressed.
-#[inline]
-#[must_use]
-fn closest_lifted(x: DVec3, corners: [DVec3; 3], square: f64) -> ClosestPoint {
     let [a, b, c] = corners;
     let ab = b - a;
     let ac = c - a;
     let ax = x - a;
-    let d1 = ab.dot(ax) + square;
-    let d2 = ac.dot(ax) + square;
+    let d1 = ab.dot(ax);
+    let d2 = ac.dot(ax);
     if d1 <= 0.0 && d2 <= 0.0 {
         return vertex(0);
     }
     let bx = x - b;
-    let d3 = ab.dot(bx) - square;
+    let d3 = ab.dot(bx);
     let d4 = ac.dot(bx);
     if d3 >= 0.0 && d4 <= d3 {
         return vertex(1);
     }
     let cx = x - c;
     let d5 = ab.dot(cx);
-    let d6 = ac.dot(cx) - square;
+    let d6 = ac.dot(cx);
     if d6 >= 0.0 && d5 <= d6 {
         return vertex(2);
     }
@@ -76,23 +68,6 @@ fn closest_lifted(x: DVec3, corners: [DVec3; 3], square: f64) -> ClosestPoint {
     let weight_b = area_b / area;
     let weight_c = area_c / area;
     ClosestPoint { weights: [1.0 - weight_b - weight_c, weight_b, weight_c], feature: Feature::Face }
-}
-
-/// The point with the weights w for which |x - p| sqrt(1 + k |w|^2) is least, k being `rounding`, and that least value [m]: the
-/// closest point lifted by the root of `k |x - p|^2 / (1 + k |w|^2)`, taken at the point itself.
-#[must_use]
-pub fn rounded(x: DVec3, corners: [DVec3; 3], rounding: f64) -> (ClosestPoint, f64) {
-    let measure = |point: &ClosestPoint| {
-        let [a, b, c] = point.weights;
-        (x.distance_squared(point_at(corners, point.weights)), 1.0 + rounding * (a * a + b * b + c * c))
-    };
-    let mut point = closest_point(x, corners);
-    for _ in 0..ROUNDING_PASSES {
-        let (square, rise) = measure(&point);
-        point = closest_lifted(x, corners, rounding * square / rise);
-    }
-    let (square, rise) = measure(&point);
-    (point, (square * rise).sqrt())
 }
 
 /// Corner k.

@@ -1,32 +1,13 @@
-//! The surface where it is now, for searches near a point: packets of triangles, placed anew when a search first comes to them.
+//! The deformed surface, for searches near a point. Nodes are displaced, and packets of triangles placed, when a search first comes
+//! to them, so that what a search costs does not grow with the size of the mesh.
 
 use super::bounding_volumes::{Leaf, Volume};
+use super::closest_point::Feature;
 use super::model::Model;
-use super::packet::{LANES, Packet, greatest};
-use super::wide::{Kernel, widest};
-use crate::tolerances::LENGTH_ROUNDING;
+use super::packet::Packet;
+use super::surface;
+use crate::object::Compliance;
 use glam::DVec3;
-
-/// The greatest of the squares of vectors, three numbers each, that is a number.
-struct GreatestSquare<'v>(&'v [f64]);
-
-impl Kernel for GreatestSquare<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run(self) -> f64 {
-        let square = |[a, b, c]: [f64; 3]| a * a + b * b + c * c;
-        let (eights, rest) = self.0.as_chunks().0.as_chunks::<LANES>();
-        let mut most = [0.0; LANES];
-        for eight in eights {
-            for (most, vector) in most.iter_mut().zip(eight) {
-                *most = greatest(square(*vector), *most);
-            }
-        }
-        let rest = rest.iter().map(|vector| square(*vector));
-        most.into_iter().chain(rest).fold(0.0, |most, square| greatest(square, most))
-    }
-}
 
 /// A leaf's triangles where they are now.
 #[derive(Clone)]
@@ -44,6 +25,14 @@ pub struct Deformation {
     surface: u64,
     /// An upper bound of how far any point of the surface is from where it rests [m].
     pub moved: f64,
+    /// Forces that displace it: where the rows of C begin at the nodes that carry them, and the forces [N].
+    loads: Vec<(usize, [f64; 3])>,
+    /// The surface's number when each node was displaced.
+    displaced: Vec<u64>,
+    /// Displacement of the nodes that are displaced [m].
+    displacement: Vec<DVec3>,
+    /// Their positions [m].
+    pub positions: Vec<DVec3>,
     places: Vec<Place>,
 }
 
@@ -52,24 +41,95 @@ impl Deformation {
     #[must_use]
     pub fn new(model: &Model) -> Self {
         let place = |leaf: &Leaf| Place { surface: 0, packet: Packet::default(), volume: leaf.volume };
-        Self { surface: 0, moved: 0.0, places: model.bounds.leaves.iter().map(place).collect() }
+        Self {
+            surface: 0,
+            moved: 0.0,
+            loads: Vec::new(),
+            displaced: vec![0; model.rest.len()],
+            displacement: vec![DVec3::ZERO; model.rest.len()],
+            positions: model.rest.clone(),
+            places: model.bounds.leaves.iter().map(place).collect(),
+        }
     }
 
-    /// Another surface, displaced by `displacement` [m].
-    pub fn take(&mut self, displacement: &[f64]) {
+    /// Another surface, displaced by `forces` on `nodes`, three numbers a node [N], nowhere by more than `moved` [m].
+    pub fn take(&mut self, model: &Model, nodes: &[u32], forces: &[f64], moved: f64) {
         self.surface += 1;
-        self.moved = widest(GreatestSquare(displacement)).sqrt() * (1.0 + LENGTH_ROUNDING);
+        self.moved = moved;
+        let Compliance { rows_per_node, .. } = model.compliance;
+        let block = rows_per_node * model.compliance.order();
+        self.loads.clear();
+        self.loads.extend(nodes.iter().zip(forces.as_chunks().0).filter_map(|(&node, &force)| {
+            let place = (force != [0.0; 3]).then(|| model.compliance.place(node)).flatten()?;
+            Some((place * block, force))
+        }));
     }
 
-    /// Calls `visit` with each triangle of the surface, nodes now at `positions`, that is nearer to `x` than the squared radius that
-    /// `visit` returned last; `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among them.
+    /// Displacement of a node; zero where the compliance does not cover it [m].
+    pub fn displacement(&mut self, model: &Model, node: u32) -> DVec3 {
+        self.displace(model, node);
+        self.displacement[node as usize]
+    }
+
+    fn displace(&mut self, model: &Model, node: u32) {
+        let j = node as usize;
+        if self.displaced[j] == self.surface {
+            return;
+        }
+        self.displaced[j] = self.surface;
+        let mut u = DVec3::ZERO;
+        if let Some(place) = model.compliance.place(node) {
+            let entries = &model.compliance.entries;
+            if model.compliance.rows_per_node == 1 {
+                for &(start, force) in &self.loads {
+                    u += DVec3::from_array(force) * entries[start + place];
+                }
+            } else {
+                // C is symmetric: the rows of the node that carries force are columns of this one.
+                let order = model.compliance.order();
+                for &(start, force) in &self.loads {
+                    for (a, component) in force.into_iter().enumerate() {
+                        u += DVec3::from_slice(&entries[start + a * order + 3 * place..]) * component;
+                    }
+                }
+            }
+        }
+        self.displacement[j] = u;
+        self.positions[j] = model.rest[j] + u;
+    }
+
+    /// Pseudonormal of a feature of triangle `t`, outward, not of length one.
+    pub fn pseudonormal(&mut self, model: &Model, t: usize, feature: Feature) -> DVec3 {
+        let (triangles, topology) = (&model.object.triangles, &model.object.topology);
+        match feature {
+            Feature::Face => {}
+            Feature::Edge(k) => {
+                triangles[topology.across[t][k] as usize].into_iter().for_each(|node| self.displace(model, node));
+            }
+            Feature::Vertex(k) => {
+                for &around in surface::triangles_around(topology, triangles[t][k]) {
+                    triangles[around as usize].into_iter().for_each(|node| self.displace(model, node));
+                }
+            }
+        }
+        surface::pseudonormal(&self.positions, triangles, topology, t, feature)
+    }
+
+    /// Corners of triangle `t` [m].
+    pub fn corners(&mut self, model: &Model, t: u32) -> [DVec3; 3] {
+        let nodes = model.object.triangles[t as usize];
+        nodes.into_iter().for_each(|node| self.displace(model, node));
+        surface::corners(&self.positions, nodes)
+    }
+
+    /// Calls `visit` with each triangle of the surface that is nearer to `x` than the squared radius that `visit` returned last, and
+    /// with its corners; `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among them.
     pub fn search(
         &mut self,
         model: &Model,
-        positions: &[DVec3],
         x: DVec3,
         radius_squared: f64,
-        mut visit: impl FnMut(u32) -> f64,
+        mut visit: impl FnMut(u32, [DVec3; 3]) -> f64,
     ) {
         let slack = model.bounds.slack(x);
         let moved = self.moved;
@@ -78,14 +138,17 @@ impl Deformation {
         let mut bound = radius_squared + slack;
         let mut limit = widened(bound);
         model.bounds.walk(x, limit, |leaf| {
-            let place = self.place(model, positions, leaf);
+            self.place(model, leaf);
+            let Self { places, positions, .. } = self;
+            let place = &places[leaf];
             if place.volume.distance_squared(x) <= bound {
                 let mut nearer = false;
                 for (&triangle, square) in
                     model.bounds.leaves[leaf].triangles.iter().zip(place.packet.distances_squared(x))
                 {
                     if square <= bound {
-                        bound = visit(triangle) + slack;
+                        let corners = surface::corners(positions, model.object.triangles[triangle as usize]);
+                        bound = visit(triangle, corners) + slack;
                         nearer = true;
                     }
                 }
@@ -97,34 +160,16 @@ impl Deformation {
         });
     }
 
-    /// Where the triangles of leaf `leaf` are.
-    fn place(&mut self, model: &Model, positions: &[DVec3], leaf: usize) -> &Place {
+    /// Places the triangles of leaf `leaf`.
+    fn place(&mut self, model: &Model, leaf: usize) {
+        if self.places[leaf].surface == self.surface {
+            return;
+        }
+        let nodes = &model.bounds.leaves[leaf].nodes;
+        nodes.as_flattened().iter().for_each(|&node| self.displace(model, node));
         let place = &mut self.places[leaf];
-        if place.surface != self.surface {
-            place.surface = self.surface;
-            place.packet.set(positions, &model.bounds.leaves[leaf].nodes);
-            place.volume = Volume::new(place.packet.bounds());
-        }
-        place
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Wherever it stands, whatever is beside the last eight, and however many are no numbers.
-    #[test]
-    fn the_greatest_square_is_found() {
-        for count in 0..20 {
-            for place in 0..count {
-                let mut vectors = vec![[0.1, -0.2, 0.2]; count];
-                vectors[(place + 1) % count] = [f64::NAN, 9.0, 9.0];
-                vectors[place] = [2.0, -3.0, 6.0];
-                assert_eq!(GreatestSquare(vectors.as_flattened()).run(), 49.0, "{place} of {count}");
-                assert_eq!(widest(GreatestSquare(vectors.as_flattened())), 49.0);
-            }
-        }
-        assert_eq!(GreatestSquare(&[]).run(), 0.0);
+        place.surface = self.surface;
+        place.packet.set(&self.positions, nodes);
+        place.volume = Volume::new(place.packet.bounds());
     }
 }

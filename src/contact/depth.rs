@@ -21,7 +21,8 @@ use super::closest_point::Feature;
 use crate::tolerances::{MINIMUM_CURVATURE_RADIUS, MINIMUM_SQUARE};
 use glam::DVec3;
 
-/// One proxy node and the surface feature closest to it.
+/// One proxy node and a surface feature that it feels: a row of the contact problem. A point has one row, a ball one for each facet
+/// that it feels (see [`super::series`]).
 #[derive(Clone, Copy, Debug)]
 pub struct Contact {
     /// Number of the proxy node.
@@ -30,18 +31,19 @@ pub struct Contact {
     pub nodes: [u32; 3],
     /// Barycentric weights of p; exactly zero for nodes that the feature does not touch.
     pub weights: [f64; 3],
-    /// Outward direction N, of length one, but of walls as their rounding has it.
+    /// Unit direction N in which the surface pushes the proxy node.
     pub normal: DVec3,
     /// r + s, positive in contact [m].
     pub depth: f64,
     /// Stiffness of the proxy node's spring over that of [`super::Model::kc`] [1].
     pub share: f64,
-    /// Force lambda by which the curvature counts; share kc depth at the solution [N].
+    /// Its part of the depth of the proxy node's spring: max(0, depth) where the node feels this facet alone; see
+    /// [`super::series`] [m].
+    pub push: f64,
+    /// Force lambda by which the curvature counts: the row's force at the solution [N].
     pub multiplier: f64,
     /// Second derivative of s.
     pub curvature: Curvature,
-    /// How it bends and what it bears, where it is one of a ball's walls; see [`super::walls`].
-    pub wall: Option<super::walls::Wall>,
 }
 
 /// How s bends under displacements of the object's nodes; see the file's head.
@@ -115,9 +117,6 @@ pub fn face_gradients(corners: [DVec3; 3]) -> [DVec3; 3] {
 #[must_use]
 pub fn second_variation(contact: &Contact, v: [DVec3; 3]) -> [DVec3; 3] {
     let Contact { weights, normal, curvature, .. } = contact;
-    if let Some(wall) = &contact.wall {
-        return wall.second_variation(*weights, *normal, v);
-    }
     let mut dp = DVec3::ZERO;
     let mut turn = DVec3::ZERO;
     for j in 0..3 {
@@ -134,23 +133,12 @@ pub fn second_variation(contact: &Contact, v: [DVec3; 3]) -> [DVec3; 3] {
     product
 }
 
-/// Product of the Hessian of the energy of a spring of stiffness `kc`, bent by the contact's multiplier, with node displacements
-/// `v` [m]: one force per node [N].
-#[inline]
-#[must_use]
-pub fn stiffness_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3] {
-    let Contact { weights, normal, multiplier, .. } = contact;
-    let push = *normal * (kc * contact.deepening(v));
-    let product = if *multiplier == 0.0 { [DVec3::ZERO; 3] } else { second_variation(contact, v) };
-    [0, 1, 2].map(|j| push * weights[j] + product[j] * *multiplier)
-}
-
 impl Contact {
-    /// The force that it bears, over kc: the depth, or of a wall its part of the ball's, times the node's share [m].
+    /// Its force over kc: its part of the depth times the node's share [m].
     #[inline]
     #[must_use]
-    pub fn bears(&self) -> f64 {
-        self.share * self.wall.as_ref().map_or(self.depth.max(0.0), |wall| wall.push)
+    pub fn force_over_kc(&self) -> f64 {
+        self.share * self.push
     }
 
     /// A spring of the stiffness kc on the feature that [`measure`] found.
@@ -158,7 +146,7 @@ impl Contact {
     #[must_use]
     pub fn new(proxy_node: u32, nodes: [u32; 3], weights: [f64; 3], measured: (DVec3, f64, Curvature)) -> Self {
         let (normal, depth, curvature) = measured;
-        Self { proxy_node, nodes, weights, normal, depth, share: 1.0, multiplier: 0.0, curvature, wall: None }
+        Self { proxy_node, nodes, weights, normal, depth, share: 1.0, push: depth.max(0.0), multiplier: 0.0, curvature }
     }
 
     /// What displacements `v` of its nodes bring the feature nearer by, to first order [m].
@@ -180,15 +168,12 @@ impl Contact {
     /// Its depth changes in proportion to displacements from here on.
     pub fn freeze(&mut self) {
         self.curvature = Curvature::default();
-        if let Some(wall) = &mut self.wall {
-            wall.freeze();
-        }
     }
 
-    /// Whether two contacts are walls of one ball, which share its spring.
+    /// Whether two rows belong to one proxy node, whose spring they share.
     #[must_use]
-    pub fn shares_ball(&self, other: &Self) -> bool {
-        self.wall.is_some() && other.wall.is_some() && self.proxy_node == other.proxy_node
+    pub fn shares_spring(&self, other: &Self) -> bool {
+        self.proxy_node == other.proxy_node
     }
 }
 

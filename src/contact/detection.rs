@@ -11,11 +11,9 @@ use super::closest_point::{ClosestPoint, Feature, closest_point, point_at};
 use super::deformation::Deformation;
 use super::depth::{Contact, measure};
 use super::model::Model;
-use super::newton::Care;
-use super::series::share_out;
+use super::series::distribute_all;
 use super::surface;
-use super::walls::{WallSearch, wall};
-use crate::tolerances::{FACET_ROUNDING, KNOWN_WALLS, WALL_COMPLIANCE};
+use crate::tolerances::{FACET_COMPLIANCE, KNOWN_FACETS};
 use glam::DVec3;
 
 /// Where a proxy node stands at rest, and what is known of it since.
@@ -61,10 +59,9 @@ impl Closest {
         Self { distance_squared: f64::MAX, triangle: u32::MAX, point }
     }
 
-    /// Takes triangle `t` instead if it is nearer to `x`, or as near with a lower number; its closest point, and the squared
+    /// Takes triangle `t` with these corners instead if it is nearer to `x`, or as near with a lower number; its closest point, and the squared
     /// distance of that [m^2].
-    pub fn consider(&mut self, x: DVec3, positions: &[DVec3], triangles: &[[u32; 3]], t: u32) -> (ClosestPoint, f64) {
-        let corners = surface::corners(positions, triangles[t as usize]);
+    pub fn consider(&mut self, x: DVec3, corners: [DVec3; 3], t: u32) -> (ClosestPoint, f64) {
         let point = closest_point(x, corners);
         let distance_squared = x.distance_squared(point_at(corners, point.weights));
         if distance_squared < self.distance_squared || (distance_squared == self.distance_squared && t < self.triangle)
@@ -75,28 +72,19 @@ impl Closest {
     }
 }
 
-/// Which walls a node with a radius feels.
+/// Which facets of the surface a node with a radius is measured against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Walls {
+pub enum Facets {
     /// The closest one.
     Closest,
-    /// All that it feels: about as near as the nearest (see [`super::walls`]).
-    All,
+    /// All that its spring acts on: those about as near as the closest (see [`super::series`]).
+    Felt,
 }
 
-/// What a ball feels whose centre is inside the object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Inner {
-    /// The nearest wall alone: E jumps where the centre passes the surface near an edge, but nothing holds the ball inside.
-    Alone,
-    /// The nearest among the others, which it feels as from outside: E is continuous, and has minima more than there need be.
-    Among,
-}
-
-/// Distance within which walls of a ball matter whose nearest is at `least`: those that may bear (see [`super::series`]), and those that
-/// may be the next that do [m].
-fn reach(radius: f64, least: f64) -> f64 {
-    least + WALL_COMPLIANCE * (radius - least).max(0.0) + KNOWN_WALLS * radius
+/// Distance within which a ball knows facets whose closest is at the distance `least`: those that may take force, and those that may be
+/// the next that do [m].
+fn known_distance(radius: f64, least: f64) -> f64 {
+    least + FACET_COMPLIANCE * (radius - least).max(0.0) + KNOWN_FACETS * radius
 }
 
 /// Detection for one thread: node positions of the current configuration and reusable lists.
@@ -105,17 +93,9 @@ pub struct Detection {
     nodes: Vec<DVec3>,
     standings: Vec<Standing>,
     deformation: Deformation,
-    /// Whether a ball's side is made sure of.
-    pub care: Care,
-    /// What balls feel whose centres are inside.
-    pub inner: Inner,
-    /// How much facets are rounded for balls [1].
-    pub rounding: f64,
-    /// Whether [`Inner::Alone`] has left out a wall, since this was last set to false.
-    pub left_out: bool,
-    /// Of the node at hand.
-    walls: WallSearch,
-    pushes: Vec<f64>,
+    /// Facets that the ball at hand may feel.
+    facets: Vec<Closest>,
+    parts: Vec<f64>,
 }
 
 impl Detection {
@@ -127,12 +107,8 @@ impl Detection {
             nodes: vec![DVec3::ZERO; count],
             standings: vec![Standing::default(); count],
             deformation: Deformation::new(model),
-            care: Care::Quick,
-            inner: Inner::Among,
-            rounding: FACET_ROUNDING,
-            left_out: false,
-            walls: WallSearch::default(),
-            pushes: Vec::new(),
+            facets: Vec::new(),
+            parts: Vec::new(),
         }
     }
 
@@ -145,18 +121,6 @@ impl Detection {
     /// A lower bound of the signed distance of each proxy node to the surface at rest, in the configuration taken up [m].
     pub fn distances(&self) -> impl Iterator<Item = f64> {
         self.standings.iter().map(Standing::signed)
-    }
-
-    /// Depth at rest of the node with a radius that lies deepest, in radii; zero where there is none inside [1].
-    #[must_use]
-    pub fn depth_in_radii(&self, model: &Model) -> f64 {
-        let mut deepest = 0.0f64;
-        for (standing, node) in self.standings.iter().zip(&model.chain.nodes) {
-            if standing.inside && node.radius > 0.0 {
-                deepest = deepest.max((standing.distance + node.radius) / node.radius);
-            }
-        }
-        deepest
     }
 
     /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns the smallest signed distance of a
@@ -210,19 +174,20 @@ impl Detection {
         first
     }
 
-    /// Contacts with the surface displaced by `displacement`, i.e. at `positions` relative to the model's centre [m], in
-    /// ascending order of proxy nodes. Nodes that touched before in this configuration are included with a depth below zero
-    /// when they do not touch now, because they are the ones that may touch again.
-    pub fn deformed(
-        &mut self,
-        model: &Model,
-        displacement: &[f64],
-        positions: &[DVec3],
-        walls: Walls,
-        contacts: &mut Vec<Contact>,
-    ) {
+    /// Takes up the surface displaced by `forces` on `nodes`, three numbers a node [N], nowhere by more than `moved` [m].
+    pub fn displace(&mut self, model: &Model, nodes: &[u32], forces: &[f64], moved: f64) {
+        self.deformation.take(model, nodes, forces, moved);
+    }
+
+    /// Displacement of a surface node [m].
+    pub fn displacement(&mut self, model: &Model, node: u32) -> DVec3 {
+        self.deformation.displacement(model, node)
+    }
+
+    /// Contacts with the surface as displaced, in ascending order of proxy nodes. Nodes that touched before in this configuration are
+    /// included with a depth below zero when they do not touch now, because they are the ones that may touch again.
+    pub fn deformed(&mut self, model: &Model, facets: Facets, contacts: &mut Vec<Contact>) {
         contacts.clear();
-        self.deformation.take(displacement);
         let moved = self.deformation.moved;
         for i in 0..self.nodes.len() {
             let x = self.nodes[i];
@@ -237,66 +202,72 @@ impl Detection {
                     continue;
                 }
             }
-            let triangles = &model.object.triangles;
-            let mut closest = Closest::none();
-            let likely = if moved == 0.0 { standing.at_rest } else { standing.last };
-            // None was closest where the pass before was not a number.
-            if (likely as usize) < triangles.len() {
-                closest.consider(x, positions, triangles, likely);
-            }
-            let rounding = self.rounding;
-            let feels = walls != Walls::Closest && radius > 0.0;
-            // Squared distance within which triangles are looked for.
-            let within = |closest: &Closest| {
-                if feels {
-                    let least = (closest.distance_squared * (1.0 + rounding)).sqrt();
-                    reach(radius, least).powi(2)
-                } else {
-                    closest.distance_squared
-                }
-            };
-            self.walls.clear();
-            if feels || moved != 0.0 {
-                self.deformation.search(model, positions, x, within(&closest), |triangle| {
-                    if feels || triangle != likely {
-                        let (_, distance_squared) = closest.consider(x, positions, triangles, triangle);
-                        let within = within(&closest);
-                        if feels && distance_squared <= within {
-                            self.walls.push(triangle);
-                        }
-                        return within;
-                    }
-                    within(&closest)
-                });
-            }
-            standing.last = closest.triangle;
-            let Some(contact) = contact_at(model, i, x, radius, positions, closest.triangle, closest.point) else {
+            let feels = facets == Facets::Felt && radius > 0.0;
+            let Some(closest) = self.closest(model, i, feels) else {
                 continue;
             };
+            let standing = &mut self.standings[i];
+            standing.last = closest.triangle;
+            let contact = self.contact_at(model, i, closest);
+            let standing = &mut self.standings[i];
             standing.watched |= contact.depth > 0.0;
             if !standing.watched {
                 continue;
             }
-            if !feels {
-                contacts.push(contact);
-                continue;
+            contacts.push(contact);
+            if feels {
+                let within = known_distance(radius, closest.distance_squared.sqrt()).powi(2);
+                self.facets.retain(|facet| facet.distance_squared <= within && facet.triangle != closest.triangle);
+                self.facets.sort_unstable_by_key(|facet| facet.triangle);
+                let Self { facets, deformation, .. } = self;
+                contacts.extend(facets.iter().map(|facet| facing(model, i, x, deformation, *facet)));
             }
-            let (facets, nearest) = self.walls.find(x, rounding, |least| reach(radius, least), positions, triangles);
-            // Where deformation has folded the surface over itself, the closest feature need not know the side.
-            let inside = contact.depth > radius
-                && (self.care == Care::Quick || surface::winding_number(positions, triangles, x) > 0.5);
-            let first = contacts.len();
-            let alone = inside && self.inner == Inner::Alone;
-            self.left_out |= alone && facets.len() > 1;
-            for (k, facet) in facets.iter().enumerate().filter(|&(k, _)| !alone || k == nearest) {
-                let nodes = triangles[facet.triangle as usize];
-                let place = (nodes, surface::corners(positions, nodes));
-                let inside = inside && k == nearest;
-                let wall = wall((i as u32, x, radius), place, facet.point, inside, contact.normal, rounding);
-                contacts.push(Contact { share: model.shares[i], ..wall });
-            }
-            share_out(&mut contacts[first..], &mut self.pushes);
         }
+        distribute_all(contacts, &mut self.parts);
+    }
+
+    /// The closest feature of the deformed surface to node `i`, if it is near enough to matter; with `feels`, the facets that the node
+    /// may feel are left in `facets`.
+    fn closest(&mut self, model: &Model, i: usize, feels: bool) -> Option<Closest> {
+        let Self { deformation, facets, .. } = self;
+        let x = self.nodes[i];
+        let radius = model.chain.nodes[i].radius;
+        let standing = self.standings[i];
+        let moved = deformation.moved;
+        // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than that.
+        let matters =
+            if standing.inside || standing.watched { f64::MAX } else { radius.max(moved - standing.distance) };
+        let mut closest = Closest::none();
+        let likely = if moved == 0.0 { standing.at_rest } else { standing.last };
+        // None was closest where the pass before was not a number.
+        if (likely as usize) < model.object.triangles.len() {
+            closest.consider(x, deformation.corners(model, likely), likely);
+        }
+        // Squared distance within which triangles are looked for.
+        let within = |closest: &Closest| {
+            let distance = closest.distance_squared.sqrt().min(matters);
+            (if feels { known_distance(radius, distance) } else { distance }).powi(2)
+        };
+        facets.clear();
+        if feels || moved != 0.0 {
+            deformation.search(model, x, within(&closest), |triangle, corners| {
+                if feels || triangle != likely {
+                    let (point, distance_squared) = closest.consider(x, corners, triangle);
+                    if feels && distance_squared <= within(&closest) {
+                        facets.push(Closest { distance_squared, triangle, point });
+                    }
+                }
+                within(&closest)
+            });
+        }
+        (closest.distance_squared.sqrt() <= matters).then_some(closest)
+    }
+
+    /// The contact (or near miss, with depth <= 0) of proxy node `i` with the closest feature of the deformed surface.
+    fn contact_at(&mut self, model: &Model, i: usize, closest: Closest) -> Contact {
+        let corners = self.deformation.corners(model, closest.triangle);
+        let pseudonormal = self.deformation.pseudonormal(model, closest.triangle as usize, closest.point.feature);
+        contact_with(model, i, self.nodes[i], closest, corners, pseudonormal)
     }
 
     /// Rows of the problem with geometry frozen at rest: every proxy node within `reach` of the surface, with its depth at
@@ -311,9 +282,14 @@ impl Detection {
                 continue;
             }
             let closest = find_standing(model, x, standing);
-            let Closest { triangle, point, .. } = closest;
-            let row = contact_at(model, i, x, radius, &model.rest, triangle, point);
-            if let Some(mut row) = row.filter(|row| row.depth >= -reach) {
+            if closest.triangle == u32::MAX {
+                continue;
+            }
+            let t = closest.triangle as usize;
+            let corners = surface::corners(&model.rest, model.object.triangles[t]);
+            let mut row =
+                contact_with(model, i, x, closest, corners, model.rest_pseudonormal(t, closest.point.feature));
+            if row.depth >= -reach {
                 row.freeze();
                 rows.push(row);
             }
@@ -334,11 +310,11 @@ fn find_standing(model: &Model, x: DVec3, standing: &mut Standing) -> Closest {
     let mut closest = Closest::none();
     let last = standing.last;
     if (last as usize) < triangles.len() {
-        closest.consider(x, &model.rest, triangles, last);
+        closest.consider(x, surface::corners(&model.rest, triangles[last as usize]), last);
     }
     model.bounds.search(x, closest.distance_squared, |t| {
         if t != last {
-            closest.consider(x, &model.rest, triangles, t);
+            closest.consider(x, surface::corners(&model.rest, triangles[t as usize]), t);
         }
         closest.distance_squared
     });
@@ -355,23 +331,34 @@ fn find_standing(model: &Model, x: DVec3, standing: &mut Standing) -> Closest {
     closest
 }
 
-/// The contact (or near miss, with depth <= 0) of proxy node `i` with a feature of `triangle`.
+/// The contact (or near miss, with depth <= 0) of proxy node `i` at `x` with the feature of a triangle with these `corners`, on the
+/// side that `pseudonormal` tells.
 #[inline(always)]
-fn contact_at(
+fn contact_with(
     model: &Model,
     i: usize,
     x: DVec3,
-    radius: f64,
-    positions: &[DVec3],
-    triangle: u32,
-    point: ClosestPoint,
-) -> Option<Contact> {
-    let t = triangle as usize;
-    let nodes = *model.object.triangles.get(t)?;
-    let ClosestPoint { weights, feature } = point;
-    let pseudonormal = surface::pseudonormal(positions, &model.object.triangles, &model.object.topology, t, feature);
-    let measured = measure(x, radius, surface::corners(positions, nodes), weights, feature, pseudonormal);
-    Some(Contact { share: model.shares[i], ..Contact::new(i as u32, nodes, weights, measured) })
+    Closest { triangle, point, .. }: Closest,
+    corners: [DVec3; 3],
+    pseudonormal: DVec3,
+) -> Contact {
+    let radius = model.chain.nodes[i].radius;
+    let measured = measure(x, radius, corners, point.weights, point.feature, pseudonormal);
+    let nodes = model.object.triangles[triangle as usize];
+    Contact { share: model.shares[i], ..Contact::new(i as u32, nodes, point.weights, measured) }
+}
+
+/// The contact of the ball `i` at `x` with a facet that is not the closest, from the side on which its centre is.
+fn facing(model: &Model, i: usize, x: DVec3, deformation: &mut Deformation, facet: Closest) -> Contact {
+    let corners = deformation.corners(model, facet.triangle);
+    let towards = x - point_at(corners, facet.point.weights);
+    let normal = surface::unit_or_zero(surface::area_vector(corners));
+    let direction = match facet.point.feature {
+        Feature::Face if normal.dot(towards) < 0.0 => -normal,
+        Feature::Face => normal,
+        _ => towards,
+    };
+    contact_with(model, i, x, facet, corners, direction)
 }
 
 #[cfg(test)]
@@ -421,10 +408,13 @@ mod tests {
         for (i, &x) in nodes.iter().enumerate() {
             let mut closest = Closest::none();
             for t in 0..model.object.triangles.len() {
-                closest.consider(x, positions, &model.object.triangles, t as u32);
+                closest.consider(x, surface::corners(positions, model.object.triangles[t]), t as u32);
             }
-            let radius = model.chain.nodes[i].radius;
-            let contact = contact_at(model, i, x, radius, positions, closest.triangle, closest.point).unwrap();
+            let (triangles, t) = (&model.object.triangles, closest.triangle as usize);
+            let pseudonormal =
+                surface::pseudonormal(positions, triangles, &model.object.topology, t, closest.point.feature);
+            let corners = surface::corners(positions, triangles[t]);
+            let contact = contact_with(model, i, x, closest, corners, pseudonormal);
             if contact.depth > 0.0 {
                 contacts.push(contact);
             }
@@ -432,13 +422,12 @@ mod tests {
         contacts
     }
 
-    /// To the last bit, for displacements from none to a radius, local and global, growing and shrinking within one
-    /// configuration.
+    /// For displacements from none to a radius, growing and shrinking within one configuration.
     #[test]
     fn culling_changes_no_result() {
         let object = ball();
         let mut next = sequence(3);
-        let mut compared = 0;
+        let (mut compared, mut same) = (0, 0);
         for radius in [0.0, 0.01] {
             let chain = nodes(30, radius);
             let contact = ContactSpec {
@@ -459,27 +448,43 @@ mod tests {
                 let deepest = brute_force(&model, &x, &model.rest).iter().map(|c| c.depth).fold(0.0, f64::max);
                 assert!(((-gap).max(0.0) - deepest).abs() < 1e-15, "{gap} {deepest}");
                 for size in [0.0, 1e-9, 1e-3, 0.02, 0.005, 0.05, 0.0] {
-                    let centre = DVec3::new(next(), next(), next()) * 0.05;
-                    let displacement: Vec<f64> = (0..3 * model.rest.len())
-                        .map(|k| size * next() * (-(model.rest[k / 3] - centre).length() / 0.02).exp())
-                        .collect();
-                    let positions: Vec<DVec3> = (0..model.rest.len())
-                        .map(|j| model.rest[j] + DVec3::from_slice(&displacement[3 * j..]))
-                        .collect();
+                    // Forces on some nodes, which displace the surface by about `size`.
+                    let nodes: Vec<u32> = (0..5).map(|_| ((next() + 1.0) * 50.0) as u32).collect();
+                    let mut forces: Vec<f64> = (0..15).map(|_| next()).collect();
+                    let displace = |forces: &[f64]| -> Vec<DVec3> {
+                        let load = |j: usize, (k, force): (&u32, &[f64; 3])| {
+                            model.compliance.block(j, *k as usize) * DVec3::from_array(*force)
+                        };
+                        let loads = || nodes.iter().zip(forces.as_chunks().0);
+                        (0..model.rest.len()).map(|j| loads().map(|pair| load(j, pair)).sum()).collect()
+                    };
+                    let most = displace(&forces).iter().map(|u| u.length()).fold(0.0, f64::max);
+                    forces.iter_mut().for_each(|force| *force *= size / most);
+                    let displacement = displace(&forces);
+                    let positions: Vec<DVec3> = model.rest.iter().zip(&displacement).map(|(n, u)| *n + *u).collect();
+                    let work: f64 = nodes
+                        .iter()
+                        .zip(forces.as_chunks().0)
+                        .map(|(&node, force)| displacement[node as usize].dot(DVec3::from_array(*force)))
+                        .sum();
+                    let moved = model.motion_bound(0.5 * work);
+                    assert!(displacement.iter().all(|u| u.length() <= moved), "{size} {moved}");
+                    detection.displace(&model, &nodes, &forces, moved);
                     let mut found = Vec::new();
-                    detection.deformed(&model, &displacement, &positions, Walls::Closest, &mut found);
+                    detection.deformed(&model, Facets::Closest, &mut found);
                     found.retain(|contact| contact.depth > 0.0);
                     let expected = brute_force(&model, &x, &positions);
                     assert_eq!(found.len(), expected.len());
                     for (found, expected) in found.iter().zip(&expected) {
                         compared += 1;
                         assert_eq!(found.proxy_node, expected.proxy_node);
-                        assert_eq!((found.nodes, found.weights), (expected.nodes, expected.weights));
-                        assert_eq!((found.depth, found.normal), (expected.depth, expected.normal));
+                        // Displacements are sums in another order.
+                        assert!((found.depth - expected.depth).abs() < 1e-15);
+                        same += usize::from(found.nodes == expected.nodes);
                     }
                 }
             }
         }
-        assert!(compared > 1000, "{compared}");
+        assert!(compared > 1000 && 100 * same > 99 * compared, "{same} of {compared}");
     }
 }

@@ -9,28 +9,26 @@
 //! valley, whose floor soft contact finds and stiffer contact only corrects. A stage's end never lies above the rest
 //! state in E at the final kc: E_s(u_s) <= E_s(0) bounds both its elastic energy and its depths by those at rest.
 //!
-//! What does not converge from the rest state is approached from outside ([`outside`]).
-//!
 //! With the geometry frozen at rest (`linearised`) the same steps minimise the convex
 //! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`; each of its updates freezes the geometry anew at the
 //! displacement found and solves again.
 
-mod outside;
-
 use super::NodeForce;
 use super::depth::Contact;
-use super::detection::{Detection, Inner, Walls};
+use super::detection::{Detection, Facets};
 use super::model::Model;
-use super::newton::{Care, Damping, Newton, Step};
-use super::series::share_out;
-use super::springs::{Bending, Springs, add_contact_forces};
+use super::newton::{Damping, Newton, Step};
+use super::series::distribute_all;
+use super::springs::{Springs, add_contact_forces};
 use super::support::{Support, dot, root};
 use super::tangent;
 use crate::JointMatrix;
 use crate::proxy::Pose;
+use crate::random::Random;
 use crate::tolerances::{
     ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GIVE_UP_LENGTH,
-    GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, STAGE_TOLERANCE, STALLED_LENGTH,
+    GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, NUDGE, NUDGE_HALVINGS, POOR_SHARE, PROBE_TOLERANCE,
+    RESIDUAL_FLOOR, STAGE_TOLERANCE, STALLED_LENGTH,
 };
 use glam::DVec3;
 
@@ -48,26 +46,12 @@ pub enum Geometry {
 pub struct State {
     /// Forces on the support [N].
     pub forces: Vec<f64>,
-    /// Displacement of all surface nodes [m].
-    pub displacement: Vec<f64>,
-    /// Surface nodes relative to the model's centre [m].
-    pub positions: Vec<DVec3>,
     /// Contacts at this displacement.
     pub contacts: Vec<Contact>,
     /// E [J].
     pub energy: f64,
     /// Its elastic part [J].
     pub elastic: f64,
-}
-
-impl State {
-    /// Positions from displacement.
-    fn place(&mut self, model: &Model) {
-        let displacement = self.displacement.as_chunks().0;
-        for ((position, rest), u) in self.positions.iter_mut().zip(&model.rest).zip(displacement) {
-            *position = *rest + DVec3::from_array(*u);
-        }
-    }
 }
 
 /// When a search ends.
@@ -95,8 +79,6 @@ pub struct EnergySearch {
     /// The current state; the result when the search has ended.
     pub state: State,
     trial: State,
-    /// The state before a step on probation.
-    before: State,
     /// The object nodes that carry force.
     pub support: Support,
     /// Contact stiffness of the current stage, and of the last [N/m].
@@ -107,9 +89,10 @@ pub struct EnergySearch {
     /// r = c - f [N], and C r [m].
     residual: Vec<f64>,
     product: Vec<f64>,
+    /// Displacement of the support in the trial [m].
+    displacement: Vec<f64>,
     newton: Newton,
     damping: Damping,
-    care: Care,
     /// Rows of the frozen problem, with their depths at rest.
     frozen: Vec<Contact>,
     /// E at the start of the last stage and after each step taken since [J].
@@ -120,15 +103,9 @@ impl EnergySearch {
     /// Room for the object of `model`.
     #[must_use]
     pub fn new(model: &Model) -> Self {
-        let state = || State {
-            displacement: vec![0.0; 3 * model.rest.len()],
-            positions: model.rest.clone(),
-            ..State::default()
-        };
         Self {
-            state: state(),
-            trial: state(),
-            before: state(),
+            state: State::default(),
+            trial: State::default(),
             support: Support::new(model.rest.len()),
             slots: Vec::new(),
             kc: 0.0,
@@ -136,67 +113,18 @@ impl EnergySearch {
             contact_forces: Vec::new(),
             residual: Vec::new(),
             product: Vec::new(),
+            displacement: Vec::new(),
             newton: Newton::default(),
             damping: Damping::default(),
-            care: Care::Quick,
             frozen: Vec::new(),
             history: Vec::new(),
         }
     }
 
-    /// The equilibrium of the configuration that `detection` has taken up, with proxy nodes at `nodes` [m] in the world.
-    pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry, nodes: &[DVec3]) -> Outcome {
-        (detection.inner, detection.left_out) = (Inner::Alone, false);
-        let mut outcome = self.search_from_rest(model, detection, geometry);
-        detection.inner = Inner::Among;
-        if geometry == Geometry::Frozen {
-            return outcome;
-        }
-        if detection.left_out && (!outcome.converged || self.is_inside(model)) {
-            outcome = self.go_on(model, detection, outcome);
-        }
-        if !outcome.converged {
-            self.search_from_outside(model, detection, nodes, &mut outcome);
-        }
-        outcome
-    }
-
-    /// Whether a ball's centre is inside the object.
-    fn is_inside(&self, model: &Model) -> bool {
-        let radius = |row: &Contact| model.chain.nodes[row.proxy_node as usize].radius;
-        self.state.contacts.iter().any(|row| row.wall.is_some() && row.depth > radius(row))
-    }
-
-    /// Goes on where balls have felt the nearest wall alone inside: from the equilibrium found, or if there is none or no way on, from the
-    /// rest state.
-    fn go_on(&mut self, model: &Model, detection: &mut Detection, mut outcome: Outcome) -> Outcome {
-        if outcome.converged {
-            self.descend_anew(model, detection, &mut outcome);
-        }
-        if !outcome.converged {
-            let before = outcome.iterations;
-            outcome = self.search_from_rest(model, detection, Geometry::Deformed);
-            outcome.iterations += before;
-        }
-        outcome
-    }
-
-    /// Descends from the current state by an E that detection measures otherwise than before.
-    fn descend_anew(&mut self, model: &Model, detection: &mut Detection, outcome: &mut Outcome) {
-        self.trial.forces.clone_from(&self.state.forces);
-        self.take_trial(model, detection, Geometry::Deformed);
-        let iterations = outcome.iterations + model.contact.max_iterations;
-        let limits = Limits { tolerance: model.contact.tolerance, iterations };
-        self.descend(model, detection, Geometry::Deformed, limits, outcome);
-    }
-
-    /// Searches from the rest state.
-    fn search_from_rest(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> Outcome {
+    /// The equilibrium of the configuration that `detection` has taken up, searched from the rest state.
+    pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> Outcome {
         self.kc = match geometry {
-            // A spring pressed in beyond a node's radius would pull the node's centre through the surface.
-            Geometry::Deformed => {
-                model.kc.min(CONTINUATION_START / model.softest * detection.depth_in_radii(model).max(1.0))
-            }
+            Geometry::Deformed => model.kc.min(CONTINUATION_START / model.softest),
             Geometry::Frozen => model.kc,
         };
         self.last_kc = model.kc;
@@ -247,9 +175,7 @@ impl EnergySearch {
     fn take_trial(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
         self.evaluate(model, detection, geometry);
         std::mem::swap(&mut self.state, &mut self.trial);
-        for contact in &mut self.state.contacts {
-            contact.multiplier = self.kc * contact.bears();
-        }
+        self.weigh_curvature();
     }
 
     /// Descends from the current state until it is balanced or there is no going on.
@@ -273,7 +199,13 @@ impl EnergySearch {
                 length = greatest;
                 continue;
             }
-            outcome.converged = self.kc == self.last_kc && outcome.residual <= limits.tolerance;
+            let balanced = self.kc == self.last_kc && outcome.residual <= limits.tolerance;
+            if balanced && outcome.iterations < limits.iterations && self.leave_saddle(model, detection, geometry) {
+                outcome.iterations += 1;
+                outcome.residual = self.balance(model);
+                continue;
+            }
+            outcome.converged = balanced;
             if outcome.converged || outcome.iterations >= limits.iterations || stuck {
                 break;
             }
@@ -287,13 +219,7 @@ impl EnergySearch {
             // Contacts that come and go may leave a step that promises nothing.
             let share =
                 |trial: &State| if promised > 0.0 { (energy - trial.energy + rounding) / promised } else { 0.0 };
-            let mut ratio = share(&self.trial);
-            let on_probation = self.care.is_thorough() && ratio < ACCEPTED_SHARE && promised > 0.0;
-            if on_probation {
-                outcome.iterations += 1;
-                self.correct(model, detection, geometry);
-                ratio = share(&self.trial);
-            }
+            let ratio = share(&self.trial);
             if ratio >= POOR_SHARE {
                 self.damping.decrease(ratio > GOOD_SHARE);
                 length = greatest;
@@ -304,8 +230,6 @@ impl EnergySearch {
             if ratio >= ACCEPTED_SHARE {
                 std::mem::swap(&mut self.state, &mut self.trial);
                 self.history.push(self.state.energy);
-            }
-            if ratio >= ACCEPTED_SHARE || on_probation {
                 outcome.residual = self.balance(model);
             }
         }
@@ -315,46 +239,82 @@ impl EnergySearch {
     fn step(&mut self, residual: f64) -> Step {
         let step = self.newton.step(
             &self.support,
-            Springs { contacts: &self.state.contacts, slots: &self.slots, kc: self.kc, bending: Bending::Exact },
+            Springs { contacts: &self.state.contacts, slots: &self.slots, kc: self.kc },
             (&self.residual, &self.product),
             self.damping.multiple,
             residual.clamp(INNER_TOLERANCE_FLOOR, INNER_TOLERANCE),
-            self.care,
         );
         self.damping.multiple = step.damping;
         step
     }
 
-    /// Puts in the trial's place what another step leads to from there. The state stays as it is, its balance does not.
-    fn correct(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
-        std::mem::swap(&mut self.before, &mut self.state);
-        std::mem::swap(&mut self.state, &mut self.trial);
-        let residual = self.balance(model);
-        self.step(residual);
-        self.try_step(model, detection, geometry);
-        std::mem::swap(&mut self.state, &mut self.before);
-    }
-
     /// Freezes the geometry anew, as it is at the current displacement: an update of linearised contact.
     fn freeze_here(&mut self, model: &Model, detection: &mut Detection) {
+        self.displace(model, detection, &self.state.forces, self.state.elastic);
         let Self { state, frozen, .. } = self;
-        state.place(model);
-        detection.deformed(model, &state.displacement, &state.positions, Walls::All, frozen);
+        detection.deformed(model, Facets::Felt, frozen);
         frozen.iter_mut().for_each(Contact::freeze);
         // Depths at rest, by the slopes here.
         for row in frozen.iter_mut() {
-            row.depth -= linear_change(row, &state.displacement);
+            row.depth -= linear_change(model, row, detection);
         }
-        frozen_contacts(frozen, &state.displacement, &mut state.contacts);
+        frozen_contacts(model, frozen, detection, &mut state.contacts);
+    }
+
+    /// Displaces the surface by `forces` on the support, which store the energy `elastic` [J].
+    fn displace(&self, model: &Model, detection: &mut Detection, forces: &[f64], elastic: f64) {
+        detection.displace(model, self.support.nodes(), forces, model.motion_bound(elastic));
+    }
+
+    /// Takes a step from a balanced state that is no minimum but a saddle of E, along a direction of negative curvature, to a state of
+    /// less energy; false where there is none.
+    fn leave_saddle(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> bool {
+        if geometry == Geometry::Frozen {
+            // A convex problem has no saddle.
+            return false;
+        }
+        self.weigh_curvature();
+        let Self { state, slots, support, newton, kc, product, .. } = self;
+        let springs = Springs { contacts: &state.contacts, slots, kc: *kc };
+        let mut random = Random::new(1);
+        product.fill_with(|| random.between(-1.0, 1.0));
+        newton.factorise(support, springs);
+        if newton.respond(support, springs, product, PROBE_TOLERANCE).is_some() {
+            return false;
+        }
+        let (descent, length) = newton.descent();
+        let descent = descent.to_vec();
+        let mut step = NUDGE * root(2.0 * self.state.energy) / length;
+        let fallen = self.state.energy - self.energy_rounding(detection.nodes());
+        for _ in 0..NUDGE_HALVINGS {
+            for side in [step, -step] {
+                self.trial.forces.clear();
+                self.trial.forces.extend(self.state.forces.iter().zip(&descent).map(|(f, along)| f + side * along));
+                self.evaluate(model, detection, geometry);
+                if self.trial.energy < fallen {
+                    std::mem::swap(&mut self.state, &mut self.trial);
+                    self.weigh_curvature();
+                    self.history.push(self.state.energy);
+                    return true;
+                }
+            }
+            step *= 0.5;
+        }
+        false
+    }
+
+    /// Sets the multipliers to the rows' forces: the curvature then is that of E.
+    fn weigh_curvature(&mut self) {
+        for contact in &mut self.state.contacts {
+            contact.multiplier = self.kc * contact.force_over_kc();
+        }
     }
 
     /// The tangent d tau/d q at the current state, an equilibrium of the proxy in `pose`; see [`tangent`].
     pub fn tangent(&mut self, model: &Model, pose: &Pose) -> Option<JointMatrix> {
+        self.weigh_curvature();
         let Self { state, slots, support, newton, kc, .. } = self;
-        for contact in &mut state.contacts {
-            contact.multiplier = *kc * contact.bears();
-        }
-        let springs = Springs { contacts: &state.contacts, slots, kc: *kc, bending: Bending::Exact };
+        let springs = Springs { contacts: &state.contacts, slots, kc: *kc };
         tangent::tangent(model, pose, springs, support, newton)
     }
 
@@ -374,22 +334,16 @@ impl EnergySearch {
         self.support.clear();
         self.state.forces.clear();
         self.state.elastic = 0.0;
-        self.state.displacement.fill(0.0);
-        self.state.positions.copy_from_slice(&model.rest);
-        detection.deformed(
-            model,
-            &self.state.displacement,
-            &self.state.positions,
-            if geometry == Geometry::Frozen { Walls::Closest } else { Walls::All },
-            &mut self.state.contacts,
-        );
+        detection.displace(model, &[], &[], 0.0);
+        let facets = if geometry == Geometry::Frozen { Facets::Closest } else { Facets::Felt };
+        detection.deformed(model, facets, &mut self.state.contacts);
         if geometry == Geometry::Frozen {
             // 1/2 |u|^2 <= E <= E(0) in the energy norm and |u_j|^2 <= trace(C_jj) |u|^2, all along the search: nodes
             // farther from the surface than this can never touch.
             let energy = contact_energy(&self.state.contacts, self.kc);
             let reach = (2.0 * energy * model.softest).sqrt();
             detection.frozen(model, reach, &mut self.frozen);
-            frozen_contacts(&self.frozen, &self.state.displacement, &mut self.state.contacts);
+            frozen_contacts(model, &self.frozen, detection, &mut self.state.contacts);
         }
     }
 
@@ -413,10 +367,7 @@ impl EnergySearch {
         state.forces.resize(order, 0.0);
         contact_forces.clear();
         contact_forces.resize(order, 0.0);
-        add_contact_forces(
-            Springs { contacts: &state.contacts, slots, kc: *kc, bending: Bending::Exact },
-            contact_forces,
-        );
+        add_contact_forces(Springs { contacts: &state.contacts, slots, kc: *kc }, contact_forces);
         residual.clear();
         residual.extend(contact_forces.iter().zip(&state.forces).map(|(c, f)| c - f));
         product.resize(order, 0.0);
@@ -437,82 +388,69 @@ impl EnergySearch {
         trial.forces.extend(state.forces.iter().zip(&newton.force).map(|(f, df)| f + df));
         self.evaluate(model, detection, geometry);
         let Self { state, trial, newton, .. } = self;
-        let bears = &newton.bears;
-        foresee(&mut trial.contacts, &state.contacts, |_, k| self.kc * bears[k]);
+        predict_multipliers(&mut trial.contacts, &state.contacts, |k| self.kc * newton.forces_over_kc[k]);
     }
 
     /// Displacement, contacts and energy that the trial's forces lead to.
     fn evaluate(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
-        let Self { trial, support, .. } = self;
-        support.displace(&model.compliance, &trial.forces, &mut trial.displacement);
+        let Self { trial, support, displacement, .. } = self;
+        support.gather(&model.compliance);
+        displacement.resize(support.order(), 0.0);
+        support.multiply(&trial.forces, displacement);
+        trial.elastic = 0.5 * dot(&trial.forces, displacement);
+        self.displace(model, detection, &self.trial.forces, self.trial.elastic);
+        let contacts = &mut self.trial.contacts;
         match geometry {
-            Geometry::Deformed => {
-                trial.place(model);
-                detection.deformed(model, &trial.displacement, &trial.positions, Walls::All, &mut trial.contacts);
-            }
-            Geometry::Frozen => frozen_contacts(&self.frozen, &trial.displacement, &mut trial.contacts),
+            Geometry::Deformed => detection.deformed(model, Facets::Felt, contacts),
+            Geometry::Frozen => frozen_contacts(model, &self.frozen, detection, contacts),
         }
-        let mut work = 0.0;
-        for (slot, &node) in support.nodes().iter().enumerate() {
-            let at = 3 * node as usize;
-            work += dot(&trial.forces[3 * slot..3 * slot + 3], &trial.displacement[at..at + 3]);
-        }
-        trial.elastic = 0.5 * work;
-        trial.energy = trial.elastic + contact_energy(&trial.contacts, self.kc);
+        self.trial.energy = self.trial.elastic + contact_energy(contacts, self.kc);
     }
 
     /// What E is rounded by: each depth is rounded by a few eps of the coordinates, E's part by lambda times that [J].
     fn energy_rounding(&self, nodes: &[DVec3]) -> f64 {
         let mut size = self.state.energy;
         for contact in &self.state.contacts {
-            size += self.kc * contact.bears() * nodes[contact.proxy_node as usize].length();
+            size += self.kc * contact.force_over_kc() * nodes[contact.proxy_node as usize].length();
         }
         ENERGY_ROUNDING * size
     }
 }
 
-/// Multipliers as `force` foretells them from the contacts before, by contact and place in the list: of the same wall, or
-/// the one that faces the same way; zero for a node that was not known. Both lists ascend by proxy node [N].
-fn foresee(contacts: &mut [Contact], before: &[Contact], force: impl Fn(&Contact, usize) -> f64) {
+/// Sets the multipliers of `contacts` to the forces that `force` predicts for the rows `before`, by their place: each row takes that
+/// of the row of its proxy node that faces most nearly the same way, zero where the node had none. Both lists ascend by proxy
+/// node [N].
+fn predict_multipliers(contacts: &mut [Contact], before: &[Contact], force: impl Fn(usize) -> f64) {
     let mut first = 0;
     for contact in contacts {
         while first < before.len() && before[first].proxy_node < contact.proxy_node {
             first += 1;
         }
-        let mut likest = -2.0;
-        contact.multiplier = 0.0;
-        for (k, before) in before.iter().enumerate().skip(first) {
-            if before.proxy_node != contact.proxy_node {
-                break;
-            }
-            let same = contact.wall.is_some() && before.nodes == contact.nodes;
-            let alike = if same { 2.0 } else { before.normal.dot(contact.normal) };
-            if alike > likest {
-                likest = alike;
-                contact.multiplier = force(before, k).max(0.0);
-            }
-        }
+        let rows = before[first..].iter().take_while(|row| row.proxy_node == contact.proxy_node);
+        let alike = |row: &Contact| row.normal.dot(contact.normal);
+        let nearest = rows.enumerate().max_by(|(_, a), (_, b)| alike(a).total_cmp(&alike(b)));
+        contact.multiplier = nearest.map_or(0.0, |(k, _)| force(first + k).max(0.0));
     }
 }
 
-/// 1/2 kc sum_i share_i depth_i^2, or of a ball that touches walls what [`super::series`] says [J].
+/// 1/2 kc sum_i share_i p_i depth_i, with the parts p_i of [`super::series`] [J].
 #[must_use]
 pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
     let mut sum = 0.0;
     for contact in contacts {
-        sum += contact.bears() * contact.depth;
+        sum += contact.force_over_kc() * contact.depth;
     }
     0.5 * kc * sum
 }
 
-/// Rows of the frozen problem with their depths at `displacement`.
-fn frozen_contacts(rows: &[Contact], displacement: &[f64], contacts: &mut Vec<Contact>) {
+/// Rows of the frozen problem with their depths at the displacement that `detection` has taken up.
+fn frozen_contacts(model: &Model, rows: &[Contact], detection: &mut Detection, contacts: &mut Vec<Contact>) {
     contacts.clear();
-    contacts.extend(rows.iter().map(|row| Contact { depth: row.depth + linear_change(row, displacement), ..*row }));
-    share_out(contacts, &mut Vec::new());
+    contacts.extend(rows.iter().map(|row| Contact { depth: row.depth + linear_change(model, row, detection), ..*row }));
+    distribute_all(contacts, &mut Vec::new());
 }
 
-/// By how much `displacement` deepens a frozen row [m].
-fn linear_change(row: &Contact, displacement: &[f64]) -> f64 {
-    row.deepening(row.nodes.map(|node| DVec3::from_slice(&displacement[3 * node as usize..])))
+/// By how much that displacement deepens a frozen row [m].
+fn linear_change(model: &Model, row: &Contact, detection: &mut Detection) -> f64 {
+    row.deepening(row.nodes.map(|node| detection.displacement(model, node)))
 }

@@ -28,7 +28,6 @@ mod springs;
 pub(crate) mod support;
 pub(crate) mod surface;
 mod tangent;
-pub(crate) mod walls;
 mod wide;
 
 pub use model::Model;
@@ -78,8 +77,7 @@ impl Status {
 pub struct Equilibrium {
     /// What became of it.
     pub status: Status,
-    /// Steps tried (`energy`, `linearised`) or passes (`paper`); of `energy` those from the rest state, and where these did not converge
-    /// those of all that was tried then, each with the scene's limit.
+    /// Steps tried (`energy`, `linearised`) or passes (`paper`).
     pub iterations: u32,
     /// Relative residual of the force balance, in the energy norm; one where nothing could be computed [1].
     pub residual: f64,
@@ -109,7 +107,7 @@ pub struct NodeForce {
 
 /// One proxy node in contact with one feature of the surface: pushed by `force` at x_i, pushing back on three object nodes.
 ///
-/// A point has at most one; a node with a radius has one for each facet that bears it (`walls.rs`, `series.rs`), whose sum is its force.
+/// A point has at most one; a node with a radius has one for each facet that takes force (`series.rs`), whose sum is its force.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
     /// Number of the proxy's node.

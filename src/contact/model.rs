@@ -9,7 +9,7 @@ use crate::JointVector;
 use crate::object::{Compliance, Object, ObjectError};
 use crate::proxy::Chain;
 use crate::scene::ContactSpec;
-use crate::tolerances::RIGID_STIFFNESS;
+use crate::tolerances::{LENGTH_ROUNDING, RIGID_STIFFNESS};
 use glam::DVec3;
 
 /// An object and a proxy, prepared for contact.
@@ -40,6 +40,9 @@ pub struct Model<'a> {
     pub rest: Vec<DVec3>,
     /// Largest trace of a covered node's own block C_jj: no node moves farther than sqrt(softest) times |u| in the energy norm [m/N].
     pub softest: f64,
+    /// Largest eigenvalue of a covered node's own block C_jj, or a bound of it: no node moves farther than sqrt(mobility) times |u| in
+    /// the energy norm [m/N].
+    pub mobility: f64,
     /// The triangles at rest, for closest-point queries.
     pub bounds: BoundingVolumes,
     /// What is known of distances to the surface at rest without such a query.
@@ -76,7 +79,7 @@ impl<'a> Model<'a> {
         }
         let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
         model.compliance = Compliance::on(object, reach::reached(&model, configurations))?;
-        model.softest = softest(&model.compliance);
+        (model.softest, model.mobility) = softest(&model.compliance);
         model.set_stiffness(contact.stiffness);
         Ok(model)
     }
@@ -104,10 +107,12 @@ impl<'a> Model<'a> {
             }
         }
         let bounds = BoundingVolumes::new(&rest, triangles);
+        let (softest, mobility) = softest(&compliance);
         let mut model = Self {
             object,
             chain,
-            softest: softest(&compliance),
+            softest,
+            mobility,
             compliance,
             contact,
             kc: 0.0,
@@ -134,6 +139,13 @@ impl<'a> Model<'a> {
         self.kc = 3.0 * self.contact.stiffness;
     }
 
+    /// How far any point of the surface can be from where it rests when the object stores the energy `elastic` [J]:
+    /// |u_j|^2 <= |C_jj| |u|^2, the last in the energy norm [m].
+    #[must_use]
+    pub fn motion_bound(&self, elastic: f64) -> f64 {
+        (2.0 * self.mobility * elastic.max(0.0)).sqrt() * (1.0 + LENGTH_ROUNDING)
+    }
+
     /// Pseudonormal of a feature of triangle `t` at rest, outward, not of length one.
     #[must_use]
     pub fn rest_pseudonormal(&self, t: usize, feature: Feature) -> DVec3 {
@@ -145,11 +157,13 @@ impl<'a> Model<'a> {
     }
 }
 
-/// Largest trace of a node's own block [m/N].
-fn softest(compliance: &Compliance) -> f64 {
+/// Largest trace of a node's own block, and a bound of its largest eigenvalue: that of an isotropic object's block is a third of its
+/// trace [m/N].
+fn softest(compliance: &Compliance) -> (f64, f64) {
     let trace = |j: usize| {
         let own = compliance.block(j, j);
         own.x_axis.x + own.y_axis.y + own.z_axis.z
     };
-    (0..compliance.nodes.len()).map(trace).fold(0.0, f64::max)
+    let softest = (0..compliance.nodes.len()).map(trace).fold(0.0, f64::max);
+    (softest, if compliance.rows_per_node == 1 { softest / 3.0 } else { softest })
 }

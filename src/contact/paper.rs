@@ -17,12 +17,12 @@
 
 use super::cholesky;
 use super::depth::Contact;
-use super::detection::{Detection, Walls};
+use super::detection::{Detection, Facets};
 use super::energy::Outcome;
 use super::model::Model;
 use super::support::{Support, dot, root};
 use super::surface;
-use crate::tolerances::RESIDUAL_FLOOR;
+use crate::tolerances::{LENGTH_ROUNDING, RESIDUAL_FLOOR};
 use glam::DVec3;
 
 /// A proxy node tied to its three closest object nodes.
@@ -122,7 +122,9 @@ impl PaperIteration {
     /// Step 1: proxy nodes inside, each tied to the three closest object nodes.
     fn tie(&mut self, model: &Model, detection: &mut Detection) {
         self.place(model);
-        detection.deformed(model, &self.displacement, &self.positions, Walls::Closest, &mut self.contacts);
+        let moved = self.displacement.as_chunks().0.iter().map(|u| DVec3::from_array(*u).length()).fold(0.0, f64::max);
+        detection.displace(model, self.support.nodes(), &self.previous_forces, moved * (1.0 + LENGTH_ROUNDING));
+        detection.deformed(model, Facets::Closest, &mut self.contacts);
         self.support.clear();
         self.ties.clear();
         for contact in self.contacts.iter().filter(|contact| contact.depth > 0.0) {

@@ -55,17 +55,8 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
     }
 }
 
-/// Whether the compliance covers all that the result depends on.
-pub(super) fn covers(
-    model: &Model<'_>,
-    detection: &Detection,
-    equilibrium: &Equilibrium,
-    displacement: &[f64],
-) -> bool {
-    if model.compliance.is_whole() {
-        return true;
-    }
-    let moved = displacement.chunks_exact(3).map(|u| DVec3::from_slice(u).length_squared()).fold(0.0, f64::max).sqrt();
+/// Whether the compliance covers all that the result depends on, where no point of the surface has moved by more than `moved` [m].
+pub(super) fn covers(model: &Model<'_>, detection: &Detection, equilibrium: &Equilibrium, moved: f64) -> bool {
     let covered = |node: u32| model.compliance.place(node).is_some();
     let mut within = equilibrium.forces.iter().all(|force| covered(force.node));
     for (i, distance) in detection.distances().enumerate() {

@@ -7,15 +7,13 @@
 //! bend. P r is kept twice like all directions: as the force (r - G^T y) / (1 + mu), y being the push of the springs, and as the
 //! displacement C of it.
 //!
-//! The walls of a ball are springs in series ([`super::series`]), whose compliance is simple: (1 - e) / kc in common, and e / kc each.
+//! Each row of a ball's spring is a spring here. In series ([`super::series`]) they share the compliance (1 - e) / kc, and have e / kc each.
 
 use super::cholesky;
-use super::depth::Contact;
 use super::rows::add_rows;
 use super::springs::{Springs, add_on_nodes, nodes_of};
 use super::support::Support;
-use crate::tolerances::WALL_COMPLIANCE;
-use std::ops::Range;
+use crate::tolerances::FACET_COMPLIANCE;
 
 /// Springs of a block for [`add_rows`].
 const TOGETHER: usize = 3;
@@ -23,11 +21,9 @@ const TOGETHER: usize = 3;
 /// The preconditioner for the springs that touch; its vectors are reused.
 #[derive(Default)]
 pub struct Relief {
-    /// Places of each spring's rows in the list of contacts.
-    taken: Vec<Range<usize>>,
-    /// g_a of one spring: slots and forces [1].
-    forces: Vec<(usize, [f64; 3])>,
-    /// C g_a on the support for each spring, filled up with zeros to whole blocks [m/N].
+    /// Places of the touching rows in the list of contacts.
+    taken: Vec<usize>,
+    /// C g_a on the support for each of them, filled up with zeros to whole blocks [m/N].
     columns: Vec<f64>,
     order: usize,
     /// 1 + mu [1].
@@ -41,15 +37,9 @@ pub struct Relief {
 impl Relief {
     /// Takes up the springs for which `touching` is true, on an object stiffened by the factor `stiffening`.
     pub fn set_up(&mut self, support: &Support, springs: Springs, touching: &[bool], stiffening: f64) {
-        let Self { taken, forces, columns, order, factor, pushes, .. } = self;
+        let Self { taken, columns, order, factor, pushes, .. } = self;
         taken.clear();
-        springs.for_each_depth(|first, rows| {
-            if rows[0].wall.is_some() {
-                taken.extend((first..first + rows.len()).filter(|&row| touching[row]).map(|row| row..row + 1));
-            } else if touching[first] {
-                taken.push(first..first + rows.len());
-            }
-        });
+        taken.extend((0..touching.len()).filter(|&row| touching[row]));
         let count = taken.len();
         self.stiffening = stiffening;
         *order = support.order();
@@ -58,16 +48,13 @@ impl Relief {
         columns.clear();
         columns.resize(pushes.len() * *order, 0.0);
         factor.resize(count * count, 0.0);
-        for (a, spring) in taken.iter().enumerate() {
+        for (a, &row) in taken.iter().enumerate() {
             let column = &mut columns[a * *order..][..*order];
-            forces.clear();
-            for row in spring.clone() {
-                let spread = springs.contacts[row].spread(1.0).map(|force| force.to_array());
-                forces.extend(springs.slots[row].into_iter().zip(spread));
-            }
-            support.respond(forces, column);
-            for (b, other) in taken[..=a].iter().enumerate() {
-                let given = compliance(springs, spring, other) / (springs.kc * springs.contacts[spring.start].share);
+            let unit = springs.contacts[row].spread(1.0).map(|force| force.to_array());
+            let [first, second, third] = springs.slots[row];
+            support.respond(&[(first, unit[0]), (second, unit[1]), (third, unit[2])], column);
+            for (b, &other) in taken[..=a].iter().enumerate() {
+                let given = compliance(springs, row, other) / (springs.kc * springs.contacts[row].share);
                 factor[a * count + b] = change(springs, other, column) + stiffening * given;
             }
         }
@@ -86,14 +73,12 @@ impl Relief {
         displacement.copy_from_slice(product);
         let Self { taken, columns, order, stiffening, factor, pushes, .. } = self;
         let count = taken.len();
-        for (push, spring) in pushes.iter_mut().zip(&*taken) {
-            *push = -change(springs, spring, product);
+        for (push, &row) in pushes.iter_mut().zip(&*taken) {
+            *push = -change(springs, row, product);
         }
         cholesky::solve(factor, pushes[..count].as_chunks_mut::<1>().0);
-        for (spring, &push) in taken.iter().zip(&*pushes) {
-            for row in spring.clone() {
-                add_on_nodes(springs.contacts[row].spread(push), springs.slots[row], force);
-            }
+        for (&row, &push) in taken.iter().zip(&*pushes) {
+            add_on_nodes(springs.contacts[row].spread(push), springs.slots[row], force);
         }
         let blocks = columns.chunks_exact((TOGETHER * *order).max(1));
         add_rows(blocks.zip(pushes.as_chunks::<TOGETHER>().0.iter().copied()), displacement);
@@ -103,21 +88,17 @@ impl Relief {
     }
 }
 
-/// What `displacement` on the support deepens a spring by, to first order [m].
-fn change(springs: Springs, spring: &Range<usize>, displacement: &[f64]) -> f64 {
-    let rows = &springs.contacts[spring.clone()];
-    rows.iter()
-        .zip(&springs.slots[spring.clone()])
-        .map(|(row, &slots)| row.deepening(nodes_of(displacement, slots)))
-        .sum()
+/// By how much `displacement` on the support deepens a row, to first order [m].
+fn change(springs: Springs, row: usize, displacement: &[f64]) -> f64 {
+    springs.contacts[row].deepening(nodes_of(displacement, springs.slots[row]))
 }
 
-/// What one spring gives way by under what another bears, times kc [1].
-fn compliance(springs: Springs, one: &Range<usize>, other: &Range<usize>) -> f64 {
-    let (a, b): (&Contact, &Contact) = (&springs.contacts[one.start], &springs.contacts[other.start]);
-    match (one == other, a.shares_ball(b)) {
+/// By how much one row gives way under the force of another, times kc [1].
+fn compliance(springs: Springs, row: usize, other: usize) -> f64 {
+    match (row == other, springs.contacts[row].shares_spring(&springs.contacts[other])) {
+        // Its own part and the shared one.
         (true, _) => 1.0,
-        (false, true) => 1.0 - WALL_COMPLIANCE,
+        (false, true) => 1.0 - FACET_COMPLIANCE,
         (false, false) => 0.0,
     }
 }

@@ -22,13 +22,22 @@ pub struct Solver<'a> {
     detection: Detection,
     energy: EnergySearch,
     paper: PaperIteration,
-    /// Of the last configuration [m], and whether any of it is not zero.
-    displacement: Vec<f64>,
-    displaced: bool,
+    /// What holds the displacement of the last configuration.
+    held_by: HeldBy,
+    /// That displacement, where it was asked for [m].
+    displacement: Option<Vec<f64>>,
     /// Sum of the forces on each surface node [N], and whether it is among `touched`.
     node_forces: Vec<DVec3>,
     marked: Vec<bool>,
     touched: Vec<u32>,
+}
+
+/// Which forces hold a displacement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum HeldBy {
+    Nothing,
+    Energy,
+    Paper,
 }
 
 impl<'a> Solver<'a> {
@@ -42,8 +51,8 @@ impl<'a> Solver<'a> {
             detection: Detection::new(model),
             energy: EnergySearch::new(model),
             paper: PaperIteration::new(model),
-            displacement: vec![0.0; 3 * surface_nodes],
-            displaced: false,
+            held_by: HeldBy::Nothing,
+            displacement: None,
             node_forces: vec![DVec3::ZERO; surface_nodes],
             marked: vec![false; surface_nodes],
             touched: Vec::new(),
@@ -84,9 +93,7 @@ impl<'a> Solver<'a> {
     /// What `search` finds at `q`, where there is contact.
     fn find(&mut self, q: &[f64], search: impl FnOnce(&mut Self, &mut Equilibrium) -> Outcome) -> Equilibrium {
         let model = self.model;
-        if std::mem::take(&mut self.displaced) {
-            self.displacement.fill(0.0);
-        }
+        (self.held_by, self.displacement) = (HeldBy::Nothing, None);
         let joints = model.chain.joints.len();
         if q.len() != joints || !q.iter().all(|x| x.is_finite()) {
             return unknown(joints);
@@ -102,7 +109,6 @@ impl<'a> Solver<'a> {
             return equilibrium;
         }
         let outcome = search(self, &mut equilibrium);
-        self.displaced = true;
         equilibrium.iterations = outcome.iterations;
         equilibrium.residual = outcome.residual;
         equilibrium.status = if outcome.converged { Status::Contact } else { Status::Unconverged };
@@ -110,14 +116,27 @@ impl<'a> Solver<'a> {
         if model.with_tangent && outcome.converged && model.contact.algorithm == Algorithm::Energy {
             equilibrium.tangent = self.energy.tangent(model, &self.pose);
         }
-        if is_finite(&equilibrium) && self.displacement.iter().all(|u| u.is_finite()) {
-            if !reach::covers(model, &self.detection, &equilibrium, &self.displacement) {
+        if is_finite(&equilibrium) {
+            if !self.is_covered(&equilibrium) {
                 equilibrium.status = Status::Overflow;
             }
             return equilibrium;
         }
-        self.displacement.fill(0.0);
+        self.held_by = HeldBy::Nothing;
         Equilibrium { gap, iterations: outcome.iterations, ..unknown(joints) }
+    }
+
+    /// Whether the compliance covers all that `equilibrium` depends on.
+    fn is_covered(&mut self, equilibrium: &Equilibrium) -> bool {
+        let model = self.model;
+        model.compliance.is_whole()
+            || (self.held_by == HeldBy::Energy
+                && reach::covers(model, &self.detection, equilibrium, model.motion_bound(self.energy.state.elastic)))
+            || {
+                let moved = self.displacement().chunks_exact(3).map(|u| DVec3::from_slice(u).length());
+                let moved = moved.fold(0.0, f64::max);
+                reach::covers(model, &self.detection, equilibrium, moved)
+            }
     }
 
     /// Smallest signed distance of the proxy's nodes to the surface at rest, less their radius, at the joint coordinates `q`,
@@ -138,8 +157,19 @@ impl<'a> Solver<'a> {
 
     /// Displacement u of the surface nodes at the last configuration solved, three numbers a node [m].
     #[must_use]
-    pub fn displacement(&self) -> &[f64] {
-        &self.displacement
+    pub fn displacement(&mut self) -> &[f64] {
+        let Self { model, energy, paper, held_by, displacement, .. } = self;
+        displacement.get_or_insert_with(|| {
+            let mut displacement = vec![0.0; 3 * model.rest.len()];
+            match held_by {
+                HeldBy::Nothing => {}
+                HeldBy::Energy => {
+                    energy.support.displace(&model.compliance, &energy.state.forces, &mut displacement);
+                }
+                HeldBy::Paper => displacement.copy_from_slice(&paper.displacement),
+            }
+            displacement
+        })
     }
 
     /// The proxy's pose at the last configuration solved.
@@ -162,19 +192,19 @@ impl<'a> Solver<'a> {
         near: Option<((&[NodeForce], f64), Limits)>,
         equilibrium: &mut Equilibrium,
     ) -> Outcome {
-        let Self { model, detection, energy, pose, .. } = self;
+        let Self { model, detection, energy, .. } = self;
         let outcome = match near {
-            None => energy.search(model, detection, geometry, &pose.nodes),
+            None => energy.search(model, detection, geometry),
             Some((forces, limits)) => energy.settle(model, detection, geometry, forces, limits),
         };
         let state = &self.energy.state;
-        self.displacement.copy_from_slice(&state.displacement);
+        self.held_by = HeldBy::Energy;
         equilibrium.energy = state.energy;
-        equilibrium.touches.extend(state.contacts.iter().filter(|c| c.bears() > 0.0).map(|contact| Touch {
+        equilibrium.touches.extend(state.contacts.iter().filter(|c| c.push > 0.0).map(|contact| Touch {
             proxy_node: contact.proxy_node,
             nodes: contact.nodes,
             weights: contact.weights,
-            force: contact.normal * (self.model.kc * contact.bears()),
+            force: contact.normal * (self.model.kc * contact.force_over_kc()),
         }));
         for touch in &equilibrium.touches {
             for (&node, weight) in touch.nodes.iter().zip(touch.weights) {
@@ -191,11 +221,11 @@ impl<'a> Solver<'a> {
     /// Its three forces on the nodes of a tie need not be parallel; the weights of a touch are their shares along the whole.
     fn iterate(&mut self, equilibrium: &mut Equilibrium) -> Outcome {
         let outcome = self.paper.iterate(self.model, &mut self.detection);
-        self.displacement.copy_from_slice(&self.paper.displacement);
+        self.held_by = HeldBy::Paper;
         for (slot, &node) in self.paper.support.nodes().iter().enumerate() {
             let at = 3 * node as usize;
             let forces = &self.paper.forces[3 * slot..3 * slot + 3];
-            equilibrium.energy += 0.5 * dot(forces, &self.displacement[at..at + 3]);
+            equilibrium.energy += 0.5 * dot(forces, &self.paper.displacement[at..at + 3]);
         }
         for tie in &self.paper.ties {
             let force = -(tie.forces[0] + tie.forces[1] + tie.forces[2]);

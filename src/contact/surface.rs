@@ -75,6 +75,7 @@ pub fn vertex_normal(positions: &[DVec3], triangles: &[[u32; 3]], topology: &Top
 
 /// How often the surface winds around `x`: the solid angles of all triangles over 4 pi (Van Oosterom & Strackee 1983). One
 /// inside, zero outside; it changes nowhere but on the surface, also where deformation has folded that over itself [1].
+#[cfg(test)]
 #[must_use]
 pub fn winding_number(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3) -> f64 {
     let mut sum = 0.0;
@@ -88,7 +89,8 @@ pub fn winding_number(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3) -> 
 }
 
 /// Triangles around `node`.
-fn triangles_around(topology: &Topology, node: u32) -> &[u32] {
+#[must_use]
+pub fn triangles_around(topology: &Topology, node: u32) -> &[u32] {
     let node = node as usize;
     &topology.around[topology.around_offsets[node] as usize..topology.around_offsets[node + 1] as usize]
 }

@@ -9,7 +9,6 @@
 //! `dq . E_qq dq' = v . B v' - lambda_i N_i . x_i''(dq, dq')`, with the second derivative of the forward kinematics
 //! `d^2 x_i / dq_k dq_l = a_k x J_il` for k <= l where joint k is revolute, and zero where it is prismatic.
 
-use super::depth::{Contact, stiffness_product};
 use super::model::Model;
 use super::newton::Newton;
 use super::springs::{Springs, add_on_nodes};
@@ -17,6 +16,7 @@ use super::support::{Support, dot};
 use crate::JointMatrix;
 use crate::proxy::Pose;
 use crate::scene::JointKind;
+use crate::tolerances::RESPONSE_TOLERANCE;
 use glam::DVec3;
 
 /// The tangent at the equilibrium that `springs` and `support` describe, multipliers being the forces of the contacts, with the proxy in `pose`; `None` where the equilibrium is no
@@ -33,32 +33,32 @@ pub(super) fn tangent(
     let mut tangent = JointMatrix::zeros(joints);
     // E_uq, column by column.
     let mut loads = vec![vec![0.0; order]; joints];
-    for (contact, &slots) in springs.contacts.iter().zip(springs.slots) {
-        let Contact { proxy_node, depth, share, normal, multiplier, .. } = contact;
-        if *depth <= 0.0 {
-            continue;
+    springs.for_each(|first, rows| {
+        if rows.iter().all(|row| row.push == 0.0) {
+            return;
         }
-        if contact.wall.is_some() {
-            return None;
-        }
-        let node = *proxy_node as usize;
+        let node = rows[0].proxy_node as usize;
         let columns: Vec<DVec3> = (0..joints).map(|k| model.chain.jacobian_column(pose, node, k)).collect();
+        let force: DVec3 = rows.iter().map(|row| row.normal * row.multiplier).sum();
         for (k, column) in columns.iter().enumerate() {
-            let resistance = stiffness_product(contact, springs.kc * share, [-*column; 3]);
-            add_on_nodes(resistance, slots, &mut loads[k]);
-            let whole = resistance[0] + resistance[1] + resistance[2];
+            let mut whole = DVec3::ZERO;
+            let resistance = |row: usize, forces: [DVec3; 3]| {
+                whole += forces.into_iter().sum::<DVec3>();
+                add_on_nodes(forces, springs.slots[first + row], &mut loads[k]);
+            };
+            springs.resist(rows, |row| rows[row].push > 0.0, |_| [-*column; 3], resistance);
             for (l, other) in columns.iter().enumerate().take(k + 1) {
                 let turn = match model.chain.joints[l].kind {
                     JointKind::Revolute => pose.axes[l].cross(*column),
                     JointKind::Prismatic => DVec3::ZERO,
                 };
-                tangent.add(k, l, whole.dot(*other) + *multiplier * normal.dot(turn));
+                tangent.add(k, l, whole.dot(*other) + force.dot(turn));
             }
         }
-    }
+    });
     newton.factorise(support, springs);
     for k in 0..joints {
-        let moved = newton.respond(support, springs, &loads[k])?;
+        let moved = newton.respond(support, springs, &loads[k], RESPONSE_TOLERANCE)?;
         for (l, load) in loads.iter().enumerate().take(k + 1) {
             tangent.add(k, l, dot(load, moved));
         }

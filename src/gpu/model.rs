@@ -76,7 +76,7 @@ impl DeviceModel {
                 least_distance: (tolerances::GPU_LEAST_DISTANCE_PER_EXTENT * extent) as f32,
                 depth_rounding: (tolerances::GPU_DEPTH_ROUNDING_PER_EDGE * longest_edge) as f32,
                 clusters: clusters.len().div_ceil(CLUSTER) as u32,
-                mobility: mobility(model) as f32,
+                mobility: model.mobility as f32,
                 ..bytemuck::Zeroable::zeroed()
             },
             kinds: chain.joints.iter().map(|joint| joint.kind).collect(),
@@ -181,12 +181,6 @@ fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 
     let spheres = triangles.iter().map(|nodes| around(nodes));
     let radii = model.chain.nodes.iter().map(|node| [node.radius as f32, 0.0, 0.0, 0.0]);
     nodes.chain(spheres).chain(radii).chain(clusters.chunks(CLUSTER).map(cluster)).collect()
-}
-
-/// Largest eigenvalue of a covered node's own block of C, or a bound of it [m/N]. That of an isotropic object is a number times
-/// the identity.
-fn mobility(model: &contact::Model<'_>) -> f64 {
-    if model.compliance.rows_per_node == 1 { model.softest / 3.0 } else { model.softest }
 }
 
 /// Corners, neighbours, lists around nodes and places, then the clusters' triangles and nodes, one behind the other: see

@@ -71,7 +71,7 @@ impl Inspection {
     pub fn new(model: &Model<'_>, q: &[f64]) -> Self {
         let mut solver = Solver::new(model);
         let equilibrium = solver.solve(q);
-        let (object, chain, pose) = (model.object, model.chain, solver.pose());
+        let (object, chain) = (model.object, model.chain);
         let rest = &object.rest[..object.surface_nodes];
         let mut object_nodes: Vec<ObjectNode> = rest
             .iter()
@@ -81,6 +81,7 @@ impl Inspection {
         for contact in &equilibrium.forces {
             object_nodes[contact.node as usize].force = contact.force;
         }
+        let pose = solver.pose();
         let proxy_nodes =
             chain.nodes.iter().zip(&pose.nodes).enumerate().map(|(node, (specified, &position))| ProxyNode {
                 link: chain.joints[specified.link].name.clone(),

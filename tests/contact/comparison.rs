@@ -108,7 +108,7 @@ fn linearised_contact_obeys_its_law_at_every_node() {
         }
         assert_eq!(equilibrium.status, Status::Contact);
         touching += 1;
-        let u = solver.displacement();
+        let u = solver.displacement().to_vec();
         for (i, x) in solver.pose().nodes.iter().enumerate() {
             let at = crate::oracle::depth(&object.rest, &object.triangles, *x);
             let mut depth = at.depth;

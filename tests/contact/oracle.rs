@@ -5,7 +5,7 @@ use glam::DVec3;
 use haptize::contact::Equilibrium;
 use haptize::object::Object;
 use haptize::proxy::{Chain, Pose};
-use haptize::tolerances::{FACET_ROUNDING, WALL_COMPLIANCE};
+use haptize::tolerances::FACET_COMPLIANCE;
 
 /// Depth of a point below a surface, and the force law's direction and weights there.
 pub struct Depth {
@@ -58,29 +58,10 @@ fn winding_number(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3) -> f64 
 /// Depth of `x`, by trial of all faces, edges and vertices.
 pub fn depth(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3) -> Depth {
     let mut best = (f64::MAX, DVec3::ZERO, 0, [0.0; 3]);
-    let mut consider = |weights: [f64; 3], t: usize| {
-        let [a, b, c] = triangles[t].map(|node| positions[node as usize]);
-        let p = a * weights[0] + b * weights[1] + c * weights[2];
+    for (t, triangle) in triangles.iter().enumerate() {
+        let (weights, p) = closest(triangle.map(|node| positions[node as usize]), x);
         if p.distance(x) < best.0 {
             best = (p.distance(x), p, t, weights);
-        }
-    };
-    for (t, triangle) in triangles.iter().enumerate() {
-        let corners = triangle.map(|node| positions[node as usize]);
-        for k in 0..3 {
-            let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            let share = ((x - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
-            let mut weights = [0.0; 3];
-            weights[k] = 1.0 - share;
-            weights[(k + 1) % 3] = share;
-            consider(weights, t);
-        }
-        let [a, b, c] = corners;
-        let n = (b - a).cross(c - a);
-        let weights = [(c - b).cross(x - b), (a - c).cross(x - c), (b - a).cross(x - a)]
-            .map(|part| part.dot(n) / n.length_squared());
-        if weights.iter().all(|&w| w >= 0.0) {
-            consider(weights, t);
         }
     }
     let inside = winding_number(positions, triangles, x) > 0.5;
@@ -89,75 +70,60 @@ pub fn depth(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3) -> Depth {
     Depth { depth, normal: (p - x) / depth, triangle, weights }
 }
 
-/// Weights of the point of a triangle for which |x - p| sqrt(1 + k |w|^2) is least, by trial of all features in six dimensions, where
-/// the corners are lifted; and that least value.
-fn rounded(corners: [DVec3; 3], x: DVec3) -> ([f64; 3], f64) {
-    let of = |w: [f64; 3]| {
-        let p = corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2];
-        (x.distance_squared(p), 1.0 + FACET_ROUNDING * w.iter().map(|w| w * w).sum::<f64>())
-    };
-    let mut best = [1.0 / 3.0; 3];
-    for _ in 0..8 {
-        let (square, rise) = of(best);
-        let lift = FACET_ROUNDING * square / rise;
-        let cost = |w: [f64; 3]| of(w).0 + lift * w.iter().map(|w| w * w).sum::<f64>();
-        // Gram matrix of the offsets of the lifted corners from x: cost = w . gram w.
-        let offsets = corners.map(|corner| corner - x);
-        let gram = |j: usize, k: usize| offsets[j].dot(offsets[k]) + if j == k { lift } else { 0.0 };
-        let mut candidates = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        for (j, k) in [(0, 1), (1, 2), (2, 0)] {
-            let share = (gram(j, j) - gram(j, k)) / (gram(j, j) - 2.0 * gram(j, k) + gram(k, k));
-            let mut w = [0.0; 3];
-            (w[j], w[k]) = (1.0 - share, share);
-            candidates.push(w);
-        }
-        // Cofactors: gram w is the same in all three components.
-        let minor = |j: usize, k: usize| {
-            let (a, b, c, d) = ((j + 1) % 3, (j + 2) % 3, (k + 1) % 3, (k + 2) % 3);
-            gram(a, c) * gram(b, d) - gram(a, d) * gram(b, c)
-        };
-        let w = [0, 1, 2].map(|j| minor(j, 0) + minor(j, 1) + minor(j, 2));
-        let sum: f64 = w.iter().sum();
-        candidates.push(w.map(|w| w / sum));
-        candidates.retain(|w| w.iter().all(|&w| w >= 0.0));
-        best = candidates.into_iter().min_by(|v, w| cost(*v).total_cmp(&cost(*w))).unwrap();
+/// Weights of the point of a triangle that is closest to `x`, by trial of its edges and its inside, and that point.
+fn closest(corners: [DVec3; 3], x: DVec3) -> ([f64; 3], DVec3) {
+    let at = |w: [f64; 3]| corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2];
+    let mut candidates = Vec::new();
+    for k in 0..3 {
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        let share = ((x - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+        let mut weights = [0.0; 3];
+        weights[k] = 1.0 - share;
+        weights[(k + 1) % 3] = share;
+        candidates.push(weights);
     }
-    let (square, rise) = of(best);
-    (best, (square * rise).sqrt())
+    let [a, b, c] = corners;
+    let n = (b - a).cross(c - a);
+    let weights = [(c - b).cross(x - b), (a - c).cross(x - c), (b - a).cross(x - a)];
+    let weights = weights.map(|part| part.dot(n) / n.length_squared());
+    if weights.iter().all(|&w| w >= 0.0) {
+        candidates.push(weights);
+    }
+    let best = candidates.into_iter().min_by(|v, w| at(*v).distance(x).total_cmp(&at(*w).distance(x))).unwrap();
+    (best, at(best))
 }
 
-/// The walls of a ball: force on it, triangle and weights of each. With t the common part of its spring's compression, t / (1 - e) is the
-/// sum of (s - t) / e over the walls deeper than t: found by halving.
-fn walls(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3, radius: f64, kc: f64) -> Vec<(DVec3, usize, [f64; 3])> {
+/// The facets that a ball feels: force on it, triangle and weights of each. With t the shared part of its spring's compression,
+/// t / (1 - e) is the sum of (s - t) / e over the facets deeper than t: found by halving.
+fn felt(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3, radius: f64, kc: f64) -> Vec<(DVec3, usize, [f64; 3])> {
     let mut all: Vec<_> = triangles
         .iter()
         .enumerate()
         .map(|(t, triangle)| {
-            let (weights, distance) = rounded(triangle.map(|node| positions[node as usize]), x);
-            (radius - distance, 1.0, t, weights)
+            let (weights, p) = closest(triangle.map(|node| positions[node as usize]), x);
+            (radius - p.distance(x), 1.0, t, weights)
         })
         .collect();
     if winding_number(positions, triangles, x) > 0.5 {
         let nearest = all.iter_mut().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
         (nearest.0, nearest.1) = (2.0 * radius - nearest.0, -1.0);
     }
-    let (mut low, mut high) = (0.0, all.iter().map(|wall| wall.0).fold(0.0, f64::max));
+    let (mut low, mut high) = (0.0, all.iter().map(|facet| facet.0).fold(0.0, f64::max));
     for _ in 0..60 {
         let t = 0.5 * (low + high);
-        let borne: f64 = all.iter().map(|wall| (wall.0 - t).max(0.0) / WALL_COMPLIANCE).sum();
-        if borne > t / (1.0 - WALL_COMPLIANCE) {
+        let taken: f64 = all.iter().map(|facet| (facet.0 - t).max(0.0) / FACET_COMPLIANCE).sum();
+        if taken > t / (1.0 - FACET_COMPLIANCE) {
             low = t;
         } else {
             high = t;
         }
     }
-    all.retain(|wall| wall.0 > low);
+    all.retain(|facet| facet.0 > low);
     let force = |(depth, side, t, weights): (f64, f64, usize, [f64; 3])| {
         let [a, b, c] = triangles[t].map(|node| positions[node as usize]);
         let offset = x - (a * weights[0] + b * weights[1] + c * weights[2]);
-        let rise = 1.0 + FACET_ROUNDING * weights.iter().map(|w| w * w).sum::<f64>();
-        let push = kc * (depth - low) / WALL_COMPLIANCE;
-        (offset.normalize() * (side * rise.sqrt() * push), t, weights)
+        let push = kc * (depth - low) / FACET_COMPLIANCE;
+        (offset.normalize() * (side * push), t, weights)
     };
     all.into_iter().map(force).collect()
 }
@@ -222,8 +188,8 @@ pub fn check_account(object: &Object, chain: &Chain, q: &[f64], equilibrium: &Eq
 
 /// Balance and contact law: with u = K^-1 (stored forces), every proxy node's force is kc times its depth below the
 /// displaced surface along the normal there, and the object's nodes carry it by the weights of the closest point. A node with a radius
-/// is a spring in series with one to each facet ([`walls`]). `tolerance` is relative to the largest force; a wall's own spring is
-/// stiffer than kc by 1 / WALL_COMPLIANCE.
+/// is a spring in series with one to each facet ([`felt`]). `tolerance` is relative to the largest force; a facet's own spring is
+/// stiffer than kc by 1 / FACET_COMPLIANCE.
 pub fn check_contact_law(
     object: &Object,
     chain: &Chain,
@@ -248,13 +214,13 @@ pub fn check_contact_law(
         if radius > 0.0 && touches.peek().is_some() {
             let sum: DVec3 = touches.map(|touch| touch.force).sum();
             let mut law = DVec3::ZERO;
-            for (force, triangle, weights) in walls(&positions, &object.triangles, *x, radius, kc) {
+            for (force, triangle, weights) in felt(&positions, &object.triangles, *x, radius, kc) {
                 law += force;
                 for (node, weight) in object.triangles[triangle].iter().zip(weights) {
                     expected[*node as usize] -= force * weight;
                 }
             }
-            if (sum - law).length() > tolerance / WALL_COMPLIANCE * scale {
+            if (sum - law).length() > tolerance / FACET_COMPLIANCE * scale {
                 return Err(format!("node {i}: force {sum}, law {law}, largest {scale}"));
             }
             continue;
@@ -273,7 +239,7 @@ pub fn check_contact_law(
         }
     }
     for (node, (force, expected)) in forces.iter().zip(&expected).enumerate() {
-        let tolerance = if balls { tolerance / WALL_COMPLIANCE } else { tolerance };
+        let tolerance = if balls { tolerance / FACET_COMPLIANCE } else { tolerance };
         if (*force - *expected).length() > tolerance * scale {
             return Err(format!("object node {node}: force {force}, law {expected}"));
         }

@@ -10,7 +10,7 @@ use haptize::{
     object::{Compliance, Object},
     proxy::Chain,
     scene::{Algorithm, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
-    tolerances::{FACET_ROUNDING, GPU_SETTLED_RESIDUAL, WALL_COMPLIANCE},
+    tolerances::{FACET_COMPLIANCE, GPU_SETTLED_RESIDUAL},
 };
 
 /// Springs along their rest direction, and a solid: of both, unlike isotropic springs, the compliance has blocks of nine numbers.
@@ -82,23 +82,17 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
     let mut energy = 0.0;
     for touch in &result.touches {
         let magnitude = touch.force.length();
-        // Contact law: lambda = kc depth, of one of several walls its part of it, and compression: lambda > 0 outwards.
+        // Contact law: lambda = kc depth, of one of several facets its part of it, and compression: lambda > 0 outwards.
         let foot: DVec3 = (touch.nodes.iter().zip(touch.weights))
             .map(|(&node, weight)| (model.object.rest[node as usize] + displacement(node)) * weight)
             .sum();
         let radius = model.chain.nodes[touch.proxy_node as usize].radius;
         let toward = foot - pose.nodes[touch.proxy_node as usize];
         let normal = touch.force / magnitude;
-        let rise = |touch: &Touch| {
-            let squares: f64 = touch.weights.iter().map(|w| w * w).sum();
-            // Facets are rounded for balls where they deform.
-            let rounded = radius > 0.0 && model.contact.algorithm == Algorithm::Energy;
-            if rounded { (1.0 + FACET_ROUNDING * squares).sqrt() } else { 1.0 }
-        };
-        let push = |touch: &Touch| touch.force.length() / (rise(touch) * model.kc);
-        let depth = radius + normal.dot(toward) * rise(touch);
+        let push = |touch: &Touch| touch.force.length() / model.kc;
+        let depth = radius + normal.dot(toward);
         let whole: f64 = result.touches.iter().filter(|t| t.proxy_node == touch.proxy_node).map(push).sum();
-        let law = WALL_COMPLIANCE * push(touch) + (1.0 - WALL_COMPLIANCE) * whole;
+        let law = FACET_COMPLIANCE * push(touch) + (1.0 - FACET_COMPLIANCE) * whole;
         if (depth - law).abs() > DEPTH_AGREEMENT + INVARIANT_AGREEMENT * depth.abs() {
             return Some(format!("contact law: depth {depth:e} m, force {magnitude:e} N"));
         }

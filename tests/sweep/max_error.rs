@@ -12,11 +12,11 @@ use haptize::{
 use serde_json::Value;
 use std::{path::Path, process::Output, sync::atomic::AtomicBool};
 
-/// The small sphere on 25 x 33 grid points, touched by balls: torque has kinks, and hardly a jump.
+/// The small sphere on 25 x 29 grid points, touched by balls: torque has kinks, and hardly a jump.
 fn text() -> String {
     SCENE
         .replace("step = 0.1, count = 7", "step = 0.025, count = 25")
-        .replace("step = 0.004, count = 9", "step = 0.001, count = 33")
+        .replace("step = 0.004, count = 9", "step = 0.001, count = 29")
         .replace("count = 3 }]", "count = 3, radius = 0.01 }]")
 }
 

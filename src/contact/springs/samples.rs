@@ -1,16 +1,15 @@
 //! Contact springs to test with: points and balls pressed into the sphere.
 
-use super::{Bending, Springs, add_contact_hessian};
-use crate::contact::closest_point::{closest_point, rounded};
+use super::{Springs, add_contact_hessian};
+use crate::contact::closest_point::{closest_point, point_at};
 use crate::contact::depth::{Contact, measure};
-use crate::contact::series::share_out;
+use crate::contact::series::distribute_all;
 use crate::contact::support::Support;
-use crate::contact::{surface, walls::wall};
+use crate::contact::surface;
 use crate::object::{Compliance, Object};
 use crate::random::Random;
 use crate::report::stability::contact::world::{Ball, PAPER, sphere};
 use crate::scene::SpringKind;
-use crate::tolerances::FACET_ROUNDING;
 use glam::DVec3;
 
 /// Springs on a support.
@@ -47,16 +46,17 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
         let shared = object.triangles[t][0];
         let around = (0..object.triangles.len()).filter(|&near| object.triangles[near].contains(&shared));
         for near in around.take(3) {
-            let (point, _) = rounded(x, corners(near), FACET_ROUNDING);
-            let nodes = (object.triangles[near], corners(near));
-            contacts.push(wall((i, x, 0.008), nodes, point, false, DVec3::X, FACET_ROUNDING));
+            let point = closest_point(x, corners(near));
+            let outward = x - point_at(corners(near), point.weights);
+            let measured = measure(x, 0.008, corners(near), point.weights, point.feature, outward.normalize());
+            contacts.push(Contact::new(i, object.triangles[near], point.weights, measured));
         }
     }
-    share_out(&mut contacts, &mut Vec::new());
+    distribute_all(&mut contacts, &mut Vec::new());
     for contact in &mut contacts {
         // Springs of different stiffness.
         contact.share = 0.5 + 0.25 * f64::from(contact.proxy_node);
-        contact.multiplier = bending * kc * contact.bears();
+        contact.multiplier = bending * kc * contact.force_over_kc();
     }
     let mut support = Support::new(object.surface_nodes);
     let slots = contacts.iter().map(|contact| contact.nodes.map(|node| support.add(node))).collect();
@@ -65,14 +65,6 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
 }
 
 impl Sample {
-    /// The same without the points.
-    pub fn of_balls(mut self) -> Self {
-        let mut contacts = self.contacts.iter();
-        self.slots.retain(|_| contacts.next().is_some_and(|contact| contact.wall.is_some()));
-        self.contacts.retain(|contact| contact.wall.is_some());
-        self
-    }
-
     /// The object's part.
     pub fn support(&self) -> &Support {
         &self.support
@@ -80,12 +72,12 @@ impl Sample {
 
     /// The springs.
     pub fn springs(&self) -> Springs<'_> {
-        Springs { contacts: &self.contacts, slots: &self.slots, kc: self.kc, bending: Bending::Exact }
+        Springs { contacts: &self.contacts, slots: &self.slots, kc: self.kc }
     }
 
     /// Which of them touch.
     pub fn touching(&self) -> Vec<bool> {
-        self.contacts.iter().map(|contact| contact.bears() > 0.0).collect()
+        self.contacts.iter().map(|contact| contact.force_over_kc() > 0.0).collect()
     }
 
     /// `((1 + mu) K + B) C force`, `stiffening` being 1 + mu [N].

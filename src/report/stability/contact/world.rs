@@ -8,7 +8,7 @@ use crate::{
     proxy::Chain,
     scene::{
         Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
-        ProxySpec, Shape, SpringKind, SpringSpec,
+        ProxySpec, Shape, SkinSpec, SpringKind, SpringSpec,
     },
 };
 use glam::DVec3;
@@ -80,6 +80,20 @@ pub fn sphere_spec(ball: Ball, centre: DVec3, scale: f64, stiffness: f64) -> Obj
 /// When it cannot be built.
 pub fn sphere(ball: Ball) -> Result<Object, Failure> {
     Ok(Object::build(&sphere_spec(ball, DVec3::ZERO, 1.0, 1.0))?)
+}
+
+/// A sphere around the origin with the skin of the scene that ships, edges of the icosahedron in `divisions` parts.
+///
+/// # Errors
+/// When it cannot be built.
+pub fn skinned(divisions: usize) -> Result<Object, Failure> {
+    Ok(Object::build(&ObjectSpec {
+        shape: Shape::Icosphere { centre: DVec3::ZERO, radius: RADIUS, divisions },
+        material: Material::Hollow,
+        skin: Some(SkinSpec { tension: 260.0, bending: 0.08, foundation: 1.6e5 }),
+        ground: None,
+        ..sphere_spec(PAPER, DVec3::ZERO, 1.0, 1.0)
+    })?)
 }
 
 /// A surface with springs of 300 N/m, held at every node by 100 N/m.
