@@ -223,6 +223,9 @@ pub const STAGE_TOLERANCE: f64 = 0.01;
 /// the next has a different energy and mostly gets past it.
 pub const STALLED_LENGTH: f64 = 1e-5;
 
+/// Ripple of the force on a contact point over a facet above which a bake warns that the mesh shows through [1].
+pub const RIPPLE_WARNING: f64 = 0.1;
+
 /// How far the surface of an object is expected to move, in depths of the deepest proxy node below it at rest [1]: in stiff
 /// contact it moves by that depth along the normal, and as much again leaves room for what neighbouring nodes drag along.
 pub const EXPECTED_MOTION: f64 = 2.0;

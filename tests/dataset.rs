@@ -73,6 +73,7 @@ fn sample() -> Dataset {
             adapter: "none".into(),
             date: "2012-03-04T00:00:00Z".into(),
             error: None,
+            mesh_ripple: None,
             aim: None,
         },
     }

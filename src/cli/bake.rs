@@ -121,6 +121,7 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Optio
     if let Some(skin) = report.skin {
         writeln!(text, "  skin         {skin}")?;
     }
+    info::mesh_ripple(text, report.mesh_ripple)?;
     if let Some(Lowered { points, converged, greatest, rounds, searches, seconds }) = report.lowered {
         writeln!(
             text,
@@ -134,6 +135,9 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Optio
 
 /// What the sweep is going to take, before it begins.
 fn announce(progress: &Progress) {
+    if let Some(remedy) = progress.mesh_ripple.and_then(|ripple| ripple.remedy()) {
+        eprintln!("haptize: {remedy}");
+    }
     let range = |Bounds { least, most }| format!("{} to {}", megabytes(least), megabytes(most));
     let Progress { points, done, footprint: Footprint { memory, disk }, .. } = progress;
     let disk = match disk.most {

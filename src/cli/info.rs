@@ -3,6 +3,7 @@
 use super::{Failure, Report};
 use glam::DVec3;
 use haptize::{
+    contact::MeshRipple,
     dataset::{Axis, Dataset, MeasuredError, Summary},
     object::Skin,
     scene::Rendering,
@@ -85,6 +86,7 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
         writeln!(text, "  not there    {}", absent.join(", "))?;
     }
     let from = &summary.provenance;
+    mesh_ripple(text, from.mesh_ripple)?;
     error(text, from.error.as_ref(), from.aim)?;
     write!(text, "  made         {} by haptize {}: {}", from.date, from.version, from.algorithm)?;
     // Measured torques were not solved for: they have no residual.
@@ -92,6 +94,13 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
         write!(text, " to {:.0e}", from.tolerance)?;
     }
     writeln!(text, " on {} ({})", from.backend, from.adapter)
+}
+
+/// How much a contact point feels the mesh, and what to do about it.
+pub fn mesh_ripple(text: &mut String, ripple: Option<MeshRipple>) -> fmt::Result {
+    let Some(ripple) = ripple else { return Ok(()) };
+    writeln!(text, "  mesh ripple  {ripple}")?;
+    ripple.remedy().map_or(Ok(()), |remedy| writeln!(text, "  {:<12} {remedy}", ""))
 }
 
 /// The error that the bake measured, and the one that its grid was chosen for.

@@ -13,6 +13,7 @@ pub(crate) mod depth;
 pub(crate) mod detection;
 mod distance_bounds;
 pub(crate) mod energy;
+mod mesh_ripple;
 mod model;
 mod newton;
 mod packet;
@@ -30,6 +31,7 @@ pub(crate) mod surface;
 mod tangent;
 mod wide;
 
+pub use mesh_ripple::MeshRipple;
 pub use model::Model;
 pub use proximity::Proximity;
 pub use solver::Solver;

@@ -27,7 +27,7 @@ pub(crate) use file::{Contents as TensorContents, Heading, Tensor, write_file};
 pub use grid::{Axis, Grid};
 pub use summary::{StatusCounts, Summary};
 
-use crate::contact::{NodeForce, Status};
+use crate::contact::{MeshRipple, NodeForce, Status};
 use glam::DVec3;
 
 /// A dataset. Columns are owned (just baked) or lie in a mapped file (just opened); both read alike.
@@ -100,6 +100,9 @@ pub struct Provenance {
     /// The error that the bake measured; absent where that was left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<MeasuredError>,
+    /// How much a contact point feels the mesh; absent where nothing was solved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh_ripple: Option<MeshRipple>,
     /// Where the grid was chosen for an error, that error: rms, over the rms of the torque [1].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aim: Option<f64>,

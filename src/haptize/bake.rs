@@ -73,6 +73,7 @@ impl Bake<'_> {
         model.with_tangent = scene.uses_tangent();
         let mut backend = ChosenBackend::open(backend, &model)?;
         let mut sweep = Sweep::new(scene, &object, backend.name(), &backend.adapter(), date)?;
+        sweep.diagnose(&model);
         sweep.skip_free_space(&model)?;
         sweep.find_lowest(&model)?;
         sweep.measure_error(&model, &scene.haptics, measured)?;

@@ -89,9 +89,10 @@ impl Sweep<'_> {
         let Begun { mut tally, mut provenance } = begun;
         let (points, resumed, start) = (self.grid.points(), tally.points, Instant::now());
         let left_before = backend.left_to_cpu();
+        let mesh_ripple = self.mesh_ripple();
         let mut tell = |tally: &Tally, rate| {
             let (done, contact_points) = (tally.points, tally.statuses.in_contact());
-            (run.progress)(Progress { done, points, contact_points, rate, footprint });
+            (run.progress)(Progress { done, points, contact_points, rate, footprint, mesh_ripple });
         };
         tell(&tally, 0.0);
         let (free_space, mut skipped) = (self.free_space(), 0);

@@ -1,6 +1,7 @@
 //! What a sweep did, in numbers.
 
 use super::{Footprint, Lowered, tally::Tally};
+use crate::contact::MeshRipple;
 use crate::dataset::{MeasuredError, Provenance};
 use crate::object::Skin;
 use serde::Serialize;
@@ -48,6 +49,9 @@ pub struct SweepReport {
     /// The object's skin beside its mesh; absent where it has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<Skin>,
+    /// How much a contact point feels the mesh; absent where that was not looked at.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh_ripple: Option<MeshRipple>,
     /// What was noticed about the object while it was built, and what happened on the way.
     pub warnings: Vec<String>,
 }
@@ -89,6 +93,7 @@ impl SweepReport {
             algorithm: provenance.algorithm.clone(),
             footprint,
             skin: None,
+            mesh_ripple: provenance.mesh_ripple,
             warnings: object_warnings.iter().chain(&provenance.notices).cloned().collect(),
         }
     }

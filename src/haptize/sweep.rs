@@ -16,7 +16,7 @@ use super::{
     tally::Tally,
 };
 use crate::{
-    contact::Model,
+    contact::{MeshRipple, Model},
     dataset::{Axis, Contacts, Dataset, Grid, Heading, Provenance, Surface, Target},
     object::{Object, Skin},
     scene::{HapticsSpec, JointKind, Scene},
@@ -42,6 +42,8 @@ pub struct Progress {
     pub rate: f64,
     /// What the sweep takes up.
     pub footprint: Footprint,
+    /// How much a contact point feels the mesh, where that was looked at.
+    pub mesh_ripple: Option<MeshRipple>,
 }
 
 /// How a sweep is run; nothing of it changes the result.
@@ -133,6 +135,7 @@ impl<'a> Sweep<'a> {
                 date: date.into(),
                 notices: Vec::new(),
                 error: None,
+                mesh_ripple: None,
                 aim: None,
             },
             skin: object.skin,
@@ -142,6 +145,16 @@ impl<'a> Sweep<'a> {
             error: None,
             proxy_nodes: scene.proxy.joints.iter().map(|joint| joint.nodes.len()).sum(),
         })
+    }
+
+    /// States how much a contact point of `model` feels the mesh, which is that of the scene.
+    pub fn diagnose(&mut self, model: &Model<'_>) {
+        self.provenance.mesh_ripple = MeshRipple::new(model);
+    }
+
+    /// How much a contact point feels the mesh, where that was looked at.
+    pub(super) fn mesh_ripple(&self) -> Option<MeshRipple> {
+        self.provenance.mesh_ripple
     }
 
     /// Skips the points that [`FreeSpace`] proves free: `model` is that of the scene. Nothing is changed but gaps farther than

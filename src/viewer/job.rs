@@ -251,6 +251,7 @@ fn bake(
     };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
     let mut sweep = Sweep::new(&scene, &object, backend.name(), &backend.adapter(), &date)?;
+    sweep.diagnose(&model);
     sweep.skip_free_space(&model)?;
     sweep.find_lowest(&model)?;
     sweep.measure_error(&model, &scene.haptics, None)?;
