@@ -4,7 +4,7 @@
 
 use haptize::{
     contact::Status,
-    dataset::{Axis, Contacts, Dataset, Error, Format, Grid, Provenance, Surface},
+    dataset::{Axis, Contacts, Dataset, Error, Format, Grid, Provenance, Solid, Surface},
 };
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -62,6 +62,10 @@ fn sample() -> Dataset {
         surface: Some(Surface {
             nodes: (0..12).map(|k| f64::from(k) / 7.0).collect::<Vec<_>>().into(),
             triangles: vec![0, 1, 2, 0, 2, 3, 0, 3, 1, 1, 3, 2].into(),
+            solid: Some(Solid {
+                inner_nodes: vec![0.1, 0.2, 1.0 / 3.0].into(),
+                tetrahedra: vec![0, 1, 2, 4, 0, 2, 3, 4].into(),
+            }),
         }),
         scene: "name = \"sample\" # Kontakt \u{fc}ber \u{3c0}\n".into(),
         provenance: Provenance {
@@ -101,6 +105,7 @@ fn bits<T: bytemuck::Pod>(column: &[T]) -> Vec<u8> {
 fn contents(dataset: &Dataset) -> Vec<(&'static str, Option<Vec<u8>>)> {
     let contacts = dataset.contacts.as_ref();
     let surface = dataset.surface.as_ref();
+    let solid = surface.and_then(|surface| surface.solid.as_ref());
     vec![
         ("grid", Some(format!("{:?}", dataset.grid).into_bytes())),
         ("provenance", Some(format!("{:?}", dataset.provenance).into_bytes())),
@@ -116,6 +121,8 @@ fn contents(dataset: &Dataset) -> Vec<(&'static str, Option<Vec<u8>>)> {
         ("forces", contacts.map(|c| bits(&c.forces))),
         ("surface nodes", surface.map(|s| bits(&s.nodes))),
         ("triangles", surface.map(|s| bits(&s.triangles))),
+        ("inner nodes", solid.map(|s| bits(&s.inner_nodes))),
+        ("tetrahedra", solid.map(|s| bits(&s.tetrahedra))),
     ]
 }
 
@@ -304,6 +311,9 @@ fn hostile_files_with_right_checksums_are_refused_in_small_memory() {
         ("an infinite force", write("contact_forces", 14, f32::INFINITY.to_le_bytes().into()), "contact_forces"),
         ("a corner of the surface nowhere", write("surface_nodes", 0, f64::NAN.to_le_bytes().into()), "surface_nodes"),
         ("a triangle on a node that is not", write("surface_triangles", 3, 4_u32.to_le_bytes().into()), "node 4, of 4"),
+        ("a tetrahedron on a node that is not", write("tetrahedra", 7, 5_u32.to_le_bytes().into()), "node 5, of 5"),
+        ("an inner node nowhere", write("inner_nodes", 2, f64::INFINITY.to_le_bytes().into()), "inner_nodes"),
+        ("tetrahedra without inner nodes", Box::new(|header, _| rename(header, "inner_nodes", "i")), "inner_nodes"),
         ("a contact on a node that is not", write("contact_nodes", 1, u32::MAX.to_le_bytes().into()), "contact_nodes"),
         ("a node twice in a row", write("contact_nodes", 1, 0_u32.to_le_bytes().into()), "do not ascend"),
         ("a row beyond the end", write("contact_offsets", 3, u64::MAX.to_le_bytes().into()), "descend"),

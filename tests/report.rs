@@ -133,10 +133,7 @@ fn dataset(chain: &Chain, object: &Object, counts: &[usize]) -> Dataset {
         iterations: None,
         tangent: None,
         contacts: Some(Contacts { offsets: offsets.into(), nodes: nodes.into(), forces: forces.into() }),
-        surface: Some(Surface {
-            nodes: object.rest.iter().flat_map(|n| n.to_array()).collect::<Vec<f64>>().into(),
-            triangles: object.triangles.as_flattened().to_vec().into(),
-        }),
+        surface: Some(Surface::of(object)),
         scene: String::new(),
         provenance: Provenance::default(),
     }

@@ -86,9 +86,7 @@ fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
     };
     let mut scene = Scene::parse(&dataset.scene, path)?;
     scene.contact.algorithm = Algorithm::from_str(&dataset.provenance.algorithm, true)?;
-    let nodes = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
-    let triangles = surface.triangles.chunks_exact(3).map(|corners| [corners[0], corners[1], corners[2]]).collect();
-    let object = Object::from_surface(&scene.object, nodes, triangles)?;
+    let object = surface.object(&scene.object)?;
     Ok((scene, object, Some(dataset)))
 }
 

@@ -3,7 +3,7 @@
 //! Lengths fit the grid, contact rows are ordered and within, statuses are known, every number is finite. Checked in an
 //! order in which no check relies on one that comes later, and without allocating, so that hostile counts cost nothing.
 
-use super::{Column, Contacts, Dataset, Surface};
+use super::{Column, Contacts, Dataset, Solid, Surface};
 use crate::{JointMatrix, contact::Status};
 
 /// `Err` says what is wrong.
@@ -46,12 +46,18 @@ pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
 }
 
 fn check_surface(surface: &Surface) -> Result<(), String> {
-    let (nodes, triangles) = (&surface.nodes, &surface.triangles);
+    let Surface { nodes, triangles, solid } = surface;
     if !nodes.len().is_multiple_of(3) || !triangles.len().is_multiple_of(3) {
         return Err("the surface has an incomplete node or triangle".into());
     }
     finite("surface_nodes", nodes, |x: &f64| x.is_finite())?;
-    within("surface_triangles", triangles, nodes.len() / 3)
+    within("surface_triangles", triangles, nodes.len() / 3)?;
+    let Some(Solid { inner_nodes, tetrahedra }) = solid else { return Ok(()) };
+    if !inner_nodes.len().is_multiple_of(3) || !tetrahedra.len().is_multiple_of(4) {
+        return Err("the solid has an incomplete node or tetrahedron".into());
+    }
+    finite("inner_nodes", inner_nodes, |x: &f64| x.is_finite())?;
+    within("tetrahedra", tetrahedra, (nodes.len() + inner_nodes.len()) / 3)
 }
 
 fn check_contacts(contacts: &Contacts, points: usize, surface_nodes: usize) -> Result<(), String> {

@@ -18,6 +18,7 @@
 //! | `contact_offsets` | u64 | points + 1 | rows of the next two |
 //! | `contact_nodes`, `contact_forces` | u32, f32 | c and c, 3 | object node, force on it [N] |
 //! | `surface_nodes`, `surface_triangles` | f64, u32 | S, 3 and T, 3 | at rest [m] |
+//! | `inner_nodes`, `tetrahedra` | f64, u32 | I, 3 and V, 4 | of a mesh of tetrahedra; inner nodes are numbered from S on [m] |
 //!
 //! In Python: `safetensors.numpy.load_file("sphere.haptize")["torque"]`.
 //!
@@ -28,7 +29,7 @@
 //! A mapped file must not be cut short by anyone while it is open: the system then kills the reader (SIGBUS). Programs
 //! of this crate never do that, they rename; the haptic loop reads through [`Dataset::load`], which copies.
 
-use super::{Column, Contacts, Dataset, Error, Grid, Provenance, Surface, Target, check, replace_file};
+use super::{Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, Target, check, replace_file};
 use crate::JointMatrix;
 use bytemuck::Pod;
 use safetensors::{Dtype, tensor::TensorInfo};
@@ -116,16 +117,23 @@ impl<C> Tensor<C> {
         Self { name, dtype: T::DTYPE, shape, contents }
     }
 
+    /// The same tensor, its contents handed over in another form.
+    pub(crate) fn map<D>(self, convert: impl FnOnce(C) -> D) -> Tensor<D> {
+        let Self { name, dtype, shape, contents } = self;
+        Tensor { name, dtype, shape, contents: convert(contents) }
+    }
+
     fn bytes(&self) -> usize {
         self.shape.iter().product::<usize>() * self.dtype.bitsize() / 8
     }
 }
 
+fn tensor<'a, T: Element>(name: &'static str, shape: &[usize], column: &'a Column<T>) -> Tensor<&'a [u8]> {
+    Tensor::new::<T>(name, shape.to_vec(), bytemuck::cast_slice(column))
+}
+
 /// All tensors of a dataset.
 pub(super) fn tensors(dataset: &Dataset) -> Vec<Tensor<&[u8]>> {
-    fn tensor<'a, T: Element>(name: &'static str, shape: &[usize], column: &'a Column<T>) -> Tensor<&'a [u8]> {
-        Tensor::new::<T>(name, shape.to_vec(), bytemuck::cast_slice(column))
-    }
     let grid = dataset.grid.counts();
     let torque_shape = [&grid[..], &[dataset.grid.joints()]].concat();
     let mut tensors = vec![tensor("torque", &torque_shape, &dataset.torque), tensor("status", &grid, &dataset.status)];
@@ -140,9 +148,20 @@ pub(super) fn tensors(dataset: &Dataset) -> Vec<Tensor<&[u8]>> {
         tensors.push(tensor("contact_nodes", &[nodes.len()], nodes));
         tensors.push(tensor("contact_forces", &[nodes.len(), 3], forces));
     }
-    if let Some(Surface { nodes, triangles }) = &dataset.surface {
-        tensors.push(tensor("surface_nodes", &[nodes.len() / 3, 3], nodes));
-        tensors.push(tensor("surface_triangles", &[triangles.len() / 3, 3], triangles));
+    tensors.extend(dataset.surface.iter().flat_map(surface_tensors));
+    tensors
+}
+
+/// The tensors of an object's geometry.
+pub(crate) fn surface_tensors(surface: &Surface) -> Vec<Tensor<&[u8]>> {
+    let Surface { nodes, triangles, solid } = surface;
+    let mut tensors = vec![
+        tensor("surface_nodes", &[nodes.len() / 3, 3], nodes),
+        tensor("surface_triangles", &[triangles.len() / 3, 3], triangles),
+    ];
+    if let Some(Solid { inner_nodes, tetrahedra }) = solid {
+        tensors.push(tensor("inner_nodes", &[inner_nodes.len() / 3, 3], inner_nodes));
+        tensors.push(tensor("tetrahedra", &[tetrahedra.len() / 4, 4], tetrahedra));
     }
     tensors
 }

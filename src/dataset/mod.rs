@@ -16,6 +16,7 @@ mod grid;
 mod known;
 mod read;
 mod summary;
+mod surface;
 
 pub use accuracy::{InterpolationError, MeasuredError};
 pub(crate) use atomic::BUFFER;
@@ -23,7 +24,7 @@ pub use atomic::{Target, replace_file};
 pub use column::Column;
 pub use error::Error;
 pub use export::Format;
-pub(crate) use file::{Contents as TensorContents, Heading, Tensor, write_file};
+pub(crate) use file::{Contents as TensorContents, Heading, Tensor, surface_tensors, write_file};
 pub use grid::{Axis, Grid};
 pub use summary::{StatusCounts, Summary};
 
@@ -52,7 +53,7 @@ pub struct Dataset {
     pub iterations: Option<Column<u32>>,
     /// Absent where the scene has no graphics, and in scanned datasets.
     pub contacts: Option<Contacts>,
-    /// The object's surface at rest; absent in scanned datasets.
+    /// The object's geometry at rest; absent in scanned datasets.
     pub surface: Option<Surface>,
     /// The scene's text; empty for scanned datasets without one.
     pub scene: String,
@@ -70,13 +71,24 @@ pub struct Contacts {
     pub forces: Column<f32>,
 }
 
-/// The object's surface at rest.
+/// The object's geometry at rest: its surface, and what is inside where the scene's mesh is one of tetrahedra.
 #[derive(Clone)]
 pub struct Surface {
     /// Three numbers a node [m].
     pub nodes: Column<f64>,
     /// Three node numbers a triangle.
     pub triangles: Column<u32>,
+    /// The tetrahedra; absent where the object is made of its surface alone.
+    pub solid: Option<Solid>,
+}
+
+/// Tetrahedra inside a surface.
+#[derive(Clone)]
+pub struct Solid {
+    /// Nodes that are not on the surface, numbered behind those that are, three numbers each [m].
+    pub inner_nodes: Column<f64>,
+    /// Four node numbers a tetrahedron.
+    pub tetrahedra: Column<u32>,
 }
 
 /// Where a dataset comes from.

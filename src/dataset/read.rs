@@ -1,7 +1,7 @@
 //! Dataset files, read: mapped or copied, checked as a whole, and cut into columns where they lie.
 
 use super::{
-    Column, Contacts, Dataset, Error, Grid, Provenance, Surface, check,
+    Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, check,
     file::{CHECKSUM, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, digits},
 };
 use crate::JointMatrix;
@@ -153,6 +153,15 @@ impl Windows {
                     triangles: self
                         .column(tensors, "surface_triangles", &[None, Some(3)])?
                         .ok_or_else(|| missing("surface_triangles"))?,
+                    solid: match self.column(tensors, "tetrahedra", &[None, Some(4)])? {
+                        None => None,
+                        Some(tetrahedra) => Some(Solid {
+                            inner_nodes: self
+                                .column(tensors, "inner_nodes", &[None, Some(3)])?
+                                .ok_or_else(|| missing("inner_nodes"))?,
+                            tetrahedra,
+                        }),
+                    },
                 }),
             },
             grid,

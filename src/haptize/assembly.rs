@@ -5,7 +5,7 @@ use super::{
     columns::{Replaced, Section, Shape},
     part::{self, Part},
 };
-use crate::dataset::{self, Heading, Surface, Target, Tensor, TensorContents, write_file};
+use crate::dataset::{self, Heading, Surface, Target, Tensor, TensorContents, surface_tensors, write_file};
 use std::{
     io::{self, Read, Write},
     sync::atomic::{AtomicBool, Ordering},
@@ -50,17 +50,7 @@ impl Results<'_> {
             tensors.push(Tensor::new::<u32>("contact_nodes", vec![forces], of(Section::Nodes)));
             tensors.push(Tensor::new::<f32>("contact_forces", vec![forces, 3], of(Section::Forces)));
         }
-        let (nodes, triangles) = (&surface.nodes, &surface.triangles);
-        tensors.push(Tensor::new::<f64>(
-            "surface_nodes",
-            vec![nodes.len() / 3, 3],
-            Contents::Held(bytemuck::cast_slice(nodes)),
-        ));
-        tensors.push(Tensor::new::<u32>(
-            "surface_triangles",
-            vec![triangles.len() / 3, 3],
-            Contents::Held(bytemuck::cast_slice(triangles)),
-        ));
+        tensors.extend(surface_tensors(surface).into_iter().map(|tensor| tensor.map(Contents::Held)));
         write_file(output, heading, tensors)
     }
 

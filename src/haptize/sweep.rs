@@ -105,7 +105,6 @@ impl<'a> Sweep<'a> {
             return Err(SweepError::Grid(format!("{} axes for {} joints", grid.joints(), scene.proxy.joints.len())));
         }
         grid.check().map_err(SweepError::Grid)?;
-        let surface = &object.rest[..object.surface_nodes];
         let with_forces = scene.graphics.is_some() || scene.haptics.effects.at_contacts().is_some();
         Ok(Self {
             shape: Shape {
@@ -117,10 +116,7 @@ impl<'a> Sweep<'a> {
             with_forces,
             grid,
             object: content(object),
-            surface: Surface {
-                nodes: surface.iter().flat_map(|node| node.to_array()).collect::<Vec<f64>>().into(),
-                triangles: object.triangles.as_flattened().to_vec().into(),
-            },
+            surface: Surface::of(object),
             scene: scene.text.clone(),
             provenance: Provenance {
                 version: env!("CARGO_PKG_VERSION").into(),

@@ -68,6 +68,28 @@ pub enum ObjectError {
         /// Its corners.
         corners: [u32; 4],
     },
+    /// A tetrahedron names a node that is not there.
+    #[error("a tetrahedron has the nodes {corners:?}, of {count}: build the object again from its scene")]
+    TetrahedronNode {
+        /// Its corners.
+        corners: [u32; 4],
+        /// Number of nodes.
+        count: usize,
+    },
+    /// More surface nodes than nodes.
+    #[error("{surface} of {count} nodes are on the surface: build the object again from its scene")]
+    SurfaceNodes {
+        /// Surface nodes.
+        surface: usize,
+        /// Number of nodes.
+        count: usize,
+    },
+    /// A body without the tetrahedra that the scene names, or with some that it does not.
+    #[error(
+        "the tetrahedra of the scene's object and those that are stored do not agree, as in datasets of earlier versions, \
+         which held none: bake the scene again"
+    )]
+    OtherTetrahedra,
     /// The lattice that fills the surface would be too fine.
     #[error("cells of this size make {cubes:.0} cubes, more than {limit:.0}: make object.elasticity.cell larger")]
     TooManyCubes {

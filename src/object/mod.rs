@@ -5,6 +5,7 @@
 //! hold, or a surface that is not closed, is refused with the reason. The [`Compliance`] C = K^-1 is for contact alone, which
 //! forms it from the factor; graphics never does.
 
+mod body;
 mod compliance;
 mod crossing;
 mod elasticity;
@@ -25,6 +26,7 @@ mod stiffness;
 mod substitution;
 mod topology;
 
+pub use body::Body;
 pub use compliance::Compliance;
 pub use error::{ObjectError, SurfaceDefect};
 pub use factor::{Factor, FactorError};
@@ -37,7 +39,6 @@ pub use topology::Topology;
 use crate::scene::{ElasticSpec, Material, ObjectSpec, Shape};
 use elasticity::Solid;
 use glam::{DMat3, DVec3};
-use import::Body;
 use skin::Laplacian;
 
 /// A deformable object at rest.
@@ -51,6 +52,8 @@ pub struct Object {
     pub surface_nodes: usize,
     /// Outward-oriented closed surface, corner nodes counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// Corners of the tetrahedra of a mesh of such; empty for a surface, whatever fills it.
+    pub tetrahedra: Vec<[u32; 4]>,
     /// Neighbours on the surface.
     pub topology: Topology,
     /// The skin of the surface, where it has one.
@@ -100,18 +103,25 @@ impl Object {
         Self::assemble(spec, body, warnings)
     }
 
-    /// The same object on a surface that is already at hand, such as the one stored in a dataset: the surface that the scene
-    /// names is not read. Tetrahedra are, because a surface does not tell what is inside.
+    /// Builds the object of `spec` on another surface; no file is read.
     ///
     /// # Errors
-    /// As for [`Object::build`], except for the file of a surface.
+    /// As for [`Object::from_body`].
     pub fn from_surface(spec: &ObjectSpec, nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, ObjectError> {
-        match spec.shape {
-            Shape::Tetrahedra { .. } => Self::build(spec),
-            Shape::Sphere { .. } | Shape::Icosphere { .. } | Shape::Mesh { .. } => {
-                Self::assemble(spec, Body::shell((nodes, triangles)), Vec::new())
-            }
+        Self::from_body(spec, Body::shell((nodes, triangles)))
+    }
+
+    /// Builds the object of `spec` on the geometry that a dataset holds of it; no file is read.
+    ///
+    /// # Errors
+    /// As for [`Object::build`], except for files; [`ObjectError::OtherTetrahedra`] if one of `spec` and `body` has tetrahedra and the
+    /// other none; [`ObjectError::TetrahedronNode`] and [`ObjectError::SurfaceNodes`] if `body` names nodes that it lacks.
+    pub fn from_body(spec: &ObjectSpec, body: Body) -> Result<Self, ObjectError> {
+        if matches!(spec.shape, Shape::Tetrahedra { .. }) == body.tetrahedra.is_empty() {
+            return Err(ObjectError::OtherTetrahedra);
         }
+        body.check()?;
+        Self::assemble(spec, body, Vec::new())
     }
 
     fn assemble(spec: &ObjectSpec, body: Body, mut warnings: Vec<String>) -> Result<Self, ObjectError> {
@@ -121,7 +131,8 @@ impl Object {
         let surface = topology::close(&nodes[..surface_nodes], &mut triangles)
             .map_err(|defect| ObjectError::Surface { surface: surface_name(spec), defect })?;
         warnings.extend(surface.warnings);
-        let mut solid = Solid { filled: vec![1.0; tetrahedra.len()], tetrahedra, ..Solid::default() };
+        let mut solid =
+            Solid { filled: vec![1.0; tetrahedra.len()], tetrahedra: tetrahedra.clone(), ..Solid::default() };
         if let (Material::Elastic(ElasticSpec { cell, .. }), true) = (spec.material, solid.tetrahedra.is_empty()) {
             let cell = cell.ok_or_else(|| ObjectError::NoCell { surface: surface_name(spec) })?;
             solid = fill::fill(&mut nodes, &triangles, cell)?;
@@ -161,6 +172,7 @@ impl Object {
             damping: vec![spec.node_damping; nodes.len()],
             rest: nodes,
             triangles,
+            tetrahedra,
             topology: surface.topology,
             stiffness,
             factor,

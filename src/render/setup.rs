@@ -19,7 +19,6 @@ use crate::{
     proxy::Chain,
     scene::{HapticsSpec, ProxyInertia, Rendering, SceneError},
 };
-use glam::DVec3;
 use std::sync::Arc;
 
 /// A dataset, ready to be felt and drawn.
@@ -102,11 +101,7 @@ impl Setup {
         let (haptics, bounds) = haptic_loop(dataset, &chain, &scene, &scene.haptics)?;
         let exceeded = bounds.iter().filter(|bound| bound.is_exceeded()).cloned().collect();
         let object = match (&scene.object, &scene.graphics, &dataset.contacts, &dataset.surface) {
-            (Some(object), Some(_), Some(_), Some(surface)) => {
-                let nodes = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
-                let triangles = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-                Some(Object::from_surface(object, nodes, triangles)?)
-            }
+            (Some(object), Some(_), Some(_), Some(surface)) => Some(surface.object(object)?),
             _ => match scene.graphics.and_then(|graphics| graphics.effects.named()) {
                 Some(effect) => return Err(SetupError::NothingDrawn(effect)),
                 None => None,

@@ -165,7 +165,7 @@ impl Viewer {
     pub fn start(&mut self, start: &Start, egui: &egui::Context) {
         match start {
             Start::Sphere => match Scene::parse(SPHERE, "datasets/sphere.toml") {
-                Ok(scene) => self.begin(Task::Bake(Arc::new(scene)), egui),
+                Ok(scene) => self.begin(Task::Bake(Arc::new(scene), None), egui),
                 Err(error) => self.error = Some(error.to_string()),
             },
             Start::File(path) => self.open_file(path, egui),

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     contact::Model,
-    dataset::Dataset,
+    dataset::{Dataset, Surface},
     gpu::{AdapterChoice, AdapterSummary, Context, GpuError, GpuSolver},
     haptize::{BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, sample},
     object::Object,
@@ -33,8 +33,8 @@ use std::{
 pub enum Task {
     /// Open a scene, and bake it, or a dataset.
     Open(PathBuf),
-    /// Bake a scene.
-    Bake(Arc<Scene>),
+    /// Bake a scene, on the geometry that a dataset holds of its object where there is one: its mesh is not read again then.
+    Bake(Arc<Scene>, Option<Surface>),
 }
 
 /// What bakes.
@@ -132,7 +132,7 @@ impl Job {
     ) -> Result<Self, String> {
         let title = match &task {
             Task::Open(path) => format!("Opening {}", path.file_name().unwrap_or(path.as_os_str()).display()),
-            Task::Bake(scene) => format!("Haptizing {}", scene.name),
+            Task::Bake(scene, _) => format!("Haptizing {}", scene.name),
         };
         let stop = Arc::new(AtomicBool::new(false));
         let (sender, reports) = mpsc::channel();
@@ -210,12 +210,12 @@ fn run(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(Loaded, Option<Body>), Failure> {
     let loaded = match task {
-        Task::Open(path) if is_scene(&path) => bake(Scene::load(&path)?, solver, context, stop, progress)?,
+        Task::Open(path) if is_scene(&path) => bake(Scene::load(&path)?, None, solver, context, stop, progress)?,
         Task::Open(path) => {
             let dataset = Dataset::load(&path)?;
             Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
         }
-        Task::Bake(scene) => bake((*scene).clone(), solver, context, stop, progress)?,
+        Task::Bake(scene, surface) => bake((*scene).clone(), surface, solver, context, stop, progress)?,
     };
     let body = Body::new(context, &loaded, &loaded.tuning().graphics)?;
     Ok((loaded, body))
@@ -228,12 +228,13 @@ fn is_scene(path: &Path) -> bool {
 
 fn bake(
     scene: Scene,
+    surface: Option<Surface>,
     solver: &Solver,
     context: &Arc<Context>,
     stop: &AtomicBool,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Loaded, Failure> {
-    let object = Object::build(&scene.object)?;
+    let object = surface.map_or_else(|| Object::build(&scene.object), |surface| surface.object(&scene.object))?;
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
     model.with_tangent = scene.uses_tangent();
@@ -269,18 +270,35 @@ fn is_cancelled(error: &(dyn Error + 'static)) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Shape;
 
     #[test]
     fn an_adapter_that_does_not_answer_is_told_with_what_to_do() {
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
         let scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
         let gone = AdapterSummary { name: "Unplugged (1)".into(), ..context.adapter().clone() };
-        let task = Task::Bake(Arc::new(scene));
+        let task = Task::Bake(Arc::new(scene), None);
         let Outcome::Failed(why) = Job::begin(task, Solver::Adapter(gone), Arc::clone(&context), || ()).unwrap().wait()
         else {
             panic!("an adapter that is not there baked")
         };
         assert!(why.contains("Unplugged") && why.contains(&context.adapter().name), "{why}");
         assert!(why.contains("Choose the CPU or another adapter"), "{why}");
+    }
+
+    #[test]
+    fn a_bake_on_a_stored_surface_reads_no_mesh() {
+        let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
+        let mut scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
+        let surface = Surface::of(&Object::build(&scene.object).unwrap());
+        let (file, centre) = ("gone.obj".into(), glam::DVec3::ZERO);
+        scene.object.shape = Shape::Mesh { file, scale: 1.0, centre, refine: None };
+        scene.grid.axes.iter_mut().for_each(|axis| axis.count = 2);
+        let bake = |surface| {
+            let task = Task::Bake(Arc::new(scene.clone()), surface);
+            Job::begin(task, Solver::Cpu, Arc::clone(&context), || ()).unwrap().wait()
+        };
+        assert!(matches!(bake(Some(surface)), Outcome::Loaded(_)));
+        assert!(matches!(bake(None), Outcome::Failed(why) if why.contains("gone.obj")));
     }
 }

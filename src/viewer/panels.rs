@@ -181,7 +181,8 @@ impl Viewer {
         });
         self.solver = session.controls.solver.clone();
         if let (true, Some(scene)) = (bake, session.controls.scene.clone()) {
-            self.begin(Task::Bake(scene), &ui.ctx().clone());
+            let surface = session.loaded.dataset.surface.clone();
+            self.begin(Task::Bake(scene, surface), &ui.ctx().clone());
         }
     }
 

@@ -1,26 +1,8 @@
 //! The surface of tetrahedra: their faces that no other tetrahedron shares.
 
-use crate::object::elasticity::volume;
+use crate::object::{Body, elasticity::volume};
 use glam::DVec3;
 use std::collections::HashMap;
-
-/// A body with its surface nodes first.
-pub(in crate::object) struct Body {
-    /// Surface nodes, then interior ones, each kind in the order of the file [m].
-    pub nodes: Vec<DVec3>,
-    pub surface_nodes: usize,
-    /// Faces of the surface, facing outward.
-    pub triangles: Vec<[u32; 3]>,
-    /// Corners, of positive volume.
-    pub tetrahedra: Vec<[u32; 4]>,
-}
-
-impl Body {
-    /// A surface without any.
-    pub fn shell((nodes, triangles): (Vec<DVec3>, Vec<[u32; 3]>)) -> Self {
-        Self { surface_nodes: nodes.len(), nodes, triangles, tetrahedra: Vec::new() }
-    }
-}
 
 /// Faces of a tetrahedron of positive volume, counter-clockwise seen from outside.
 const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];

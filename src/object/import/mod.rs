@@ -9,9 +9,7 @@ mod boundary;
 mod msh;
 mod ply;
 
-pub(super) use boundary::Body;
-
-use super::{ObjectError, topology::place};
+use super::{Body, ObjectError, topology::place};
 use glam::DVec3;
 use std::collections::HashMap;
 use std::fs::File;

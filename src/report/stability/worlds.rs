@@ -58,6 +58,7 @@ pub fn block(haptics: &str) -> Dataset {
     let surface = Surface {
         nodes: vec![0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.1, 0.0].into(),
         triangles: vec![0_u32, 1, 2].into(),
+        solid: None,
     };
     let direction = JointVector::from_slice(&[0.0, 1.0]);
     Dataset {

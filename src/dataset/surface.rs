@@ -1,0 +1,43 @@
+//! An object's geometry as columns, and back: a dataset needs neither scene nor mesh file.
+
+use super::{Column, Solid, Surface};
+use crate::{
+    object::{Body, Object, ObjectError},
+    scene::ObjectSpec,
+};
+use glam::DVec3;
+
+impl Surface {
+    /// Returns the geometry of `object`.
+    #[must_use]
+    pub fn of(object: &Object) -> Self {
+        let (surface, inner) = object.rest.split_at(object.surface_nodes);
+        let numbers = |nodes: &[DVec3]| Column::from(nodes.iter().flat_map(|node| node.to_array()).collect::<Vec<_>>());
+        Self {
+            nodes: numbers(surface),
+            triangles: object.triangles.as_flattened().to_vec().into(),
+            solid: (!object.tetrahedra.is_empty()).then(|| Solid {
+                inner_nodes: numbers(inner),
+                tetrahedra: object.tetrahedra.as_flattened().to_vec().into(),
+            }),
+        }
+    }
+
+    /// Builds the object that was baked; `spec` is that of the dataset's scene. No file is read.
+    ///
+    /// # Errors
+    /// As for [`Object::from_body`].
+    pub fn object(&self, spec: &ObjectSpec) -> Result<Object, ObjectError> {
+        let (inner, tetrahedra) =
+            self.solid.as_ref().map_or((&[][..], &[][..]), |solid| (&solid.inner_nodes[..], &solid.tetrahedra[..]));
+        let nodes: Vec<DVec3> =
+            self.nodes.chunks_exact(3).chain(inner.chunks_exact(3)).map(DVec3::from_slice).collect();
+        let body = Body {
+            nodes,
+            surface_nodes: self.nodes.len() / 3,
+            triangles: self.triangles.as_chunks().0.to_vec(),
+            tetrahedra: tetrahedra.as_chunks().0.to_vec(),
+        };
+        Object::from_body(spec, body)
+    }
+}

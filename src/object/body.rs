@@ -1,0 +1,36 @@
+//! Nodes, surface and tetrahedra of an object: what a mesh file or a dataset holds of it.
+
+use super::ObjectError;
+use glam::DVec3;
+
+/// The geometry of an object at rest, its surface nodes first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Body {
+    /// Surface nodes, then interior ones [m].
+    pub nodes: Vec<DVec3>,
+    /// Number of surface nodes.
+    pub surface_nodes: usize,
+    /// Faces of the surface, facing outward.
+    pub triangles: Vec<[u32; 3]>,
+    /// Corners of tetrahedra of positive volume; empty for a surface.
+    pub tetrahedra: Vec<[u32; 4]>,
+}
+
+impl Body {
+    /// A surface.
+    #[must_use]
+    pub fn shell((nodes, triangles): (Vec<DVec3>, Vec<[u32; 3]>)) -> Self {
+        Self { surface_nodes: nodes.len(), nodes, triangles, tetrahedra: Vec::new() }
+    }
+
+    /// Refuses node numbers that are out of range. Those of the triangles are checked with the surface.
+    pub(super) fn check(&self) -> Result<(), ObjectError> {
+        let count = self.nodes.len();
+        let wild = |corners: &&[u32; 4]| corners.iter().any(|&corner| corner as usize >= count);
+        match self.tetrahedra.iter().find(wild) {
+            Some(corners) => Err(ObjectError::TetrahedronNode { corners: *corners, count }),
+            None if self.surface_nodes > count => Err(ObjectError::SurfaceNodes { surface: self.surface_nodes, count }),
+            None => Ok(()),
+        }
+    }
+}
