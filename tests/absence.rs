@@ -129,8 +129,11 @@ fn a_dataset_holds_what_its_effects_need_and_all_else_is_the_same_bits() {
     assert!(contacts.nodes.len() > 100);
     for effect in EFFECTS {
         let named = with(false, &[effect]);
-        let like = if effect.needs_forces() { &graphics } else { &plain };
-        assert_eq!(named.fields(), like.fields(), "{}", effect.key);
+        let mut fields = if effect.is_drawn() { graphics.fields() } else { plain.fields() };
+        if effect.is_at_contacts() {
+            fields.extend(["touch_forces", "touch_nodes", "touch_offsets"].map(str::to_owned));
+        }
+        assert_eq!(named.fields(), fields, "{}", effect.key);
         assert!(named.columns() == plain.columns(), "{}", effect.key);
         if let Some(stored) = &named.data.contacts {
             assert_eq!(
@@ -334,7 +337,7 @@ fn an_effect_that_cannot_act_is_an_error_that_says_so() {
     // A virtual one whose dataset was gridized from measurements, or has lost its contact forces.
     let without_forces = |effect: Effect| {
         let mut baked = with(true, &[effect]);
-        baked.data.contacts = None;
+        (baked.data.contacts, baked.data.touches) = (None, None);
         Setup::new(&baked.data).err().map(|error| error.to_string())
     };
     for effect in EFFECTS {

@@ -95,9 +95,16 @@ fn effects_are_priced_side_by_side(scene: &Scene) -> accuracy::effects::Effects 
     assert!(priced.in_contact > 0.2 && priced.nodes == 102, "{priced:?}");
     let [plain, graphics] = ["plain", "graphics"].map(|name| priced.of(name).unwrap());
     assert_eq!((plain.alone.bake.least, plain.alone.tick.least, graphics.alone.frame.unwrap().least), (1.0, 1.0, 1.0));
+    let touched = priced.of("friction").unwrap();
     for effect in EFFECTS {
         let price = priced.of(effect.key).unwrap();
-        let like = if effect.needs_forces() { graphics } else { plain };
+        let like = if effect.is_at_contacts() {
+            touched
+        } else if effect.is_drawn() {
+            graphics
+        } else {
+            plain
+        };
         assert_eq!(price.dataset_bytes, like.dataset_bytes, "{}", effect.key);
         let costs = price.alone;
         assert_eq!((costs.frame.is_some(), costs.gpu_frame.is_some()), (effect.is_drawn(), effect.is_drawn()));
@@ -110,7 +117,9 @@ fn effects_are_priced_side_by_side(scene: &Scene) -> accuracy::effects::Effects 
         }
     }
     let together = priced.of("whole").unwrap();
-    assert!(graphics.dataset_bytes > plain.dataset_bytes && together.dataset_bytes == graphics.dataset_bytes);
+    let forces = [graphics, touched].map(|priced| priced.dataset_bytes - plain.dataset_bytes);
+    assert!(forces.iter().all(|bytes| *bytes > 0));
+    assert_eq!(together.dataset_bytes, plain.dataset_bytes + forces.iter().sum::<usize>());
     let all = EFFECTS.map(|effect| effect.key).into_iter().filter(|key| *key != "quasi_static");
     assert_eq!(together.setting, all.collect::<Vec<_>>().join(", "));
     // Nothing on the device without graphics; with stiffening more than without.

@@ -133,6 +133,7 @@ fn dataset(chain: &Chain, object: &Object, counts: &[usize]) -> Dataset {
         iterations: None,
         tangent: None,
         contacts: Some(Contacts { offsets: offsets.into(), nodes: nodes.into(), forces: forces.into() }),
+        touches: None,
         surface: Some(Surface::of(object)),
         scene: String::new(),
         provenance: Provenance::default(),

@@ -3,7 +3,10 @@
 //! Lengths fit the grid, contact rows are ordered and within, statuses are known, every number is finite. Checked in an
 //! order in which no check relies on one that comes later, and without allocating, so that hostile counts cost nothing.
 
-use super::{Column, Contacts, Dataset, Solid, Surface};
+use super::{
+    Column, Contacts, Dataset, Solid, Surface,
+    file::{CONTACTS, TOUCHES},
+};
 use crate::{JointMatrix, contact::Status};
 
 /// `Err` says what is wrong.
@@ -39,10 +42,15 @@ pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
         check_surface(surface)?;
     }
     match (&dataset.contacts, &dataset.surface) {
-        (Some(contacts), Some(surface)) => check_contacts(contacts, points, surface.nodes.len() / 3),
-        (Some(_), None) => Err("contact forces name the nodes of a surface that is not there".into()),
-        (None, _) => Ok(()),
+        (Some(contacts), Some(surface)) => {
+            check_contacts(contacts, points, CONTACTS)?;
+            within(CONTACTS[1], &contacts.nodes, surface.nodes.len() / 3)?;
+        }
+        (Some(_), None) => return Err("contact forces name the nodes of a surface that is not there".into()),
+        (None, _) => (),
     }
+    // How many nodes the proxy has is for the scene to say.
+    dataset.touches.as_ref().map_or(Ok(()), |touches| check_contacts(touches, points, TOUCHES))
 }
 
 fn check_surface(surface: &Surface) -> Result<(), String> {
@@ -60,23 +68,22 @@ fn check_surface(surface: &Surface) -> Result<(), String> {
     within("tetrahedra", tetrahedra, (nodes.len() + inner_nodes.len()) / 3)
 }
 
-fn check_contacts(contacts: &Contacts, points: usize, surface_nodes: usize) -> Result<(), String> {
+fn check_contacts(contacts: &Contacts, points: usize, names: [&str; 3]) -> Result<(), String> {
     let Contacts { offsets, nodes, forces } = contacts;
-    length("contact_offsets", offsets, points.checked_add(1).ok_or("the grid has too many points")?)?;
-    length("contact_forces", forces, nodes.len().checked_mul(3).ok_or("there are too many contacts")?)?;
+    length(names[0], offsets, points.checked_add(1).ok_or("the grid has too many points")?)?;
+    length(names[2], forces, nodes.len().checked_mul(3).ok_or("there are too many contacts")?)?;
     if offsets[0] != 0 || offsets[points] != nodes.len() as u64 {
-        return Err(format!("contact_offsets do not run from 0 to the {} contacts", nodes.len()));
+        return Err(format!("{} do not run from 0 to the {} contacts", names[0], nodes.len()));
     }
     if let Some(point) = offsets.windows(2).position(|pair| pair[0] > pair[1]) {
-        return Err(format!("contact_offsets descend at point {point}"));
+        return Err(format!("{} descend at point {point}", names[0]));
     }
-    within("contact_nodes", nodes, surface_nodes)?;
     // Ascending offsets that end at nodes.len() are all within.
     let row = |point: usize| &nodes[offsets[point] as usize..offsets[point + 1] as usize];
     if let Some(point) = (0..points).find(|&point| row(point).windows(2).any(|pair| pair[0] >= pair[1])) {
-        return Err(format!("contact_nodes of point {point} do not ascend"));
+        return Err(format!("{} of point {point} do not ascend", names[1]));
     }
-    finite("contact_forces", forces, |x: &f32| x.is_finite())
+    finite(names[2], forces, |x: &f32| x.is_finite())
 }
 
 fn length<T: bytemuck::Pod>(name: &str, column: &Column<T>, expected: usize) -> Result<(), String> {

@@ -17,6 +17,7 @@
 //! | `status` | u8 | n1 .. nd | [`crate::contact::Status`] |
 //! | `contact_offsets` | u64 | points + 1 | rows of the next two |
 //! | `contact_nodes`, `contact_forces` | u32, f32 | c and c, 3 | object node, force on it [N] |
+//! | `touch_offsets`, `touch_nodes`, `touch_forces` | u64, u32, f32 | as these | the same on nodes of the proxy, where an effect needs it |
 //! | `surface_nodes`, `surface_triangles` | f64, u32 | S, 3 and T, 3 | at rest [m] |
 //! | `inner_nodes`, `tetrahedra` | f64, u32 | I, 3 and V, 4 | of a mesh of tetrahedra; inner nodes are numbered from S on [m] |
 //!
@@ -77,6 +78,11 @@ struct Metadata {
     provenance: String,
     scene: String,
 }
+
+/// Tensors of the contact forces on the object.
+pub(crate) const CONTACTS: [&str; 3] = ["contact_offsets", "contact_nodes", "contact_forces"];
+/// Tensors of those on the proxy.
+pub(crate) const TOUCHES: [&str; 3] = ["touch_offsets", "touch_nodes", "touch_forces"];
 
 /// A number type that a tensor may hold.
 pub(crate) trait Element: Pod {
@@ -143,10 +149,12 @@ pub(super) fn tensors(dataset: &Dataset) -> Vec<Tensor<&[u8]>> {
     tensors.extend(dataset.gap.as_ref().map(|column| tensor("gap", &grid, column)));
     tensors.extend(dataset.residual.as_ref().map(|column| tensor("residual", &grid, column)));
     tensors.extend(dataset.iterations.as_ref().map(|column| tensor("iterations", &grid, column)));
-    if let Some(Contacts { offsets, nodes, forces }) = &dataset.contacts {
-        tensors.push(tensor("contact_offsets", &[offsets.len()], offsets));
-        tensors.push(tensor("contact_nodes", &[nodes.len()], nodes));
-        tensors.push(tensor("contact_forces", &[nodes.len(), 3], forces));
+    for (names, contacts) in [(CONTACTS, &dataset.contacts), (TOUCHES, &dataset.touches)] {
+        if let Some(Contacts { offsets, nodes, forces }) = contacts {
+            tensors.push(tensor(names[0], &[offsets.len()], offsets));
+            tensors.push(tensor(names[1], &[nodes.len()], nodes));
+            tensors.push(tensor(names[2], &[nodes.len(), 3], forces));
+        }
     }
     tensors.extend(dataset.surface.iter().flat_map(surface_tensors));
     tensors

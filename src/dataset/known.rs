@@ -24,6 +24,7 @@ impl Dataset {
             iterations: None,
             tangent: None,
             contacts: None,
+            touches: None,
             surface: None,
             scene: String::new(),
             provenance: Provenance::default(),

@@ -24,7 +24,7 @@ pub use atomic::{Target, replace_file};
 pub use column::Column;
 pub use error::Error;
 pub use export::Format;
-pub(crate) use file::{Contents as TensorContents, Heading, Tensor, surface_tensors, write_file};
+pub(crate) use file::{CONTACTS, Contents as TensorContents, Heading, TOUCHES, Tensor, surface_tensors, write_file};
 pub use grid::{Axis, Grid};
 pub use summary::{StatusCounts, Summary};
 
@@ -51,8 +51,10 @@ pub struct Dataset {
     pub residual: Option<Column<f32>>,
     /// Iterations of the contact solver; absent in scanned datasets.
     pub iterations: Option<Column<u32>>,
-    /// Absent where the scene has no graphics, and in scanned datasets.
+    /// On the object's nodes; absent where the scene has no graphics, and in scanned datasets.
     pub contacts: Option<Contacts>,
+    /// On the proxy's nodes; absent where the scene names no effect that acts at contacts, and in scanned datasets.
+    pub touches: Option<Contacts>,
     /// The object's geometry at rest; absent in scanned datasets.
     pub surface: Option<Surface>,
     /// The scene's text; empty for scanned datasets without one.
@@ -61,11 +63,11 @@ pub struct Dataset {
     pub provenance: Provenance,
 }
 
-/// Contact forces f_j on the object's nodes, compressed sparse rows.
+/// Contact forces on nodes of the object, f_j, or of the proxy: compressed sparse rows.
 pub struct Contacts {
     /// One more than there are points.
     pub offsets: Column<u64>,
-    /// Nodes of the object's surface, ascending within a row.
+    /// Nodes of the object's surface, or of the proxy; ascending within a row.
     pub nodes: Column<u32>,
     /// Three numbers a contact [N].
     pub forces: Column<f32>,

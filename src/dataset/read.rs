@@ -2,7 +2,7 @@
 
 use super::{
     Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, check,
-    file::{CHECKSUM, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, digits},
+    file::{CHECKSUM, CONTACTS, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, TOUCHES, digits},
 };
 use crate::JointMatrix;
 use memmap2::{Mmap, MmapMut};
@@ -127,7 +127,6 @@ impl Windows {
         let counts: Vec<_> = grid.counts().into_iter().map(Some).collect();
         let with_joints: Vec<_> = counts.iter().copied().chain([Some(grid.joints())]).collect();
         let with_tangent: Vec<_> = counts.iter().copied().chain([Some(JointMatrix::entries(grid.joints()))]).collect();
-        let missing = |name: &str| format!("tensor {name} is missing");
         Ok(Dataset {
             torque: self.column(tensors, "torque", &with_joints)?.ok_or_else(|| missing("torque"))?,
             status: self.column(tensors, "status", &counts)?.ok_or_else(|| missing("status"))?,
@@ -136,16 +135,8 @@ impl Windows {
             gap: self.column(tensors, "gap", &counts)?,
             residual: self.column(tensors, "residual", &counts)?,
             iterations: self.column(tensors, "iterations", &counts)?,
-            contacts: match self.column(tensors, "contact_offsets", &[None])? {
-                None => None,
-                Some(offsets) => Some(Contacts {
-                    offsets,
-                    nodes: self.column(tensors, "contact_nodes", &[None])?.ok_or_else(|| missing("contact_nodes"))?,
-                    forces: self
-                        .column(tensors, "contact_forces", &[None, Some(3)])?
-                        .ok_or_else(|| missing("contact_forces"))?,
-                }),
-            },
+            contacts: self.contacts(tensors, CONTACTS)?,
+            touches: self.contacts(tensors, TOUCHES)?,
             surface: match self.column(tensors, "surface_nodes", &[None, Some(3)])? {
                 None => None,
                 Some(nodes) => Some(Surface {
@@ -170,6 +161,20 @@ impl Windows {
         })
     }
 
+    /// Takes contact forces out of `tensors`; `None` where they are absent.
+    fn contacts(
+        &self,
+        tensors: &mut BTreeMap<String, TensorInfo>,
+        [offsets, nodes, forces]: [&str; 3],
+    ) -> Result<Option<Contacts>, String> {
+        let Some(offsets) = self.column(tensors, offsets, &[None])? else { return Ok(None) };
+        Ok(Some(Contacts {
+            offsets,
+            nodes: self.column(tensors, nodes, &[None])?.ok_or_else(|| missing(nodes))?,
+            forces: self.column(tensors, forces, &[None, Some(3)])?.ok_or_else(|| missing(forces))?,
+        }))
+    }
+
     /// Takes the tensor `name` out of `tensors`; `None` where it is absent. `shape` leaves free lengths as `None`.
     fn column<T: Element>(
         &self,
@@ -188,4 +193,8 @@ impl Windows {
             .map(Some)
             .ok_or_else(|| format!("tensor {name} lies outside the file or is misaligned"))
     }
+}
+
+fn missing(name: &str) -> String {
+    format!("tensor {name} is missing")
 }

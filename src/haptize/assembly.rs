@@ -5,7 +5,9 @@ use super::{
     columns::{Replaced, Section, Shape},
     part::{self, Part},
 };
-use crate::dataset::{self, Heading, Surface, Target, Tensor, TensorContents, surface_tensors, write_file};
+use crate::dataset::{
+    self, CONTACTS, Heading, Surface, TOUCHES, Target, Tensor, TensorContents, surface_tensors, write_file,
+};
 use std::{
     io::{self, Read, Write},
     sync::atomic::{AtomicBool, Ordering},
@@ -20,8 +22,8 @@ pub(super) struct Results<'a> {
     pub shape: Shape,
     /// New results of single points.
     pub replaced: &'a Replaced,
-    /// Contact forces of all points, the new results among them.
-    pub contacts: usize,
+    /// Contacts and touches of all points, the new results among them.
+    pub forces: [usize; 2],
     /// When this becomes true putting them together ends soon, in an error.
     pub stop: &'a AtomicBool,
 }
@@ -43,12 +45,17 @@ impl Results<'_> {
             let shape = [&heading.grid.counts()[..], &[self.shape.width().tangent]].concat();
             tensors.push(Tensor::new::<f32>("tangent", shape, of(Section::Tangent)));
         }
-        if self.shape.with_forces {
-            let forces = self.contacts;
-            let offsets = vec![heading.grid.points() + 1];
-            tensors.push(Tensor::new::<u64>("contact_offsets", offsets, Contents::Offsets(self)));
-            tensors.push(Tensor::new::<u32>("contact_nodes", vec![forces], of(Section::Nodes)));
-            tensors.push(Tensor::new::<f32>("contact_forces", vec![forces, 3], of(Section::Forces)));
+        let rows = [
+            (self.shape.with_forces, CONTACTS, [Section::Ends, Section::Nodes, Section::Forces]),
+            (self.shape.with_touches, TOUCHES, [Section::TouchEnds, Section::TouchNodes, Section::TouchForces]),
+        ];
+        for ((stored, names, [ends, nodes, forces]), count) in rows.into_iter().zip(self.forces) {
+            if stored {
+                let offsets = vec![heading.grid.points() + 1];
+                tensors.push(Tensor::new::<u64>(names[0], offsets, Contents::Offsets(self, ends)));
+                tensors.push(Tensor::new::<u32>(names[1], vec![count], of(nodes)));
+                tensors.push(Tensor::new::<f32>(names[2], vec![count, 3], of(forces)));
+            }
         }
         tensors.extend(surface_tensors(surface).into_iter().map(|tensor| tensor.map(Contents::Held)));
         write_file(output, heading, tensors)
@@ -66,8 +73,8 @@ enum Contents<'a> {
     Held(&'a [u8]),
     /// A column of all points.
     Section(&'a Results<'a>, Section),
-    /// Ends of the points' contacts, behind a 0.
-    Offsets(&'a Results<'a>),
+    /// A column of the ends of rows, behind a 0.
+    Offsets(&'a Results<'a>, Section),
 }
 
 impl TensorContents for Contents<'_> {
@@ -77,10 +84,10 @@ impl TensorContents for Contents<'_> {
             Self::Section(results, section) => {
                 results.column(*section, &mut |column| io::copy(column, writer).map(drop))
             }
-            Self::Offsets(results) => {
+            Self::Offsets(results, ends) => {
                 let mut before = 0_u64;
                 writer.write_all(&before.to_le_bytes())?;
-                results.column(Section::Ends, &mut |column| {
+                results.column(*ends, &mut |column| {
                     let mut ends = Vec::new();
                     column.read_to_end(&mut ends)?;
                     let mut end = before;

@@ -38,8 +38,11 @@ impl Store for Columns {
     fn append(&mut self, _first: usize, chunk: &Columns) -> Result<(), SweepError> {
         let points = self.status.capacity();
         let each = |numbers: usize| numbers / chunk.points().max(1);
-        let width = Width { joints: each(chunk.torque.len()), tangent: each(chunk.tangent.len()) };
-        let bytes = Columns::bytes(points, width, self.nodes.len() + chunk.nodes.len());
+        let (joints, tangent) = (each(chunk.torque.len()), each(chunk.tangent.len()));
+        let width = Width { joints, tangent, touches: each(chunk.touches.ends.len()) };
+        let [contacts, touches] = [(&self.contacts, &chunk.contacts), (&self.touches, &chunk.touches)]
+            .map(|(rows, more)| rows.nodes.len() + more.nodes.len());
+        let bytes = Columns::bytes(points, width, contacts, touches);
         self.append(chunk).map_err(|source| SweepError::Memory { points, bytes, source })
     }
     fn note(&mut self, _notice: &str) -> Result<(), SweepError> {

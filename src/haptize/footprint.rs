@@ -36,7 +36,8 @@ impl Bounds {
 /// Results of `points` points at each of which `touching` nodes of the proxy touch [bytes].
 pub(super) fn results(points: usize, touching: usize, shape: Shape) -> usize {
     let contacts = if shape.with_forces { node_forces(touching, shape) } else { 0 };
-    Columns::bytes(points, shape.width(), points.saturating_mul(contacts))
+    let touches = touching * shape.width().touches;
+    Columns::bytes(points, shape.width(), points.saturating_mul(contacts), points.saturating_mul(touches))
 }
 
 /// A chunk on its way: `solved` configurations and their equilibria, and the columns of `points` points [bytes].
@@ -45,7 +46,8 @@ pub(super) fn chunk(solved: usize, points: usize, touching: usize, shape: Shape)
     let lists = 2 * (node_forces(touching, shape) * size_of::<NodeForce>() + touching * size_of::<Touch>());
     let each = size_of::<JointVector>() + size_of::<Equilibrium>() + lists;
     let contacts = if shape.with_forces { 2 * solved.saturating_mul(node_forces(touching, shape)) } else { 0 };
-    solved.saturating_mul(each).saturating_add(Columns::bytes(points, shape.width(), contacts))
+    let touches = 2 * solved.saturating_mul(touching * shape.width().touches);
+    solved.saturating_mul(each).saturating_add(Columns::bytes(points, shape.width(), contacts, touches))
 }
 
 /// Nodes of the object that `touching` nodes of the proxy touch.

@@ -212,7 +212,8 @@ mod tests {
     use super::*;
     use crate::{field::synthetic, haptize::table::Block};
 
-    const SHAPE: Shape = Shape { joints: 1, surface_nodes: 9, with_forces: true, with_tangent: false };
+    const SHAPE: Shape =
+        Shape { joints: 1, surface_nodes: 9, with_forces: true, with_touches: false, with_tangent: false };
 
     /// An equilibrium in contact with as many node forces as its energy has joules.
     fn equilibrium(energy: f64, torque: f64) -> Equilibrium {
@@ -277,7 +278,7 @@ mod tests {
         whole.replace(0, &replaced).unwrap();
         let expected = columns(&[1.0, 4.0, 3.0, 2.0, 5.0]);
         assert_eq!(whole.block(0), expected.block(0));
-        assert_eq!(table.more_contacts(), 4);
+        assert_eq!(table.more(), [4, 0]);
         for (point, energy) in [1.0, 4.0, 3.0, 2.0, 5.0].into_iter().enumerate() {
             let found = table.result(point);
             assert_eq!((found.energy, found.torque[0], found.iterations), (energy, -1.0, 3));

@@ -243,6 +243,7 @@ fn window(grid: &Grid, table: &Table<'_>, lines: &[Range<usize>]) -> Dataset {
         iterations: None,
         tangent: None,
         contacts: None,
+        touches: None,
         surface: None,
         scene: String::new(),
         provenance: Provenance::default(),
@@ -261,7 +262,8 @@ mod tests {
         },
     };
 
-    const SHAPE: Shape = Shape { joints: 2, surface_nodes: 0, with_forces: false, with_tangent: false };
+    const SHAPE: Shape =
+        Shape { joints: 2, surface_nodes: 0, with_forces: false, with_touches: false, with_tangent: false };
 
     /// A spring of 2 N m/rad beyond q0 = 0.35, and beside it one of 1 N m/rad.
     fn columns(grid: &Grid) -> Columns {

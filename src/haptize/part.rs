@@ -1,7 +1,7 @@
 //! The part: an unfinished sweep on disk, so that killing the process loses one chunk at most.
 //!
 //! ```text
-//! "haptize part 3\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
+//! "haptize part 4\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
 //! ```
 //!
 //! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`], or [`NOTICE`] and a text. Frames are only
@@ -23,7 +23,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-const MAGIC: &[u8] = b"haptize part 3\n";
+const MAGIC: &[u8] = b"haptize part 4\n";
 /// Length and checksum before each body [bytes].
 const FRAME: usize = 8 + 4;
 
@@ -43,12 +43,14 @@ pub(super) struct Binding {
     pub object: u32,
     /// Whether tangents are stored.
     pub with_tangent: bool,
+    /// Whether contact forces on the proxy are stored.
+    pub with_touches: bool,
     pub provenance: Provenance,
 }
 
 impl Binding {
     fn width(&self) -> Width {
-        Width::new(self.grid.joints(), self.with_tangent)
+        Width::new(self.grid.joints(), self.with_tangent, self.with_touches)
     }
 
     /// What differs from `other` so that its numbers cannot be continued; the date may differ.
@@ -64,6 +66,7 @@ impl Binding {
             ("another text of the scene", self.scene != other.scene),
             ("another object, such as a mesh that changed meanwhile", self.object != other.object),
             ("another interpolation, for which tangents are stored or not", self.with_tangent != other.with_tangent),
+            ("other effects, for which contact forces are stored or not", self.with_touches != other.with_touches),
         ];
         differences.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
     }
@@ -75,8 +78,8 @@ pub(super) struct Part {
     file: File,
     /// Where the frame behind the binding begins [bytes].
     results: u64,
-    /// Contact forces in all.
-    contacts: usize,
+    /// Contacts and touches in all.
+    forces: [usize; 2],
 }
 
 impl Part {
@@ -97,7 +100,7 @@ impl Part {
             // Some network file systems have no locks; only the second of two bakes at once would notice.
             Err(TryLockError::Error(_)) => (),
         }
-        let mut part = Self { path: path.into(), file, results: 0, contacts: 0 };
+        let mut part = Self { path: path.into(), file, results: 0, forces: [0; 2] };
         if !resume && part.holds_results()? {
             return Err(SweepError::Unfinished { path: path.into() });
         }
@@ -114,7 +117,7 @@ impl Part {
         let mut body = vec![opening.as_flattened()];
         body.extend(columns);
         self.write(&body).map_err(|source| SweepError::Part { path: self.path.clone(), source })?;
-        self.contacts += chunk.nodes.len();
+        self.forces = add(self.forces, chunk);
         Ok(())
     }
 
@@ -130,9 +133,9 @@ impl Part {
         std::fs::remove_file(&path).map_err(|source| SweepError::Part { path, source })
     }
 
-    /// Number of contact forces in it.
-    pub fn contacts(&self) -> usize {
-        self.contacts
+    /// Number of contacts and of touches in it.
+    pub fn forces(&self) -> [usize; 2] {
+        self.forces
     }
 
     /// Where it is.
@@ -270,7 +273,7 @@ impl Part {
             return Err(SweepError::OtherPart { path: self.path.clone(), difference });
         }
         let (points, width) = (binding.grid.points(), binding.width());
-        let (results, mut tally, mut contacts) = (whole, Tally::default(), 0);
+        let (results, mut tally, mut forces) = (whole, Tally::default(), [0; 2]);
         loop {
             let before = whole;
             let Some(body) = next(&mut whole)? else { break };
@@ -281,7 +284,7 @@ impl Part {
             match Columns::decode(&body, tally.points, width) {
                 Some(chunk) if chunk.points() <= points - tally.points => {
                     tally.add(&chunk);
-                    contacts += chunk.nodes.len();
+                    forces = add(forces, &chunk);
                 }
                 _ => {
                     whole = before;
@@ -292,7 +295,7 @@ impl Part {
         drop(reader);
         self.file.set_len(whole).map_err(failed)?;
         self.file.seek(SeekFrom::Start(whole)).map_err(failed)?;
-        (self.results, self.contacts) = (results, contacts);
+        (self.results, self.forces) = (results, forces);
         binding.provenance.date = found.provenance.date;
         Ok(Some(tally))
     }
@@ -300,6 +303,11 @@ impl Part {
     fn foreign(&self, reason: &str) -> SweepError {
         SweepError::ForeignPart { path: self.path.clone(), reason: reason.into() }
     }
+}
+
+/// `forces` and those of `chunk`.
+fn add([contacts, touches]: [usize; 2], chunk: &Columns) -> [usize; 2] {
+    [contacts + chunk.contacts.nodes.len(), touches + chunk.touches.nodes.len()]
 }
 
 /// The next frame's body, of a file with `left` bytes left; `None` when there is no whole one.

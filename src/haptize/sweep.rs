@@ -7,7 +7,7 @@ use super::{
     Backend, Footprint, FreeSpace, SweepError, SweepReport,
     assembly::{self, Results},
     chunks::{Begun, Solved, together},
-    columns::{Columns, Replaced, Shape},
+    columns::{Columns, Replaced, Rows, Shape},
     footprint::{self, Bounds},
     lowest,
     measured::ErrorCheck,
@@ -105,12 +105,13 @@ impl<'a> Sweep<'a> {
             return Err(SweepError::Grid(format!("{} axes for {} joints", grid.joints(), scene.proxy.joints.len())));
         }
         grid.check().map_err(SweepError::Grid)?;
-        let with_forces = scene.graphics.is_some() || scene.haptics.effects.at_contacts().is_some();
+        let with_forces = scene.graphics.is_some();
         Ok(Self {
             shape: Shape {
                 joints: grid.joints(),
                 surface_nodes: object.surface_nodes,
                 with_forces,
+                with_touches: scene.haptics.effects.at_contacts().is_some(),
                 with_tangent: false,
             },
             with_forces,
@@ -282,6 +283,7 @@ impl<'a> Sweep<'a> {
             scene: self.scene.clone(),
             object: self.object,
             with_tangent: self.shape.with_tangent,
+            with_touches: self.shape.with_touches,
             provenance: self.provenance.clone(),
         };
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
@@ -307,20 +309,21 @@ impl<'a> Sweep<'a> {
             }
         };
         let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
-        let (report, provenance, replaced, contacts) = if self.lowest.is_none() && self.error.is_none() {
+        let (report, provenance, replaced, forces) = if self.lowest.is_none() && self.error.is_none() {
             let (report, provenance) = self.report(solved);
-            (report, provenance, Replaced::new(), part.contacts())
+            (report, provenance, Replaced::new(), part.forces())
         } else {
             let failed = |source| SweepError::Part { path: kept_in.clone(), source };
             let map = part.map().map_err(failed)?;
             let mut table = part.table(&map, self.shape.width()).map_err(failed)?;
             let (report, provenance) = self.complete(solved, &mut table, run.stop, Some(&kept_in))?;
-            let contacts = part.contacts().saturating_add_signed(table.more_contacts());
-            (report, provenance, table.replaced, contacts)
+            let ([contacts, touches], more) = (part.forces(), table.more());
+            let forces = [contacts.saturating_add_signed(more[0]), touches.saturating_add_signed(more[1])];
+            (report, provenance, table.replaced, forces)
         };
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
         let shape = Shape { with_forces: self.with_forces, ..self.shape };
-        let results = Results { part: &part, shape, replaced: &replaced, contacts, stop };
+        let results = Results { part: &part, shape, replaced: &replaced, forces, stop };
         results.assemble(target, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
         part.remove()?;
         Ok(report)
@@ -369,11 +372,11 @@ impl<'a> Sweep<'a> {
     }
 
     fn dataset(&self, columns: Columns, provenance: Provenance) -> Dataset {
-        let contacts = self.with_forces.then(|| Contacts {
-            offsets: std::iter::once(0).chain(columns.ends).collect::<Vec<u64>>().into(),
-            nodes: columns.nodes.into(),
-            forces: columns.forces.into(),
-        });
+        let contacts = |rows: Rows| Contacts {
+            offsets: std::iter::once(0).chain(rows.ends).collect::<Vec<u64>>().into(),
+            nodes: rows.nodes.into(),
+            forces: rows.forces.into(),
+        };
         Dataset {
             grid: self.grid.clone(),
             torque: columns.torque.into(),
@@ -383,7 +386,8 @@ impl<'a> Sweep<'a> {
             status: columns.status.into(),
             residual: Some(columns.residual.into()),
             iterations: Some(columns.iterations.into()),
-            contacts,
+            contacts: self.with_forces.then(|| contacts(columns.contacts)),
+            touches: self.shape.with_touches.then(|| contacts(columns.touches)),
             surface: Some(self.surface.clone()),
             scene: self.scene.clone(),
             provenance,

@@ -7,6 +7,7 @@ use crate::{
 };
 use bytemuck::Pod;
 use glam::DVec3;
+use std::ops::Range;
 
 /// Results of all points of a grid, with the new ones of single points over them.
 pub(super) struct Table<'a> {
@@ -77,13 +78,17 @@ impl<'a> Block<'a> {
     }
 
     fn forces(&self, row: usize) -> Vec<NodeForce> {
-        let end = |row: usize| self.number::<u64>(Section::Ends, row) as usize;
-        let start = if row == 0 { 0 } else { end(row - 1) };
         let force = |contact: usize| NodeForce {
             node: self.number(Section::Nodes, contact),
             force: DVec3::from_array([0, 1, 2].map(|k| self.number::<f32>(Section::Forces, 3 * contact + k).into())),
         };
-        (start..end(row)).map(force).collect()
+        self.row(Section::Ends, row).map(force).collect()
+    }
+
+    /// Which contacts, or touches, are those of a point; `ends` are their ends.
+    fn row(&self, ends: Section, row: usize) -> Range<usize> {
+        let end = |row: usize| self.number::<u64>(ends, row) as usize;
+        (if row == 0 { 0 } else { end(row - 1) })..end(row)
     }
 }
 
@@ -114,13 +119,18 @@ impl<'a> Table<'a> {
         block.result(point - block.first, self.joints)
     }
 
-    /// By how many contact forces the new results exceed those that they replace.
-    pub fn more_contacts(&self) -> isize {
-        let more = |(&point, row): (&usize, &Columns)| {
+    /// By how many contacts and touches the new results exceed those that they replace.
+    pub fn more(&self) -> [isize; 2] {
+        let mut more = [0; 2];
+        for (&point, row) in &self.replaced {
             let block = self.block(point);
-            row.nodes.len() as isize - block.forces(point - block.first).len() as isize
-        };
-        self.replaced.iter().map(more).sum()
+            let point = point - block.first;
+            more[0] += row.contacts.nodes.len() as isize - block.row(Section::Ends, point).len() as isize;
+            if !row.touches.ends.is_empty() {
+                more[1] += row.touches.nodes.len() as isize - block.row(Section::TouchEnds, point).len() as isize;
+            }
+        }
+        more
     }
 
     fn block(&self, point: usize) -> &Block<'a> {

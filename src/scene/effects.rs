@@ -122,10 +122,16 @@ impl Effect {
         self.table == "graphics"
     }
 
-    /// Whether it acts at contacts, and so has their forces stored.
+    /// Whether it acts on the proxy's nodes in contact, and so has the forces on them stored.
+    #[must_use]
+    pub fn is_at_contacts(&self) -> bool {
+        matches!(self.key, "friction" | "contact_damping")
+    }
+
+    /// Whether it has contact forces stored, on the object's nodes or the proxy's.
     #[must_use]
     pub fn needs_forces(&self) -> bool {
-        self.is_drawn() || matches!(self.key, "friction" | "contact_damping")
+        self.is_drawn() || self.is_at_contacts()
     }
 
     /// Its value in `scene`; none where the scene does not name it, or says that it is off.

@@ -60,8 +60,12 @@ fn the_memory_stated_is_the_memory_of_the_columns() {
     assert_eq!(columns.most - columns.least, POINTS * 16 * 9);
     // Without graphics there are no forces to keep.
     let blind = Scene::parse(&SCENE.replace("graphics = {}", ""), "small.toml").unwrap();
-    let blind = sweep_of(&blind, "none", "").footprint(10, false).disk;
-    assert_eq!(blind.least, blind.most);
+    let disk = sweep_of(&blind, "none", "").footprint(10, false).disk;
+    assert_eq!(disk.least, disk.most);
+    // With friction there are those on the proxy's three nodes.
+    let friction = Scene::parse(&(blind.text + "\n[haptics.friction]\ncoefficient = 0.4\n"), "small.toml").unwrap();
+    let friction = sweep_of(&friction, "none", "").footprint(10, false).disk;
+    assert_eq!([friction.least - disk.least, friction.most - friction.least], [8 * POINTS, POINTS * 16 * 3]);
 }
 
 #[test]

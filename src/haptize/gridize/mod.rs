@@ -224,6 +224,7 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
         iterations: None,
         tangent: None,
         contacts: None,
+        touches: None,
         surface: None,
         scene: String::new(),
         provenance: Provenance {

@@ -1,20 +1,11 @@
-//! Where the proxy is touched, and how hard: contact forces of the dataset, brought from the object's nodes to the
-//! proxy's and interpolated like the torque.
-//!
-//! A dataset stores the forces f_j on the object's nodes. The proxy node that a force belongs to is taken to be the one
-//! nearest to the object's node at rest, of those that press: the force on it is minus the sum of its object nodes'.
-//! The forces in sum are exact; their torque J^T F differs from the dataset's by the lever arm between the contact and
-//! the node that was chosen, [`Contacts::torque_error`]: friction and damping are known to no better than
-//! that, while the contact torque itself stays the dataset's.
+//! Where the proxy is touched, and how hard: the dataset's contact forces on the proxy's nodes, interpolated like the torque.
 //!
 //! Between grid points `F_i(q) = share sum_c w_c F_i(q_c)`, with the weights of the torque and the factor of boundary
 //! layer and fade; likewise the share of the corners at which node i is touched. Both are continuous in q.
 
 use crate::{
-    JointVector,
     dataset::Dataset,
     field::stencil::{Lattice, LatticeError},
-    proxy::Chain,
     tolerances::LEAST_CONTACT_FORCE,
 };
 use glam::DVec3;
@@ -27,7 +18,6 @@ pub struct Contacts {
     nodes: Vec<u16>,
     /// [N]
     forces: Vec<[f32; 3]>,
-    torque_error: f64,
 }
 
 /// What touches one proxy node.
@@ -48,53 +38,21 @@ impl Touch {
 }
 
 impl Contacts {
-    /// The contacts of `dataset` with `chain`; `None` where the dataset has no contact forces.
+    /// The contacts of `dataset` with a proxy of `nodes` nodes; `None` where the dataset does not hold them, or holds those of another
+    /// proxy.
     ///
     /// # Errors
     /// When its grid is none.
-    pub fn new(dataset: &Dataset, chain: &Chain) -> Result<Option<Self>, LatticeError> {
-        let (Some(_), Some(surface)) = (&dataset.contacts, &dataset.surface) else { return Ok(None) };
-        let lattice = Lattice::new(&dataset.grid)?;
-        let rest: Vec<DVec3> = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
-        let mut this = Self { lattice, offsets: vec![0], nodes: Vec::new(), forces: Vec::new(), torque_error: 0.0 };
-        let mut on_node = vec![DVec3::ZERO; chain.nodes.len()];
-        let mut pose = chain.new_pose();
-        let (mut missed, mut whole) = (0.0, 0.0);
-        for point in 0..dataset.grid.points() {
-            chain.pose(&dataset.grid.configuration(point), &mut pose);
-            on_node.fill(DVec3::ZERO);
-            for contact in dataset.forces(point) {
-                let Some(&place) = rest.get(contact.node as usize) else { continue };
-                // Of a proxy node inside the object, the force points away from the object's node: it is pressed outwards.
-                let distance = |node: usize| pose.nodes[node].distance(place) - chain.nodes[node].radius;
-                let nearest = (0..chain.nodes.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-                if let Some(node) = nearest {
-                    on_node[node] -= contact.force;
-                }
-            }
-            let mut torque = JointVector::zeros(dataset.grid.joints());
-            for (node, &force) in on_node.iter().enumerate().filter(|(_, force)| **force != DVec3::ZERO) {
-                chain.add_torque(&pose, node, force, &mut torque);
-                // A scene has at most 4096 nodes.
-                this.nodes.push(node as u16);
-                this.forces.push(force.as_vec3().to_array());
-            }
-            this.offsets.push(this.nodes.len());
-            for (found, stored) in torque.iter().zip(dataset.torque(point)) {
-                missed += (found - stored).powi(2);
-                whole += stored * stored;
-            }
-        }
-        if whole > 0.0 {
-            this.torque_error = (missed / whole).sqrt();
-        }
-        Ok(Some(this))
-    }
-
-    /// Root mean square of the torque that the chosen proxy nodes miss, over that of the dataset's torque [1].
-    #[must_use]
-    pub fn torque_error(&self) -> f64 {
-        self.torque_error
+    pub fn new(dataset: &Dataset, nodes: usize) -> Result<Option<Self>, LatticeError> {
+        let Some(touches) = &dataset.touches else { return Ok(None) };
+        let known = |node: &u32| u16::try_from(*node).ok().filter(|&node| usize::from(node) < nodes);
+        let Some(nodes) = touches.nodes.iter().map(known).collect() else { return Ok(None) };
+        Ok(Some(Self {
+            lattice: Lattice::new(&dataset.grid)?,
+            offsets: touches.offsets.iter().map(|&offset| offset as usize).collect(),
+            nodes,
+            forces: touches.forces.as_chunks().0.to_vec(),
+        }))
     }
 
     /// Writes what touches each proxy node at `q` to `touches`, one entry per node, forces times `share`.

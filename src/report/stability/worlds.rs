@@ -44,17 +44,19 @@ nodes = [{{ at = [0.0, 0.0, 0.0] }}]
 #[must_use]
 pub fn block(haptics: &str) -> Dataset {
     let grid = grid(&[("slide", "m", 5, 0.1), ("press", "m", 41, 1e-3)]);
-    let (mut offsets, mut nodes, mut forces) = (vec![0_u64], Vec::new(), Vec::new());
+    let (mut offsets, mut depths) = (vec![0_u64], Vec::new());
     for point in 0..grid.points() {
         let depth = grid.configuration(point)[1].max(0.0);
         if depth > 0.0 {
-            // The finger is pushed up, the block down.
-            nodes.push(0_u32);
-            forces.extend([0.0_f32, 0.0, -(BLOCK_STIFFNESS * depth) as f32]);
+            depths.push(depth);
         }
-        offsets.push(nodes.len() as u64);
+        offsets.push(depths.len() as u64);
     }
-    let contacts = Contacts { offsets: offsets.into(), nodes: nodes.into(), forces: forces.into() };
+    let contacts = |stiffness: f64| Contacts {
+        offsets: offsets.clone().into(),
+        nodes: vec![0; depths.len()].into(),
+        forces: depths.iter().flat_map(|depth| [0.0, 0.0, (stiffness * depth) as f32]).collect::<Vec<_>>().into(),
+    };
     let surface = Surface {
         nodes: vec![0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.1, 0.0].into(),
         triangles: vec![0_u32, 1, 2].into(),
@@ -62,7 +64,9 @@ pub fn block(haptics: &str) -> Dataset {
     };
     let direction = JointVector::from_slice(&[0.0, 1.0]);
     Dataset {
-        contacts: Some(contacts),
+        // The finger is pushed up, the block down.
+        contacts: Some(contacts(-BLOCK_STIFFNESS)),
+        touches: Some(contacts(BLOCK_STIFFNESS)),
         surface: Some(surface),
         scene: block_scene(haptics),
         ..Dataset::of_half_space(grid, &direction, BLOCK_STIFFNESS)
