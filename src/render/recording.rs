@@ -72,6 +72,9 @@ pub enum RecordingError {
 /// Largest file that is read [bytes]: two hours of six joints at 1 kHz.
 const GREATEST_FILE: u64 = 4 << 30;
 
+/// Most frames of a tick: those of a second at the highest rate. A loop that rests longer has long missed its deadlines.
+const MAX_FRAMES: u32 = 10_000;
+
 /// What the comment with the first position begins with.
 const START: &str = "# start";
 
@@ -254,6 +257,10 @@ fn row(text: &str, joints: usize) -> Result<Row, String> {
     if fields.len() != SCALARS + 4 * joints {
         return Err(format!("{} fields in the place of {}", fields.len(), SCALARS + 4 * joints));
     }
+    let frames: u32 = number(fields[4])?;
+    if frames > MAX_FRAMES {
+        return Err(format!("{frames} frames in one tick, more than {MAX_FRAMES}"));
+    }
     let vector = |k: usize| vector(&fields[SCALARS + k * joints..][..joints], joints);
     Ok(Row {
         inputs: Inputs {
@@ -263,7 +270,7 @@ fn row(text: &str, joints: usize) -> Result<Row, String> {
             position: vector(0)?,
         },
         restart: number::<u8>(fields[3])? != 0,
-        frames: number(fields[4])?,
+        frames,
         hand: vector(1)?,
         torque: vector(2)?,
         proxy: vector(3)?,

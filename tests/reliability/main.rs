@@ -1,7 +1,8 @@
-//! Nothing silent, nothing lost: datasets that need nothing but their file.
+//! Nothing silent, nothing lost: datasets that need nothing but their file, and readers that no file harms.
 
 // Helpers outside test functions may fail the test too.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 mod alone;
+mod fuzz;
 mod program;

@@ -85,8 +85,8 @@ press = [{{ time = 0.0, q = [0.0, 0.0] }}, {{ time = 0.1, q = [0.004, 0.035] }}]
     )
 }
 
-/// A cube of side 0.2 m around the origin: twelve tetrahedra, one on each half of a face, around a node that is not in its middle.
-const BLOCK: &str = "$MeshFormat
+/// As a Gmsh 2.2 file: a cube of side 0.2 m around the origin: twelve tetrahedra, one on each half of a face, around a node that is not in its middle.
+pub const BLOCK: &str = "$MeshFormat
 2.2 0 8
 $EndMeshFormat
 $Nodes
@@ -115,5 +115,36 @@ $Elements
 10 4 0 1 8 5 9
 11 4 0 2 7 3 9
 12 4 0 2 6 7 9
+$EndElements
+";
+
+/// Two tetrahedra as a Gmsh 4.1 file.
+pub const BLOCK_4: &str = "$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$Comments
+two tetrahedra
+$EndComments
+$Nodes
+1 5 1 5
+3 1 0 5
+1
+2
+3
+4
+5
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+0.5 0.5 -1
+$EndNodes
+$Elements
+2 3 1 3
+2 1 2 1
+1 1 2 3
+3 1 4 2
+2 1 2 3 4
+3 1 3 2 5
 $EndElements
 ";

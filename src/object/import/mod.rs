@@ -1,12 +1,13 @@
 //! Surfaces from mesh files (OBJ, STL and PLY, chosen by the file's extension), and tetrahedra from Gmsh files.
 //!
-//! Polygons are cut into triangle fans. Nodes at exactly the same point become one node (an STL file has no others, and
-//! grouped OBJ files repeat those on the seams), and faces that are left with fewer than three are dropped. Nodes keep the order of a PLY file; in OBJ and STL files they are
+//! Polygons are cut into triangle fans. Nodes at exactly the same point become one node (an STL file has no others), and faces that
+//! are left with fewer than three are dropped. Nodes keep the order of a PLY file; in OBJ and STL files they are
 //! numbered in the order in which triangles first name them, and nodes that no triangle names are dropped. Coordinates
 //! become `scale * coordinate + centre`.
 
 mod boundary;
 mod msh;
+mod obj;
 mod ply;
 
 use super::{Body, ObjectError, topology::place};
@@ -30,7 +31,7 @@ pub(super) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<St
     let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let reader = match extension.as_str() {
-        "obj" => read_obj,
+        "obj" => obj::read,
         "stl" => read_stl,
         "ply" => ply::read,
         _ => return Err(ObjectError::Format { file: file.to_owned() }),
@@ -82,20 +83,6 @@ fn open(file: &Path) -> Result<File, ObjectError> {
         return Err(unreadable(format!("it is not a plain file of at most {MAX_BYTES} bytes")));
     }
     Ok(stream)
-}
-
-fn read_obj(stream: &mut BufReader<File>) -> Result<Surface, String> {
-    let options =
-        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
-    // Materials are of no concern here: the files that name them need not exist.
-    let (models, _) = tobj::load_obj_buf(stream, &options, |_| Ok(Default::default())).map_err(|e| e.to_string())?;
-    let (mut nodes, mut triangles) = (Vec::new(), Vec::new());
-    for tobj::Model { mesh, .. } in models {
-        let first = node_number(nodes.len())?;
-        nodes.extend(mesh.positions.as_chunks().0.iter().copied().map(DVec3::from_array));
-        triangles.extend(mesh.indices.as_chunks().0.iter().map(|corners| corners.map(|node| first + node)));
-    }
-    Ok((nodes, triangles))
 }
 
 fn read_stl(stream: &mut (impl Read + Seek)) -> Result<Surface, String> {

@@ -1,20 +1,21 @@
 //! PLY files, by `ply-rs-bw`.
 //!
-//! That reader reserves memory for as many entries as a file announces. So what is announced is held against what can
-//! be there before it is called: element counts against the file's length, list lengths against the line (text) or by
-//! the type of their count (binary).
+//! That reader panics on a number in the header that is no `u64`, and reserves memory for as many entries as a file announces. So what is
+//! announced is held against what can be there before it is called: element counts against the file's length, list lengths
+//! against the line (text) or by the type of their count (binary).
 
 use super::{Surface, node_number};
 use glam::DVec3;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyType, ScalarType};
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 
 /// Nodes and triangles of a PLY file.
 pub(super) fn read(stream: &mut BufReader<File>) -> Result<Surface, String> {
     let length = stream.get_ref().metadata().map_err(|error| error.to_string())?.len();
-    let header = Parser::<PlyVertex>::new().read_header(stream).map_err(|error| error.to_string())?;
+    let text = header_text(stream)?;
+    let header = Parser::<PlyVertex>::new().read_header(&mut &text[..]).map_err(|error| error.to_string())?;
     let (mut nodes, mut triangles) = (Vec::new(), Vec::new());
     for (name, element) in &header.elements {
         if element.count as u64 > length {
@@ -40,6 +41,32 @@ pub(super) fn read(stream: &mut BufReader<File>) -> Result<Surface, String> {
     }
     node_number(nodes.len())?;
     Ok((nodes, triangles))
+}
+
+/// Longest header [bytes].
+const MAX_HEADER: u64 = 1 << 16;
+
+/// Longest run of digits in it: more may be no `u64`.
+const MAX_DIGITS: usize = 18;
+
+/// The header, up to `end_header`, without numbers that the parser cannot hold.
+fn header_text(stream: &mut impl BufRead) -> Result<Vec<u8>, String> {
+    let mut text = Vec::new();
+    loop {
+        let start = text.len();
+        let read = stream.take(MAX_HEADER - start as u64).read_until(b'\n', &mut text);
+        if read.map_err(|error| error.to_string())? == 0 {
+            return Err(format!("it has no header that ends within {MAX_HEADER} bytes"));
+        }
+        let line = text[start..].trim_ascii();
+        let is_remark = line.starts_with(b"comment") || line.starts_with(b"obj_info");
+        if !is_remark && line.split(|byte| !byte.is_ascii_digit()).any(|digits| digits.len() > MAX_DIGITS) {
+            return Err(format!("its header has a number of more than {MAX_DIGITS} digits"));
+        }
+        if line == b"end_header" {
+            return Ok(text);
+        }
+    }
 }
 
 /// All of one kind of element, lists checked before they are read.
