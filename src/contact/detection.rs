@@ -7,18 +7,21 @@
 //!
 //! Ties go to the lower triangle number.
 
-use super::closest_point::{ClosestPoint, Feature, closest_point, point_at};
-use super::deformation::Deformation;
-use super::depth::{Contact, measure};
+mod deformation;
+
+use super::geometry::RestSurface;
+use super::geometry::closest_point::{Closest, Feature, point_at};
+use super::geometry::normals;
+use super::law::depth::{Contact, measure};
+use super::law::series::distribute_all;
 use super::model::Model;
-use super::series::distribute_all;
-use super::surface;
 use crate::tolerances::{FACET_COMPLIANCE, KNOWN_FACETS};
+use deformation::Deformation;
 use glam::DVec3;
 
 /// Where a proxy node stands at rest, and what is known of it since.
 #[derive(Clone, Copy, Default)]
-struct Standing {
+struct RestDistance {
     /// Unsigned distance to the surface at rest, or a lower bound of it [m].
     distance: f64,
     /// False while `distance` is only a bound.
@@ -28,47 +31,15 @@ struct Standing {
     /// Has touched since the configuration was taken up, and is reported as a near miss from then on.
     watched: bool,
     /// Triangle that is closest at rest, where `distance` is exact.
-    at_rest: u32,
+    closest: u32,
     /// Triangle that was closest last: tried first, which makes the search short.
     last: u32,
 }
 
-impl Standing {
+impl RestDistance {
     /// Signed distance to the surface at rest, negative inside, or a lower bound of it [m].
     fn signed(&self) -> f64 {
         if self.inside { -self.distance } else { self.distance }
-    }
-}
-
-/// The closest feature of the surface.
-#[derive(Clone, Copy)]
-pub struct Closest {
-    /// Squared distance [m^2].
-    pub distance_squared: f64,
-    /// Triangle.
-    pub triangle: u32,
-    /// Point and feature on it.
-    pub point: ClosestPoint,
-}
-
-impl Closest {
-    /// None yet.
-    #[must_use]
-    pub fn none() -> Self {
-        let point = ClosestPoint { weights: [0.0; 3], feature: Feature::Face };
-        Self { distance_squared: f64::MAX, triangle: u32::MAX, point }
-    }
-
-    /// Takes triangle `t` with these corners instead if it is nearer to `x`, or as near with a lower number; its closest point, and the squared
-    /// distance of that [m^2].
-    pub fn consider(&mut self, x: DVec3, corners: [DVec3; 3], t: u32) -> (ClosestPoint, f64) {
-        let point = closest_point(x, corners);
-        let distance_squared = x.distance_squared(point_at(corners, point.weights));
-        if distance_squared < self.distance_squared || (distance_squared == self.distance_squared && t < self.triangle)
-        {
-            *self = Self { distance_squared, triangle: t, point };
-        }
-        (point, distance_squared)
     }
 }
 
@@ -77,7 +48,7 @@ impl Closest {
 pub enum Facets {
     /// The closest one.
     Closest,
-    /// All that its spring acts on: those about as near as the closest (see [`super::series`]).
+    /// All that its spring acts on: those about as near as the closest (see [`super::law::series`]).
     Felt,
 }
 
@@ -91,7 +62,7 @@ fn known_distance(radius: f64, least: f64) -> f64 {
 pub struct Detection {
     /// Proxy nodes relative to the model's centre [m].
     nodes: Vec<DVec3>,
-    standings: Vec<Standing>,
+    at_rest: Vec<RestDistance>,
     deformation: Deformation,
     /// Facets that the ball at hand may feel.
     facets: Vec<Closest>,
@@ -105,7 +76,7 @@ impl Detection {
         let count = model.chain.nodes.len();
         Self {
             nodes: vec![DVec3::ZERO; count],
-            standings: vec![Standing::default(); count],
+            at_rest: vec![RestDistance::default(); count],
             deformation: Deformation::new(model),
             facets: Vec::new(),
             parts: Vec::new(),
@@ -120,7 +91,7 @@ impl Detection {
 
     /// A lower bound of the signed distance of each proxy node to the surface at rest, in the configuration taken up [m].
     pub fn distances(&self) -> impl Iterator<Item = f64> {
-        self.standings.iter().map(Standing::signed)
+        self.at_rest.iter().map(RestDistance::signed)
     }
 
     /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns the smallest signed distance of a
@@ -130,15 +101,15 @@ impl Detection {
         let first = self.place(model, nodes);
         let mut gap = f64::MAX;
         for i in std::iter::once(first).chain(0..nodes.len()) {
-            let standing = &mut self.standings[i];
+            let known = &mut self.at_rest[i];
             let radius = model.chain.nodes[i].radius;
-            if !standing.exact {
-                if standing.distance > 0.0 && standing.distance - radius > gap {
+            if !known.exact {
+                if known.distance > 0.0 && known.distance - radius > gap {
                     continue;
                 }
-                find_standing(model, self.nodes[i], standing);
+                find_at_rest(&model.surface, self.nodes[i], known);
             }
-            gap = gap.min(standing.signed() - radius);
+            gap = gap.min(known.signed() - radius);
         }
         gap
     }
@@ -148,25 +119,25 @@ impl Detection {
     pub fn place(&mut self, model: &Model, nodes: &[DVec3]) -> usize {
         let (mut first, mut least) = (0, f64::INFINITY);
         for (i, &node) in nodes.iter().enumerate() {
-            let x = node - model.centre;
-            let standing = &mut self.standings[i];
-            standing.watched = false;
+            let x = node - model.surface.centre;
+            let known = &mut self.at_rest[i];
+            known.watched = false;
             // Of a node that stands where it stood in the configuration before, as all do that hang on joints which have not moved, all
             // is known.
-            if !(standing.exact && self.nodes[i] == x) {
+            if !(known.exact && self.nodes[i] == x) {
                 self.nodes[i] = x;
-                standing.exact = false;
-                standing.inside = false;
+                known.exact = false;
+                known.inside = false;
                 // Beyond the lattice of bounds the surface's box bounds the distance.
-                standing.distance = match model.distance_bounds.at(x) {
+                known.distance = match model.surface.distance_bounds.at(x) {
                     Some((bound, triangle)) => {
-                        standing.last = triangle;
+                        known.last = triangle;
                         bound
                     }
-                    None => model.bounds.distance_squared(x).sqrt(),
+                    None => model.surface.bounds.distance_squared(x).sqrt(),
                 };
             }
-            let clearance = standing.signed() - model.chain.nodes[i].radius;
+            let clearance = known.signed() - model.chain.nodes[i].radius;
             if clearance < least {
                 (first, least) = (i, clearance);
             }
@@ -192,13 +163,13 @@ impl Detection {
         for i in 0..self.nodes.len() {
             let x = self.nodes[i];
             let radius = model.chain.nodes[i].radius;
-            let standing = &mut self.standings[i];
-            if !standing.inside && standing.distance - radius > moved {
+            let known = &mut self.at_rest[i];
+            if !known.inside && known.distance - radius > moved {
                 continue;
             }
-            if !standing.exact {
-                find_standing(model, x, standing);
-                if !standing.inside && standing.distance - radius > moved {
+            if !known.exact {
+                find_at_rest(&model.surface, x, known);
+                if !known.inside && known.distance - radius > moved {
                     continue;
                 }
             }
@@ -206,12 +177,12 @@ impl Detection {
             let Some(closest) = self.closest(model, i, feels) else {
                 continue;
             };
-            let standing = &mut self.standings[i];
-            standing.last = closest.triangle;
+            let known = &mut self.at_rest[i];
+            known.last = closest.triangle;
             let contact = self.contact_at(model, i, closest);
-            let standing = &mut self.standings[i];
-            standing.watched |= contact.depth > 0.0;
-            if !standing.watched {
+            let known = &mut self.at_rest[i];
+            known.watched |= contact.depth > 0.0;
+            if !known.watched {
                 continue;
             }
             contacts.push(contact);
@@ -232,13 +203,12 @@ impl Detection {
         let Self { deformation, facets, .. } = self;
         let x = self.nodes[i];
         let radius = model.chain.nodes[i].radius;
-        let standing = self.standings[i];
+        let known = self.at_rest[i];
         let moved = deformation.moved;
         // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than that.
-        let matters =
-            if standing.inside || standing.watched { f64::MAX } else { radius.max(moved - standing.distance) };
+        let matters = if known.inside || known.watched { f64::MAX } else { radius.max(moved - known.distance) };
         let mut closest = Closest::none();
-        let likely = if moved == 0.0 { standing.at_rest } else { standing.last };
+        let likely = if moved == 0.0 { known.closest } else { known.last };
         // None was closest where the pass before was not a number.
         if (likely as usize) < model.object.triangles.len() {
             closest.consider(x, deformation.corners(model, likely), likely);
@@ -277,18 +247,18 @@ impl Detection {
         for i in 0..self.nodes.len() {
             let x = self.nodes[i];
             let radius = model.chain.nodes[i].radius;
-            let standing = &mut self.standings[i];
-            if !standing.inside && standing.distance - radius > reach {
+            let known = &mut self.at_rest[i];
+            if !known.inside && known.distance - radius > reach {
                 continue;
             }
-            let closest = find_standing(model, x, standing);
+            let closest = find_at_rest(&model.surface, x, known);
             if closest.triangle == u32::MAX {
                 continue;
             }
-            let t = closest.triangle as usize;
-            let corners = surface::corners(&model.rest, model.object.triangles[t]);
-            let mut row =
-                contact_with(model, i, x, closest, corners, model.rest_pseudonormal(t, closest.point.feature));
+            let Closest { triangle, point, .. } = closest;
+            let (corners, direction) =
+                (model.surface.corners(triangle), model.surface.pseudonormal(triangle, point.feature));
+            let mut row = contact_with(model, i, x, closest, corners, direction);
             if row.depth >= -reach {
                 row.freeze();
                 rows.push(row);
@@ -297,37 +267,14 @@ impl Detection {
     }
 }
 
-/// Signed distance of `x` to the surface at rest [m], and the closest triangle; `near` is a triangle near by, if any is known.
-pub(super) fn signed_distance(model: &Model, x: DVec3, near: Option<u32>) -> (f64, u32) {
-    let mut standing = Standing { last: near.unwrap_or(u32::MAX), ..Standing::default() };
-    let triangle = find_standing(model, x, &mut standing).triangle;
-    (if standing.inside { -standing.distance } else { standing.distance }, triangle)
-}
-
 /// Closest feature at rest; notes distance and side.
-fn find_standing(model: &Model, x: DVec3, standing: &mut Standing) -> Closest {
-    let triangles = &model.object.triangles;
-    let mut closest = Closest::none();
-    let last = standing.last;
-    if (last as usize) < triangles.len() {
-        closest.consider(x, surface::corners(&model.rest, triangles[last as usize]), last);
-    }
-    model.bounds.search(x, closest.distance_squared, |t| {
-        if t != last {
-            closest.consider(x, surface::corners(&model.rest, triangles[t as usize]), t);
-        }
-        closest.distance_squared
-    });
-    standing.exact = true;
-    standing.distance = closest.distance_squared.sqrt();
-    standing.at_rest = closest.triangle;
-    standing.last = closest.triangle;
-    standing.inside = false;
-    if closest.triangle != u32::MAX {
-        let t = closest.triangle as usize;
-        let offset = point_at(surface::corners(&model.rest, triangles[t]), closest.point.weights) - x;
-        standing.inside = offset.dot(model.rest_pseudonormal(t, closest.point.feature)) > 0.0;
-    }
+fn find_at_rest(surface: &RestSurface, x: DVec3, known: &mut RestDistance) -> Closest {
+    let closest = surface.closest(x, known.last);
+    known.exact = true;
+    known.distance = closest.distance_squared.sqrt();
+    known.closest = closest.triangle;
+    known.last = closest.triangle;
+    known.inside = surface.is_inside(x, &closest);
     closest
 }
 
@@ -352,7 +299,7 @@ fn contact_with(
 fn facing(model: &Model, i: usize, x: DVec3, deformation: &mut Deformation, facet: Closest) -> Contact {
     let corners = deformation.corners(model, facet.triangle);
     let towards = x - point_at(corners, facet.point.weights);
-    let normal = surface::unit_or_zero(surface::area_vector(corners));
+    let normal = normals::unit_or_zero(normals::area_vector(corners));
     let direction = match facet.point.feature {
         Feature::Face if normal.dot(towards) < 0.0 => -normal,
         Feature::Face => normal,
@@ -408,12 +355,12 @@ mod tests {
         for (i, &x) in nodes.iter().enumerate() {
             let mut closest = Closest::none();
             for t in 0..model.object.triangles.len() {
-                closest.consider(x, surface::corners(positions, model.object.triangles[t]), t as u32);
+                closest.consider(x, normals::corners(positions, model.object.triangles[t]), t as u32);
             }
             let (triangles, t) = (&model.object.triangles, closest.triangle as usize);
             let pseudonormal =
-                surface::pseudonormal(positions, triangles, &model.object.topology, t, closest.point.feature);
-            let corners = surface::corners(positions, triangles[t]);
+                normals::pseudonormal(positions, triangles, &model.object.topology, t, closest.point.feature);
+            let corners = normals::corners(positions, triangles[t]);
             let contact = contact_with(model, i, x, closest, corners, pseudonormal);
             if contact.depth > 0.0 {
                 contacts.push(contact);
@@ -442,10 +389,11 @@ mod tests {
             let mut detection = Detection::new(&model);
             for _ in 0..40 {
                 let world: Vec<DVec3> =
-                    (0..30).map(|_| model.centre + DVec3::new(next(), next(), next()) * 0.06).collect();
+                    (0..30).map(|_| model.surface.centre + DVec3::new(next(), next(), next()) * 0.06).collect();
                 let gap = detection.take_up(&model, &world);
-                let x: Vec<DVec3> = world.iter().map(|node| *node - model.centre).collect();
-                let deepest = brute_force(&model, &x, &model.rest).iter().map(|c| c.depth).fold(0.0, f64::max);
+                let x: Vec<DVec3> = world.iter().map(|node| *node - model.surface.centre).collect();
+                let deepest =
+                    brute_force(&model, &x, &model.surface.positions).iter().map(|c| c.depth).fold(0.0, f64::max);
                 assert!(((-gap).max(0.0) - deepest).abs() < 1e-15, "{gap} {deepest}");
                 for size in [0.0, 1e-9, 1e-3, 0.02, 0.005, 0.05, 0.0] {
                     // Forces on some nodes, which displace the surface by about `size`.
@@ -456,12 +404,13 @@ mod tests {
                             model.compliance.block(j, *k as usize) * DVec3::from_array(*force)
                         };
                         let loads = || nodes.iter().zip(forces.as_chunks().0);
-                        (0..model.rest.len()).map(|j| loads().map(|pair| load(j, pair)).sum()).collect()
+                        (0..model.surface.positions.len()).map(|j| loads().map(|pair| load(j, pair)).sum()).collect()
                     };
                     let most = displace(&forces).iter().map(|u| u.length()).fold(0.0, f64::max);
                     forces.iter_mut().for_each(|force| *force *= size / most);
                     let displacement = displace(&forces);
-                    let positions: Vec<DVec3> = model.rest.iter().zip(&displacement).map(|(n, u)| *n + *u).collect();
+                    let positions: Vec<DVec3> =
+                        model.surface.positions.iter().zip(&displacement).map(|(n, u)| *n + *u).collect();
                     let work: f64 = nodes
                         .iter()
                         .zip(forces.as_chunks().0)

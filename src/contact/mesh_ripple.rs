@@ -42,7 +42,7 @@ impl MeshRipple {
             (0..model.object.triangles.len()).filter_map(|triangle| facet(model, triangle)).collect();
         ripples.sort_unstable_by(f64::total_cmp);
         let (median, worst) = (*ripples.get(ripples.len() / 2)?, *ripples.last()?);
-        Some(Self { median, worst, edge: model.mean_edge, skin: model.object.skin.is_some() })
+        Some(Self { median, worst, edge: model.surface.mean_edge, skin: model.object.skin.is_some() })
     }
 
     /// What to do where the mesh shows through by more than [`RIPPLE_WARNING`].
@@ -71,7 +71,7 @@ fn facet(model: &Model<'_>, triangle: usize) -> Option<f64> {
     for (place, node) in places.iter_mut().zip(nodes) {
         *place = model.compliance.place(node)?;
     }
-    let normal = model.rest_normals[triangle];
+    let normal = model.surface.normals[triangle];
     let between = |i: usize, j: usize| normal.dot(model.compliance.block(places[i], places[j]) * normal);
     let compliance = |w: [f64; 3]| -> f64 {
         (0..3).map(|i| (0..3).map(|j| w[i] * w[j] * between(i, j)).sum::<f64>()).sum::<f64>() + 1.0 / model.kc

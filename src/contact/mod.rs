@@ -1,35 +1,24 @@
 //! Equilibrium of one configuration, equation (2), in f64 on the CPU.
 //!
 //! Prepare a [`Model`] once, give each thread a [`Solver`], and solve configuration after configuration.
+//!
+//! Each room uses those before it: `linear` (algebra), `geometry` (the surface), `law` (depth, springs), `detection` (which proxy nodes
+//! touch), `equilibrium` (the searches), and the solver.
 
 use crate::{JointMatrix, JointVector};
 use glam::DVec3;
 
-mod bounding_volumes;
-mod cholesky;
-pub(crate) mod closest_point;
-mod deformation;
-pub(crate) mod depth;
 pub(crate) mod detection;
-mod distance_bounds;
-pub(crate) mod energy;
+pub(crate) mod equilibrium;
+pub(crate) mod geometry;
+pub(crate) mod law;
+pub(crate) mod linear;
 mod mesh_ripple;
 mod model;
-mod newton;
-mod packet;
-mod paper;
 mod proximity;
 mod reach;
-mod relief;
-mod rows;
-mod series;
 mod solver;
 mod solvers;
-mod springs;
-pub(crate) mod support;
-pub(crate) mod surface;
-mod tangent;
-mod wide;
 
 pub use mesh_ripple::MeshRipple;
 pub use model::Model;

@@ -1,16 +1,11 @@
 //! What contact needs to know of object and proxy, computed once and shared by all threads.
 
-use super::bounding_volumes::BoundingVolumes;
-use super::closest_point::Feature;
-use super::distance_bounds::DistanceBounds;
-use super::reach;
-use super::surface;
+use super::{geometry::RestSurface, reach};
 use crate::JointVector;
 use crate::object::{Compliance, Object, ObjectError};
 use crate::proxy::Chain;
 use crate::scene::ContactSpec;
 use crate::tolerances::{LENGTH_ROUNDING, RIGID_STIFFNESS};
-use glam::DVec3;
 
 /// An object and a proxy, prepared for contact.
 pub struct Model<'a> {
@@ -31,28 +26,13 @@ pub struct Model<'a> {
     pub shares: Vec<f64>,
     /// Whether each equilibrium comes with its tangent d tau/d q.
     pub with_tangent: bool,
-    /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
-    /// loses no digits.
-    pub centre: DVec3,
-    /// Distance of the farthest surface node from the centre [m].
-    pub extent: f64,
-    /// Rest positions of the surface nodes, relative to the centre [m].
-    pub rest: Vec<DVec3>,
+    /// The surface at rest.
+    pub surface: RestSurface<'a>,
     /// Largest trace of a covered node's own block C_jj: no node moves farther than sqrt(softest) times |u| in the energy norm [m/N].
     pub softest: f64,
     /// Largest eigenvalue of a covered node's own block C_jj, or a bound of it: no node moves farther than sqrt(mobility) times |u| in
     /// the energy norm [m/N].
     pub mobility: f64,
-    /// The triangles at rest, for closest-point queries.
-    pub bounds: BoundingVolumes,
-    /// What is known of distances to the surface at rest without such a query.
-    pub distance_bounds: DistanceBounds,
-    /// Mean length of the surface's edges at rest [m].
-    pub mean_edge: f64,
-    /// Unit normals of the triangles at rest.
-    pub rest_normals: Vec<DVec3>,
-    /// Angle-weighted pseudonormals of the surface nodes at rest, not of length one.
-    pub rest_pseudonormals: Vec<DVec3>,
 }
 
 impl<'a> Model<'a> {
@@ -88,25 +68,6 @@ impl<'a> Model<'a> {
     pub const WHOLE: usize = 2048;
 
     fn with_compliance(object: &'a Object, chain: &'a Chain, contact: ContactSpec, compliance: Compliance) -> Self {
-        let surface_rest = &object.rest[..object.surface_nodes];
-        let low = surface_rest.iter().copied().fold(DVec3::MAX, DVec3::min);
-        let high = surface_rest.iter().copied().fold(DVec3::MIN, DVec3::max);
-        let centre = low.midpoint(high);
-        let rest: Vec<DVec3> = surface_rest.iter().map(|&position| position - centre).collect();
-        let extent = rest.iter().map(|position| position.length()).fold(0.0, f64::max);
-        let triangles = &object.triangles;
-        let rest_normals = (0..triangles.len())
-            .map(|t| surface::pseudonormal(&rest, triangles, &object.topology, t, Feature::Face))
-            .collect();
-        let mean_edge = surface::mean_edge(&rest, triangles);
-        let mut rest_pseudonormals = vec![DVec3::ZERO; rest.len()];
-        for (t, triangle) in triangles.iter().enumerate() {
-            for (k, &node) in triangle.iter().enumerate() {
-                rest_pseudonormals[node as usize] =
-                    surface::pseudonormal(&rest, triangles, &object.topology, t, Feature::Vertex(k));
-            }
-        }
-        let bounds = BoundingVolumes::new(&rest, triangles);
         let (softest, mobility) = softest(&compliance);
         let mut model = Self {
             object,
@@ -118,16 +79,8 @@ impl<'a> Model<'a> {
             kc: 0.0,
             shares: chain.nodes.iter().map(|node| contact.share(node.length)).collect(),
             with_tangent: false,
-            centre,
-            extent,
-            rest,
-            bounds,
-            distance_bounds: DistanceBounds::none(),
-            mean_edge,
-            rest_normals,
-            rest_pseudonormals,
+            surface: RestSurface::new(object),
         };
-        model.distance_bounds = DistanceBounds::new(&model);
         model.set_stiffness(contact.stiffness);
         model
     }
@@ -144,16 +97,6 @@ impl<'a> Model<'a> {
     #[must_use]
     pub fn motion_bound(&self, elastic: f64) -> f64 {
         (2.0 * self.mobility * elastic.max(0.0)).sqrt() * (1.0 + LENGTH_ROUNDING)
-    }
-
-    /// Pseudonormal of a feature of triangle `t` at rest, outward, not of length one.
-    #[must_use]
-    pub fn rest_pseudonormal(&self, t: usize, feature: Feature) -> DVec3 {
-        match feature {
-            Feature::Face => self.rest_normals[t],
-            Feature::Edge(k) => self.rest_normals[t] + self.rest_normals[self.object.topology.across[t][k] as usize],
-            Feature::Vertex(k) => self.rest_pseudonormals[self.object.triangles[t][k] as usize],
-        }
     }
 }
 

@@ -23,13 +23,13 @@ pub(super) fn reached(model: &Model<'_>, configurations: &[JointVector]) -> Vec<
         .map_init(
             || Proximity::new(model),
             |proximity, share| {
-                let mut marked = vec![false; model.rest.len()];
+                let mut marked = vec![false; model.surface.positions.len()];
                 share.iter().for_each(|q| mark(model, proximity, q, &mut marked));
                 marked
             },
         )
         .reduce(
-            || vec![false; model.rest.len()],
+            || vec![false; model.surface.positions.len()],
             |mut all, some| {
                 all.iter_mut().zip(some).for_each(|(all, some)| *all |= some);
                 all
@@ -49,7 +49,7 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
             continue;
         }
         let radius = (clearance + node.radius).abs() + 2.0 * motion;
-        for_triangles_within(model, *x - model.centre, radius, |t| {
+        for_triangles_within(model, *x - model.surface.centre, radius, |t| {
             model.object.triangles[t as usize].iter().for_each(|&node| marked[node as usize] = true);
         });
     }
@@ -71,7 +71,7 @@ pub(super) fn covers(model: &Model<'_>, detection: &Detection, equilibrium: &Equ
 
 /// Visits the triangles that are within `radius` of `x` at rest.
 fn for_triangles_within(model: &Model<'_>, x: DVec3, radius: f64, mut visit: impl FnMut(u32)) {
-    model.bounds.search(x, radius * radius, |t| {
+    model.surface.bounds.search(x, radius * radius, |t| {
         visit(t);
         radius * radius
     });

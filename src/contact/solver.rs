@@ -1,11 +1,11 @@
 //! Equilibrium of one configuration: dispatch to the scene's algorithm and the account of its result.
 
 use super::detection::Detection;
-use super::energy::{EnergySearch, Geometry, Limits, Outcome};
+use super::equilibrium::energy::{EnergySearch, Geometry, Limits, Outcome};
+use super::equilibrium::paper::PaperIteration;
+use super::linear::support::dot;
 use super::model::Model;
-use super::paper::PaperIteration;
 use super::reach;
-use super::support::dot;
 use super::{Equilibrium, NodeForce, Status, Touch};
 use crate::JointVector;
 use crate::proxy::Pose;
@@ -44,7 +44,7 @@ impl<'a> Solver<'a> {
     /// A solver for `model`.
     #[must_use]
     pub fn new(model: &'a Model<'a>) -> Self {
-        let surface_nodes = model.rest.len();
+        let surface_nodes = model.surface.positions.len();
         Self {
             model,
             pose: model.chain.new_pose(),
@@ -160,7 +160,7 @@ impl<'a> Solver<'a> {
     pub fn displacement(&mut self) -> &[f64] {
         let Self { model, energy, paper, held_by, displacement, .. } = self;
         displacement.get_or_insert_with(|| {
-            let mut displacement = vec![0.0; 3 * model.rest.len()];
+            let mut displacement = vec![0.0; 3 * model.surface.positions.len()];
             match held_by {
                 HeldBy::Nothing => {}
                 HeldBy::Energy => {

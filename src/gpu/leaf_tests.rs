@@ -13,9 +13,9 @@ use super::{
 use crate::{
     contact::{
         Model, Solver, Status,
-        closest_point::{Feature, closest_point, point_at},
-        depth::{Contact, measure, second_variation},
-        surface::{area_vector, unit_or_zero},
+        geometry::closest_point::{Feature, closest_point, point_at},
+        geometry::normals::{area_vector, unit_or_zero},
+        law::depth::{Contact, measure, second_variation},
     },
     haptize::Backend,
     object::Object,

@@ -53,13 +53,13 @@ impl DeviceModel {
         if !compliance.is_whole() && contact.algorithm == Algorithm::Paper {
             return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });
         }
-        let extent = model.rest.iter().map(|n| n.length()).fold(0.0, f64::max);
+        let extent = model.surface.positions.iter().map(|n| n.length()).fold(0.0, f64::max);
         let gap_band = tolerances::GPU_GAP_BAND_PER_EXTENT * extent
-            + tolerances::GPU_GAP_BAND_PER_JOINT * chain.joints.len() as f64 * reach(chain, model.centre);
-        let corners = |t: &[u32; 3]| t.map(|j| model.rest[j as usize]);
+            + tolerances::GPU_GAP_BAND_PER_JOINT * chain.joints.len() as f64 * reach(chain, model.surface.centre);
+        let corners = |t: &[u32; 3]| t.map(|j| model.surface.positions[j as usize]);
         let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
         let longest_edge = object.triangles.iter().map(|t| edge(corners(t))).fold(0.0, f64::max);
-        let clusters: Vec<u32> = model.bounds.order().collect();
+        let clusters: Vec<u32> = model.surface.bounds.order().collect();
         let entries: Vec<f32> = compliance.entries.iter().map(|&entry| entry as f32).collect();
         Ok(Self {
             parameters: Parameters {
@@ -80,7 +80,7 @@ impl DeviceModel {
                 ..bytemuck::Zeroable::zeroed()
             },
             kinds: chain.joints.iter().map(|joint| joint.kind).collect(),
-            joints: StorageBuffer::from_slice(context, "joints", &joints(chain, model.centre))?,
+            joints: StorageBuffer::from_slice(context, "joints", &joints(chain, model.surface.centre))?,
             proxy_nodes: StorageBuffer::from_slice(context, "proxy nodes", &proxy_nodes(chain))?,
             rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, &clusters, extent))?,
             mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(model, &clusters))?,
@@ -166,7 +166,7 @@ fn proxy_nodes(chain: &proxy::Chain) -> Vec<ProxyNode> {
 /// behind the other.
 fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 4]> {
     let around = |nodes: &[u32]| {
-        let corners = nodes.iter().map(|&j| model.rest[j as usize]);
+        let corners = nodes.iter().map(|&j| model.surface.positions[j as usize]);
         let centre = corners.clone().sum::<DVec3>() / nodes.len() as f64;
         let radius = corners.map(|c| c.distance(centre)).fold(0.0, f64::max);
         let [x, y, z, _] = padded(centre);
@@ -177,7 +177,7 @@ fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 
         let nodes: Vec<u32> = numbers.iter().flat_map(|&t| triangles[t as usize]).collect();
         around(&nodes)
     };
-    let nodes = model.rest.iter().map(|&n| padded(n));
+    let nodes = model.surface.positions.iter().map(|&n| padded(n));
     let spheres = triangles.iter().map(|nodes| around(nodes));
     let radii = model.chain.nodes.iter().map(|node| [node.radius as f32, 0.0, 0.0, 0.0]);
     nodes.chain(spheres).chain(radii).chain(clusters.chunks(CLUSTER).map(cluster)).collect()

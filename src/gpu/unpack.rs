@@ -11,7 +11,7 @@ use super::{
     solver::free,
 };
 use crate::{
-    contact::{self, Equilibrium, NodeForce, Status, energy::Limits},
+    contact::{self, Equilibrium, NodeForce, Status, equilibrium::energy::Limits},
     scene::Algorithm,
     tolerances::{GPU_RESOLVED_RESIDUAL, GPU_SETTLED_RESIDUAL, MINIMUM_SQUARE, SETTLING_STEPS},
 };
@@ -53,7 +53,7 @@ fn settled(
     let forces: Vec<NodeForce> = list
         .iter()
         .flat_map(nodes)
-        .filter(|(node, force)| *node != contact::support::ABSENT && *force != [0.0; 3])
+        .filter(|(node, force)| *node != contact::linear::support::ABSENT && *force != [0.0; 3])
         .map(|(node, force)| NodeForce { node, force: DVec3::from(force.map(f64::from)) })
         .collect();
     let tolerance = model.contact.tolerance.clamp(GPU_SETTLED_RESIDUAL, GPU_RESOLVED_RESIDUAL);

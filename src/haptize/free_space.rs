@@ -272,7 +272,7 @@ impl FreeSpace<'_> {
             wide[j] = (steps + FreeSpace::MARGIN as f64) * axis.step;
         }
         let nearest = proximity.place(&centre);
-        let rounding = FREE_SPACE_ROUNDING * (self.reach.length + self.model.extent);
+        let rounding = FREE_SPACE_ROUNDING * (self.reach.length + self.model.surface.extent);
         let stays = |(i, clearance): (usize, f64)| clearance - self.motion(proximity, i, &wide) > rounding;
         let least = proximity.clearances().nth(nearest).unwrap_or(f64::INFINITY);
         if stays((nearest, least)) && proximity.clearances().enumerate().all(stays) {

@@ -186,7 +186,7 @@ fn objects_that_are_not_isotropic_have_the_same_equilibria_on_gpu_and_cpu() {
 fn part<'a>((scene, object, chain): &'a (Scene, Object, Chain), algorithm: Algorithm) -> Model<'a> {
     let contact = haptize::scene::ContactSpec { algorithm, ..scene.contact };
     let mut model = Model::new(object, chain, contact);
-    let reached = |node: &u32| model.rest[*node as usize].dot(DVec3::new(-0.3, 0.0, 1.0)) > 0.015;
+    let reached = |node: &u32| model.surface.positions[*node as usize].dot(DVec3::new(-0.3, 0.0, 1.0)) > 0.015;
     model.compliance = Compliance::on(object, (0..object.surface_nodes as u32).filter(reached).collect()).unwrap();
     model
 }

@@ -83,7 +83,7 @@ fn compare(
         let mut backend = CpuBackend::new(&model, 0).map_err(crate::haptize::BackendError::from)?;
         let (cost, solved) =
             timed(study.rounds, || backend.solve(&reference.places)).unwrap_or_else(|never| match never {});
-        let value = if varied == Study::Mesh { model.mean_edge } else { *factor };
+        let value = if varied == Study::Mesh { model.surface.mean_edge } else { *factor };
         found.push((value, object.rest.len(), cost, solved));
     }
     // Numbers of nodes are whole: the edge is measured.

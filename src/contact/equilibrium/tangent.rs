@@ -9,11 +9,11 @@
 //! `dq . E_qq dq' = v . B v' - lambda_i N_i . x_i''(dq, dq')`, with the second derivative of the forward kinematics
 //! `d^2 x_i / dq_k dq_l = a_k x J_il` for k <= l where joint k is revolute, and zero where it is prismatic.
 
-use super::model::Model;
 use super::newton::Newton;
-use super::springs::{Springs, add_on_nodes};
-use super::support::{Support, dot};
 use crate::JointMatrix;
+use crate::contact::law::springs::{Springs, add_on_nodes};
+use crate::contact::linear::support::{Support, dot};
+use crate::contact::model::Model;
 use crate::proxy::Pose;
 use crate::scene::JointKind;
 use crate::tolerances::RESPONSE_TOLERANCE;

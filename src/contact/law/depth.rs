@@ -17,7 +17,7 @@
 //! One form for all three, so that a product needs no branch: P dp = dp - N (N . dp) - e (e . dp), with 1/s = 0 on faces and
 //! e = 0 at vertices. It is needed because contact points creep over flat facets when it is left out.
 
-use super::closest_point::Feature;
+use crate::contact::geometry::closest_point::Feature;
 use crate::tolerances::{MINIMUM_CURVATURE_RADIUS, MINIMUM_SQUARE};
 use glam::DVec3;
 
@@ -35,7 +35,7 @@ pub struct Contact {
     pub normal: DVec3,
     /// r + s, positive in contact [m].
     pub depth: f64,
-    /// Stiffness of the proxy node's spring over that of [`super::Model::kc`] [1].
+    /// Stiffness of the proxy node's spring over that of [`crate::contact::Model::kc`] [1].
     pub share: f64,
     /// Its part of the depth of the proxy node's spring: max(0, depth) where the node feels this facet alone; see
     /// [`super::series`] [m].
@@ -180,7 +180,7 @@ impl Contact {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::closest_point::closest_point;
+    use crate::contact::geometry::closest_point::closest_point;
     use crate::random::sequence;
 
     /// The contact of `x` with one triangle; `outward` decides the side at edges and vertices.

@@ -1,11 +1,11 @@
 //! The deformed surface, for searches near a point. Nodes are displaced, and packets of triangles placed, when a search first comes
 //! to them, so that what a search costs does not grow with the size of the mesh.
 
-use super::bounding_volumes::{Leaf, Volume};
-use super::closest_point::Feature;
-use super::model::Model;
-use super::packet::Packet;
-use super::surface;
+use crate::contact::geometry::bounding_volumes::{Leaf, Volume};
+use crate::contact::geometry::closest_point::Feature;
+use crate::contact::geometry::normals;
+use crate::contact::geometry::packet::Packet;
+use crate::contact::model::Model;
 use crate::object::Compliance;
 use glam::DVec3;
 
@@ -45,10 +45,10 @@ impl Deformation {
             surface: 0,
             moved: 0.0,
             loads: Vec::new(),
-            displaced: vec![0; model.rest.len()],
-            displacement: vec![DVec3::ZERO; model.rest.len()],
-            positions: model.rest.clone(),
-            places: model.bounds.leaves.iter().map(place).collect(),
+            displaced: vec![0; model.surface.positions.len()],
+            displacement: vec![DVec3::ZERO; model.surface.positions.len()],
+            positions: model.surface.positions.clone(),
+            places: model.surface.bounds.leaves.iter().map(place).collect(),
         }
     }
 
@@ -95,7 +95,7 @@ impl Deformation {
             }
         }
         self.displacement[j] = u;
-        self.positions[j] = model.rest[j] + u;
+        self.positions[j] = model.surface.positions[j] + u;
     }
 
     /// Pseudonormal of a feature of triangle `t`, outward, not of length one.
@@ -107,19 +107,19 @@ impl Deformation {
                 triangles[topology.across[t][k] as usize].into_iter().for_each(|node| self.displace(model, node));
             }
             Feature::Vertex(k) => {
-                for &around in surface::triangles_around(topology, triangles[t][k]) {
+                for &around in topology.triangles_around(triangles[t][k] as usize) {
                     triangles[around as usize].into_iter().for_each(|node| self.displace(model, node));
                 }
             }
         }
-        surface::pseudonormal(&self.positions, triangles, topology, t, feature)
+        normals::pseudonormal(&self.positions, triangles, topology, t, feature)
     }
 
     /// Corners of triangle `t` [m].
     pub fn corners(&mut self, model: &Model, t: u32) -> [DVec3; 3] {
         let nodes = model.object.triangles[t as usize];
         nodes.into_iter().for_each(|node| self.displace(model, node));
-        surface::corners(&self.positions, nodes)
+        normals::corners(&self.positions, nodes)
     }
 
     /// Calls `visit` with each triangle of the surface that is nearer to `x` than the squared radius that `visit` returned last, and
@@ -131,23 +131,23 @@ impl Deformation {
         radius_squared: f64,
         mut visit: impl FnMut(u32, [DVec3; 3]) -> f64,
     ) {
-        let slack = model.bounds.slack(x);
+        let slack = model.surface.bounds.slack(x);
         let moved = self.moved;
         // Of boxes at rest.
         let widened = |bound: f64| (bound.sqrt() + moved).powi(2) + slack;
         let mut bound = radius_squared + slack;
         let mut limit = widened(bound);
-        model.bounds.walk(x, limit, |leaf| {
+        model.surface.bounds.walk(x, limit, |leaf| {
             self.place(model, leaf);
             let Self { places, positions, .. } = self;
             let place = &places[leaf];
             if place.volume.distance_squared(x) <= bound {
                 let mut nearer = false;
                 for (&triangle, square) in
-                    model.bounds.leaves[leaf].triangles.iter().zip(place.packet.distances_squared(x))
+                    model.surface.bounds.leaves[leaf].triangles.iter().zip(place.packet.distances_squared(x))
                 {
                     if square <= bound {
-                        let corners = surface::corners(positions, model.object.triangles[triangle as usize]);
+                        let corners = normals::corners(positions, model.object.triangles[triangle as usize]);
                         bound = visit(triangle, corners) + slack;
                         nearer = true;
                     }
@@ -165,7 +165,7 @@ impl Deformation {
         if self.places[leaf].surface == self.surface {
             return;
         }
-        let nodes = &model.bounds.leaves[leaf].nodes;
+        let nodes = &model.surface.bounds.leaves[leaf].nodes;
         nodes.as_flattened().iter().for_each(|&node| self.displace(model, node));
         let place = &mut self.places[leaf];
         place.surface = self.surface;

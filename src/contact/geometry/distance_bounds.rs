@@ -11,10 +11,8 @@
 //!
 //! So away from the surface bounds are sharp to second order in h.
 
+use super::RestSurface;
 use super::closest_point::{closest_point, point_at};
-use super::detection::signed_distance;
-use super::model::Model;
-use super::surface;
 use crate::tolerances::DEPTH_ROUNDING;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -58,15 +56,15 @@ impl DistanceBounds {
         Self { low: DVec3::ZERO, inverse_side: 1.0, counts: [0; 3], cubes: Vec::new() }
     }
 
-    /// The lattice for the surface at rest of `model`, which has none yet: the surface's box, widened all round by half
+    /// The lattice for `surface`, which has none yet: the surface's box, widened all round by half
     /// of its longest side.
     #[must_use]
-    pub fn new(model: &Model) -> Self {
-        let low = model.rest.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-        let high = model.rest.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    pub fn new(surface: &RestSurface) -> Self {
+        let low = surface.positions.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+        let high = surface.positions.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         let margin = 0.5 * (high - low).max_element();
         let (low, size) = (low - margin, high - low + 2.0 * margin);
-        let wanted = (CUBES_PER_TRIANGLE * model.object.triangles.len()).clamp(LEAST_CUBES, MOST_CUBES);
+        let wanted = (CUBES_PER_TRIANGLE * surface.triangles.len()).clamp(LEAST_CUBES, MOST_CUBES);
         let side = (size.element_product() / wanted as f64).cbrt();
         if !(side > 0.0 && side.is_finite()) {
             return Self::none();
@@ -78,7 +76,7 @@ impl DistanceBounds {
             (0..counts[2]).map(move |k| {
                 let index = [line / counts[1], line % counts[1], k];
                 let middle = low + (DVec3::from_array(index.map(|place| place as f64)) + 0.5) * side;
-                let cube = cube(model, middle, 0.5 * side, slack, near);
+                let cube = cube(surface, middle, 0.5 * side, slack, near);
                 near = Some(cube.triangle);
                 cube
             })
@@ -102,10 +100,11 @@ impl DistanceBounds {
 }
 
 /// The bound around `c`, `half` of a side to either side of it; `near` is a triangle near by, if any is known.
-fn cube(model: &Model, c: DVec3, half: f64, slack: f64, near: Option<u32>) -> Cube {
-    let corners = |t: u32| surface::corners(&model.rest, model.object.triangles[t as usize]);
-    let offset = |t: u32, x: DVec3| x - point_at(corners(t), closest_point(x, corners(t)).weights);
-    let (s, triangle) = signed_distance(model, c, near);
+fn cube(surface: &RestSurface, c: DVec3, half: f64, slack: f64, near: Option<u32>) -> Cube {
+    let offset = |t: u32, x: DVec3| x - point_at(surface.corners(t), closest_point(x, surface.corners(t)).weights);
+    let closest = surface.closest(c, near.unwrap_or(u32::MAX));
+    let (distance, triangle) = (closest.distance_squared.sqrt(), closest.triangle);
+    let s = if surface.is_inside(c, &closest) { -distance } else { distance };
     let reach = 3.0_f64.sqrt() * half;
     let nearest = offset(triangle, c);
     // The direction as it is stored.
@@ -115,7 +114,7 @@ fn cube(model: &Model, c: DVec3, half: f64, slack: f64, near: Option<u32>) -> Cu
         let mut least = s;
         // |g - g_t|_1 is at most 2 sqrt(3).
         let radius = s + 2.0 * reach;
-        model.bounds.search(c, radius * radius, |t| {
+        surface.bounds.search(c, radius * radius, |t| {
             let offset = offset(t, c);
             let distance = offset.length();
             least = least.min(distance - half * (g - offset / distance).abs().element_sum());
@@ -138,7 +137,8 @@ fn cube(model: &Model, c: DVec3, half: f64, slack: f64, near: Option<u32>) -> Cu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{object::Object, proxy::Chain, random::Random, scene::Scene};
+    use crate::contact::geometry::normals;
+    use crate::{object::Object, random::Random, scene::Scene};
     use std::path::Path;
 
     /// Distances by trial of every triangle, sides by solid angles: on a convex surface and on one with a hollow. Bounds hold,
@@ -147,9 +147,9 @@ mod tests {
     fn bounds_hold_and_are_sharp_away_from_the_surface() {
         for name in ["tests/scenes/sphere.toml", "datasets/mesh.toml"] {
             let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
-            let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
-            let model = Model::new(&object, &chain, scene.contact);
-            let bounds = &model.distance_bounds;
+            let object = Object::build(&scene.object).unwrap();
+            let surface = RestSurface::new(&object);
+            let bounds = &surface.distance_bounds;
             let side = bounds.inverse_side.recip();
             let size = DVec3::from_array(bounds.counts.map(|count| count as f64)) * side;
             let mut random = Random::new(1);
@@ -157,12 +157,12 @@ mod tests {
             let (mut slack, mut count, mut inside) = (0.0, 0.0, 0);
             for _ in 0..4000 {
                 let x = bounds.low + size * DVec3::new(next(), next(), next());
-                let distance = |nodes: &[u32; 3]| {
-                    let corners = surface::corners(&model.rest, *nodes);
+                let distance = |t: u32| {
+                    let corners = surface.corners(t);
                     x.distance(point_at(corners, closest_point(x, corners).weights))
                 };
-                let distance = object.triangles.iter().map(distance).fold(f64::INFINITY, f64::min);
-                let is_inside = surface::winding_number(&model.rest, &object.triangles, x) > 0.5;
+                let distance = (0..object.triangles.len() as u32).map(distance).fold(f64::INFINITY, f64::min);
+                let is_inside = normals::winding_number(&surface.positions, &object.triangles, x) > 0.5;
                 let signed = if is_inside { -distance } else { distance };
                 let (bound, _) = bounds.at(x).unwrap();
                 assert!(bound <= signed, "{name}: {bound} {signed} at {x}");

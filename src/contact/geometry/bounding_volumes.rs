@@ -5,7 +5,7 @@
 //! rounding ([`CULLING_SLACK`]), and ties go to the lower triangle number, so that no result depends on the order of visits.
 
 use super::packet::{LANES, Packet, greatest};
-use super::wide::{Kernel, widest};
+use crate::contact::linear::wide::{Kernel, widest};
 use crate::tolerances::CULLING_SLACK;
 use glam::DVec3;
 
@@ -190,7 +190,7 @@ impl BoundingVolumes {
 
 /// Appends the leaves over the triangles `order`, split along the longest axis so that all leaves and branches but the last are full.
 fn build(positions: &[DVec3], triangles: &[[u32; 3]], order: &mut [u32], leaves: &mut Vec<Leaf>) {
-    let corners = |t: u32| super::surface::corners(positions, triangles[t as usize]);
+    let corners = |t: u32| super::normals::corners(positions, triangles[t as usize]);
     let volume = |t: u32| {
         let [a, b, c] = corners(t);
         Volume::new((a.min(b).min(c), a.max(b).max(c)))
@@ -222,8 +222,8 @@ fn build(positions: &[DVec3], triangles: &[[u32; 3]], order: &mut [u32], leaves:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::closest_point::{closest_point, point_at};
-    use crate::contact::surface;
+    use crate::contact::geometry::closest_point::{closest_point, point_at};
+    use crate::contact::geometry::normals;
     use crate::random::sequence;
 
     /// Trees of every height up to four, full and not: against all triangles tried one by one, for spheres of fixed size and for one
@@ -248,7 +248,7 @@ mod tests {
             for _ in 0..20 {
                 let x = point();
                 let square = |t: u32| {
-                    let corners = surface::corners(&positions, triangles[t as usize]);
+                    let corners = normals::corners(&positions, triangles[t as usize]);
                     x.distance_squared(point_at(corners, closest_point(x, corners).weights))
                 };
                 let radius_squared = 0.3;

@@ -15,13 +15,13 @@
 //! repeats an earlier one to the last bit (Brent 1980: compared with the pass of the last power of two). A node with a radius, which the paper does not have, acts through its deepest
 //! point x_i - r_i N_i.
 
-use super::cholesky;
-use super::depth::Contact;
-use super::detection::{Detection, Facets};
 use super::energy::Outcome;
-use super::model::Model;
-use super::support::{Support, dot, root};
-use super::surface;
+use crate::contact::detection::{Detection, Facets};
+use crate::contact::geometry::normals;
+use crate::contact::law::depth::Contact;
+use crate::contact::linear::cholesky;
+use crate::contact::linear::support::{Support, dot, root};
+use crate::contact::model::Model;
 use crate::tolerances::{LENGTH_ROUNDING, RESIDUAL_FLOOR};
 use glam::DVec3;
 
@@ -74,13 +74,13 @@ impl PaperIteration {
         Self {
             ties: Vec::new(),
             previous_ties: Vec::new(),
-            support: Support::new(model.rest.len()),
+            support: Support::new(model.surface.positions.len()),
             forces: Vec::new(),
             previous_forces: Vec::new(),
             marked_ties: Vec::new(),
             marked_forces: Vec::new(),
-            displacement: vec![0.0; 3 * model.rest.len()],
-            positions: model.rest.clone(),
+            displacement: vec![0.0; 3 * model.surface.positions.len()],
+            positions: model.surface.positions.clone(),
             contacts: Vec::new(),
             tie_counts: Vec::new(),
             matrix: Vec::new(),
@@ -155,7 +155,7 @@ impl PaperIteration {
             }
         }
         for ((target, count), &node) in targets.iter_mut().zip(tie_counts.iter()).zip(support.nodes()) {
-            *target = (DVec3::from_array(*target) / *count - model.rest[node as usize]).to_array();
+            *target = (DVec3::from_array(*target) / *count - model.surface.positions[node as usize]).to_array();
         }
         let (compliance, rows_per_node) = support.compliance();
         matrix.clear();
@@ -179,7 +179,7 @@ impl PaperIteration {
         let Self { ties, support, positions, normals, .. } = self;
         let (triangles, topology) = (&model.object.triangles, &model.object.topology);
         normals.clear();
-        let normal = |&node: &u32| surface::vertex_normal(positions, triangles, topology, node);
+        let normal = |&node: &u32| normals::vertex_normal(positions, triangles, topology, node);
         normals.extend(support.nodes().iter().map(normal));
         for tie in ties {
             for ((force, &node), slot) in tie.forces.iter_mut().zip(&tie.nodes).zip(tie.slots) {
@@ -234,7 +234,7 @@ impl PaperIteration {
     /// Positions from displacement.
     fn place(&mut self, model: &Model) {
         let displacement = self.displacement.as_chunks().0;
-        for ((position, rest), u) in self.positions.iter_mut().zip(&model.rest).zip(displacement) {
+        for ((position, rest), u) in self.positions.iter_mut().zip(&model.surface.positions).zip(displacement) {
             *position = *rest + DVec3::from_array(*u);
         }
     }

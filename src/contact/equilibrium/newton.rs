@@ -11,7 +11,7 @@
 //!   so convergence stays quadratic.
 //!
 //! Conjugate gradients on H = (1 + mu) K + B, B the Hessian of the contact terms, preconditioned by Woodbury's identity for the springs
-//! ([`super::relief`]), keep each search direction twice, as a force pi and as the displacement p = C pi, so that
+//! ([`super::woodbury`]), keep each search direction twice, as a force pi and as the displacement p = C pi, so that
 //! H p = (1 + mu) pi + B p needs no K. One product with C_AA is spent per iteration, that of the preconditioner. What it does not know
 //! of B, how contacts bend, has a rank of at most four per contact, so few iterations are needed whatever the object's size and the
 //! springs' stiffness. Negative curvature asks for more damping.
@@ -19,11 +19,11 @@
 // Indexed loops as in shaders/trust_region.wgsl.
 #![allow(clippy::needless_range_loop)]
 
-use super::depth::{Contact, second_variation};
-use super::relief::Relief;
-use super::series::distribute;
-use super::springs::{Springs, add_contact_hessian, add_on_nodes, nodes_of, stretched_and_bent};
-use super::support::{Support, dot, root};
+use super::woodbury::Woodbury;
+use crate::contact::law::depth::{Contact, second_variation};
+use crate::contact::law::series::distribute;
+use crate::contact::law::springs::{Springs, add_contact_hessian, add_on_nodes, nodes_of, stretched_and_bent};
+use crate::contact::linear::support::{Support, dot, root};
 use crate::tolerances::{
     CURVATURE_MARGIN, DAMPING_ATTEMPTS, DAMPING_DECAY, DAMPING_GROWTH, INNER_ITERATIONS_PER_UNKNOWN, LEAST_DAMPING,
     MODEL_PASSES,
@@ -96,7 +96,7 @@ pub struct Newton {
     residual: Vec<f64>,
     /// C times the residual.
     product: Vec<f64>,
-    relief: Relief,
+    woodbury: Woodbury,
     /// The residual preconditioned, as force and as displacement.
     relieved_force: Vec<f64>,
     relieved: Vec<f64>,
@@ -134,7 +134,7 @@ impl Newton {
     pub fn factorise(&mut self, support: &Support, springs: Springs) {
         self.stiffening = 1.0;
         self.reset(support.order(), springs.contacts);
-        self.relief.set_up(support, springs, &self.touching, self.stiffening);
+        self.woodbury.set_up(support, springs, &self.touching, self.stiffening);
     }
 
     /// The displacement du on the support with which (K + B) du is the force `load` on the support to `tolerance`, B the Hessian of the
@@ -174,7 +174,7 @@ impl Newton {
         for pass in 0..MODEL_PASSES {
             self.previous_force.copy_from_slice(&self.force);
             self.previous_displacement.copy_from_slice(&self.displacement);
-            self.relief.set_up(support, springs, &self.touching, self.stiffening);
+            self.woodbury.set_up(support, springs, &self.touching, self.stiffening);
             self.relieve(springs);
             if pass == 0 {
                 stop = tolerance * tolerance * dot(&self.residual, &self.relieved);
@@ -264,8 +264,8 @@ impl Newton {
 
     /// Preconditions the residual.
     fn relieve(&mut self, springs: Springs) {
-        let Self { relief, residual, product, relieved_force, relieved, .. } = self;
-        relief.apply(springs, (residual, product), relieved_force, relieved);
+        let Self { woodbury, residual, product, relieved_force, relieved, .. } = self;
+        woodbury.apply(springs, (residual, product), relieved_force, relieved);
     }
 
     /// Notes by how much the step deepens each row, g_i . du, and the rows' forces after it; returns m(0) - m(df), in differences that
@@ -347,8 +347,8 @@ fn inner(a: [DVec3; 3], b: [DVec3; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::springs::add_contact_forces;
-    use crate::contact::springs::samples::{Sample, ball, off, sample};
+    use crate::contact::law::springs::add_contact_forces;
+    use crate::contact::law::springs::samples::{Sample, ball, off, sample};
     use crate::scene::SpringKind;
 
     /// The contact forces at rest, and the step that they lead to with `damping`.

@@ -91,6 +91,38 @@ pub fn point_at(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
     corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
 }
 
+/// The closest feature of the surface.
+#[derive(Clone, Copy)]
+pub struct Closest {
+    /// Squared distance [m^2].
+    pub distance_squared: f64,
+    /// Triangle.
+    pub triangle: u32,
+    /// Point and feature on it.
+    pub point: ClosestPoint,
+}
+
+impl Closest {
+    /// None yet.
+    #[must_use]
+    pub fn none() -> Self {
+        let point = ClosestPoint { weights: [0.0; 3], feature: Feature::Face };
+        Self { distance_squared: f64::MAX, triangle: u32::MAX, point }
+    }
+
+    /// Takes triangle `t` with these corners instead if it is nearer to `x`, or as near with a lower number; its closest point, and the squared
+    /// distance of that [m^2].
+    pub fn consider(&mut self, x: DVec3, corners: [DVec3; 3], t: u32) -> (ClosestPoint, f64) {
+        let point = closest_point(x, corners);
+        let distance_squared = x.distance_squared(point_at(corners, point.weights));
+        if distance_squared < self.distance_squared || (distance_squared == self.distance_squared && t < self.triangle)
+        {
+            *self = Self { distance_squared, triangle: t, point };
+        }
+        (point, distance_squared)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,11 +1,11 @@
 //! Contact springs to test with: points and balls pressed into the sphere.
 
 use super::{Springs, add_contact_hessian};
-use crate::contact::closest_point::{closest_point, point_at};
-use crate::contact::depth::{Contact, measure};
-use crate::contact::series::distribute_all;
-use crate::contact::support::Support;
-use crate::contact::surface;
+use crate::contact::geometry::closest_point::{closest_point, point_at};
+use crate::contact::geometry::normals;
+use crate::contact::law::depth::{Contact, measure};
+use crate::contact::law::series::distribute_all;
+use crate::contact::linear::support::Support;
 use crate::object::{Compliance, Object};
 use crate::random::Random;
 use crate::report::stability::contact::world::{Ball, PAPER, sphere};
@@ -30,7 +30,7 @@ pub fn ball(springs: SpringKind) -> Object {
 pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
     let mut random = Random::new(5);
     let mut contacts = Vec::new();
-    let corners = |t: usize| surface::corners(&object.rest, object.triangles[t]);
+    let corners = |t: usize| normals::corners(&object.rest, object.triangles[t]);
     for i in 0..6 {
         let t = random.between(0.0, object.triangles.len() as f64) as usize;
         let middle = corners(t).iter().sum::<DVec3>() / 3.0;

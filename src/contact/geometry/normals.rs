@@ -54,7 +54,7 @@ pub fn pseudonormal(
         Feature::Vertex(k) => {
             let node = triangles[t][k];
             let mut sum = DVec3::ZERO;
-            for &around in triangles_around(topology, node) {
+            for &around in topology.triangles_around(node as usize) {
                 let around = around as usize;
                 sum += normal(around) * corner_angle(positions, triangles[around], node);
             }
@@ -67,7 +67,7 @@ pub fn pseudonormal(
 #[must_use]
 pub fn vertex_normal(positions: &[DVec3], triangles: &[[u32; 3]], topology: &Topology, node: u32) -> DVec3 {
     let mut sum = DVec3::ZERO;
-    for &t in triangles_around(topology, node) {
+    for &t in topology.triangles_around(node as usize) {
         sum += area_vector(corners(positions, triangles[t as usize]));
     }
     unit_or_zero(sum)
@@ -86,13 +86,6 @@ pub fn winding_number(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3) -> 
         sum += a.dot(b.cross(c)).atan2(below);
     }
     sum / std::f64::consts::TAU
-}
-
-/// Triangles around `node`.
-#[must_use]
-pub fn triangles_around(topology: &Topology, node: u32) -> &[u32] {
-    let node = node as usize;
-    &topology.around[topology.around_offsets[node] as usize..topology.around_offsets[node + 1] as usize]
 }
 
 /// Angle of a triangle at its corner `node` [rad].

@@ -7,12 +7,12 @@
 //! bend. P r is kept twice like all directions: as the force (r - G^T y) / (1 + mu), y being the push of the springs, and as the
 //! displacement C of it.
 //!
-//! Each row of a ball's spring is a spring here. In series ([`super::series`]) they share the compliance (1 - e) / kc, and have e / kc each.
+//! Each row of a ball's spring is a spring here. In series ([`crate::contact::law::series`]) they share the compliance (1 - e) / kc, and have e / kc each.
 
-use super::cholesky;
-use super::rows::add_rows;
-use super::springs::{Springs, add_on_nodes, nodes_of};
-use super::support::Support;
+use crate::contact::law::springs::{Springs, add_on_nodes, nodes_of};
+use crate::contact::linear::cholesky;
+use crate::contact::linear::rows::add_rows;
+use crate::contact::linear::support::Support;
 use crate::tolerances::FACET_COMPLIANCE;
 
 /// Springs of a block for [`add_rows`].
@@ -20,7 +20,7 @@ const TOGETHER: usize = 3;
 
 /// The preconditioner for the springs that touch; its vectors are reused.
 #[derive(Default)]
-pub struct Relief {
+pub struct Woodbury {
     /// Places of the touching rows in the list of contacts.
     taken: Vec<usize>,
     /// C g_a on the support for each of them, filled up with zeros to whole blocks [m/N].
@@ -28,13 +28,13 @@ pub struct Relief {
     order: usize,
     /// 1 + mu [1].
     stiffening: f64,
-    /// That of (1 + mu) W^-1 + G C G^T; see [`super::cholesky`].
+    /// That of (1 + mu) W^-1 + G C G^T; see [`crate::contact::linear::cholesky`].
     factor: Vec<f64>,
     /// y, filled up with zeros [N].
     pushes: Vec<f64>,
 }
 
-impl Relief {
+impl Woodbury {
     /// Takes up the springs for which `touching` is true, on an object stiffened by the factor `stiffening`.
     pub fn set_up(&mut self, support: &Support, springs: Springs, touching: &[bool], stiffening: f64) {
         let Self { taken, columns, order, factor, pushes, .. } = self;
@@ -106,7 +106,7 @@ fn compliance(springs: Springs, row: usize, other: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::springs::samples::{ball, off, sample};
+    use crate::contact::law::springs::samples::{ball, off, sample};
     use crate::random::sequence;
     use crate::scene::SpringKind;
 
@@ -124,9 +124,9 @@ mod tests {
                 let mut product = vec![0.0; order];
                 sample.support().multiply(&residual, &mut product);
                 let (mut force, mut displacement) = (vec![0.0; order], vec![0.0; order]);
-                let mut relief = Relief::default();
-                relief.set_up(sample.support(), sample.springs(), &sample.touching(), stiffening);
-                relief.apply(sample.springs(), (&residual, &product), &mut force, &mut displacement);
+                let mut woodbury = Woodbury::default();
+                woodbury.set_up(sample.support(), sample.springs(), &sample.touching(), stiffening);
+                woodbury.apply(sample.springs(), (&residual, &product), &mut force, &mut displacement);
                 sample.support().multiply(&force, &mut product);
                 let size = displacement.iter().fold(0.0_f64, |size, entry| size.max(entry.abs()));
                 assert!(off(&displacement, &product) < 1e-12 * size, "{kc} {stiffening}");

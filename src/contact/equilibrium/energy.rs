@@ -13,16 +13,16 @@
 //! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`; each of its updates freezes the geometry anew at the
 //! displacement found and solves again.
 
-use super::NodeForce;
-use super::depth::Contact;
-use super::detection::{Detection, Facets};
-use super::model::Model;
 use super::newton::{Damping, Newton, Step};
-use super::series::distribute_all;
-use super::springs::{Springs, add_contact_forces};
-use super::support::{Support, dot, root};
 use super::tangent;
 use crate::JointMatrix;
+use crate::contact::NodeForce;
+use crate::contact::detection::{Detection, Facets};
+use crate::contact::law::depth::Contact;
+use crate::contact::law::series::distribute_all;
+use crate::contact::law::springs::{Springs, add_contact_forces};
+use crate::contact::linear::support::{Support, dot, root};
+use crate::contact::model::Model;
 use crate::proxy::Pose;
 use crate::random::Random;
 use crate::tolerances::{
@@ -106,7 +106,7 @@ impl EnergySearch {
         Self {
             state: State::default(),
             trial: State::default(),
-            support: Support::new(model.rest.len()),
+            support: Support::new(model.surface.positions.len()),
             slots: Vec::new(),
             kc: 0.0,
             last_kc: 0.0,
@@ -376,7 +376,7 @@ impl EnergySearch {
         support.multiply(residual, product);
         let out_of_balance = dot(residual, product);
         // Forces of depths too small to be known to the tolerance are measured against the smallest that is.
-        let resolved_depth = DEPTH_ROUNDING * model.extent / model.contact.tolerance;
+        let resolved_depth = DEPTH_ROUNDING * model.surface.extent / model.contact.tolerance;
         let floor = *kc * resolved_depth * model.softest.sqrt();
         root(out_of_balance) / root(scale).max(floor).max(RESIDUAL_FLOOR)
     }
@@ -433,7 +433,7 @@ fn predict_multipliers(contacts: &mut [Contact], before: &[Contact], force: impl
     }
 }
 
-/// 1/2 kc sum_i share_i p_i depth_i, with the parts p_i of [`super::series`] [J].
+/// 1/2 kc sum_i share_i p_i depth_i, with the parts p_i of [`crate::contact::law::series`] [J].
 #[must_use]
 pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
     let mut sum = 0.0;

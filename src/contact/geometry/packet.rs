@@ -4,7 +4,7 @@
 //! triangle has no area, and is nowhere too great by more than rounding: in the plane's place an edge is taken by mistake only
 //! where it is as near as rounding can tell.
 
-use super::wide::{Kernel, widest};
+use crate::contact::linear::wide::{Kernel, widest};
 use crate::tolerances::MINIMUM_SQUARE;
 use glam::DVec3;
 
@@ -130,7 +130,7 @@ pub fn greatest(a: f64, b: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::closest_point::{closest_point, point_at};
+    use crate::contact::geometry::closest_point::{closest_point, point_at};
     use crate::random::sequence;
 
     /// The packet of triangles with these corners, their true squared distances from `x`, and those found.

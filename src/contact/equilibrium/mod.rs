@@ -1,0 +1,7 @@
+//! Searches for the equilibrium: the minimum of the energy by damped Newton steps, with its tangent, and the paper's iteration.
+
+pub mod energy;
+mod newton;
+pub mod paper;
+mod tangent;
+mod woodbury;

@@ -1,0 +1,10 @@
+//! The surface: closest points, normals, and searches that skip what cannot be closest. Nothing of forces.
+
+pub mod bounding_volumes;
+pub mod closest_point;
+mod distance_bounds;
+pub mod normals;
+pub mod packet;
+mod rest;
+
+pub use rest::RestSurface;

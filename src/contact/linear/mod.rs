@@ -1,0 +1,6 @@
+//! Dense linear algebra on the nodes that carry contact.
+
+pub mod cholesky;
+pub mod rows;
+pub mod support;
+pub mod wide;
