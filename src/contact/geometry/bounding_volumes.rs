@@ -29,6 +29,12 @@ impl Volume {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
+    /// Middle and radius of the ball around it [m].
+    #[must_use]
+    pub fn ball(&self) -> (DVec3, f64) {
+        (self.low.midpoint(self.high), 0.5 * self.low.distance(self.high))
+    }
+
     /// Squared distance of `x`; zero inside [m^2].
     #[inline]
     #[must_use]

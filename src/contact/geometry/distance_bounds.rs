@@ -12,10 +12,12 @@
 //! So away from the surface bounds are sharp to second order in h.
 
 use super::RestSurface;
+use super::bounding_volumes::Leaf;
 use super::closest_point::{closest_point, point_at};
 use crate::tolerances::DEPTH_ROUNDING;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::f64::consts::SQRT_2;
 
 /// Cubes for each triangle, about: their sides are not much longer than a triangle's where the lattice is twice as wide as the
 /// object.
@@ -112,12 +114,24 @@ fn cube(surface: &RestSurface, c: DVec3, half: f64, slack: f64, near: Option<u32
     let g = gradient.as_dvec3();
     let (least, gradient) = if s > reach + slack {
         let mut least = s;
-        // |g - g_t|_1 is at most 2 sqrt(3).
+        let matters = |leaf: &Leaf, least: f64| {
+            let (middle, size) = leaf.volume.ball();
+            let (away, distance) = (c - middle, c.distance(middle));
+            // |g - g_t|, g_t being the direction from a point of that ball: with an angle phi, sin(phi) <= size / distance.
+            let turn = if size < distance { (g - away / distance).length() + SQRT_2 * size / distance } else { 2.0 };
+            leaf.volume.distance_squared(c).sqrt() - reach * turn.min(2.0) < least
+        };
+        // |g - g_t|_1 is at most sqrt(3) |g - g_t|, and that at most 2.
         let radius = s + 2.0 * reach;
-        surface.bounds.search(c, radius * radius, |t| {
-            let offset = offset(t, c);
-            let distance = offset.length();
-            least = least.min(distance - half * (g - offset / distance).abs().element_sum());
+        surface.bounds.walk(c, radius * radius, |leaf| {
+            let leaf = &surface.bounds.leaves[leaf];
+            if matters(leaf, least) {
+                for &t in &leaf.triangles {
+                    let offset = offset(t, c);
+                    let distance = offset.length();
+                    least = least.min(distance - half * (g - offset / distance).abs().element_sum());
+                }
+            }
             radius * radius
         });
         (least, gradient)
