@@ -6,15 +6,17 @@ use crate::object::{Compliance, Object, ObjectError};
 use crate::proxy::Chain;
 use crate::scene::ContactSpec;
 use crate::tolerances::{LENGTH_ROUNDING, RIGID_STIFFNESS};
+use std::sync::Arc;
 
-/// An object and a proxy, prepared for contact.
+/// An object and a proxy, prepared for contact. A clone shares what is large.
+#[derive(Clone)]
 pub struct Model<'a> {
     /// The object.
     pub object: &'a Object,
     /// The proxy.
     pub chain: &'a Chain,
     /// C = K^-1 on the surface nodes that can be reached.
-    pub compliance: Compliance,
+    pub compliance: Arc<Compliance>,
     /// How equation (2) is solved; its stiffness is finite.
     pub contact: ContactSpec,
     /// Stiffness kc = 3 Kc at a contact point of the energy form: three springs Kc on the nodes of a triangle act along the
@@ -27,7 +29,7 @@ pub struct Model<'a> {
     /// Whether each equilibrium comes with its tangent d tau/d q.
     pub with_tangent: bool,
     /// The surface at rest.
-    pub surface: RestSurface<'a>,
+    pub surface: Arc<RestSurface<'a>>,
     /// Largest trace of a covered node's own block C_jj: no node moves farther than sqrt(softest) times |u| in the energy norm [m/N].
     pub softest: f64,
     /// Largest eigenvalue of a covered node's own block C_jj, or a bound of it: no node moves farther than sqrt(mobility) times |u| in
@@ -58,7 +60,7 @@ impl<'a> Model<'a> {
             return Ok(Self::new(object, chain, contact));
         }
         let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
-        model.compliance = Compliance::on(object, reach::reached(&model, configurations))?;
+        model.compliance = Arc::new(Compliance::on(object, reach::reached(&model, configurations))?);
         (model.softest, model.mobility) = softest(&model.compliance);
         model.set_stiffness(contact.stiffness);
         Ok(model)
@@ -74,13 +76,22 @@ impl<'a> Model<'a> {
             chain,
             softest,
             mobility,
-            compliance,
+            compliance: Arc::new(compliance),
             contact,
             kc: 0.0,
             shares: chain.nodes.iter().map(|node| contact.share(node.length)).collect(),
             with_tangent: false,
-            surface: RestSurface::new(object),
+            surface: Arc::new(RestSurface::new(object)),
         };
+        model.set_stiffness(contact.stiffness);
+        model
+    }
+
+    /// The same object and proxy in contact as `contact` says.
+    #[must_use]
+    pub fn with_contact(&self, contact: ContactSpec) -> Self {
+        let shares = self.chain.nodes.iter().map(|node| contact.share(node.length)).collect();
+        let mut model = Self { contact, shares, ..self.clone() };
         model.set_stiffness(contact.stiffness);
         model
     }

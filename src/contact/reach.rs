@@ -120,7 +120,7 @@ mod tests {
         let nodes = reached(&whole, &configurations);
         assert!(nodes.len() > 10 && 2 * nodes.len() < object.surface_nodes, "{} nodes", nodes.len());
         let mut some = Model::new(&object, &chain, scene.contact);
-        some.compliance = Compliance::on(&object, nodes).unwrap();
+        some.compliance = Compliance::on(&object, nodes).unwrap().into();
         let (mut solver, mut reference) = (Solver::new(&some), Solver::new(&whole));
         let mut touching = 0;
         for q in &configurations {

@@ -170,8 +170,8 @@ impl Ground {
         Ok(Self { object: Object::build(&scene.object)?, chain: Chain::new(&scene.proxy) })
     }
 
-    fn model(&self, scene: &Scene) -> Model<'_> {
-        Model::new(&self.object, &self.chain, scene.contact)
+    fn model(&self, scene: &Scene) -> Result<Model<'_>, ObjectError> {
+        Model::reaching(&self.object, &self.chain, scene.contact, &sample(scene))
     }
 }
 
@@ -182,7 +182,7 @@ impl Pilot {
     /// Any [`PilotError`] but [`PilotError::OutOfReach`].
     pub fn run(scene: &Scene, aim: Aim, backend: BackendChoice, stop: &AtomicBool) -> Result<Self, PilotError> {
         let ground = Ground::new(scene)?;
-        let model = ground.model(scene);
+        let model = ground.model(scene)?;
         let reference = Reference::in_contact(scene, &model, SEED, CONTACTS)?;
         let joints = scene.grid.axes.len();
         let finest = (spacing::points(scene) as f64 / PILOT_POINTS).powf(1.0 / joints as f64).max(1.0);
@@ -328,8 +328,7 @@ fn errors(
 /// What baking `scene` into a file takes up.
 fn footprint(scene: &Scene, backend: BackendChoice) -> Result<Footprint, PilotError> {
     let ground = Ground::new(scene)?;
-    let model =
-        Model::reaching(&ground.object, &ground.chain, scene.contact, &sample(scene)).map_err(BakeError::from)?;
+    let model = ground.model(scene)?;
     let backend = ChosenBackend::open(backend, &model).map_err(BakeError::from)?;
     let sweep = Sweep::new(scene, &ground.object, "", "", "").map_err(BakeError::from)?;
     Ok(sweep.footprint(backend.chunk(), false))

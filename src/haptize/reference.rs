@@ -134,7 +134,7 @@ pub(crate) fn equilibria(
     contact: ContactSpec,
     places: &[JointVector],
 ) -> Result<Vec<Equilibrium>, BackendError> {
-    let model = Model::new(model.object, model.chain, contact);
+    let model = model.with_contact(contact);
     let mut backend = CpuBackend::new(&model, 0)?;
     Ok(backend.solve(places).unwrap_or_else(|never| match never {}))
 }

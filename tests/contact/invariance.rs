@@ -111,7 +111,7 @@ fn broken_numbers_are_flagged_and_never_come_out() {
     }
     for algorithm in [Algorithm::Energy, Algorithm::Linearised, Algorithm::Paper] {
         let mut model = Model::new(&object, &chain, contact(algorithm, 500.0));
-        model.compliance.entries.fill(f64::NAN);
+        std::sync::Arc::make_mut(&mut model.compliance).entries.fill(f64::NAN);
         assert_harmless(&Solver::new(&model).solve(&q));
     }
 }

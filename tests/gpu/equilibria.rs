@@ -187,7 +187,8 @@ fn part<'a>((scene, object, chain): &'a (Scene, Object, Chain), algorithm: Algor
     let contact = haptize::scene::ContactSpec { algorithm, ..scene.contact };
     let mut model = Model::new(object, chain, contact);
     let reached = |node: &u32| model.surface.positions[*node as usize].dot(DVec3::new(-0.3, 0.0, 1.0)) > 0.015;
-    model.compliance = Compliance::on(object, (0..object.surface_nodes as u32).filter(reached).collect()).unwrap();
+    model.compliance =
+        Compliance::on(object, (0..object.surface_nodes as u32).filter(reached).collect()).unwrap().into();
     model
 }
 

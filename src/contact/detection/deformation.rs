@@ -56,7 +56,7 @@ impl Deformation {
     pub fn take(&mut self, model: &Model, nodes: &[u32], forces: &[f64], moved: f64) {
         self.surface += 1;
         self.moved = moved;
-        let Compliance { rows_per_node, .. } = model.compliance;
+        let Compliance { rows_per_node, .. } = *model.compliance;
         let block = rows_per_node * model.compliance.order();
         self.loads.clear();
         self.loads.extend(nodes.iter().zip(forces.as_chunks().0).filter_map(|(&node, &force)| {

@@ -166,33 +166,60 @@ pub(super) fn loops(accuracy: &Accuracy) -> Canvas {
     canvas
 }
 
-/// The contact solver: error against time over tolerances, algorithms and arithmetic; and change of the torque by mesh, contact nodes, skin
-/// and contact stiffness.
+/// The contact solver: error against time and against iterations, over tolerances, algorithms and arithmetic.
 #[must_use]
 pub(super) fn solver(accuracy: &Accuracy) -> Canvas {
     let mut canvas = sheet(
         "Error of a solved configuration against its time",
-        "left: tolerance, updates, algorithm, arithmetic, time relative to the scene's own; right: edge of the mesh, spacing of nodes, bending, compliance",
+        "tolerance of the energy form, updates of linearised contact, the paper's iteration, arithmetic",
     );
-    let place = |row: &Row| (row.cost.least, row.rms);
-    let mut curves = series(accuracy, Study::Tolerance, place);
-    curves.iter_mut().for_each(|curve| curve.name = "tolerance".to_owned());
-    for study in [Study::Updates, Study::Algorithm, Study::Arithmetic] {
-        for mut curve in series(accuracy, study, place) {
-            curve.colour = curves.len();
-            curves.push(curve);
+    let curves = |place: fn(&Row) -> (f64, f64)| {
+        let mut curves = series(accuracy, Study::Tolerance, place);
+        curves.iter_mut().for_each(|curve| curve.name = "tolerance".to_owned());
+        for study in [Study::Updates, Study::Algorithm, Study::Arithmetic] {
+            for mut curve in series(accuracy, study, place) {
+                curve.colour = curves.len();
+                curves.push(curve);
+            }
         }
+        // The tolerance of the energy form is the curve of the algorithm of that name.
+        curves.retain(|curve| curve.name != "energy" && curve.name != "cpu");
+        curves
+    };
+    let timed = curves(|row| (row.cost.least, row.rms));
+    panel(&mut canvas, 0, "Time of a configuration, relative to the scene's own [1]", "Rms error [N m]", &timed, &[]);
+    let counted = curves(|row| (row.points as f64, row.rms));
+    panel(&mut canvas, 1, "Iterations of a configuration in contact [1]", "Rms error [N m]", &counted, &[]);
+    legend(&mut canvas, &timed, Vec::new());
+    canvas
+}
+
+/// What refining the scene changes: mesh and contact nodes, which must converge, beside skin and contact compliance, which say what the
+/// body is.
+#[must_use]
+pub(super) fn refinement(accuracy: &Accuracy) -> Canvas {
+    let mut canvas = sheet(
+        "Change of the torque by the next step of refinement",
+        "left: what only resolves the scene; right: what the scene is made of",
+    );
+    let mut all: Vec<Series> = Vec::new();
+    let pairs = [[Study::Mesh, Study::Links], [Study::Skin, Study::Stiffness]];
+    for (side, studies) in pairs.into_iter().enumerate() {
+        let change = |study| series(accuracy, study, |row| (row.value, row.rms));
+        let mut curves: Vec<Series> = studies.into_iter().flat_map(change).collect();
+        curves.iter_mut().zip(all.len()..).for_each(|(curve, colour)| curve.colour = colour);
+        let across = ["Length of edges, spacing of nodes", "Bending stiffness, compliance"][side];
+        panel(
+            &mut canvas,
+            side,
+            &format!("{across}, relative to the scene's own [1]"),
+            "Rms change [N m]",
+            &curves,
+            &[],
+        );
+        all.extend(curves);
     }
-    // The tolerance of the energy form is the curve of the algorithm of that name.
-    curves.retain(|curve| curve.name != "energy" && curve.name != "cpu");
-    panel(&mut canvas, 0, "Time of a configuration [1]", "Rms error [N m]", &curves, &[]);
-    let refined = [Study::Mesh, Study::Links, Study::Skin, Study::Stiffness].into_iter();
-    let mut refined: Vec<Series> =
-        refined.flat_map(|study| series(accuracy, study, |row| (row.value, row.rms))).collect();
-    refined.iter_mut().zip(curves.len()..).for_each(|(curve, colour)| curve.colour = colour);
-    panel(&mut canvas, 1, "Relative to the scene's own [1]", "Rms change by the next step [N m]", &refined, &[]);
-    curves.extend(refined);
-    legend(&mut canvas, &curves, Vec::new());
+    legend(&mut canvas, &all, Vec::new());
     canvas
 }
 

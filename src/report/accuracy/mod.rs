@@ -25,7 +25,7 @@ use crate::{
     device::MotionError,
     field::FieldError,
     gpu::FrameError,
-    haptize::{BackendChoice, BackendError, BakeError, ReferenceError, reference::Reference, spacing},
+    haptize::{BackendChoice, BackendError, BakeError, ReferenceError, reference::Reference, sample, spacing},
     object::{Object, ObjectError},
     proxy::Chain,
     render::{graphics::GraphicsError, session::SessionError, setup::SetupError},
@@ -212,7 +212,7 @@ pub enum AccuracyError {
 pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) -> Result<Accuracy, AccuracyError> {
     let object = Object::build(&scene.object)?;
     let chain = Chain::new(&scene.proxy);
-    let model = Model::new(&object, &chain, scene.contact);
+    let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
     progress("reference");
     let reference = Reference::solve(scene, &model, SEED, extent.configurations)?;
     let mut study = Accuracy {

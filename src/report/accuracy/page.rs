@@ -21,7 +21,7 @@ use std::{
 /// # Errors
 /// [`ReportError::Write`] when a file cannot be written.
 pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, ReportError> {
-    let sheets: [(&str, Canvas, &str); 4] = [
+    let sheets: [(&str, Canvas, &str); 5] = [
         (
             "accuracy-spacing",
             figures::spacing(accuracy),
@@ -42,9 +42,14 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
             "accuracy-solver",
             figures::solver(accuracy),
             "A tolerance below the knee buys nothing that interpolation does not throw away. Linearised contact freezes the \
-             geometry, at rest and again at each update (0 to 8 along its curve); the paper's iteration has its own fixed point, or none: the table counts what did not converge. \
-             Right: what one more step of refinement changes. Where such a curve does not fall to the left, torque \
-             does not converge.",
+             geometry, at rest and again at each update (0 to 8 along its curve); the paper's iteration has its own fixed point, \
+             or none: the table counts what did not converge.",
+        ),
+        (
+            "accuracy-refinement",
+            figures::refinement(accuracy),
+            "Each dot compares a setting with the next finer one. Left: where such a curve does not fall to the left, torque does not \
+             converge. Right: another skin or contact stiffness is another body.",
         ),
         (
             "accuracy-graphics",
