@@ -70,7 +70,8 @@ pub struct Equilibrium {
     pub status: Status,
     /// Steps tried (`energy`, `linearised`) or passes (`paper`).
     pub iterations: u32,
-    /// Relative residual of the force balance, in the energy norm; one where nothing could be computed [1].
+    /// Relative residual of the force balance, in the energy norm; one where nothing could be computed [1]. In contact so stiff that forces
+    /// follow the rounding of depths it may exceed the tolerance of a converged equilibrium.
     pub residual: f64,
     /// Stored energy U: elastic and contact springs [J].
     pub energy: f64,

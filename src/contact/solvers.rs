@@ -2,7 +2,7 @@
 
 use super::{Model, Solver};
 use rayon::prelude::*;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 /// Items that one thread takes at a time: enough that sharing them out costs nothing, few enough that no thread waits long
 /// for the last.
@@ -10,6 +10,7 @@ pub(crate) const SHARE: usize = 8;
 
 /// Solvers of one model, one a thread of a pool.
 pub(crate) struct Solvers<'a> {
+    model: &'a Model<'a>,
     /// By the thread's number: the lock is never contended.
     solvers: Vec<Mutex<Solver<'a>>>,
 }
@@ -17,7 +18,7 @@ pub(crate) struct Solvers<'a> {
 impl<'a> Solvers<'a> {
     /// Solvers of `model` for a pool of `threads` threads.
     pub fn new(model: &'a Model<'a>, threads: usize) -> Self {
-        Self { solvers: (0..threads).map(|_| Mutex::new(Solver::new(model))).collect() }
+        Self { model, solvers: (0..threads).map(|_| Mutex::new(Solver::new(model))).collect() }
     }
 
     /// How many there are.
@@ -32,8 +33,13 @@ impl<'a> Solvers<'a> {
             .with_min_len(SHARE)
             .map(|item| {
                 let solver = &self.solvers[rayon::current_thread_index().unwrap_or(0) % self.solvers.len()];
-                // A solver keeps nothing from one configuration to the next that a panic could have spoilt.
-                solve(&mut solver.lock().unwrap_or_else(PoisonError::into_inner), item)
+                let mut solver = solver.lock().unwrap_or_else(|poisoned| {
+                    // A panic may have left it in the middle of its work.
+                    let mut solver = poisoned.into_inner();
+                    *solver = Solver::new(self.model);
+                    solver
+                });
+                solve(&mut solver, item)
             })
             .collect()
     }

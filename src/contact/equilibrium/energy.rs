@@ -66,7 +66,7 @@ pub struct Limits {
 /// What became of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// Whether the residual reached the tolerance.
+    /// Whether forces are balanced to the tolerance, or to what depths are rounded by.
     pub converged: bool,
     /// Steps tried.
     pub iterations: u32,
@@ -89,6 +89,8 @@ pub struct EnergySearch {
     /// r = c - f [N], and C r [m].
     residual: Vec<f64>,
     product: Vec<f64>,
+    /// |r| over |c| in the energy norm [1].
+    imbalance: f64,
     /// Displacement of the support in the trial [m].
     displacement: Vec<f64>,
     newton: Newton,
@@ -113,6 +115,7 @@ impl EnergySearch {
             contact_forces: Vec::new(),
             residual: Vec::new(),
             product: Vec::new(),
+            imbalance: 0.0,
             displacement: Vec::new(),
             newton: Newton::default(),
             damping: Damping::default(),
@@ -140,7 +143,7 @@ impl EnergySearch {
             self.freeze_here(model, detection);
             self.descend(model, detection, geometry, limits, &mut outcome);
         }
-        outcome
+        Outcome { residual: self.imbalance, ..outcome }
     }
 
     /// Searches from where `forces` on the object's nodes hold it, which should be near the minimum with contact stiffness `kc` [N/m], for
@@ -168,7 +171,7 @@ impl EnergySearch {
         self.kc = model.kc;
         let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
         self.descend(model, detection, geometry, limits, &mut outcome);
-        outcome
+        Outcome { residual: self.imbalance, ..outcome }
     }
 
     /// Takes what the trial's forces lead to for the state.
@@ -348,7 +351,8 @@ impl EnergySearch {
     }
 
     /// Brings the support, the contact forces and the residual force r = c - f up to date with the current state; returns
-    /// the relative residual sqrt(r . C r) / sqrt(c . C c).
+    /// the relative residual sqrt(r . C r) / sqrt(c . C c), where forces of depths that are known to less than the tolerance count as those of
+    /// the least depth that is.
     fn balance(&mut self, model: &Model) -> f64 {
         let Self { state, support, slots, contact_forces, residual, product, kc, .. } = self;
         slots.clear();
@@ -375,9 +379,9 @@ impl EnergySearch {
         let scale = dot(contact_forces, product);
         support.multiply(residual, product);
         let out_of_balance = dot(residual, product);
-        // Forces of depths too small to be known to the tolerance are measured against the smallest that is.
         let resolved_depth = DEPTH_ROUNDING * model.surface.extent / model.contact.tolerance;
         let floor = *kc * resolved_depth * model.softest.sqrt();
+        self.imbalance = root(out_of_balance) / root(scale).max(RESIDUAL_FLOOR);
         root(out_of_balance) / root(scale).max(floor).max(RESIDUAL_FLOOR)
     }
 
