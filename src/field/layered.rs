@@ -13,7 +13,8 @@
 //! torque then passes zero at the boundary, where the layer cuts it off, and errs with h^2 in cells that the boundary
 //! crosses, too.
 //!
-//! Points that were not computed carry zero torque, so that the torque fades out over the cells towards them.
+//! Points that were not computed carry the torque of the nearest one that was. So the torque does not end inside the object where the
+//! measurements do: it keeps the value that it has there.
 
 use super::{
     FieldError,

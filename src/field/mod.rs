@@ -50,7 +50,8 @@ pub struct Sample {
     pub torque: JointVector,
     /// Interpolated contact index, 0 to 1.
     pub index: f64,
-    /// Whether the proxy is beyond the object's boundary, beside at least one point that was computed.
+    /// Whether the proxy is beyond the object's boundary; beside points that were not computed, as far as the nearest ones that
+    /// were say.
     pub contact: bool,
     /// Object nodes in contact at the heaviest corner in contact; 0 out of contact.
     pub contact_nodes: u32,
@@ -66,8 +67,6 @@ pub struct Sample {
 #[derive(Default)]
 struct Corners {
     flags: Flags,
-    /// Weight of those that were computed.
-    present: f64,
     index: f64,
     contact_nodes: u32,
 }
@@ -128,7 +127,7 @@ impl TorqueField {
         self.has_energy
     }
 
-    /// Whether the torque is minus the gradient of [`Sample::energy`] inside the grid, away from absent points.
+    /// Whether the torque is minus the gradient of [`Sample::energy`] inside the grid.
     #[must_use]
     pub fn is_potential(&self) -> bool {
         matches!(self.interpolant, Interpolant::Potential(_))
@@ -166,7 +165,6 @@ impl TorqueField {
         for (point, weight) in stencil.corners().filter(|(_, weight)| *weight > 0.0) {
             let corner = self.points[point];
             corners.flags |= corner.flags;
-            corners.present += if corner.is_present() { weight } else { 0.0 };
             corners.index += if corner.touching { weight } else { 0.0 };
             if corner.in_contact && weight > heaviest {
                 (corners.contact_nodes, heaviest) = (corner.contacts, weight);
@@ -175,12 +173,10 @@ impl TorqueField {
         if stencil.fade < 1.0 {
             corners.flags |= Flags::OUTSIDE;
         }
-        let (mut torque, energy, inside, share, fade);
+        let (mut torque, energy, inside, share);
         match &self.interpolant {
             Interpolant::Layered(layered) => {
-                // Absent points carry zero torque already.
                 let at = layered.at::<D>(&stencil);
-                fade = stencil.fade;
                 (torque, energy, inside, share) = (at.torque, at.energy, at.depth > 0.0, at.held);
                 if at.held < 1.0 {
                     corners.flags |= Flags::LAYER;
@@ -188,14 +184,11 @@ impl TorqueField {
             }
             Interpolant::Potential(potential) => {
                 let at = potential.at::<D, N>(&stencil);
-                // Exactly one away from absent points, whatever the rounding of the weights.
-                let present = if corners.flags.contains(Flags::ABSENT) { corners.present } else { 1.0 };
-                fade = stencil.fade * present;
                 (torque, energy, inside, share) = (at.torque, at.energy, at.contact, at.share);
             }
         }
-        torque.iter_mut().for_each(|tau| *tau *= fade);
-        let contact = inside && corners.present > 0.0 && stencil.fade > 0.0;
+        torque.iter_mut().for_each(|tau| *tau *= stencil.fade);
+        let contact = inside && stencil.fade > 0.0;
         Sample {
             torque,
             index: corners.index,

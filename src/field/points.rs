@@ -54,10 +54,11 @@ pub(super) struct Checked<'a> {
 }
 
 impl Checked<'_> {
-    /// tau of `point`; zeros where none is stored.
+    /// tau of `point`, or of the nearest that was computed; zeros where that is free.
     pub fn torque<'b>(&'b self, point: usize, zeros: &'b [f64]) -> Result<&'b [f64], FieldError> {
-        let torque = if self.points[point].in_contact { self.dataset.torque(point) } else { zeros };
-        torque.iter().try_for_each(|&tau| plausible("torque", point, tau))?;
+        let source = self.nearest[point];
+        let torque = if self.points[source].in_contact { self.dataset.torque(source) } else { zeros };
+        torque.iter().try_for_each(|&tau| plausible("torque", source, tau))?;
         Ok(torque)
     }
 

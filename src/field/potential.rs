@@ -18,8 +18,7 @@
 //! differences for the third ones add 1 to 10 % to it.
 //!
 //! *Free points* take w and its gradient from the nearest points in contact by Taylor's formula, at most zero. Points that
-//! were not computed do so, too, but there the sign is not known; a factor (the weight of the computed corners) lets the
-//! torque fade out towards them, at the price of the gradient. *Unconverged points* have an energy and a torque that do not
+//! were not computed do so, too, but there w may be positive: the torque goes on where the data end. *Unconverged points* have an energy and a torque that do not
 //! belong together: the energy is taken, the gradient from differences of w.
 //!
 //! Where equilibria change abruptly (the object snaps from one to another), U jumps between two grid points. The field then

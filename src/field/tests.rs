@@ -156,18 +156,37 @@ fn torque_fades_out_over_one_cell_beyond_the_grid() {
     assert_eq!(*at(f64::NAN).torque, [0.0, 0.0]);
 }
 
+/// A scan that ends inside the object, and has a hole there: the torque must not fall to zero in either.
 #[test]
-fn torque_fades_out_towards_absent_points_without_making_a_boundary_there() {
-    let data = Dataset::of_field(grid(&[(0.0, 0.1, 8)]), |q| {
-        let status = if q[0] > 0.45 { Status::Outside } else { Status::Contact };
-        (vector(&[if q[0] > 0.45 { f64::NAN } else { 1.0 }]), q[0], status)
+fn torque_goes_on_where_points_in_contact_are_absent_and_free_ones_stay_free() {
+    let data = Dataset::of_field(grid(&[(0.0, 0.1, 10), (0.0, 0.1, 6)]), |q| {
+        let depth = q[0] - 0.25;
+        let absent = q[0] > 0.65 || q[0] < 0.05 || (q[0] - 0.4).hypot(q[1] - 0.2) < 0.05;
+        let tau = if absent { f64::NAN } else { -2.0 * depth.max(0.0) };
+        let status = match depth > 0.0 {
+            _ if absent => Status::Outside,
+            true => Status::Contact,
+            false => Status::Free,
+        };
+        (vector(&[tau, 0.0]), depth.max(0.0).powi(2), status)
     });
-    let field = rendered(&data, 0.1);
-    assert_eq!(field.sample(&[0.4]).torque[0], 1.0);
-    let fading = field.sample(&[0.45]);
-    assert!((fading.torque[0] - 0.5).abs() < 1e-12 && fading.flags.contains(Flags::ABSENT) && fading.contact);
-    let gone = field.sample(&[0.65]);
-    assert!(gone.torque[0] == 0.0 && gone.flags.contains(Flags::ABSENT) && !gone.contact);
+    for interpolation in [Interpolation::Linear, Interpolation::Potential] {
+        let field = field_of(&data, interpolation);
+        for across in [0.2, 0.25, 0.5] {
+            for k in 36..=90 {
+                let at = field.sample(&[f64::from(k) * 0.01, across]);
+                // No less than at the point before the hole.
+                assert!(at.torque[0] < -0.099 && at.contact, "{interpolation:?} at {k}, {across}: {at:?}");
+                assert!(at.flags.contains(Flags::ABSENT) || k <= 60);
+            }
+            let free = field.sample(&[0.0, across]);
+            assert!(free.torque[0] == 0.0 && !free.contact && free.flags.contains(Flags::ABSENT));
+        }
+        let (last, beyond) = (field.sample(&[0.6, 0.5]).torque[0], field.sample(&[0.85, 0.5]).torque[0]);
+        assert!((last + 0.7).abs() < 1e-12);
+        let expected = if interpolation == Interpolation::Linear { last } else { -2.0 * (0.85 - 0.25) };
+        assert!((beyond - expected).abs() < 1e-12, "{interpolation:?}: {beyond}");
+    }
 }
 
 #[test]
@@ -343,19 +362,13 @@ fn every_interpolation_is_continuous_over_faces_edges_and_the_rim() {
 }
 
 #[test]
-fn potential_fades_out_towards_absent_points_and_beyond_the_grid() {
+fn potential_fades_out_beyond_the_grid() {
     let data = Dataset::of_field(grid(&[(0.0, 0.1, 8)]), |q| {
-        let absent = q[0] > 0.45;
-        let tau = if absent { f64::NAN } else { -2.0 * (q[0] + 0.1) };
-        (vector(&[tau]), (q[0] + 0.1).powi(2), if absent { Status::Outside } else { Status::Contact })
+        (vector(&[-2.0 * (q[0] + 0.1)]), (q[0] + 0.1).powi(2), Status::Contact)
     });
     let field = field_of(&data, Interpolation::Potential);
     let exact = |x: f64| -2.0 * (x + 0.1);
     assert!((field.sample(&[0.37]).torque[0] - exact(0.37)).abs() < 1e-12);
-    let fading = field.sample(&[0.45]);
-    assert!((fading.torque[0] - 0.5 * exact(0.45)).abs() < 1e-12 && fading.flags.contains(Flags::ABSENT));
-    let gone = field.sample(&[0.65]);
-    assert!(gone.torque[0] == 0.0 && gone.flags.contains(Flags::ABSENT) && !gone.contact);
     let outside = field.sample(&[-0.05]);
     assert!((outside.torque[0] - 0.5 * exact(0.0)).abs() < 1e-12 && outside.flags.contains(Flags::OUTSIDE));
     assert_eq!(field.sample(&[f64::NAN]).torque[0], 0.0);
