@@ -113,7 +113,7 @@ pub struct Report {
 /// Runs what the command line asks for.
 pub fn run() -> ExitCode {
     let line = CommandLine::parse();
-    let report = line.command.as_ref().map_or_else(demo::run, Command::run);
+    let report = start_threads().and_then(|()| line.command.as_ref().map_or_else(demo::run, Command::run));
     match report.and_then(|report| print(&report, line.json).map(|()| report.whole)) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
@@ -123,6 +123,13 @@ pub fn run() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Starts the threads that all work shares: where the system gives none, this is an error here and a panic later.
+fn start_threads() -> Result<(), Failure> {
+    let remedy = "close other programs, or raise the limits on processes and memory (ulimit -u, ulimit -v)";
+    let started = rayon::ThreadPoolBuilder::new().build_global();
+    started.map_err(|error| format!("no threads to work with: {error}; {remedy}").into())
 }
 
 /// Prints one half of `report`. A reader that has seen enough (`haptize info ... | head`) is no failure.

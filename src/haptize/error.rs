@@ -69,7 +69,9 @@ pub enum SweepError {
         path: PathBuf,
     },
     /// The part cannot be read or written.
-    #[error("{path}: {source}; free some space, then continue with the same command and --resume")]
+    #[error(
+        "{path}: {source}; free some space (memory, if that is what is missing), then continue with the same command and --resume"
+    )]
     Part {
         /// The part.
         path: PathBuf,

@@ -1,8 +1,10 @@
-//! Nothing silent, nothing lost: datasets that need nothing but their file, and readers that no file harms.
+//! Nothing silent, nothing lost: datasets that need nothing but their file, readers that no file harms, and bakes that
+//! survive what stops them.
 
 // Helpers outside test functions may fail the test too.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod alone;
+mod crash;
 mod fuzz;
 mod program;

@@ -9,7 +9,7 @@
 mod mutate;
 mod targets;
 
-use mutate::Random;
+pub use mutate::Random;
 use std::{
     alloc::{GlobalAlloc, Layout, System},
     cell::Cell,

@@ -1,0 +1,181 @@
+//! Bakes that are killed, that fill the disk, and that run out of memory: what was written is never lost, and the dataset is the one of
+//! an undisturbed bake.
+//!
+//! `HAPTIZE_KILLS` sets the number of bakes that are killed on each backend.
+
+use crate::{
+    fuzz::Random,
+    program::{OBJECTS, command, message, succeed, write_scene},
+};
+use std::{
+    path::Path,
+    process::{Command, Output, Stdio},
+    time::{Duration, Instant},
+};
+
+/// Killed bakes of each backend unless the environment says otherwise.
+const KILLS: usize = 4;
+
+/// A bake of `scene.toml` into `x.haptize`, continued if there is anything.
+fn bake(backend: &str) -> [&str; 7] {
+    ["bake", "scene.toml", "-o", "x.haptize", "--backend", backend, "--resume"]
+}
+
+/// Header without date and checksum, and data.
+fn contents(file: &[u8]) -> (serde_json::Value, Vec<u8>) {
+    let length = u64::from_le_bytes(*file.first_chunk().unwrap()) as usize;
+    let mut header: serde_json::Value = serde_json::from_slice(&file[8..8 + length]).unwrap();
+    let metadata = &mut header["__metadata__"];
+    metadata["checksum"].take();
+    let mut provenance: serde_json::Value = serde_json::from_str(metadata["provenance"].as_str().unwrap()).unwrap();
+    provenance["date"].take();
+    metadata["provenance"] = provenance;
+    (header, file[8 + length..].to_vec())
+}
+
+/// A scene of `lines` times `lines` points in a folder, its dataset, and how long its bake takes.
+struct Undisturbed {
+    folder: tempfile::TempDir,
+    contents: (serde_json::Value, Vec<u8>),
+    seconds: f64,
+    bytes: u64,
+}
+
+impl Undisturbed {
+    fn new(backend: &str, lines: usize) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        write_scene(folder.path(), OBJECTS[0].1, lines);
+        let began = Instant::now();
+        succeed(folder.path(), &bake(backend));
+        let seconds = began.elapsed().as_secs_f64();
+        let bytes = std::fs::read(folder.path().join("x.haptize")).unwrap();
+        std::fs::remove_file(folder.path().join("x.haptize")).unwrap();
+        Self { folder, contents: contents(&bytes), seconds, bytes: bytes.len() as u64 }
+    }
+
+    /// Continues what is there, compares it with the undisturbed dataset, and clears the folder.
+    fn finish(&self, backend: &str, what: &str) {
+        succeed(self.folder.path(), &bake(backend));
+        let file = self.folder.path().join("x.haptize");
+        let found = contents(&std::fs::read(&file).unwrap());
+        assert!(found == self.contents, "{what}: the continued bake differs");
+        std::fs::remove_file(file).unwrap();
+        let mut left: Vec<_> =
+            std::fs::read_dir(self.folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        left.sort();
+        assert_eq!(left, ["block.msh", "cube.obj", "scene.toml"], "{what}: nothing is left over");
+    }
+}
+
+/// What kills met.
+#[derive(Debug, Default)]
+struct Met {
+    before: usize,
+    baking: usize,
+    assembling: usize,
+}
+
+fn kill_at_random(backend: &str, lines: usize) {
+    let kills = std::env::var("HAPTIZE_KILLS").map_or(KILLS, |count| count.parse().unwrap());
+    let whole = Undisturbed::new(backend, lines);
+    let (folder, mut longest) = (whole.folder.path(), whole.seconds);
+    let (mut random, mut met) = (Random::new(7), Met::default());
+    let mut killed = 0;
+    while killed < kills {
+        let mut bake = command(folder, &bake(backend)).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_secs_f64(longest * random.below(1000) as f64 / 1000.0));
+        if bake.try_wait().unwrap().is_some() {
+            // It was faster than the undisturbed one.
+            longest *= 0.95;
+        } else {
+            bake.kill().unwrap();
+            bake.wait().unwrap();
+            killed += 1;
+            *if folder.join("x.haptize.growing").exists() {
+                &mut met.assembling
+            } else if folder.join("x.haptize.part").exists() {
+                &mut met.baking
+            } else {
+                &mut met.before
+            } += 1;
+        }
+        // Now and then a bake is killed again while it continues.
+        if random.below(3) > 0 {
+            whole.finish(backend, &format!("kill {killed}"));
+        }
+    }
+    whole.finish(backend, "the last kill");
+    eprintln!("{backend}: {kills} kills of bakes of {:.1} s: {met:?}", whole.seconds);
+}
+
+#[test]
+fn a_bake_killed_at_any_moment_continues_to_the_same_dataset_on_the_cpu() {
+    kill_at_random("cpu", 250);
+}
+
+#[test]
+fn a_bake_killed_at_any_moment_continues_to_the_same_dataset_on_software_vulkan() {
+    kill_at_random("gpu", 40);
+}
+
+#[test]
+fn the_comparison_sees_one_bit() {
+    let whole = Undisturbed::new("cpu", 4);
+    succeed(whole.folder.path(), &bake("cpu"));
+    let mut bytes = std::fs::read(whole.folder.path().join("x.haptize")).unwrap();
+    assert!(contents(&bytes) == whole.contents);
+    *bytes.last_mut().unwrap() ^= 1;
+    assert!(contents(&bytes) != whole.contents);
+}
+
+/// Runs a bake on the CPU under a limit of the shell.
+#[cfg(unix)]
+fn limited(folder: &Path, limit: &str) -> Output {
+    let program = command(folder, &bake("cpu"));
+    let arguments = program.get_args().map(|argument| argument.to_str().unwrap());
+    let line: Vec<&str> = std::iter::once(program.get_program().to_str().unwrap()).chain(arguments).collect();
+    Command::new("sh")
+        .arg("-c")
+        .arg(format!("{limit} && exec {}", line.join(" ")))
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+#[test]
+#[cfg(unix)]
+fn a_full_disk_is_an_error_and_the_bake_continues_when_there_is_room() {
+    let whole = Undisturbed::new("cpu", 100);
+    for share in [1, 40, 70, 99] {
+        let old = whole.folder.path().join("x.haptize");
+        std::fs::write(&old, "an earlier file").unwrap();
+        // Blocks of 512 bytes. Writing beyond the limit is an error, not a signal.
+        let blocks = whole.bytes * share / 100 / 512;
+        let output = limited(whole.folder.path(), &format!("trap '' XFSZ; ulimit -f {blocks}"));
+        let said = message(&output);
+        assert_eq!(output.status.code(), Some(1), "{share} %: {said}");
+        assert!(said.contains("x.haptize") && said.contains("--resume"), "{share} %: {said}");
+        assert_eq!(std::fs::read(&old).unwrap(), b"an earlier file");
+        std::fs::remove_file(old).unwrap();
+        whole.finish("cpu", &format!("{share} % of the room"));
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_bake_without_memory_ends_and_continues_where_there_is_some() {
+    let whole = Undisturbed::new("cpu", 400);
+    let mut failures = 0;
+    for kilobytes in (40_000..64_000).step_by(3_000) {
+        let output = limited(whole.folder.path(), &format!("ulimit -v {kilobytes}"));
+        let said = message(&output);
+        if output.status.success() {
+            std::fs::remove_file(whole.folder.path().join("x.haptize")).unwrap();
+        } else {
+            failures += 1;
+            assert!(!said.is_empty() && !said.contains("panicked"), "{kilobytes} kB: {said}");
+        }
+        whole.finish("cpu", &format!("{kilobytes} kB of memory"));
+    }
+    assert!(failures > 3, "the limits are felt");
+}
