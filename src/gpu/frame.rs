@@ -16,7 +16,7 @@ use super::{
     layout::FrameParameters,
     shaders,
 };
-use crate::object::{Factor, FactorError, Object, Stiffening, Stiffness, settled};
+use crate::object::{Compliance, Factor, FactorError, Object, Stiffening, Stiffness, settled};
 use crate::scene::GraphicsEffects;
 use glam::DVec3;
 use std::sync::Arc;
@@ -37,16 +37,22 @@ pub enum FrameMethod {
 }
 
 impl FrameMethod {
-    /// Most nodes whose inverse is worth its memory: up to 36 MB, read once a frame.
-    pub const MOST_NODES_INVERTED: usize = 1000;
+    /// Most memory that an inverse is worth, which is read once a frame: that of 3,000 nodes where springs and ground are isotropic, else of
+    /// 1,000 [B].
+    const MOST_BYTES_INVERTED: usize = 36_000_000;
 
     /// Enough iterations for objects whose springs reach a few dozen edges in one period.
     pub const USUAL_ITERATIONS: u32 = 32;
 
-    /// What suits an object of `nodes` nodes.
+    /// What suits `object`.
     #[must_use]
-    pub fn suitable(nodes: usize) -> Self {
-        if nodes <= Self::MOST_NODES_INVERTED { Self::Inverse } else { Self::Iterations(Self::USUAL_ITERATIONS) }
+    pub fn suitable(object: &Object) -> Self {
+        let order = if object.stiffness.is_isotropic() { object.rest.len() } else { 3 * object.rest.len() };
+        if order.saturating_pow(2) <= Self::MOST_BYTES_INVERTED / size_of::<f32>() {
+            Self::Inverse
+        } else {
+            Self::Iterations(Self::USUAL_ITERATIONS)
+        }
     }
 }
 
@@ -178,9 +184,9 @@ impl FrameUpdate {
         }
         match method {
             FrameMethod::Inverse => {
-                let (inverse, is_shared) = inverse(object, stiffness, period, effects)?;
+                let (inverse, is_isotropic) = inverse(object, stiffness, period, effects)?;
                 let mut overrides = overrides.to_vec();
-                if is_shared {
+                if is_isotropic {
                     overrides.push(("ISOTROPIC", 1.0));
                 }
                 let inverse = StorageBuffer::from_slice(gpu, "inverse", &inverse)?;
@@ -285,27 +291,9 @@ fn inverse(
     if effects.quasi_static {
         diagonal.fill(0.0);
     }
-    let factor = Factor::of(stiffness, period / 2.0, &diagonal)?;
-    let mut unit = vec![DVec3::ZERO; nodes];
-    if factor.is_shared() {
-        let mut inverse = Vec::with_capacity(nodes * nodes);
-        for row in 0..nodes {
-            unit.fill(DVec3::ZERO);
-            unit[row].x = 1.0;
-            factor.solve(&mut unit);
-            inverse.extend(unit.iter().map(|v| v.x as f32));
-        }
-        return Ok((inverse, true));
-    }
-    let mut inverse = Vec::with_capacity(9 * nodes * nodes);
-    for row in 0..3 * nodes {
-        unit.fill(DVec3::ZERO);
-        unit[row / 3][row % 3] = 1.0;
-        factor.solve(&mut unit);
-        // Column `row` of a symmetric matrix.
-        inverse.extend(unit.iter().flat_map(|v| v.as_vec3().to_array()));
-    }
-    Ok((inverse, false))
+    let inverse = Compliance::inverse(&Factor::of(stiffness, period / 2.0, &diagonal)?, nodes);
+    let entries = inverse.entries.iter().map(|&entry| entry as f32).collect();
+    Ok((entries, inverse.rows_per_node == 1))
 }
 
 const DENSE: [Access; 8] = {

@@ -56,6 +56,12 @@ impl Compliance {
         Ok(Self::of(&object.factor, object.rest.len(), object.surface_nodes, nodes))
     }
 
+    /// The whole inverse of the matrix that `factor` factorises, over `nodes` nodes, surface and inner ones.
+    #[must_use]
+    pub fn inverse(factor: &Factor, nodes: usize) -> Self {
+        Self::of(factor, nodes, nodes, (0..nodes as u32).collect())
+    }
+
     /// The part of K^-1 at `covered` ones of the first `surface_nodes` of `nodes` nodes.
     fn of(factor: &Factor, nodes: usize, surface_nodes: usize, covered: Vec<u32>) -> Self {
         let rows_per_node = factor.rows_per_node();

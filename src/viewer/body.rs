@@ -55,7 +55,7 @@ impl Nodes {
         };
         let nodes = object.rest.len();
         let period = 1.0 / graphics.rate;
-        let update = FrameUpdate::new(Arc::clone(context), object, period, FrameMethod::suitable(nodes), effects)?;
+        let update = FrameUpdate::new(Arc::clone(context), object, period, FrameMethod::suitable(object), effects)?;
         let forces = vec![DVec3::ZERO; nodes];
         let smoothing = effects.smoothing.map(|time| Smoothing::new(time, period, nodes));
         Ok(Some(Self { update, contact: Arc::clone(contact), forces, smoothing, period, owed: 0.0 }))

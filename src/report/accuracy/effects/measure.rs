@@ -299,7 +299,7 @@ fn on_the_device(setups: &[Setup], datasets: &[Dataset]) -> Result<Device, Accur
     let body = |(setup, data): (&Setup, &Dataset)| -> Result<Option<Body>, AccuracyError> {
         let (Some(object), Some(graphics)) = (&setup.object, &setup.scene.graphics) else { return Ok(None) };
         let (nodes, period) = (object.rest.len(), 1.0 / graphics.rate);
-        let method = FrameMethod::suitable(nodes);
+        let method = FrameMethod::suitable(object);
         Ok(Some(Body {
             contact: ContactForces::new(data, nodes)?,
             forces: vec![DVec3::ZERO; nodes],
