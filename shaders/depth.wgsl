@@ -1,5 +1,5 @@
 // Depth of a proxy node below the surface, with its first and second derivative in the object's nodes (twin, with the
-// formulas: src/contact/depth.rs).
+// formulas: src/contact/law/depth.rs).
 
 struct Contact {
     nodes: vec3<u32>,

@@ -1,4 +1,4 @@
-// The energy form: minimum of 1/2 u^T K u + 1/2 kc sum_i depth_i(u)^2 (twin: src/contact/energy.rs). One workgroup a
+// The energy form: minimum of 1/2 u^T K u + 1/2 kc sum_i depth_i(u)^2 (twin: src/contact/equilibrium/energy.rs). One workgroup a
 // configuration; invocation k keeps contact k.
 //
 // Steps are found otherwise (trust_region.wgsl), and two things more differ from the twin, both because of f32. Depths are known to some 1e-9 m, which stiff contact turns into

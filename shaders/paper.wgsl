@@ -1,4 +1,4 @@
-// The paper's four-step iteration, section 2.1 (twin, with the steps: src/contact/paper.rs). One workgroup a
+// The paper's four-step iteration, section 2.1 (twin, with the steps: src/contact/equilibrium/paper.rs). One workgroup a
 // configuration; invocation k keeps tie k. In f32 a tie's pull is taken from the solution of step 2, not as Kc times a
 // difference of positions.
 

@@ -1,4 +1,4 @@
-// Contact: the closest facet pushes, a spring a contact (twin: src/contact/springs.rs). Invocation k keeps contact k. Vectors on the support are in the workgroup's memory.
+// Contact: the closest facet pushes, a spring a contact (twin: src/contact/law/springs.rs). Invocation k keeps contact k. Vectors on the support are in the workgroup's memory.
 
 // A size that follows; named, because naga 30 loses count of overrides in array sizes that are expressions.
 override VECTOR_NUMBERS: u32 = 3u * VECTORS * SUPPORT;

@@ -1,5 +1,5 @@
 // What the equilibrium stages share: one workgroup a configuration, the object nodes A that carry contact force, and the
-// compliance among them (twin: src/contact/support.rs).
+// compliance among them (twin: src/contact/linear/support.rs).
 //
 // Forces live on A only and displacement is u = C f. Every sum runs in the same order in every invocation, so that all
 // agree to the bit on what to do next, and barriers stay in uniform control flow.

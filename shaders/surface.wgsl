@@ -1,4 +1,4 @@
-// Normals of the deformed faceted surface (twin: src/contact/surface.rs).
+// Normals of the deformed faceted surface (twin: src/contact/geometry/normals.rs).
 //
 // The stage declares `parameters`, `mesh` and `node_from(j, x)`: node j's position less x. Geometry is computed relative
 // to the point in question, where f32 is finest. `mesh` holds, one behind the other, three corners a triangle, three

@@ -1,5 +1,5 @@
 // One trust-region Newton step of the energy form, by truncated conjugate gradients (Steihaug 1983, Toint 1981), for the model that
-// src/contact/newton.rs derives. There damping keeps steps short and a dense factor of the springs that touch preconditions them; here,
+// src/contact/equilibrium/newton.rs derives. There damping keeps steps short and a dense factor of the springs that touch preconditions them; here,
 // where a workgroup's memory has no room for the factor, C preconditions them and the ball df . C df <= radius^2 keeps them short. Negative
 // curvature and long steps go to its boundary. Both end at the same equilibria.
 

@@ -99,7 +99,7 @@ pub struct NodeForce {
 
 /// One proxy node in contact with one feature of the surface: pushed by `force` at x_i, pushing back on three object nodes.
 ///
-/// A point has at most one; a node with a radius has one for each facet that takes force (`series.rs`), whose sum is its force.
+/// A point has at most one; a node with a radius has one for each facet that takes force (`law/series.rs`), whose sum is its force.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
     /// Number of the proxy's node.

@@ -112,7 +112,7 @@ mod tests {
 
     /// What is relieved, resisted by the object and straight springs, is what it was before.
     #[test]
-    fn relief_is_the_inverse_of_object_and_springs() {
+    fn woodbury_is_the_inverse_of_object_and_springs() {
         for kind in [SpringKind::Isotropic, SpringKind::Axial] {
             let object = ball(kind);
             for (kc, stiffening) in [(1.0, 1.0), (1e3, 3.0), (1e6, 1.0), (1e6, 1e3)] {
