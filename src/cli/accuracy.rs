@@ -1,6 +1,6 @@
 //! `haptize accuracy`: what accuracy costs in time, for one scene.
 
-use super::{Failure, Report};
+use super::{Failure, Report, tell};
 use haptize::{
     report::accuracy::{self, Extent},
     scene::Scene,
@@ -38,7 +38,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         points: arguments.points,
         rounds: arguments.rounds.max(1),
     };
-    let mut progress = |what: &str| eprintln!("haptize: {what} ...");
+    let mut progress = |what: &str| tell(format_args!("haptize: {what} ..."));
     let mut found = accuracy::measure(&scene, extent, &mut progress)?;
     if arguments.effects {
         found.effects = Some(accuracy::effects::price(&scene, extent.rounds, &mut progress)?);

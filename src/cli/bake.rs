@@ -1,6 +1,14 @@
 //! `haptize bake`: a scene haptized into a dataset.
 
-use super::{Failure, Report, bar::bar, info, interrupt::stop_flag, max_error};
+use super::{
+    Failure, Report,
+    bar::bar,
+    info,
+    interrupt::stop_flag,
+    max_error,
+    output::{self, Kind},
+    tell,
+};
 use haptize::{
     haptize::{Aim, BackendChoice, Bake, Bounds, Footprint, Iterations, Lowered, Progress, SweepReport},
     scene::{Algorithm, Scene},
@@ -55,6 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file")?)
             .with_extension("haptize"),
     };
+    output::check(&output, Kind::Dataset, [arguments.scene.as_path()])?;
     if let Some(aim) = arguments.max_error {
         let wanted = max_error::Wanted { aim, points: arguments.max_points, output: &output, resume: arguments.resume };
         return max_error::run(&scene, &wanted, arguments.backend);
@@ -95,7 +104,7 @@ pub fn watched<T, E: Into<Failure>>(
 
 /// Tells on standard error what was noticed on the way.
 pub fn warn(report: &SweepReport) {
-    report.warnings.iter().for_each(|warning| eprintln!("haptize: {warning}"));
+    report.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
 }
 
 /// What was baked into `file`, for an rms error of `aim` over the rms torque if there was one, for people.
@@ -136,7 +145,7 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Optio
 /// What the sweep is going to take, before it begins.
 fn announce(progress: &Progress) {
     if let Some(remedy) = progress.mesh_ripple.and_then(|ripple| ripple.remedy()) {
-        eprintln!("haptize: {remedy}");
+        tell(format_args!("haptize: {remedy}"));
     }
     let range = |Bounds { least, most }| format!("{} to {}", megabytes(least), megabytes(most));
     let Progress { points, done, footprint: Footprint { memory, disk }, .. } = progress;
@@ -144,10 +153,10 @@ fn announce(progress: &Progress) {
         0 => String::new(),
         _ => format!(" and {} of disk (twice that for a moment at the end)", range(*disk)),
     };
-    eprintln!(
+    tell(format_args!(
         "haptize: {points} points, {done} of them done; results take {} of memory{disk}, depending on how much touches",
         range(*memory)
-    );
+    ));
 }
 
 /// Rounded up, with unit.

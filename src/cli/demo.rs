@@ -4,7 +4,7 @@
 //! The press runs twice: as fast as it goes, which gives the same trace and figures on every machine, and against the
 //! clock, which shows what a tick costs on this one and how punctual it is.
 
-use super::{Failure, Report, bake, play};
+use super::{Failure, Report, bake, play, tell};
 use haptize::{dataset::Dataset, haptize::BackendChoice, render::setup::Setup, scene::Scene};
 use std::{
     fmt::Write,
@@ -25,20 +25,20 @@ pub fn run() -> Result<Report, Failure> {
     let scene = Scene::parse(SCENE, "datasets/sphere.toml")?;
     let file: PathBuf = folder.join("sphere.haptize");
 
-    eprintln!("haptizing the sphere, contact at {} configurations ...", points(&scene));
+    tell(format_args!("haptizing the sphere, contact at {} configurations ...", points(&scene)));
     let (baked, sweep) = bake::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
     bake::warn(&sweep);
     baked.save(&file)?;
     let dataset = Dataset::load(&file)?;
 
-    eprintln!("pressing it, as fast as it goes and against the clock ...");
+    tell(format_args!("pressing it, as fast as it goes and against the clock ..."));
     let setup = Setup::new(&dataset)?;
     let motion = play::motion(&setup, "press")?;
     let seconds = motion.duration();
     let mut played = play::play(&setup, &dataset, &mut setup.hand(motion.clone())?, seconds, false)?;
     played.timing = play::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, true)?.timing;
 
-    eprintln!("drawing ...");
+    tell(format_args!("drawing ..."));
     let mut files = vec![file.clone()];
     files.extend(play::write(&setup, &dataset, &played, folder)?);
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();

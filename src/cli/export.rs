@@ -1,6 +1,9 @@
 //! `haptize export`: a dataset for other programs.
 
-use super::{Failure, Report};
+use super::{
+    Failure, Report,
+    output::{self, Kind},
+};
 use haptize::dataset::{Dataset, Format};
 use std::path::PathBuf;
 
@@ -21,7 +24,13 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let dataset = Dataset::open(&arguments.dataset)?;
     let beside = || arguments.dataset.with_extension(arguments.format.extension());
-    let files = dataset.export(&arguments.output.clone().unwrap_or_else(beside), arguments.format)?;
+    let output = arguments.output.clone().unwrap_or_else(beside);
+    let kind = match arguments.format {
+        Format::Npz => Kind::Archive,
+        Format::Csv => Kind::Table,
+    };
+    output::check(&output, kind, [arguments.dataset.as_path()])?;
+    let files = dataset.export(&output, arguments.format)?;
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     let absent = dataset.absent();
     let mut text: String = names.iter().map(|name| format!("{name}\n")).collect();

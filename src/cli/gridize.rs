@@ -1,6 +1,10 @@
 //! `haptize gridize`: scattered measurements made a dataset over a uniform grid.
 
-use super::{Failure, Report, bar::bar};
+use super::{
+    Failure, Report,
+    bar::bar,
+    output::{self, Kind},
+};
 use haptize::{
     dataset::Dataset,
     haptize::{
@@ -93,6 +97,9 @@ impl Source {
 /// Reads the logs and writes the dataset.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let started = Instant::now();
+    let output = output(arguments)?;
+    let inputs = arguments.logs.iter().chain(&arguments.against).chain(&arguments.columns).chain(&arguments.scene);
+    output::check(&output, Kind::Dataset, inputs.map(PathBuf::as_path))?;
     let mapping = arguments.columns.as_deref().map(Mapping::load).transpose()?;
     let mut source = read(&arguments.logs, mapping.as_ref())?;
     if let Some(path) = &arguments.scene {
@@ -111,7 +118,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         [] => None,
         logs => Some(predict(&dataset, &read(logs, mapping.as_ref())?.samples)?),
     };
-    let output = output(arguments)?;
     dataset.save(&output)?;
     let figures = figures(arguments, &source, &dataset)?;
     let seconds = started.elapsed().as_secs_f64();

@@ -1,6 +1,6 @@
 //! `haptize bake --max-error`: a grid chosen for an error, and baked.
 
-use super::{Failure, Report, bake};
+use super::{Failure, Report, bake, tell};
 use haptize::{
     haptize::{Aim, BackendChoice, Bake, Choice, Pilot, PilotError},
     scene::Scene,
@@ -26,7 +26,7 @@ pub struct Wanted<'a> {
 /// Chooses, states and bakes. Nothing is baked where no grid keeps the error; exit code 1 where the error that the bake measures is larger.
 pub fn run(scene: &Scene, wanted: &Wanted<'_>, backend: BackendChoice) -> Result<Report, Failure> {
     let (pilot, choice, report) = bake::watched(scene, backend, |bake| {
-        eprintln!("haptize: pilot: coarse grids against random configurations ...");
+        tell(format_args!("haptize: pilot: coarse grids against random configurations ..."));
         let pilot = Pilot::run(scene, wanted.aim, bake.backend, bake.stop)?;
         let choice = pilot.choose(scene, wanted.points, bake.backend)?;
         state(&pilot, &choice);
@@ -53,7 +53,7 @@ pub fn run(scene: &Scene, wanted: &Wanted<'_>, backend: BackendChoice) -> Result
 /// What was chosen, and what it is going to take, before it begins.
 fn state(pilot: &Pilot, choice: &Choice) {
     let best = pilot.prospects.first().map_or(0.0, |best| best.order);
-    eprintln!(
+    tell(format_args!(
         "haptize: for an rms error of {:.2e} N m ({:.2} % of {:.4} N m): {} grid points, {:.4} apart, `{}`, solved to {:.0e}; the \
          pilot's errors fell with the spacing to the power {best:.2}",
         pilot.aim,
@@ -63,12 +63,12 @@ fn state(pilot: &Pilot, choice: &Choice) {
         choice.spacing,
         choice.interpolation,
         choice.tolerance,
-    );
+    ));
     let disk = choice.footprint.disk;
-    eprintln!(
+    tell(format_args!(
         "haptize: predicted: about {:.0} s, {} to {} on the disk",
         choice.seconds.ceil(),
         bake::megabytes(disk.least),
         bake::megabytes(disk.most),
-    );
+    ));
 }

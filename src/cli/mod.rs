@@ -22,6 +22,7 @@ mod info;
 mod inspect;
 mod interrupt;
 mod max_error;
+mod output;
 mod paper;
 mod play;
 mod scan;
@@ -118,11 +119,22 @@ pub fn run() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(failure) => {
-            // Standard error may be closed; there is nobody left to tell then.
-            let _ = writeln!(io::stderr(), "haptize: {}", explain(failure.as_ref()));
+            let message = explain(failure.as_ref());
+            tell(format_args!("haptize: {message}"));
+            if line.json {
+                let report =
+                    Report { text: String::new(), json: serde_json::json!({ "error": message }), whole: false };
+                // Where standard output is what failed there is nobody left to tell.
+                let _ = print(&report, true);
+            }
             ExitCode::FAILURE
         }
     }
+}
+
+/// Prints a line on standard error. It may be closed or full: then there is nobody to tell, and the work goes on.
+fn tell(line: std::fmt::Arguments<'_>) {
+    let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// Starts the threads that all work shares: where the system gives none, this is an error here and a panic later.

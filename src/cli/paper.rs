@@ -7,6 +7,7 @@ use super::{
     interrupt::stop_flag,
     play,
     scan::{self, Course},
+    tell,
 };
 use haptize::{
     dataset::{Dataset, replace_file},
@@ -66,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| format!("cannot make the folder {}: {error}; give another by -o", folder.display()))?;
     let scene = Scene::parse(SPHERE, "datasets/paper.toml")?;
-    eprintln!("section 4.1: haptizing and pressing the sphere ...");
+    tell(format_args!("section 4.1: haptizing and pressing the sphere ..."));
     let (dataset, sweep) = bake::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
     bake::warn(&sweep);
     dataset.save(&folder.join("paper.haptize"))?;
@@ -74,13 +75,13 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let (_, scraped) = felt(&dataset, "scrape")?;
     let sphere = Sphere { scene: &scene, dataset: &dataset, press: &pressed };
 
-    eprintln!("section 4.2: scanning three simulated spongy blocks ...");
+    tell(format_args!("section 4.2: scanning three simulated spongy blocks ..."));
     let [bare, fabric, side] = scan_all(folder)?;
     let (on_bare, on_fabric, on_side) =
         (felt(&bare.dataset, "scrape")?, felt(&fabric.dataset, "scrape")?, felt(&side.dataset, "press")?);
     let scans = Scans { bare: bare.felt(&on_bare), fabric: fabric.felt(&on_fabric), side: side.felt(&on_side) };
 
-    eprintln!("drawing ...");
+    tell(format_args!("drawing ..."));
     let figures = Figures { folder };
     let instants = object::instants(&dataset, &setup.chain, &pressed, INSTANTS)?;
     let mut files = figures.sheet("fig2-procedure", &procedure(sphere, scans))?;

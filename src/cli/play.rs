@@ -1,6 +1,11 @@
 //! `haptize play`: a dataset felt by a simulated hand, and the object seen to deform; traces and figures of it.
 
-use super::{Failure, Report, felt::Felt};
+use super::{
+    Failure, Report,
+    felt::Felt,
+    output::{self, Kind},
+    tell,
+};
 use haptize::{
     dataset::{Dataset, replace_file},
     device::{Device, Motion, Recorded},
@@ -44,9 +49,9 @@ pub struct Arguments {
     /// Has the session in this file again and compares it bit for bit; differences are an error.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "seconds", "exact", "realtime", "record"])]
     replay: Option<PathBuf>,
-    /// The folder to write traces and figures to.
-    #[arg(short, long, default_value = "out")]
-    output: PathBuf,
+    /// The folder to write traces and figures to; by default one in `out/` that is named after dataset and motion.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
     /// Another dataset, felt by the same motion: the forces at the end of both proxies are drawn in one figure.
     #[arg(long, value_name = "DATASET", conflicts_with = "replay")]
     beside: Option<PathBuf>,
@@ -60,28 +65,38 @@ const LONGEST: f64 = 3600.0;
 
 /// Plays the dataset.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    let inputs =
+        || [&arguments.dataset].into_iter().chain(&arguments.beside).chain(&arguments.replay).map(PathBuf::as_path);
+    let moved = || std::iter::once(Path::new(&arguments.motion));
+    let folder = folder(arguments);
+    if let Some(file) = &arguments.record {
+        output::check(file, Kind::Table, inputs().chain(moved()))?;
+    }
+    for trace in ["trace.csv", "frames.csv"] {
+        output::check(&folder.join(trace), Kind::Table, inputs().chain(moved()))?;
+    }
     let dataset = Dataset::load(&arguments.dataset)?;
     let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
     for exceeded in &setup.exceeded {
-        eprintln!("haptize: note: {exceeded}");
+        tell(format_args!("haptize: note: {exceeded}"));
     }
     let (played, told) = match &arguments.replay {
         Some(file) => replay(&setup, &dataset, file)?,
         None => (perform(&setup, &dataset, arguments)?, None),
     };
     if let Some(timing) = &played.timing {
-        timing.refused.iter().for_each(|refused| eprintln!("haptize: note: {refused}"));
+        timing.refused.iter().for_each(|refused| tell(format_args!("haptize: note: {refused}")));
     }
     let mut files = Vec::new();
     if let Some(file) = &arguments.record {
         record(&played, file)?;
         files.push(file.clone());
     }
-    files.extend(write(&setup, &dataset, &played, &arguments.output)?);
+    files.extend(write(&setup, &dataset, &played, &folder)?);
     let mut felt = Felt::new(&arguments.dataset, &dataset, &setup, &played.trace);
     if let Some(path) = &arguments.beside {
         felt.beside(path, motion(&setup, &arguments.motion)?, played.trace.summary().seconds)?;
-        felt.draw(&arguments.output, &played.trace)?;
+        felt.draw(&folder, &played.trace)?;
     }
     let summary = played.trace.summary();
     let fault = played.trace.ticks.iter().find_map(|tick| Some((tick.time, tick.fault?.to_string())));
@@ -105,7 +120,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if let Some(file) = &arguments.record {
         writeln!(text, "recorded in {}", file.display())?;
     }
-    writeln!(text, "traces and figures in {}", arguments.output.display())?;
+    writeln!(text, "traces and figures in {}", folder.display())?;
     Ok(Report { text, json, whole: fault.is_none() })
 }
 
@@ -138,6 +153,14 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Opti
 }
 
 /// Writes what `played` recorded to `file`.
+/// Where traces and figures go.
+fn folder(arguments: &Arguments) -> PathBuf {
+    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let felt = arguments.replay.as_deref().unwrap_or(Path::new(&arguments.motion));
+    let named = || Path::new("out").join(format!("{}-{}", stem(&arguments.dataset), stem(felt)));
+    arguments.output.clone().unwrap_or_else(named)
+}
+
 fn record(played: &Played, file: &Path) -> Result<(), Failure> {
     let lost = played.timing.as_ref().map_or(0, |timing| timing.unrecorded);
     if lost > 0 {

@@ -1,6 +1,12 @@
 //! `haptize scan`: a real object haptized by touching it. The rig that ships is simulated, and says so.
 
-use super::{Failure, Report, bar::bar, interrupt::stop_flag};
+use super::{
+    Failure, Report,
+    bar::bar,
+    interrupt::stop_flag,
+    output::{self, Kind},
+    tell,
+};
 use haptize::{
     JointVector,
     haptize::scan::{
@@ -49,6 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file; give -o")?)
             .with_extension("csv"),
     };
+    output::check(&output, Kind::Table, [arguments.scene.as_path()])?;
     let stop = stop_flag()?;
     let bar = bar(0, "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     let mut progress = |progress: ScanProgress| {
@@ -110,7 +117,7 @@ pub fn measure(
     if let Some(seconds) = course.guided {
         rig = rig.led_by(Hand::new(plan.spread(logged.len(), Hand::visits_within(seconds))));
     }
-    eprintln!("haptize: {}", rig.description());
+    tell(format_args!("haptize: {}", rig.description()));
     let mut session = Session { spec: &scene.scan, chain: &chain, rig: &mut rig, log: &mut log, stop, progress };
     Ok(match course.guided {
         Some(seconds) => session.guided(seconds, &logged),

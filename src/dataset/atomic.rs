@@ -6,7 +6,7 @@
 use std::{
     fs::File,
     io::{self, BufWriter, Write},
-    path::Path,
+    path::{Path, PathBuf},
 };
 use tempfile::{NamedTempFile, TempPath};
 
@@ -41,6 +41,18 @@ impl<'a> Target<'a> {
     }
 }
 
+/// The regular file that `path` leads to, through symbolic links, or where it is to appear.
+fn resolved(path: &Path) -> io::Result<PathBuf> {
+    match path.canonicalize() {
+        Ok(found) if found.is_file() => Ok(found),
+        Ok(_) => Err(io::Error::new(io::ErrorKind::InvalidInput, "this is a folder, a device or a pipe: name a file")),
+        Err(_) if path.is_symlink() => {
+            Err(io::Error::new(io::ErrorKind::NotFound, "this is a link to a file that is not there: remove it"))
+        }
+        Err(_) => Ok(path.to_owned()),
+    }
+}
+
 /// Replaces the file `target` by what `write` writes. Unless the target says otherwise, it grows under a name that no other file has.
 ///
 /// # Errors
@@ -50,6 +62,7 @@ pub fn replace_file<'a>(
     write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
 ) -> io::Result<()> {
     let Target { path, growing } = target.into();
+    let path = &resolved(path)?;
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -103,6 +116,23 @@ mod tests {
         replace_file(&path, |w| w.write_all(b"new")).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
         assert_eq!(names(folder.path()), ["a.bin"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_and_what_is_no_file_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, link, lost] = ["a.bin", "link", "lost"].map(|name| folder.path().join(name));
+        std::fs::write(&file, b"old").unwrap();
+        std::os::unix::fs::symlink("a.bin", &link).unwrap();
+        replace_file(&link, |w| w.write_all(b"new")).unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(std::fs::read(&file).unwrap(), b"new");
+        std::os::unix::fs::symlink("nowhere", &lost).unwrap();
+        for path in [&lost, Path::new("/dev/null"), folder.path()] {
+            assert!(replace_file(path, |w| w.write_all(b"new")).is_err(), "{}", path.display());
+        }
+        assert!(lost.is_symlink() && !Path::new("/dev/null").is_file());
     }
 
     #[test]
