@@ -83,7 +83,7 @@ fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
     );
     assert!(files.iter().all(|file| std::fs::metadata(file).unwrap().len() > 1000), "{files:?}");
     let page = std::fs::read_to_string(folder.path().join("accuracy.html")).unwrap();
-    assert!(page.matches("<svg").count() == 5 && !page.contains("src=\"http"));
+    assert!(page.matches("<svg").count() == 6 && !page.contains("src=\"http"));
     let table = std::fs::read_to_string(folder.path().join("accuracy.csv")).unwrap();
     assert_eq!(table.lines().count(), found.rows.len() + 1);
 }

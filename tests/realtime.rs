@@ -196,9 +196,25 @@ fn a_loop_that_keeps_missing_its_deadlines_lets_go_without_a_jump_and_says_why()
     assert_eq!(run(0.008).0, None);
 }
 
-/// The sphere over every third line of its grid, a little less than the joints can reach.
+/// Friction and contact damping as the tests feel them.
+fn rubbing() -> HapticEffects {
+    HapticEffects {
+        friction: Some(FrictionSpec {
+            coefficient: 0.3,
+            static_coefficient: 0.4,
+            stiffness: 500.0,
+            damping: 1.0,
+            place: 0..0,
+        }),
+        contact_damping: Some(ContactDampingSpec { damping: 5.0, place: 0..0 }),
+        ..HapticEffects::default()
+    }
+}
+
+/// The sphere over every third line of its grid, a little less than the joints can reach, with what friction and contact damping need.
 fn sphere() -> Dataset {
     let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
+    scene.haptics.effects = rubbing();
     for axis in &mut scene.grid.axes {
         (axis.step, axis.count) = (3.0 * axis.step, axis.count.div_ceil(3));
     }
@@ -219,23 +235,16 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
     let data = sphere();
     let setup = Setup::new(&data).unwrap();
     let press = setup.scene.motion.press[2].q;
-    let friction =
-        FrictionSpec { coefficient: 0.3, static_coefficient: 0.4, stiffness: 500.0, damping: 1.0, place: 0..0 };
+    let HapticEffects { friction, contact_damping, .. } = rubbing();
     let channels = FourChannelSpec { channels: [0.5, 1.0, 1.0, 0.5], filter: 0.005 };
-    let damping = ContactDampingSpec { damping: 5.0, place: 0..0 };
     let none = HapticEffects::default();
     let effects = [
         none.clone(),
-        HapticEffects { friction: Some(friction.clone()), ..none.clone() },
-        HapticEffects { contact_damping: Some(damping.clone()), ..none.clone() },
+        HapticEffects { friction: friction.clone(), ..none.clone() },
+        HapticEffects { contact_damping: contact_damping.clone(), ..none.clone() },
         HapticEffects { four_channel: Some(channels), ..none.clone() },
         HapticEffects { passivity_control: true, ..none },
-        HapticEffects {
-            friction: Some(friction),
-            contact_damping: Some(damping),
-            four_channel: Some(channels),
-            passivity_control: true,
-        },
+        HapticEffects { friction, contact_damping, four_channel: Some(channels), passivity_control: true },
     ];
     let mut touched = 0;
     for interpolation in [Interpolation::Linear, Interpolation::GapField, Interpolation::Potential] {

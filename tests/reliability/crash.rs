@@ -148,14 +148,16 @@ fn a_full_disk_is_an_error_and_the_bake_continues_when_there_is_room() {
     let whole = Undisturbed::new("cpu", 100);
     for share in [1, 40, 70, 99] {
         let old = whole.folder.path().join("x.haptize");
-        std::fs::write(&old, "an earlier file").unwrap();
+        // As much of an earlier dataset as tells it apart from other files.
+        let earlier = b"\x02\0\0\0\0\0\0\0{}";
+        std::fs::write(&old, earlier).unwrap();
         // Blocks of 512 bytes. Writing beyond the limit is an error, not a signal.
         let blocks = whole.bytes * share / 100 / 512;
         let output = limited(whole.folder.path(), &format!("trap '' XFSZ; ulimit -f {blocks}"));
         let said = message(&output);
         assert_eq!(output.status.code(), Some(1), "{share} %: {said}");
         assert!(said.contains("x.haptize") && said.contains("--resume"), "{share} %: {said}");
-        assert_eq!(std::fs::read(&old).unwrap(), b"an earlier file");
+        assert_eq!(std::fs::read(&old).unwrap(), earlier);
         std::fs::remove_file(old).unwrap();
         whole.finish("cpu", &format!("{share} % of the room"));
     }

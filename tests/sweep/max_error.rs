@@ -83,7 +83,9 @@ fn a_grid_is_chosen_stated_baked_and_verified() {
 fn an_error_that_no_grid_keeps_is_refused_before_anything_is_written() {
     let folder = Folder::new();
     std::fs::write(folder.0.path().join("a.toml"), text()).unwrap();
-    std::fs::write(folder.output(), "earlier").unwrap();
+    // As much of an earlier dataset as tells it apart from other files.
+    let earlier = b"\x02\0\0\0\0\0\0\0{}";
+    std::fs::write(folder.output(), earlier).unwrap();
     for (error, points) in [("1e-7", "2000000"), ("0.02", "50")] {
         let arguments = ["bake", "a.toml", "--backend", "cpu", "--max-error", error, "--max-points", points];
         let output = haptize(folder.0.path(), &arguments);
@@ -92,7 +94,7 @@ fn an_error_that_no_grid_keeps_is_refused_before_anything_is_written() {
         for part in ["out of reach", "to the power", "points", "shallower", "Nothing was baked"] {
             assert!(told.contains(part), "{part}: {told}");
         }
-        assert_eq!(std::fs::read(folder.output()).unwrap(), b"earlier");
+        assert_eq!(std::fs::read(folder.output()).unwrap(), earlier);
         assert_eq!(folder.names(), ["a.haptize", "a.toml"]);
     }
     for wrong in ["0", "-0.1", "1.5", "N m", "0.1 N", "nan"] {
