@@ -98,6 +98,18 @@ pub const MINIMUM_SQUARE: f64 = 1e-60;
 /// direction between the two is rounding (coordinates of 0.1 m carry 1e-17 m, a direction good to 1e-6 needs 1e-11 m).
 pub const MINIMUM_CURVATURE_RADIUS: f64 = 1e-11;
 
+/// Steps of Newton's method for the closest point of a bent facet at most: from the flat triangle's closest point three or four reach rounding, and
+/// where the distance is not convex more do not help.
+pub const FACET_ITERATIONS: usize = 16;
+
+/// Step of barycentric weights at which the search for that point ends [1]: the next step would be about its square, far below the rounding of a
+/// weight.
+pub const FACET_STEP: f64 = 1e-10;
+
+/// Least convexity of the distance to a bent facet, over that to a flat one, at which its second derivative is used [1]: beyond, the point is within
+/// a hundredth of the surface's radius of curvature from where the closest point leaps, and a step by it would be a hundred times as far.
+pub const LEAST_CONVEXITY: f64 = 1e-2;
+
 /// Slack of squared lower bounds in culling, relative to the square of the scene's size [1]: a squared distance between
 /// points of coordinates up to L is rounded by a few eps L^2 (eps = 2.2e-16); 64 eps covers bound and distance.
 pub const CULLING_SLACK: f64 = 64.0 * f64::EPSILON;

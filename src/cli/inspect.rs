@@ -102,7 +102,7 @@ fn describe(text: &mut String, inspection: &Inspection) -> fmt::Result {
         writeln!(text, "  {number:<3} {:<10} {}", node.link, numbers(&node.position.to_array()))?;
         for contact in &node.contacts {
             let carriers =
-                contact.nodes.iter().zip(contact.weights).map(|(node, weight)| format!("{node} ({weight:.3})"));
+                contact.nodes.iter().zip(&contact.weights).map(|(node, weight)| format!("{node} ({weight:.3})"));
             let carriers = carriers.collect::<Vec<_>>().join(" ");
             writeln!(text, "      force {} on {carriers}", numbers(&contact.force.to_array()))?;
         }

@@ -5,16 +5,19 @@
 //! - a node outside at rest, farther than m from the surface, is outside still;
 //! - where some triangle is at a distance d, one that was farther than d + m at rest is not the closest one.
 //!
+//! A smooth surface is searched by its flat triangles: where a facet is at a distance d, one whose triangle is farther than d plus the
+//! bulge is not the closest one.
+//!
 //! Ties go to the lower triangle number.
 
 mod deformation;
 
 use super::geometry::RestSurface;
-use super::geometry::closest_point::{Closest, Feature, point_at};
-use super::geometry::normals;
-use super::law::depth::{Contact, measure};
+use super::geometry::closest_point::{Closest, Feature};
+use super::geometry::facet::Facet;
+use super::law::depth::{Carriers, Contact, measure};
 use super::law::series::distribute_all;
-use super::model::Model;
+use super::model::{Model, MotionBound};
 use crate::tolerances::{FACET_COMPLIANCE, KNOWN_FACETS};
 use deformation::Deformation;
 use glam::DVec3;
@@ -128,14 +131,9 @@ impl Detection {
                 self.nodes[i] = x;
                 known.exact = false;
                 known.inside = false;
-                // Beyond the lattice of bounds the surface's box bounds the distance.
-                known.distance = match model.surface.distance_bounds.at(x) {
-                    Some((bound, triangle)) => {
-                        known.last = triangle;
-                        bound
-                    }
-                    None => model.surface.bounds.distance_squared(x).sqrt(),
-                };
+                let (bound, near) = model.surface.distance_bound(x);
+                known.distance = bound;
+                known.last = near.unwrap_or(known.last);
             }
             let clearance = known.signed() - model.chain.nodes[i].radius;
             if clearance < least {
@@ -145,9 +143,9 @@ impl Detection {
         first
     }
 
-    /// Takes up the surface displaced by `forces` on `nodes`, three numbers a node [N], nowhere by more than `moved` [m].
-    pub fn displace(&mut self, model: &Model, nodes: &[u32], forces: &[f64], moved: f64) {
-        self.deformation.take(model, nodes, forces, moved);
+    /// Takes up the surface displaced by `forces` on `nodes`, three numbers a node [N], within `bound`.
+    pub fn displace(&mut self, model: &Model, nodes: &[u32], forces: &[f64], bound: MotionBound) {
+        self.deformation.take(model, nodes, forces, bound);
     }
 
     /// Displacement of a surface node [m].
@@ -159,7 +157,7 @@ impl Detection {
     /// included with a depth below zero when they do not touch now, because they are the ones that may touch again.
     pub fn deformed(&mut self, model: &Model, facets: Facets, contacts: &mut Vec<Contact>) {
         contacts.clear();
-        let moved = self.deformation.moved;
+        let MotionBound { moved, .. } = self.deformation.bound;
         for i in 0..self.nodes.len() {
             let x = self.nodes[i];
             let radius = model.chain.nodes[i].radius;
@@ -191,7 +189,7 @@ impl Detection {
                 self.facets.retain(|facet| facet.distance_squared <= within && facet.triangle != closest.triangle);
                 self.facets.sort_unstable_by_key(|facet| facet.triangle);
                 let Self { facets, deformation, .. } = self;
-                contacts.extend(facets.iter().map(|facet| facing(model, i, x, deformation, *facet)));
+                contacts.extend(facets.iter().map(|facet| facing(model, i, x, deformation, facet)));
             }
         }
         distribute_all(contacts, &mut self.parts);
@@ -204,26 +202,27 @@ impl Detection {
         let x = self.nodes[i];
         let radius = model.chain.nodes[i].radius;
         let known = self.at_rest[i];
-        let moved = deformation.moved;
+        let MotionBound { moved, bulge } = deformation.bound;
         // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than that.
         let matters = if known.inside || known.watched { f64::MAX } else { radius.max(moved - known.distance) };
         let mut closest = Closest::none();
         let likely = if moved == 0.0 { known.closest } else { known.last };
         // None was closest where the pass before was not a number.
         if (likely as usize) < model.object.triangles.len() {
-            closest.consider(x, deformation.corners(model, likely), likely);
+            closest.consider(x, &deformation.facet(model, likely), likely);
         }
-        // Squared distance within which triangles are looked for.
-        let within = |closest: &Closest| {
+        // Distance within which facets are looked for, and its square for their triangles.
+        let near = |closest: &Closest| {
             let distance = closest.distance_squared.sqrt().min(matters);
-            (if feels { known_distance(radius, distance) } else { distance }).powi(2)
+            if feels { known_distance(radius, distance) } else { distance }
         };
+        let within = |closest: &Closest| (near(closest) + bulge).powi(2);
         facets.clear();
         if feels || moved != 0.0 {
-            deformation.search(model, x, within(&closest), |triangle, corners| {
+            deformation.search(model, x, within(&closest), |triangle, facet| {
                 if feels || triangle != likely {
-                    let (point, distance_squared) = closest.consider(x, corners, triangle);
-                    if feels && distance_squared <= within(&closest) {
+                    let (point, distance_squared) = closest.consider(x, facet, triangle);
+                    if feels && distance_squared <= near(&closest).powi(2) {
                         facets.push(Closest { distance_squared, triangle, point });
                     }
                 }
@@ -235,9 +234,9 @@ impl Detection {
 
     /// The contact (or near miss, with depth <= 0) of proxy node `i` with the closest feature of the deformed surface.
     fn contact_at(&mut self, model: &Model, i: usize, closest: Closest) -> Contact {
-        let corners = self.deformation.corners(model, closest.triangle);
-        let pseudonormal = self.deformation.pseudonormal(model, closest.triangle as usize, closest.point.feature);
-        contact_with(model, i, self.nodes[i], closest, corners, pseudonormal)
+        let facet = self.deformation.facet(model, closest.triangle);
+        let pseudonormal = self.deformation.pseudonormal(model, closest.triangle, &closest.point);
+        contact_with(model, i, self.nodes[i], &closest, &facet, pseudonormal)
     }
 
     /// Rows of the problem with geometry frozen at rest: every proxy node within `reach` of the surface, with its depth at
@@ -255,10 +254,9 @@ impl Detection {
             if closest.triangle == u32::MAX {
                 continue;
             }
-            let Closest { triangle, point, .. } = closest;
-            let (corners, direction) =
-                (model.surface.corners(triangle), model.surface.pseudonormal(triangle, point.feature));
-            let mut row = contact_with(model, i, x, closest, corners, direction);
+            let facet = model.surface.facet(&model.surface.positions, closest.triangle);
+            let direction = model.surface.pseudonormal_at_rest(closest.triangle, &closest.point);
+            let mut row = contact_with(model, i, x, &closest, &facet, direction);
             if row.depth >= -reach {
                 row.freeze();
                 rows.push(row);
@@ -278,34 +276,34 @@ fn find_at_rest(surface: &RestSurface, x: DVec3, known: &mut RestDistance) -> Cl
     closest
 }
 
-/// The contact (or near miss, with depth <= 0) of proxy node `i` at `x` with the feature of a triangle with these `corners`, on the
-/// side that `pseudonormal` tells.
+/// The contact (or near miss, with depth <= 0) of proxy node `i` at `x` with the closest point of `facet`, on the side that
+/// `pseudonormal` tells.
 #[inline(always)]
 fn contact_with(
     model: &Model,
     i: usize,
     x: DVec3,
-    Closest { triangle, point, .. }: Closest,
-    corners: [DVec3; 3],
+    closest: &Closest,
+    facet: &Facet,
     pseudonormal: DVec3,
 ) -> Contact {
     let radius = model.chain.nodes[i].radius;
-    let measured = measure(x, radius, corners, point.weights, point.feature, pseudonormal);
-    let nodes = model.object.triangles[triangle as usize];
-    Contact { share: model.shares[i], ..Contact::new(i as u32, nodes, point.weights, measured) }
+    let measured = measure(x, radius, facet, &closest.point, pseudonormal);
+    let carriers = Carriers::new(model.surface.carriers(closest.triangle), &closest.point);
+    Contact { share: model.shares[i], ..Contact::new(i as u32, carriers, measured) }
 }
 
 /// The contact of the ball `i` at `x` with a facet that is not the closest, from the side on which its centre is.
-fn facing(model: &Model, i: usize, x: DVec3, deformation: &mut Deformation, facet: Closest) -> Contact {
-    let corners = deformation.corners(model, facet.triangle);
-    let towards = x - point_at(corners, facet.point.weights);
-    let normal = normals::unit_or_zero(normals::area_vector(corners));
-    let direction = match facet.point.feature {
+fn facing(model: &Model, i: usize, x: DVec3, deformation: &mut Deformation, closest: &Closest) -> Contact {
+    let facet = deformation.facet(model, closest.triangle);
+    let towards = x - facet.point(closest.point.weights);
+    let normal = facet.normal(closest.point.weights);
+    let direction = match closest.point.feature {
         Feature::Face if normal.dot(towards) < 0.0 => -normal,
         Feature::Face => normal,
         _ => towards,
     };
-    contact_with(model, i, x, facet, corners, direction)
+    contact_with(model, i, x, closest, &facet, direction)
 }
 
 #[cfg(test)]
@@ -315,7 +313,7 @@ mod tests {
     use crate::proxy::Chain;
     use crate::random::sequence;
     use crate::scene::{
-        Algorithm, ContactSpec, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
+        Algorithm, ContactSpec, ContactSurface, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
         ProxySpec, Shape, SpringKind, SpringSpec,
     };
 
@@ -354,14 +352,12 @@ mod tests {
         let mut contacts = Vec::new();
         for (i, &x) in nodes.iter().enumerate() {
             let mut closest = Closest::none();
-            for t in 0..model.object.triangles.len() {
-                closest.consider(x, normals::corners(positions, model.object.triangles[t]), t as u32);
+            for t in 0..model.object.triangles.len() as u32 {
+                closest.consider(x, &model.surface.facet(positions, t), t);
             }
-            let (triangles, t) = (&model.object.triangles, closest.triangle as usize);
-            let pseudonormal =
-                normals::pseudonormal(positions, triangles, &model.object.topology, t, closest.point.feature);
-            let corners = normals::corners(positions, triangles[t]);
-            let contact = contact_with(model, i, x, closest, corners, pseudonormal);
+            let pseudonormal = model.surface.pseudonormal(positions, closest.triangle, &closest.point);
+            let facet = model.surface.facet(positions, closest.triangle);
+            let contact = contact_with(model, i, x, &closest, &facet, pseudonormal);
             if contact.depth > 0.0 {
                 contacts.push(contact);
             }
@@ -375,7 +371,9 @@ mod tests {
         let object = ball();
         let mut next = sequence(3);
         let (mut compared, mut same) = (0, 0);
-        for radius in [0.0, 0.01] {
+        for (radius, surface) in
+            [(0.0, ContactSurface::Facets), (0.01, ContactSurface::Facets), (0.0, ContactSurface::Smooth), (0.01, ContactSurface::Smooth)]
+        {
             let chain = nodes(30, radius);
             let contact = ContactSpec {
                 stiffness: 1.0,
@@ -384,6 +382,7 @@ mod tests {
                 tolerance: 1e-8,
                 max_iterations: 1,
                 updates: 0,
+        surface,
             };
             let model = Model::new(&object, &chain, contact);
             let mut detection = Detection::new(&model);
@@ -416,9 +415,9 @@ mod tests {
                         .zip(forces.as_chunks().0)
                         .map(|(&node, force)| displacement[node as usize].dot(DVec3::from_array(*force)))
                         .sum();
-                    let moved = model.motion_bound(0.5 * work);
-                    assert!(displacement.iter().all(|u| u.length() <= moved), "{size} {moved}");
-                    detection.displace(&model, &nodes, &forces, moved);
+                    let bound = model.motion_bound(0.5 * work);
+                    assert!(displacement.iter().all(|u| u.length() <= bound.moved), "{size} {bound:?}");
+                    detection.displace(&model, &nodes, &forces, bound);
                     let mut found = Vec::new();
                     detection.deformed(&model, Facets::Closest, &mut found);
                     found.retain(|contact| contact.depth > 0.0);
@@ -429,7 +428,7 @@ mod tests {
                         assert_eq!(found.proxy_node, expected.proxy_node);
                         // Displacements are sums in another order.
                         assert!((found.depth - expected.depth).abs() < 1e-15);
-                        same += usize::from(found.nodes == expected.nodes);
+                        same += usize::from(found.carriers.nodes() == expected.carriers.nodes());
                     }
                 }
             }

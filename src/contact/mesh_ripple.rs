@@ -5,6 +5,8 @@
 //! springs or a membrane without bending stiffness a single node gives way more than the middle of a facet, however fine the mesh: the
 //! force ripples as the point slides from facet to facet, and so does the torque.
 
+use super::geometry::closest_point::{ClosestPoint, Feature};
+use super::law::depth::Carriers;
 use super::model::Model;
 use crate::tolerances::RIPPLE_WARNING;
 use serde::{Deserialize, Serialize};
@@ -66,15 +68,15 @@ impl fmt::Display for MeshRipple {
 
 /// The ripple over one facet; none where the compliance does not cover it.
 fn facet(model: &Model<'_>, triangle: usize) -> Option<f64> {
-    let nodes = model.object.triangles[triangle];
-    let mut places = [0; 3];
-    for (place, node) in places.iter_mut().zip(nodes) {
-        *place = model.compliance.place(node)?;
-    }
+    let nodes = model.surface.carriers(triangle as u32);
+    let places: Vec<usize> = nodes.iter().map(|&node| model.compliance.place(node)).collect::<Option<_>>()?;
     let normal = model.surface.normals[triangle];
     let between = |i: usize, j: usize| normal.dot(model.compliance.block(places[i], places[j]) * normal);
-    let compliance = |w: [f64; 3]| -> f64 {
-        (0..3).map(|i| (0..3).map(|j| w[i] * w[j] * between(i, j)).sum::<f64>()).sum::<f64>() + 1.0 / model.kc
+    let compliance = |weights: [f64; 3]| -> f64 {
+        let carriers = Carriers::new(nodes, &ClosestPoint { weights, feature: Feature::Face });
+        let w = carriers.weights();
+        let row = |i: usize| (0..w.len()).map(|j| w[i] * w[j] * between(i, j)).sum::<f64>();
+        (0..w.len()).map(row).sum::<f64>() + 1.0 / model.kc
     };
     let all = PLACES.map(compliance);
     let (least, greatest) = (all.into_iter().fold(f64::MAX, f64::min), all.into_iter().fold(0.0, f64::max));

@@ -21,7 +21,7 @@ mod solver;
 mod solvers;
 
 pub use mesh_ripple::MeshRipple;
-pub use model::Model;
+pub use model::{Model, MotionBound};
 pub use proximity::Proximity;
 pub use solver::Solver;
 pub(crate) use solvers::{SHARE, Solvers};
@@ -97,17 +97,16 @@ pub struct NodeForce {
     pub force: DVec3,
 }
 
-/// One proxy node in contact with one feature of the surface: pushed by `force` at x_i, pushing back on three object nodes.
+/// One proxy node in contact with one feature of the surface: pushed by `force` at x_i, pushing back on the object's nodes.
 ///
 /// A point has at most one; a node with a radius has one for each facet that takes force (`law/series.rs`), whose sum is its force.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Touch {
     /// Number of the proxy's node.
     pub proxy_node: u32,
-    /// The three object nodes.
-    pub nodes: [u32; 3],
-    /// The weight with which each carries the reaction.
-    pub weights: [f64; 3],
+    /// The object's nodes of the touched facet, and the share of the reaction that each carries, in sum one: the three corners of a flat
+    /// facet, or the twelve nodes on which a smooth one depends, some of whose shares are negative.
+    pub carriers: Vec<(u32, f64)>,
     /// Force on the proxy node [N].
     pub force: DVec3,
 }

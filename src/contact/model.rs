@@ -1,6 +1,9 @@
 //! What contact needs to know of object and proxy, computed once and shared by all threads.
 
-use super::{geometry::RestSurface, reach};
+use super::{
+    geometry::{RestSurface, smooth::SmoothSurface},
+    reach,
+};
 use crate::JointVector;
 use crate::object::{Compliance, Object, ObjectError};
 use crate::proxy::Chain;
@@ -35,6 +38,17 @@ pub struct Model<'a> {
     /// Largest eigenvalue of a covered node's own block C_jj, or a bound of it: no node moves farther than sqrt(mobility) times |u| in
     /// the energy norm [m/N].
     pub mobility: f64,
+    /// The same for what facets stand off the flat triangles by, where contact is with a smooth surface [m/N].
+    bulge_mobility: f64,
+}
+
+/// How far a displaced surface is from the surface at rest.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MotionBound {
+    /// No point of the surface has moved farther [m].
+    pub moved: f64,
+    /// No facet stands off its flat triangle by more [m].
+    pub bulge: f64,
 }
 
 impl<'a> Model<'a> {
@@ -61,8 +75,7 @@ impl<'a> Model<'a> {
         }
         let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
         model.compliance = Arc::new(Compliance::on(object, reach::reached(&model, configurations))?);
-        (model.softest, model.mobility) = softest(&model.compliance);
-        model.set_stiffness(contact.stiffness);
+        model.measure_compliance();
         Ok(model)
     }
 
@@ -70,21 +83,28 @@ impl<'a> Model<'a> {
     pub const WHOLE: usize = 2048;
 
     fn with_compliance(object: &'a Object, chain: &'a Chain, contact: ContactSpec, compliance: Compliance) -> Self {
-        let (softest, mobility) = softest(&compliance);
         let mut model = Self {
             object,
             chain,
-            softest,
-            mobility,
+            softest: 0.0,
+            mobility: 0.0,
+            bulge_mobility: 0.0,
             compliance: Arc::new(compliance),
             contact,
             kc: 0.0,
             shares: chain.nodes.iter().map(|node| contact.share(node.length)).collect(),
             with_tangent: false,
-            surface: Arc::new(RestSurface::new(object)),
+            surface: Arc::new(RestSurface::new(object, contact.felt_surface())),
         };
-        model.set_stiffness(contact.stiffness);
+        model.measure_compliance();
         model
+    }
+
+    /// Takes from the compliance how far the surface moves, and how stiff rigid contact is.
+    fn measure_compliance(&mut self) {
+        (self.softest, self.mobility) = softest(&self.compliance);
+        self.bulge_mobility = self.surface.smooth.as_ref().map_or(0.0, |smooth| bulge_mobility(smooth, &self.compliance));
+        self.set_stiffness(self.contact.stiffness);
     }
 
     /// The same object and proxy in contact as `contact` says.
@@ -92,7 +112,10 @@ impl<'a> Model<'a> {
     pub fn with_contact(&self, contact: ContactSpec) -> Self {
         let shares = self.chain.nodes.iter().map(|node| contact.share(node.length)).collect();
         let mut model = Self { contact, shares, ..self.clone() };
-        model.set_stiffness(contact.stiffness);
+        if contact.felt_surface() != self.contact.felt_surface() {
+            model.surface = Arc::new(RestSurface::new(self.object, contact.felt_surface()));
+        }
+        model.measure_compliance();
         model
     }
 
@@ -103,12 +126,32 @@ impl<'a> Model<'a> {
         self.kc = 3.0 * self.contact.stiffness;
     }
 
-    /// How far any point of the surface can be from where it rests when the object stores the energy `elastic` [J]:
-    /// |u_j|^2 <= |C_jj| |u|^2, the last in the energy norm [m].
+    /// How far the surface can be from where it rests when the object stores the energy `elastic` [J]: for any sum g of the nodes'
+    /// displacements |g . u|^2 <= |g . C g| |u|^2, the last in the energy norm.
     #[must_use]
-    pub fn motion_bound(&self, elastic: f64) -> f64 {
-        (2.0 * self.mobility * elastic.max(0.0)).sqrt() * (1.0 + LENGTH_ROUNDING)
+    pub fn motion_bound(&self, elastic: f64) -> MotionBound {
+        let norm = (2.0 * elastic.max(0.0)).sqrt() * (1.0 + LENGTH_ROUNDING);
+        let bulging = self.bulge_mobility.sqrt() * norm;
+        MotionBound { moved: self.mobility.sqrt() * norm + bulging, bulge: self.surface.bulge + bulging }
     }
+}
+
+/// The greatest g . C g over what facets stand off their flat triangles by, as a sum g of nodes' displacements: a bound of its largest
+/// eigenvalue. Nodes that are not covered do not move [m/N].
+fn bulge_mobility(smooth: &SmoothSurface, compliance: &Compliance) -> f64 {
+    smooth.bulge_squared(|terms| {
+        let places = terms.iter().filter(|(_, weight)| *weight != 0.0).filter_map(|(node, weight)| Some((compliance.place(*node)?, *weight)));
+        let places: Vec<(usize, f64)> = places.collect();
+        let mut sum = 0.0;
+        for &(i, weight) in &places {
+            for &(j, other) in &places {
+                let block = compliance.block(i, j);
+                let trace = block.x_axis.x + block.y_axis.y + block.z_axis.z;
+                sum += weight * other * if compliance.rows_per_node == 1 { trace / 3.0 } else { trace };
+            }
+        }
+        sum
+    })
 }
 
 /// Largest trace of a node's own block, and a bound of its largest eigenvalue: that of an isotropic object's block is a third of its

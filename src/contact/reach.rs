@@ -49,8 +49,8 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
             continue;
         }
         let radius = (clearance + node.radius).abs() + 2.0 * motion;
-        for_triangles_within(model, *x - model.surface.centre, radius, |t| {
-            model.object.triangles[t as usize].iter().for_each(|&node| marked[node as usize] = true);
+        for_facets_within(model, *x - model.surface.centre, radius, |t| {
+            model.surface.carriers(t).iter().for_each(|&node| marked[node as usize] = true);
         });
     }
 }
@@ -61,16 +61,17 @@ pub(super) fn covers(model: &Model<'_>, detection: &Detection, equilibrium: &Equ
     let mut within = equilibrium.forces.iter().all(|force| covered(force.node));
     for (i, distance) in detection.distances().enumerate() {
         if equilibrium.touches.iter().any(|touch| touch.proxy_node as usize == i) {
-            for_triangles_within(model, detection.nodes()[i], distance.abs() + 2.0 * moved, |t| {
-                within &= model.object.triangles[t as usize].iter().all(|&node| covered(node));
+            for_facets_within(model, detection.nodes()[i], distance.abs() + 2.0 * moved, |t| {
+                within &= model.surface.carriers(t).iter().all(|&node| covered(node));
             });
         }
     }
     within
 }
 
-/// Visits the triangles that are within `radius` of `x` at rest.
-fn for_triangles_within(model: &Model<'_>, x: DVec3, radius: f64, mut visit: impl FnMut(u32)) {
+/// Visits the facets that are within `radius` of `x` at rest.
+fn for_facets_within(model: &Model<'_>, x: DVec3, radius: f64, mut visit: impl FnMut(u32)) {
+    let radius = radius + model.surface.bulge;
     model.surface.bounds.search(x, radius * radius, |t| {
         visit(t);
         radius * radius

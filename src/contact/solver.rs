@@ -131,7 +131,7 @@ impl<'a> Solver<'a> {
         let model = self.model;
         model.compliance.is_whole()
             || (self.held_by == HeldBy::Energy
-                && reach::covers(model, &self.detection, equilibrium, model.motion_bound(self.energy.state.elastic)))
+                && reach::covers(model, &self.detection, equilibrium, model.motion_bound(self.energy.state.elastic).moved))
             || {
                 let moved = self.displacement().chunks_exact(3).map(|u| DVec3::from_slice(u).length());
                 let moved = moved.fold(0.0, f64::max);
@@ -202,12 +202,11 @@ impl<'a> Solver<'a> {
         equilibrium.energy = state.energy;
         equilibrium.touches.extend(state.contacts.iter().filter(|c| c.push > 0.0).map(|contact| Touch {
             proxy_node: contact.proxy_node,
-            nodes: contact.nodes,
-            weights: contact.weights,
+            carriers: contact.carriers.iter().collect(),
             force: contact.normal * (self.model.kc * contact.force_over_kc()),
         }));
         for touch in &equilibrium.touches {
-            for (&node, weight) in touch.nodes.iter().zip(touch.weights) {
+            for &(node, weight) in &touch.carriers {
                 if weight != 0.0 {
                     push(&mut self.node_forces, &mut self.marked, &mut self.touched, node, -touch.force * weight);
                 }
@@ -234,7 +233,8 @@ impl<'a> Solver<'a> {
             }
             let square = force.length_squared().max(MINIMUM_SQUARE);
             let weights = tie.forces.map(|part| -part.dot(force) / square);
-            equilibrium.touches.push(Touch { proxy_node: tie.proxy_node, nodes: tie.nodes, weights, force });
+            let carriers = tie.nodes.into_iter().zip(weights).collect();
+            equilibrium.touches.push(Touch { proxy_node: tie.proxy_node, carriers, force });
             for (part, node) in tie.forces.into_iter().zip(tie.nodes) {
                 // A spring Kc stretched to this force stores |f|^2 / (2 Kc).
                 equilibrium.energy += part.length_squared() / (2.0 * self.model.contact.stiffness);
@@ -298,5 +298,5 @@ fn is_finite(equilibrium: &Equilibrium) -> bool {
         && equilibrium
             .touches
             .iter()
-            .all(|touch| touch.force.is_finite() && touch.weights.iter().all(|w| w.is_finite()))
+            .all(|touch| touch.force.is_finite() && touch.carriers.iter().all(|(_, weight)| weight.is_finite()))
 }

@@ -14,8 +14,9 @@ use crate::{
     contact::{
         Model, Solver, Status,
         geometry::closest_point::{Feature, closest_point, point_at},
+        geometry::facet::Facet,
         geometry::normals::{area_vector, unit_or_zero},
-        law::depth::{Contact, measure, second_variation},
+        law::depth::{Carriers, Contact, measure},
     },
     haptize::Backend,
     object::Object,
@@ -182,13 +183,15 @@ fn depth_and_its_derivatives_are_the_twins() {
         }
         compared += 1;
         let face = unit_or_zero(doubled);
-        let measured @ (normal, depth, _) = measure(DVec3::ZERO, 0.0, corners, point.weights, point.feature, face);
+        let measured @ (normal, depth, _) = measure(DVec3::ZERO, 0.0, &Facet::flat(corners), &point, face);
         assert!((depth - f64::from(answer.depth)).abs() < 4.0 * DISTANCE_ROUNDING);
         // Directions: rounding over the shortest length that is divided by.
         assert!(normal.distance(vector(&answer.normal)) < 1e-4, "{normal} {:?}", answer.normal);
-        let contact = Contact::new(0, [0, 1, 2], point.weights, measured);
+        let carriers = Carriers::new(&[0, 1, 2], &point);
+        let contact = Contact { multiplier: 1.0, ..Contact::new(0, carriers, measured) };
         let moves = question.moves.map(|v| vector(&v));
-        let reference = second_variation(&contact, moves);
+        let reaction = contact.second_variation(&contact.variation(|j| moves[j]));
+        let reference = [0, 1, 2].map(|j| contact.at_node(&reaction, j));
         let size = reference.iter().map(|v| v.length()).fold(0.0, f64::max);
         for (expected, found) in reference.iter().zip(&answer.variation) {
             let error = expected.distance(vector(found));

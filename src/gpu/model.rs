@@ -54,7 +54,9 @@ impl DeviceModel {
             return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });
         }
         let extent = model.surface.positions.iter().map(|n| n.length()).fold(0.0, f64::max);
-        let gap_band = tolerances::GPU_GAP_BAND_PER_EXTENT * extent
+        // The kernels know the flat triangles; a smooth surface stands off these.
+        let gap_band = model.surface.bulge
+            + tolerances::GPU_GAP_BAND_PER_EXTENT * extent
             + tolerances::GPU_GAP_BAND_PER_JOINT * chain.joints.len() as f64 * reach(chain, model.surface.centre);
         let corners = |t: &[u32; 3]| t.map(|j| model.surface.positions[j as usize]);
         let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));

@@ -142,13 +142,16 @@ impl<'a> GpuSolver<'a> {
         Ok(results)
     }
 
-    /// Solves in f64 what touches nothing in f32 but lies within rounding of contact.
+    /// Solves in f64 what touches nothing in f32 but lies within rounding of contact, and measures gaps to a smooth surface.
     fn decide_free(&mut self, chunk: &[JointVector], touching: &[u32], results: &mut [Equilibrium]) {
         let mut free = vec![true; chunk.len()];
         touching.iter().for_each(|&member| free[member as usize] = false);
-        let open: Vec<usize> = (0..chunk.len()).filter(|&k| free[k] && self.is_undecided(&results[k])).collect();
+        let smooth = self.model.surface.smooth.is_some();
+        let (undecided, others): (Vec<usize>, Vec<usize>) =
+            (0..chunk.len()).filter(|&k| free[k]).partition(|&k| self.is_undecided(&results[k]));
+        self.left_to_cpu += undecided.len();
+        let open = if smooth { [undecided, others].concat() } else { undecided };
         let decided = self.cpu.map(&open, |solver, &k| solver.solve(&chunk[k]));
-        self.left_to_cpu += open.len();
         for (k, result) in open.into_iter().zip(decided) {
             results[k] = result;
         }

@@ -87,7 +87,8 @@ fn iterated(model: &contact::Model<'_>, q: &[f64], status: Status, outcome: &Out
         let squares: f64 = forces.iter().map(|part| part.length_squared()).sum();
         result.energy += squares / (2.0 * model.contact.stiffness);
         model.chain.add_torque(&pose, touch.proxy_node as usize, force, &mut result.torque);
-        result.touches.push(contact::Touch { proxy_node: touch.proxy_node, nodes: touch.nodes, weights, force });
+        let carriers = touch.nodes.into_iter().zip(weights).collect();
+        result.touches.push(contact::Touch { proxy_node: touch.proxy_node, carriers, force });
         parts.extend(touch.nodes.into_iter().zip(forces).filter(|(_, part)| *part != DVec3::ZERO));
     }
     // The kernel lists contacts in the order of their first touch.

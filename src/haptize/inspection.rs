@@ -44,14 +44,14 @@ pub struct ProxyNode {
 }
 
 /// A contact of a proxy node.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Contact {
     /// Force on the proxy node [N].
     pub force: DVec3,
-    /// The three object nodes that carry its reaction.
-    pub nodes: [u32; 3],
+    /// The object's nodes that carry its reaction.
+    pub nodes: Vec<u32>,
     /// Share of each.
-    pub weights: [f64; 3],
+    pub weights: Vec<f64>,
 }
 
 /// A node of the object's surface.
@@ -91,7 +91,10 @@ impl Inspection {
                     .touches
                     .iter()
                     .filter(|touch| touch.proxy_node as usize == node)
-                    .map(|touch| Contact { force: touch.force, nodes: touch.nodes, weights: touch.weights })
+                    .map(|touch| {
+                        let (nodes, weights) = touch.carriers.iter().copied().unzip();
+                        Contact { force: touch.force, nodes, weights }
+                    })
                     .collect(),
             });
         let proxy_nodes = proxy_nodes.collect();

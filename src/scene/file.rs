@@ -2,7 +2,7 @@
 //!
 //! Unknown keys are refused with the list of the known ones. Nothing is checked here beyond types; see [`super::convert`].
 
-use super::{Algorithm, Cover, Interpolation, JointKind, ProxyInertia, SpringKind};
+use super::{Algorithm, ContactSurface, Cover, Interpolation, JointKind, ProxyInertia, SpringKind};
 use serde::Deserialize;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 use toml::Spanned;
@@ -138,6 +138,7 @@ pub(super) struct ContactTable {
     pub tolerance: Option<Number>,
     pub max_iterations: Option<Spanned<u32>>,
     pub updates: Option<Spanned<u32>>,
+    pub surface: Option<Spanned<ContactSurface>>,
 }
 
 #[derive(Deserialize)]

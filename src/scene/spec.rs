@@ -215,9 +215,28 @@ pub struct ContactSpec {
     pub max_iterations: u32,
     /// How often linearised contact takes its geometry anew, at the displacement found.
     pub updates: u32,
+    /// Which surface the proxy feels.
+    pub surface: ContactSurface,
+}
+
+/// Which surface of a mesh the proxy feels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ContactSurface {
+    /// The triangles.
+    #[default]
+    Facets,
+    /// A smooth surface through the mesh's nodes, quadratic over each triangle.
+    Smooth,
 }
 
 impl ContactSpec {
+    /// The surface that the algorithm feels: the paper's iteration is defined on facets.
+    #[must_use]
+    pub fn felt_surface(&self) -> ContactSurface {
+        if self.algorithm == Algorithm::Paper { ContactSurface::Facets } else { self.surface }
+    }
+
     /// Returns Kc of a node that stands for `length` of a link [m], in [N/m]: with a stiffness per length k' the third part of
     /// k' times the length, so that the contact point's kc = 3 Kc is k' times the length, and the whole link's does not depend on the
     /// number of its nodes.

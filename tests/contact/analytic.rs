@@ -37,7 +37,7 @@ fn a_node_on_the_middle_of_a_symmetric_face_feels_two_springs_in_series() {
                 assert!((equilibrium.energy - 0.5 * lambda * depth).abs() < 1e-6 * lambda * depth);
                 assert!((equilibrium.gap + depth).abs() < 1e-15);
                 for touch in &equilibrium.touches {
-                    assert!(touch.weights.iter().all(|w| (w - 1.0 / 3.0).abs() < 1e-6));
+                    assert!(touch.carriers.iter().all(|(_, w)| (w - 1.0 / 3.0).abs() < 1e-6));
                 }
             }
         }

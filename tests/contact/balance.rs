@@ -198,7 +198,7 @@ fn chains_of_one_and_six_joints_work() {
 
 /// Object nodes that carry a touch, ascending: a facet's three, an edge's two or a vertex.
 fn touched(touch: &Touch) -> Vec<u32> {
-    let carrying = touch.nodes.iter().zip(touch.weights).filter(|(_, weight)| *weight != 0.0);
+    let carrying = touch.carriers.iter().filter(|(_, weight)| *weight != 0.0);
     let mut nodes: Vec<u32> = carrying.map(|(node, _)| *node).collect();
     nodes.sort_unstable();
     nodes

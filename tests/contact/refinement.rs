@@ -1,6 +1,7 @@
-//! Torque converges when the contact nodes of a link are refined.
+//! Torque converges when the contact nodes of a link are refined, and when the object's mesh is.
 
 use haptize::{
+    JointVector,
     contact::{Model, Solver, Status},
     object::Object,
     proxy::Chain,
@@ -28,31 +29,67 @@ const SCENE: &str = r#"
     nodes = [{ from = [-0.036, 0.002, 0.0], to = [0.0, 0.002, 0.0], spacing = 0.004 }]
 "#;
 
-/// Force and torque in 20 configurations, with nodes `spacing` apart.
-fn torques(spacing: &str) -> Vec<f64> {
-    let scene = Scene::parse(&SCENE.replace("spacing = 0.004", &format!("spacing = {spacing}")), "link.toml").unwrap();
+/// Force and torque in `count` configurations along a line, in a scene that differs from [`SCENE`] by these replacements.
+fn torques(count: u32, replacements: &[(&str, &str)]) -> Vec<f64> {
+    let text = replacements.iter().fold(SCENE.to_string(), |text, (old, new)| {
+        assert!(text.contains(old));
+        text.replace(old, new)
+    });
+    let scene = Scene::parse(&text, "link.toml").unwrap();
     let object = Object::build(&scene.object).unwrap();
     let chain = Chain::new(&scene.proxy);
-    let model = Model::new(&object, &chain, scene.contact);
+    let place = |k: u32| f64::from(k) / f64::from(count);
+    let configurations: Vec<JointVector> =
+        (0..count).map(|k| JointVector::from_slice(&[0.003 + 0.004 * place(k), -0.1 + 0.26 * place(k)])).collect();
+    let model = Model::reaching(&object, &chain, scene.contact, &configurations).unwrap();
     let mut solver = Solver::new(&model);
     let mut torques = Vec::new();
-    for k in 0..20 {
-        let found = solver.solve(&[0.003 + 0.0002 * f64::from(k), -0.1 + 0.013 * f64::from(k)]);
+    for q in &configurations {
+        let found = solver.solve(q);
         assert_eq!(found.status, Status::Contact);
         torques.extend([0.04 * found.torque[0], found.torque[1]]);
     }
     torques
 }
 
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value * value, count + 1.0));
+    (sum / count as f64).sqrt()
+}
+
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    rms(a.iter().zip(b).map(|(a, b)| a - b))
+}
+
 #[test]
 fn torque_converges_at_second_order_as_the_nodes_of_a_link_come_closer() {
-    let [coarse, middle, fine] = ["0.004", "0.002", "0.001"].map(torques);
-    let rms = |a: &[f64], b: &[f64]| {
-        let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-        (squares / a.len() as f64).sqrt()
-    };
-    let size = rms(&fine, &vec![0.0; fine.len()]);
-    let (first, second) = (rms(&coarse, &middle), rms(&middle, &fine));
+    let [coarse, middle, fine] = ["0.004", "0.002", "0.001"].map(|spacing| {
+        torques(20, &[("spacing = 0.004", &format!("spacing = {spacing}"))])
+    });
+    let size = rms(fine.iter().copied());
+    let (first, second) = (difference(&coarse, &middle), difference(&middle, &fine));
     // Second order divides the change by four. Were the nodes at the ends as stiff as the others, it would be two.
     assert!(first > 2.8 * second && second < 0.01 * size, "{first} {second} of {size}");
+}
+
+/// What is left of a sequence of joint torques, taken in turn, when its smooth part is taken out: third differences, scaled so that
+/// independent errors keep their size.
+fn ripple(torques: &[f64]) -> f64 {
+    rms(torques.windows(7).map(|w| (w[6] - 3.0 * w[4] + 3.0 * w[2] - w[0]) / 20.0_f64.sqrt()))
+}
+
+#[test]
+fn torque_converges_at_second_order_as_the_mesh_of_a_smooth_surface_becomes_finer() {
+    let on = |subdivisions: u32, surface: &str| {
+        let mesh = format!("subdivisions = {subdivisions}");
+        let contact = format!("[contact]\nsurface = \"{surface}\"");
+        torques(60, &[("subdivisions = 3", &mesh), ("[contact]", &contact), ("spacing = 0.004", "spacing = 0.002")])
+    };
+    let [coarse, middle, fine] = [2, 3, 4].map(|subdivisions| on(subdivisions, "smooth"));
+    let size = rms(fine.iter().copied());
+    let (first, second) = (difference(&coarse, &middle), difference(&middle, &fine));
+    assert!(first > 3.48 * second && second < 0.02 * size, "order 1.8 at least: {first} {second} of {size}");
+    // Corners of the facets make the torque ripple, and less than half of that is left without them.
+    let [smooth, flat] = [&middle, &on(3, "facets")].map(|torques| ripple(torques));
+    assert!(smooth < 0.5 * flat, "{smooth} {flat} of {size}");
 }

@@ -48,7 +48,7 @@ fn check_equilibria(scene: &Scene) -> usize {
         assert!(relative_error(&perturbed, &flat(&elastic)) > 1e-6, "the comparison sees an error of 1e-5");
         let mut torque = JointVector::zeros(chain.joints.len());
         for touch in &equilibrium.touches {
-            let outwards = model.object.rest[touch.nodes[0] as usize] - centre;
+            let outwards = model.object.rest[touch.carriers[0].0 as usize] - centre;
             assert!(touch.force.dot(outwards) > 0.0, "a force pulls the proxy in at point {point}");
             chain.add_torque(solver.pose(), touch.proxy_node as usize, touch.force, &mut torque);
         }

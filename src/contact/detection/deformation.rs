@@ -2,10 +2,10 @@
 //! to them, so that what a search costs does not grow with the size of the mesh.
 
 use crate::contact::geometry::bounding_volumes::{Leaf, Volume};
-use crate::contact::geometry::closest_point::Feature;
-use crate::contact::geometry::normals;
+use crate::contact::geometry::closest_point::{ClosestPoint, Feature};
+use crate::contact::geometry::facet::Facet;
 use crate::contact::geometry::packet::Packet;
-use crate::contact::model::Model;
+use crate::contact::model::{Model, MotionBound};
 use crate::object::Compliance;
 use glam::DVec3;
 
@@ -23,8 +23,8 @@ struct Place {
 pub struct Deformation {
     /// How many surfaces there have been.
     surface: u64,
-    /// An upper bound of how far any point of the surface is from where it rests [m].
-    pub moved: f64,
+    /// How far its points have moved at most.
+    pub bound: MotionBound,
     /// Forces that displace it: where the rows of C begin at the nodes that carry them, and the forces [N].
     loads: Vec<(usize, [f64; 3])>,
     /// The surface's number when each node was displaced.
@@ -43,7 +43,7 @@ impl Deformation {
         let place = |leaf: &Leaf| Place { surface: 0, packet: Packet::default(), volume: leaf.volume };
         Self {
             surface: 0,
-            moved: 0.0,
+            bound: MotionBound::default(),
             loads: Vec::new(),
             displaced: vec![0; model.surface.positions.len()],
             displacement: vec![DVec3::ZERO; model.surface.positions.len()],
@@ -52,10 +52,10 @@ impl Deformation {
         }
     }
 
-    /// Another surface, displaced by `forces` on `nodes`, three numbers a node [N], nowhere by more than `moved` [m].
-    pub fn take(&mut self, model: &Model, nodes: &[u32], forces: &[f64], moved: f64) {
+    /// Another surface, displaced by `forces` on `nodes`, three numbers a node [N], within `bound`.
+    pub fn take(&mut self, model: &Model, nodes: &[u32], forces: &[f64], bound: MotionBound) {
         self.surface += 1;
-        self.moved = moved;
+        self.bound = bound;
         let Compliance { rows_per_node, .. } = *model.compliance;
         let block = rows_per_node * model.compliance.order();
         self.loads.clear();
@@ -98,57 +98,56 @@ impl Deformation {
         self.positions[j] = model.surface.positions[j] + u;
     }
 
-    /// Pseudonormal of a feature of triangle `t`, outward, not of length one.
-    pub fn pseudonormal(&mut self, model: &Model, t: usize, feature: Feature) -> DVec3 {
+    /// Pseudonormal at `point` of facet `t`, outward, not of length one.
+    pub fn pseudonormal(&mut self, model: &Model, t: u32, point: &ClosestPoint) -> DVec3 {
         let (triangles, topology) = (&model.object.triangles, &model.object.topology);
-        match feature {
-            Feature::Face => {}
+        match point.feature {
+            Feature::Face => self.displace_facet(model, t),
             Feature::Edge(k) => {
-                triangles[topology.across[t][k] as usize].into_iter().for_each(|node| self.displace(model, node));
+                self.displace_facet(model, t);
+                self.displace_facet(model, topology.across[t as usize][k]);
             }
             Feature::Vertex(k) => {
-                for &around in topology.triangles_around(triangles[t][k] as usize) {
-                    triangles[around as usize].into_iter().for_each(|node| self.displace(model, node));
-                }
+                let around = topology.triangles_around(triangles[t as usize][k] as usize);
+                around.iter().for_each(|&around| self.displace_facet(model, around));
             }
         }
-        normals::pseudonormal(&self.positions, triangles, topology, t, feature)
+        model.surface.pseudonormal(&self.positions, t, point)
     }
 
-    /// Corners of triangle `t` [m].
-    pub fn corners(&mut self, model: &Model, t: u32) -> [DVec3; 3] {
-        let nodes = model.object.triangles[t as usize];
-        nodes.into_iter().for_each(|node| self.displace(model, node));
-        normals::corners(&self.positions, nodes)
+    fn displace_facet(&mut self, model: &Model, t: u32) {
+        model.surface.carriers(t).iter().for_each(|&node| self.displace(model, node));
     }
 
-    /// Calls `visit` with each triangle of the surface that is nearer to `x` than the squared radius that `visit` returned last, and
-    /// with its corners; `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among them.
+    /// Facet `t` [m].
+    pub fn facet(&mut self, model: &Model, t: u32) -> Facet {
+        self.displace_facet(model, t);
+        model.surface.facet(&self.positions, t)
+    }
+
+    /// Calls `visit` with each facet of the surface whose flat triangle is nearer to `x` than the squared radius that `visit` returned last;
+    /// `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among them.
     pub fn search(
         &mut self,
         model: &Model,
         x: DVec3,
         radius_squared: f64,
-        mut visit: impl FnMut(u32, [DVec3; 3]) -> f64,
+        mut visit: impl FnMut(u32, &Facet) -> f64,
     ) {
         let slack = model.surface.bounds.slack(x);
-        let moved = self.moved;
+        let moved = self.bound.moved;
         // Of boxes at rest.
         let widened = |bound: f64| (bound.sqrt() + moved).powi(2) + slack;
         let mut bound = radius_squared + slack;
         let mut limit = widened(bound);
         model.surface.bounds.walk(x, limit, |leaf| {
             self.place(model, leaf);
-            let Self { places, positions, .. } = self;
-            let place = &places[leaf];
-            if place.volume.distance_squared(x) <= bound {
+            if self.places[leaf].volume.distance_squared(x) <= bound {
                 let mut nearer = false;
-                for (&triangle, square) in
-                    model.surface.bounds.leaves[leaf].triangles.iter().zip(place.packet.distances_squared(x))
-                {
+                let squares = self.places[leaf].packet.distances_squared(x);
+                for (&triangle, square) in model.surface.bounds.leaves[leaf].triangles.iter().zip(squares) {
                     if square <= bound {
-                        let corners = normals::corners(positions, model.object.triangles[triangle as usize]);
-                        bound = visit(triangle, corners) + slack;
+                        bound = visit(triangle, &self.facet(model, triangle)) + slack;
                         nearer = true;
                     }
                 }

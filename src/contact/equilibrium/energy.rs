@@ -20,9 +20,10 @@ use crate::contact::NodeForce;
 use crate::contact::detection::{Detection, Facets};
 use crate::contact::law::depth::Contact;
 use crate::contact::law::series::distribute_all;
-use crate::contact::law::springs::{Springs, add_contact_forces};
+use crate::contact::law::springs::{Slots, Springs, add_contact_forces};
 use crate::contact::linear::support::{Support, dot, root};
-use crate::contact::model::Model;
+use crate::contact::geometry::smooth::CARRIERS;
+use crate::contact::model::{Model, MotionBound};
 use crate::proxy::Pose;
 use crate::random::Random;
 use crate::tolerances::{
@@ -84,7 +85,7 @@ pub struct EnergySearch {
     /// Contact stiffness of the current stage, and of the last [N/m].
     kc: f64,
     last_kc: f64,
-    slots: Vec<[usize; 3]>,
+    slots: Vec<Slots>,
     contact_forces: Vec<f64>,
     /// r = c - f [N], and C r [m].
     residual: Vec<f64>,
@@ -337,7 +338,7 @@ impl EnergySearch {
         self.support.clear();
         self.state.forces.clear();
         self.state.elastic = 0.0;
-        detection.displace(model, &[], &[], 0.0);
+        detection.displace(model, &[], &[], MotionBound { moved: 0.0, bulge: model.surface.bulge });
         let facets = if geometry == Geometry::Frozen { Facets::Closest } else { Facets::Felt };
         detection.deformed(model, facets, &mut self.state.contacts);
         if geometry == Geometry::Frozen {
@@ -356,15 +357,15 @@ impl EnergySearch {
     fn balance(&mut self, model: &Model) -> f64 {
         let Self { state, support, slots, contact_forces, residual, product, kc, .. } = self;
         slots.clear();
-        for contact in &state.contacts {
-            let mut contact_slots = [0; 3];
-            for (slot, (&node, &weight)) in contact_slots.iter_mut().zip(contact.nodes.iter().zip(&contact.weights)) {
-                // Nodes without weight take no force; their entries are multiplied by zero in any slot.
-                if weight != 0.0 {
-                    *slot = support.add(node);
+        for Contact { carriers, .. } in &state.contacts {
+            let mut own = [0; CARRIERS];
+            for (j, (slot, &node)) in own.iter_mut().zip(carriers.nodes()).enumerate() {
+                // Nodes that carry nothing take no force; their entries are multiplied by zero in any slot.
+                if carriers.carries(j) {
+                    *slot = support.add(node) as u32;
                 }
             }
-            slots.push(contact_slots);
+            slots.push(own);
         }
         support.gather(&model.compliance);
         let order = support.order();
@@ -456,5 +457,9 @@ fn frozen_contacts(model: &Model, rows: &[Contact], detection: &mut Detection, c
 
 /// By how much that displacement deepens a frozen row [m].
 fn linear_change(model: &Model, row: &Contact, detection: &mut Detection) -> f64 {
-    row.deepening(row.nodes.map(|node| detection.displacement(model, node)))
+    let mut sum = DVec3::ZERO;
+    for (node, weight) in row.carriers.iter() {
+        sum += detection.displacement(model, node) * weight;
+    }
+    row.normal.dot(sum)
 }

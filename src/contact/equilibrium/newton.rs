@@ -20,15 +20,14 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::woodbury::Woodbury;
-use crate::contact::law::depth::{Contact, second_variation};
+use crate::contact::law::depth::Contact;
 use crate::contact::law::series::distribute;
-use crate::contact::law::springs::{Springs, add_contact_hessian, add_on_nodes, nodes_of, stretched_and_bent};
+use crate::contact::law::springs::{Springs, add_contact_hessian, stretched_and_bent};
 use crate::contact::linear::support::{Support, dot, root};
 use crate::tolerances::{
     CURVATURE_MARGIN, DAMPING_ATTEMPTS, DAMPING_DECAY, DAMPING_GROWTH, INNER_ITERATIONS_PER_UNKNOWN, LEAST_DAMPING,
     MODEL_PASSES,
 };
-use glam::DVec3;
 
 /// How much the model is damped: more from step to step where E refuses them, less where it keeps what they promise (Nielsen 1999).
 #[derive(Clone, Copy, Debug)]
@@ -278,10 +277,10 @@ impl Newton {
             let changes = &mut deepening[first..first + rows.len()];
             let forces = &mut forces_over_kc[first..first + rows.len()];
             for (k, row) in rows.iter().enumerate() {
-                let v = nodes_of(displacement, springs.slots[first + k]);
-                changes[k] = row.deepening(v);
+                let v = springs.variation(first + k, displacement);
+                changes[k] = row.deepening(&v);
                 if row.multiplier != 0.0 {
-                    decrease -= 0.5 * row.multiplier * inner(v, second_variation(row, v));
+                    decrease -= 0.5 * row.multiplier * row.second_variation(&v).dot(&v);
                 }
             }
             distribute(|k| rows[k].depth + changes[k], forces);
@@ -318,10 +317,10 @@ impl Newton {
             self.residual[k] = residual[k] - self.stiffening * self.force[k];
         }
         let Self { displacement, residual, forces_over_kc, .. } = self;
-        for ((row, &slots), force) in springs.contacts.iter().zip(springs.slots).zip(&*forces_over_kc) {
+        for (k, (row, force)) in springs.contacts.iter().zip(&*forces_over_kc).enumerate() {
             let push = springs.kc * (force - row.force_over_kc());
-            let forces = stretched_and_bent(row, push, nodes_of(displacement, slots));
-            add_on_nodes(forces.map(|force| -force), slots, residual);
+            let reaction = stretched_and_bent(row, push, &springs.variation(k, displacement));
+            springs.add_reaction(k, &-reaction, residual);
         }
     }
 }
@@ -338,10 +337,6 @@ fn turn(ratio: f64, residual: &[f64], direction: &mut [f64]) {
     for (direction, residual) in direction.iter_mut().zip(residual) {
         *direction = residual + ratio * *direction;
     }
-}
-
-fn inner(a: [DVec3; 3], b: [DVec3; 3]) -> f64 {
-    a[0].dot(b[0]) + a[1].dot(b[1]) + a[2].dot(b[2])
 }
 
 #[cfg(test)]

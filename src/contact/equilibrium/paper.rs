@@ -21,7 +21,7 @@ use crate::contact::geometry::normals;
 use crate::contact::law::depth::Contact;
 use crate::contact::linear::cholesky;
 use crate::contact::linear::support::{Support, dot, root};
-use crate::contact::model::Model;
+use crate::contact::model::{Model, MotionBound};
 use crate::tolerances::{LENGTH_ROUNDING, RESIDUAL_FLOOR};
 use glam::DVec3;
 
@@ -123,7 +123,8 @@ impl PaperIteration {
     fn tie(&mut self, model: &Model, detection: &mut Detection) {
         self.place(model);
         let moved = self.displacement.as_chunks().0.iter().map(|u| DVec3::from_array(*u).length()).fold(0.0, f64::max);
-        detection.displace(model, self.support.nodes(), &self.previous_forces, moved * (1.0 + LENGTH_ROUNDING));
+        let bound = MotionBound { moved: moved * (1.0 + LENGTH_ROUNDING), bulge: 0.0 };
+        detection.displace(model, self.support.nodes(), &self.previous_forces, bound);
         detection.deformed(model, Facets::Closest, &mut self.contacts);
         self.support.clear();
         self.ties.clear();

@@ -9,7 +9,8 @@
 //!
 //! Each row of a ball's spring is a spring here. In series ([`crate::contact::law::series`]) they share the compliance (1 - e) / kc, and have e / kc each.
 
-use crate::contact::law::springs::{Springs, add_on_nodes, nodes_of};
+use crate::contact::geometry::smooth::CARRIERS;
+use crate::contact::law::springs::Springs;
 use crate::contact::linear::cholesky;
 use crate::contact::linear::rows::add_rows;
 use crate::contact::linear::support::Support;
@@ -50,12 +51,16 @@ impl Woodbury {
         factor.resize(count * count, 0.0);
         for (a, &row) in taken.iter().enumerate() {
             let column = &mut columns[a * *order..][..*order];
-            let unit = springs.contacts[row].spread(1.0).map(|force| force.to_array());
-            let [first, second, third] = springs.slots[row];
-            support.respond(&[(first, unit[0]), (second, unit[1]), (third, unit[2])], column);
+            let contact = &springs.contacts[row];
+            let mut unit = [(0, [0.0; 3]); CARRIERS];
+            let weights = contact.carriers.weights();
+            for ((load, weight), &slot) in unit.iter_mut().zip(weights).zip(&springs.slots[row]) {
+                *load = (slot as usize, (contact.normal * *weight).to_array());
+            }
+            support.respond(&unit[..weights.len()], column);
             for (b, &other) in taken[..=a].iter().enumerate() {
                 let given = compliance(springs, row, other) / (springs.kc * springs.contacts[row].share);
-                factor[a * count + b] = change(springs, other, column) + stiffening * given;
+                factor[a * count + b] = springs.deepening(other, column) + stiffening * given;
             }
         }
         cholesky::factorize(factor, count);
@@ -74,11 +79,11 @@ impl Woodbury {
         let Self { taken, columns, order, stiffening, factor, pushes, .. } = self;
         let count = taken.len();
         for (push, &row) in pushes.iter_mut().zip(&*taken) {
-            *push = -change(springs, row, product);
+            *push = -springs.deepening(row, product);
         }
         cholesky::solve(factor, pushes[..count].as_chunks_mut::<1>().0);
         for (&row, &push) in taken.iter().zip(&*pushes) {
-            add_on_nodes(springs.contacts[row].spread(push), springs.slots[row], force);
+            springs.add_reaction(row, &springs.contacts[row].spread(push), force);
         }
         let blocks = columns.chunks_exact((TOGETHER * *order).max(1));
         add_rows(blocks.zip(pushes.as_chunks::<TOGETHER>().0.iter().copied()), displacement);
@@ -86,11 +91,6 @@ impl Woodbury {
             force.iter_mut().chain(displacement).for_each(|entry| *entry /= *stiffening);
         }
     }
-}
-
-/// By how much `displacement` on the support deepens a row, to first order [m].
-fn change(springs: Springs, row: usize, displacement: &[f64]) -> f64 {
-    springs.contacts[row].deepening(nodes_of(displacement, springs.slots[row]))
 }
 
 /// By how much one row gives way under the force of another, times kc [1].

@@ -4,6 +4,7 @@
 //! 2005, section 5.1.5). The point is returned as barycentric weights, p = sum_k w_k corner_k, because contact spreads
 //! its force by them; weights of corners that the feature does not touch are exactly zero.
 
+use super::facet::Facet;
 use crate::tolerances::MINIMUM_SQUARE;
 use glam::DVec3;
 
@@ -110,11 +111,17 @@ impl Closest {
         Self { distance_squared: f64::MAX, triangle: u32::MAX, point }
     }
 
-    /// Takes triangle `t` with these corners instead if it is nearer to `x`, or as near with a lower number; its closest point, and the squared
+    /// Squared distance within which flat triangles may have a facet that is as close, where facets stand off them by at most `bulge` [m^2].
+    #[must_use]
+    pub fn within(&self, bulge: f64) -> f64 {
+        if bulge == 0.0 { self.distance_squared } else { (self.distance_squared.sqrt() + bulge).powi(2) }
+    }
+
+    /// Takes `facet`, number `t`, instead if it is nearer to `x`, or as near with a lower number; its closest point, and the squared
     /// distance of that [m^2].
-    pub fn consider(&mut self, x: DVec3, corners: [DVec3; 3], t: u32) -> (ClosestPoint, f64) {
-        let point = closest_point(x, corners);
-        let distance_squared = x.distance_squared(point_at(corners, point.weights));
+    pub fn consider(&mut self, x: DVec3, facet: &Facet, t: u32) -> (ClosestPoint, f64) {
+        let point = facet.closest(x);
+        let distance_squared = x.distance_squared(facet.point(point.weights));
         if distance_squared < self.distance_squared || (distance_squared == self.distance_squared && t < self.triangle)
         {
             *self = Self { distance_squared, triangle: t, point };

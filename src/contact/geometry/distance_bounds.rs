@@ -14,6 +14,7 @@
 use super::RestSurface;
 use super::bounding_volumes::Leaf;
 use super::closest_point::{closest_point, point_at};
+use super::normals;
 use crate::tolerances::DEPTH_ROUNDING;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -89,7 +90,7 @@ impl DistanceBounds {
     /// A lower bound of the signed distance of `x` to the surface [m], and a triangle near by; `None` where there are no cubes.
     #[inline]
     #[must_use]
-    pub fn at(&self, x: DVec3) -> Option<(f64, u32)> {
+    pub(super) fn at(&self, x: DVec3) -> Option<(f64, u32)> {
         let place = (x - self.low) * self.inverse_side;
         let [m, n, o] = self.counts;
         let (i, j, k) = (place.x as u32 as usize, place.y as u32 as usize, place.z as u32 as usize);
@@ -103,7 +104,10 @@ impl DistanceBounds {
 
 /// The bound around `c`, `half` of a side to either side of it; `near` is a triangle near by, if any is known.
 fn cube(surface: &RestSurface, c: DVec3, half: f64, slack: f64, near: Option<u32>) -> Cube {
-    let offset = |t: u32, x: DVec3| x - point_at(surface.corners(t), closest_point(x, surface.corners(t)).weights);
+    let offset = |t: u32, x: DVec3| {
+        let corners = normals::corners(&surface.positions, surface.triangles[t as usize]);
+        x - point_at(corners, closest_point(x, corners).weights)
+    };
     let closest = surface.closest(c, near.unwrap_or(u32::MAX));
     let (distance, triangle) = (closest.distance_squared.sqrt(), closest.triangle);
     let s = if surface.is_inside(c, &closest) { -distance } else { distance };
@@ -151,7 +155,7 @@ fn cube(surface: &RestSurface, c: DVec3, half: f64, slack: f64, near: Option<u32
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::geometry::normals;
+    use crate::scene::ContactSurface;
     use crate::{object::Object, random::Random, scene::Scene};
     use std::path::Path;
 
@@ -162,7 +166,7 @@ mod tests {
         for name in ["tests/scenes/sphere.toml", "datasets/mesh.toml"] {
             let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
             let object = Object::build(&scene.object).unwrap();
-            let surface = RestSurface::new(&object);
+            let surface = RestSurface::new(&object, ContactSurface::Facets);
             let bounds = &surface.distance_bounds;
             let side = bounds.inverse_side.recip();
             let size = DVec3::from_array(bounds.counts.map(|count| count as f64)) * side;
@@ -172,7 +176,7 @@ mod tests {
             for _ in 0..4000 {
                 let x = bounds.low + size * DVec3::new(next(), next(), next());
                 let distance = |t: u32| {
-                    let corners = surface.corners(t);
+                    let corners = normals::corners(&surface.positions, object.triangles[t as usize]);
                     x.distance(point_at(corners, closest_point(x, corners).weights))
                 };
                 let distance = (0..object.triangles.len() as u32).map(distance).fold(f64::INFINITY, f64::min);

@@ -3,8 +3,10 @@
 pub mod bounding_volumes;
 pub mod closest_point;
 mod distance_bounds;
+pub mod facet;
 pub mod normals;
 pub mod packet;
 mod rest;
+pub mod smooth;
 
 pub use rest::RestSurface;

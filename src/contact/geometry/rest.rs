@@ -1,13 +1,19 @@
 //! The surface at rest: what of its geometry is computed once and shared by all threads.
 
 use super::bounding_volumes::BoundingVolumes;
-use super::closest_point::{Closest, Feature, point_at};
+use super::closest_point::{Closest, ClosestPoint, Feature};
 use super::distance_bounds::DistanceBounds;
+use super::facet::Facet;
 use super::normals;
+use super::smooth::{SmoothSurface, across};
 use crate::object::{Object, Topology};
+use crate::scene::ContactSurface;
 use glam::DVec3;
 
 /// A closed surface of triangles at rest, prepared for searches.
+///
+/// Contact is with the triangles themselves, or with the smooth surface that they span. Searches go through the flat triangles; a
+/// smooth facet is nowhere farther from its triangle than the bulge.
 pub struct RestSurface<'a> {
     /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
     /// loses no digits.
@@ -22,8 +28,12 @@ pub struct RestSurface<'a> {
     pub topology: &'a Topology,
     /// The triangles, for closest-point queries.
     pub bounds: BoundingVolumes,
-    /// What is known of distances without such a query.
-    pub distance_bounds: DistanceBounds,
+    /// What is known of distances to the flat triangles without such a query.
+    distance_bounds: DistanceBounds,
+    /// The smooth surface, where contact is with that.
+    pub smooth: Option<SmoothSurface>,
+    /// By how much its facets stand off the flat triangles at most; zero where there is none [m].
+    pub bulge: f64,
     /// Mean length of the edges [m].
     pub mean_edge: f64,
     /// Unit normals of the triangles.
@@ -33,9 +43,9 @@ pub struct RestSurface<'a> {
 }
 
 impl<'a> RestSurface<'a> {
-    /// The surface of `object`.
+    /// The surface of `object`, as contact is to feel it.
     #[must_use]
-    pub fn new(object: &'a Object) -> Self {
+    pub fn new(object: &'a Object, felt: ContactSurface) -> Self {
         let Object { triangles, topology, .. } = object;
         let nodes = &object.rest[..object.surface_nodes];
         let low = nodes.iter().copied().fold(DVec3::MAX, DVec3::min);
@@ -54,6 +64,8 @@ impl<'a> RestSurface<'a> {
             extent: positions.iter().map(|position| position.length()).fold(0.0, f64::max),
             bounds: BoundingVolumes::new(&positions, triangles),
             distance_bounds: DistanceBounds::none(),
+            smooth: None,
+            bulge: 0.0,
             mean_edge: normals::mean_edge(&positions, triangles),
             normals: (0..triangles.len()).map(|t| pseudonormal(t, Feature::Face)).collect(),
             pseudonormals,
@@ -62,21 +74,85 @@ impl<'a> RestSurface<'a> {
             topology,
         };
         surface.distance_bounds = DistanceBounds::new(&surface);
+        if felt == ContactSurface::Smooth {
+            let smooth = SmoothSurface::new(triangles, topology);
+            surface.bulge = smooth.bulge(&surface.positions);
+            surface.smooth = Some(smooth);
+        }
         surface
     }
 
-    /// Corners of triangle `t` [m].
+    /// A lower bound of the signed distance of `x`, and a triangle near by, if one is known [m].
     #[inline]
     #[must_use]
-    pub fn corners(&self, t: u32) -> [DVec3; 3] {
-        normals::corners(&self.positions, self.triangles[t as usize])
+    pub fn distance_bound(&self, x: DVec3) -> (f64, Option<u32>) {
+        // Beyond the lattice of bounds the surface's box bounds the distance.
+        let (bound, near) = match self.distance_bounds.at(x) {
+            Some((bound, near)) => (bound, Some(near)),
+            None => (self.bounds.distance_squared(x).sqrt(), None),
+        };
+        (bound - self.bulge, near)
     }
 
-    /// Pseudonormal of a feature of triangle `t`, outward, not of length one.
+    /// The nodes on which facet `t` depends: its corners first.
+    #[inline]
     #[must_use]
-    pub fn pseudonormal(&self, t: u32, feature: Feature) -> DVec3 {
+    pub fn carriers(&self, t: u32) -> &[u32] {
+        match &self.smooth {
+            None => &self.triangles[t as usize],
+            Some(smooth) => &smooth.nodes[t as usize],
+        }
+    }
+
+    /// Facet `t` with nodes at `positions`, relative to the centre [m].
+    #[inline]
+    #[must_use]
+    pub fn facet(&self, positions: &[DVec3], t: u32) -> Facet {
+        match &self.smooth {
+            None => Facet::flat(normals::corners(positions, self.triangles[t as usize])),
+            Some(smooth) => smooth.facet(positions, t),
+        }
+    }
+
+    /// Pseudonormal at `point` of facet `t`, outward, not of length one, with nodes at `positions`; see [`normals`].
+    #[must_use]
+    pub fn pseudonormal(&self, positions: &[DVec3], t: u32, point: &ClosestPoint) -> DVec3 {
+        let (triangles, topology) = (self.triangles, self.topology);
         let t = t as usize;
-        match feature {
+        if self.smooth.is_none() {
+            return normals::pseudonormal(positions, triangles, topology, t, point.feature);
+        }
+        let facet = |t: usize| self.facet(positions, t as u32);
+        match point.feature {
+            Feature::Face => facet(t).normal(point.weights),
+            Feature::Edge(k) => {
+                let (other, back) = across(triangles, topology, t, k);
+                let mut there = [0.0; 3];
+                (there[back], there[(back + 1) % 3]) = (point.weights[(k + 1) % 3], point.weights[k]);
+                facet(t).normal(point.weights) + facet(other).normal(there)
+            }
+            Feature::Vertex(k) => {
+                let node = triangles[t][k];
+                let around = topology.triangles_around(node as usize).iter().map(|&around| {
+                    let corner = triangles[around as usize].iter().position(|&corner| corner == node).unwrap_or(0);
+                    let mut there = [0.0; 3];
+                    there[corner] = 1.0;
+                    let facet = facet(around as usize);
+                    facet.normal(there) * facet.angle(corner)
+                });
+                around.sum()
+            }
+        }
+    }
+
+    /// The same at rest.
+    #[must_use]
+    pub fn pseudonormal_at_rest(&self, t: u32, point: &ClosestPoint) -> DVec3 {
+        if self.smooth.is_some() {
+            return self.pseudonormal(&self.positions, t, point);
+        }
+        let t = t as usize;
+        match point.feature {
             Feature::Face => self.normals[t],
             Feature::Edge(k) => self.normals[t] + self.normals[self.topology.across[t][k] as usize],
             Feature::Vertex(k) => self.pseudonormals[self.triangles[t][k] as usize],
@@ -88,13 +164,13 @@ impl<'a> RestSurface<'a> {
     pub fn closest(&self, x: DVec3, near: u32) -> Closest {
         let mut closest = Closest::none();
         if (near as usize) < self.triangles.len() {
-            closest.consider(x, self.corners(near), near);
+            closest.consider(x, &self.facet(&self.positions, near), near);
         }
-        self.bounds.search(x, closest.distance_squared, |t| {
+        self.bounds.search(x, closest.within(self.bulge), |t| {
             if t != near {
-                closest.consider(x, self.corners(t), t);
+                closest.consider(x, &self.facet(&self.positions, t), t);
             }
-            closest.distance_squared
+            closest.within(self.bulge)
         });
         closest
     }
@@ -105,7 +181,105 @@ impl<'a> RestSurface<'a> {
         if closest.triangle == u32::MAX {
             return false;
         }
-        let offset = point_at(self.corners(closest.triangle), closest.point.weights) - x;
-        offset.dot(self.pseudonormal(closest.triangle, closest.point.feature)) > 0.0
+        let facet = self.facet(&self.positions, closest.triangle);
+        let offset = facet.point(closest.point.weights) - x;
+        offset.dot(self.pseudonormal_at_rest(closest.triangle, &closest.point)) > 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use crate::scene::Scene;
+    use std::path::Path;
+
+    const RADIUS: f64 = 0.05;
+
+    fn sphere(divisions: u32) -> Object {
+        let text = format!(
+            "[object]\nsphere = {{ radius = {RADIUS}, subdivisions = {divisions} }}\nskin = {{ tension = 1.0, foundation = 1.0 }}\n\
+             [[proxy.joint]]\nkind = \"prismatic\"\naxis = [1.0, 0.0, 0.0]\nlimits = [0.0, 1.0]\nnodes = [{{ at = [0.0, 0.0, 0.0] }}]\n\
+             [contact]\nstiffness = 1.0\n[grid]\nspacing = 0.5\n"
+        );
+        Object::build(&Scene::parse(&text, "sphere.toml").unwrap().object).unwrap()
+    }
+
+    fn signed(surface: &RestSurface, x: DVec3) -> f64 {
+        let closest = surface.closest(x, u32::MAX);
+        let distance = closest.distance_squared.sqrt();
+        if surface.is_inside(x, &closest) { -distance } else { distance }
+    }
+
+    /// The greatest error of the distance to a sphere near its surface, and the greatest angle between normals on either side of an
+    /// edge [m, rad].
+    fn errors(divisions: u32, felt: ContactSurface) -> (f64, f64) {
+        let object = sphere(divisions);
+        let surface = RestSurface::new(&object, felt);
+        let mut random = Random::new(3);
+        let mut distance = 0.0_f64;
+        for _ in 0..2000 {
+            let x = random.vector().normalize() * RADIUS * random.between(0.8, 1.2);
+            distance = distance.max((signed(&surface, x) - (x.length() - RADIUS)).abs());
+        }
+        let mut angle = 0.0_f64;
+        for t in 0..object.triangles.len() {
+            for (k, middle) in [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]].into_iter().enumerate() {
+                let (other, back) = across(surface.triangles, surface.topology, t, k);
+                let mut there = [0.5; 3];
+                there[(back + 2) % 3] = 0.0;
+                let normal = |t: usize, w: [f64; 3]| surface.facet(&surface.positions, t as u32).normal(w);
+                angle = angle.max(normal(t, middle).angle_between(normal(other, there)));
+            }
+        }
+        (distance, angle)
+    }
+
+    /// Flat facets are second order in the distance and first in the normal; smooth ones are third and second, and much nearer already.
+    #[test]
+    fn a_smooth_surface_is_nearer_to_what_the_mesh_samples() {
+        let [coarse, fine] = [2, 3].map(|divisions| errors(divisions, ContactSurface::Smooth));
+        let flat = errors(3, ContactSurface::Facets);
+        assert!(fine.0 < 0.15 * flat.0 && fine.1 < 0.25 * flat.1, "{fine:?} {flat:?}");
+        assert!(coarse.0 > 6.0 * fine.0 && coarse.1 > 1.9 * fine.1, "{coarse:?} {fine:?}");
+    }
+
+    /// On a surface with a hollow: no point of a dense sample is closer, distances are bounded from below, and sides are those of the
+    /// triangles wherever the bulge leaves no doubt.
+    #[test]
+    fn the_closest_point_of_a_smooth_surface_is_found_and_its_side() {
+        let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/mesh.toml")).unwrap();
+        let object = Object::build(&scene.object).unwrap();
+        let smooth = RestSurface::new(&object, ContactSurface::Smooth);
+        let flat = RestSurface::new(&object, ContactSurface::Facets);
+        assert!(smooth.bulge > 1e-5 && smooth.bulge < 0.3 * smooth.mean_edge, "{}", smooth.bulge);
+        let mut samples = Vec::new();
+        for t in 0..object.triangles.len() as u32 {
+            let facet = smooth.facet(&smooth.positions, t);
+            for i in 0..=12 {
+                for j in 0..=12 - i {
+                    let (u, v) = (f64::from(i) / 12.0, f64::from(j) / 12.0);
+                    samples.push(facet.point([1.0 - u - v, u, v]));
+                }
+            }
+        }
+        let mut random = Random::new(5);
+        let (mut inside, mut compared) = (0, 0);
+        for _ in 0..400 {
+            let near = samples[random.between(0.0, samples.len() as f64) as usize];
+            let x = near + random.vector() * 0.01;
+            let closest = smooth.closest(x, u32::MAX);
+            let distance = closest.distance_squared.sqrt();
+            let sampled = samples.iter().map(|sample| sample.distance(x)).fold(f64::MAX, f64::min);
+            assert!(distance <= sampled + 1e-12, "{distance} {sampled}");
+            let here = signed(&smooth, x);
+            assert!(smooth.distance_bound(x).0 <= here + 1e-12);
+            if signed(&flat, x).abs() > smooth.bulge {
+                compared += 1;
+                inside += usize::from(here < 0.0);
+                assert_eq!(here < 0.0, signed(&flat, x) < 0.0, "{x}");
+            }
+        }
+        assert!(compared > 200 && inside > 50, "{compared} {inside}");
     }
 }

@@ -1,25 +1,27 @@
 //! Depth of a proxy node below the deformed surface, with its first and second derivative in the object's nodes.
 //!
 //! `depth = r + s`, `s = N . (p - x)`: x the proxy node, r its radius, p the closest surface point, N the outward unit
-//! direction, s positive inside. p = sum_j w_j n_j over the nodes of the touched feature.
+//! direction, s positive inside. p = sum_j w_j n_j over the nodes that carry the touched feature, and p moves on the feature by
+//! parameters t_a: two on a face, one along an edge, none at a vertex.
 //!
 //! First derivative, by the envelope theorem (p is a minimiser, so its sliding along the feature has no effect):
 //! `d depth / d n_j = w_j N`, `d depth / d x = -N`. With the energy 1/2 kc depth^2 the proxy node is pushed by lambda N
 //! and object node j by -lambda w_j N, lambda = kc depth.
 //!
-//! Second derivative along node displacements v_j, with dp = sum_j w_j v_j and sg = sum_j g_j (N . v_j), the turn of the
-//! feature about itself:
-//! `d2s = -s |sg|^2 - 2 sg . dp + (1/s) dp . P dp`
-//! - face: g_j the in-plane gradients of the barycentric weights, P = 0;
-//! - edge ab of unit direction e and length l: g_a = -e/l, g_b = e/l, P = T T^T with T = N x e;
-//! - vertex: g = 0, P = I - N N^T.
-//!
-//! One form for all three, so that a product needs no branch: P dp = dp - N (N . dp) - e (e . dp), with 1/s = 0 on faces and
-//! e = 0 at vertices. It is needed because contact points creep over flat facets when it is left out.
+//! Second derivative along node displacements v_j. They move the point by dp = sum_j w_j v_j, and turn the feature: its tangents
+//! T_a = dp/dt_a change by dT_a = sum_j (dw_j/dt_a) v_j. With the metric I_ab = T_a . T_b, the curvature B_ab = N . d2p/dt_a dt_b, H = I + s B,
+//! tau_a = T_a . dp and mu_a = N . dT_a, implicit differentiation of the closest point gives
+//! `d2s = tau . (I^-1 B H^-1) tau - 2 tau . H^-1 mu - s mu . H^-1 mu + (1/s) |P dp|^2`,
+//! P taking out of dp what is along N and along the feature: zero on faces. One form for flat and bent facets, faces, edges and
+//! vertices, so that a product needs no branch. It is needed because contact points creep over the surface when it is left out.
 
+use crate::contact::geometry::closest_point::ClosestPoint;
 use crate::contact::geometry::closest_point::Feature;
-use crate::tolerances::{MINIMUM_CURVATURE_RADIUS, MINIMUM_SQUARE};
+use crate::contact::geometry::facet::{Facet, directions};
+use crate::contact::geometry::smooth::{CARRIERS, point_slopes, point_weights};
+use crate::tolerances::{LEAST_CONVEXITY, MINIMUM_CURVATURE_RADIUS, MINIMUM_SQUARE};
 use glam::DVec3;
+use std::ops::Neg;
 
 /// One proxy node and a surface feature that it feels: a row of the contact problem. A point has one row, a ball one for each facet
 /// that it feels (see [`super::series`]).
@@ -27,10 +29,8 @@ use glam::DVec3;
 pub struct Contact {
     /// Number of the proxy node.
     pub proxy_node: u32,
-    /// Object nodes of the closest triangle.
-    pub nodes: [u32; 3],
-    /// Barycentric weights of p; exactly zero for nodes that the feature does not touch.
-    pub weights: [f64; 3],
+    /// The object's nodes that carry the closest point.
+    pub carriers: Carriers,
     /// Unit direction N in which the surface pushes the proxy node.
     pub normal: DVec3,
     /// r + s, positive in contact [m].
@@ -46,6 +46,102 @@ pub struct Contact {
     pub curvature: Curvature,
 }
 
+/// The nodes of a facet, and how its closest point hangs on them.
+#[derive(Clone, Copy, Debug)]
+pub struct Carriers {
+    /// Three on a flat facet, twelve on a bent one.
+    count: usize,
+    nodes: [u32; CARRIERS],
+    /// w_j; exactly zero for nodes that the feature does not touch.
+    weights: [f64; CARRIERS],
+    /// dw_j/dt_a; zero for parameters that the feature has not.
+    slopes: [[f64; CARRIERS]; 2],
+}
+
+impl Carriers {
+    /// How `point` of the facet with these `nodes` hangs on them: three of a flat facet, or all of a bent one.
+    #[inline]
+    #[must_use]
+    pub fn new(nodes: &[u32], point: &ClosestPoint) -> Self {
+        let mut carriers = Self { count: nodes.len(), nodes: [0; CARRIERS], weights: [0.0; CARRIERS], slopes: [[0.0; CARRIERS]; 2] };
+        carriers.nodes[..nodes.len()].copy_from_slice(nodes);
+        let bent = nodes.len() == CARRIERS;
+        if bent {
+            carriers.weights = point_weights(point.weights);
+        } else {
+            carriers.weights[..3].copy_from_slice(&point.weights);
+        }
+        for (slopes, &direction) in carriers.slopes.iter_mut().zip(directions(point.feature)) {
+            if bent {
+                *slopes = point_slopes(point.weights, direction);
+            } else {
+                slopes[..3].copy_from_slice(&direction);
+            }
+        }
+        carriers
+    }
+
+    /// The nodes.
+    #[inline]
+    #[must_use]
+    pub fn nodes(&self) -> &[u32] {
+        &self.nodes[..self.count]
+    }
+
+    /// Whether the closest point hangs on the node in place j at all.
+    #[inline]
+    #[must_use]
+    pub fn carries(&self, j: usize) -> bool {
+        self.weights[j] != 0.0 || self.slopes.iter().any(|slopes| slopes[j] != 0.0)
+    }
+
+    /// The nodes with their weights.
+    pub fn iter(&self) -> impl Iterator<Item = (u32, f64)> {
+        self.nodes().iter().copied().zip(self.weights().iter().copied())
+    }
+
+    /// Their weights w_j in the closest point, in sum one.
+    #[inline]
+    #[must_use]
+    pub fn weights(&self) -> &[f64] {
+        &self.weights[..self.count]
+    }
+}
+
+/// How displacements of the object's nodes move a closest point and turn the surface there.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Variation {
+    /// dp [m].
+    pub point: DVec3,
+    /// dT_a [m].
+    pub tangents: [DVec3; 2],
+}
+
+impl Variation {
+    /// A displacement of all nodes alike [m].
+    #[must_use]
+    pub fn translation(point: DVec3) -> Self {
+        Self { point, ..Self::default() }
+    }
+
+    /// The work of a reaction.
+    #[inline]
+    #[must_use]
+    pub fn dot(&self, reaction: &Self) -> f64 {
+        self.point.dot(reaction.point)
+            + self.tangents[0].dot(reaction.tangents[0])
+            + self.tangents[1].dot(reaction.tangents[1])
+    }
+}
+
+impl Neg for Variation {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Self { point: -self.point, tangents: self.tangents.map(|tangent| -tangent) }
+    }
+}
+
 /// How s bends under displacements of the object's nodes; see the file's head.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Curvature {
@@ -53,34 +149,30 @@ pub struct Curvature {
     pub distance: f64,
     /// 1/s on edges and at vertices, zero on faces [1/m].
     pub inverse_distance: f64,
-    /// g_j [1/m].
-    pub gradients: [DVec3; 3],
-    /// Unit direction e of the edge, else zero.
+    /// Unit direction of the edge, else zero.
     pub along: DVec3,
+    /// T_a; zero for parameters that the feature has not [m].
+    pub tangents: [DVec3; 2],
+    /// I^-1 B H^-1: its entries 00, 01 and 11 [1/m^3].
+    pub bending: [f64; 3],
+    /// H^-1, likewise [1/m^2].
+    pub turning: [f64; 3],
 }
 
-/// Depth of the node at `x` with `radius`, from the closest feature of the triangle `corners` with barycentric `weights`.
+/// Depth of the node at `x` with `radius`, from `point` of `facet`, which is closest to it.
 ///
-/// `pseudonormal` decides the side, and stands in for N where x lies on the edge or vertex itself.
+/// `pseudonormal` decides the side; it is N on a face, and stands in for it where x lies on the edge or vertex itself.
 #[inline]
 #[must_use]
-pub fn measure(
-    x: DVec3,
-    radius: f64,
-    corners: [DVec3; 3],
-    weights: [f64; 3],
-    feature: Feature,
-    pseudonormal: DVec3,
-) -> (DVec3, f64, Curvature) {
-    let p = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
-    let offset = p - x;
+pub fn measure(x: DVec3, radius: f64, facet: &Facet, point: &ClosestPoint, pseudonormal: DVec3) -> (DVec3, f64, Curvature) {
     let mut curvature = Curvature::default();
     let normal;
-    if feature == Feature::Face {
+    if point.feature == Feature::Face {
         normal = pseudonormal;
-        curvature.distance = normal.dot(corners[0] - x);
-        curvature.gradients = face_gradients(corners);
+        let foot = if facet.sagittas.is_none() { facet.corners[0] } else { facet.point(point.weights) };
+        curvature.distance = normal.dot(foot - x);
     } else {
+        let offset = facet.point(point.weights) - x;
         let length = offset.length();
         let inside = offset.dot(pseudonormal) >= 0.0;
         curvature.distance = if inside { length } else { -length };
@@ -91,49 +183,86 @@ pub fn measure(
         } else {
             pseudonormal / pseudonormal.length_squared().max(MINIMUM_SQUARE).sqrt()
         };
-        if let Feature::Edge(k) = feature {
-            let edge = corners[(k + 1) % 3] - corners[k];
-            let square = edge.length_squared().max(MINIMUM_SQUARE);
-            curvature.along = edge / square.sqrt();
-            curvature.gradients[k] = -edge / square;
-            curvature.gradients[(k + 1) % 3] = edge / square;
-        }
     }
+    curvature.bend(facet, point, normal);
     (normal, radius + curvature.distance, curvature)
 }
 
-/// In-plane gradients of the three barycentric weights [1/m].
-#[must_use]
-pub fn face_gradients(corners: [DVec3; 3]) -> [DVec3; 3] {
-    let [a, b, c] = corners;
-    let area_vector = (b - a).cross(c - a);
-    let square = area_vector.length_squared().max(MINIMUM_SQUARE);
-    [area_vector.cross(c - b) / square, area_vector.cross(a - c) / square, area_vector.cross(b - a) / square]
+impl Curvature {
+    /// Sets all that depends on the directions in which the point may move.
+    #[inline]
+    fn bend(&mut self, facet: &Facet, point: &ClosestPoint, normal: DVec3) {
+        let s = self.distance;
+        match *directions(point.feature) {
+            [d, e] => {
+                let (a, b) = (facet.tangent(point.weights, d), facet.tangent(point.weights, e));
+                self.tangents = [a, b];
+                let metric = [a.dot(a), a.dot(b), b.dot(b)];
+                let inverse = inverse(metric, MINIMUM_SQUARE);
+                self.turning = inverse;
+                if facet.sagittas.is_none() {
+                    return;
+                }
+                let bends = [facet.bend(d, d), facet.bend(d, e), facet.bend(e, e)].map(|bend| normal.dot(bend));
+                let full = [0, 1, 2].map(|k| metric[k] + s * bends[k]);
+                // Where the distance is hardly convex the closest point is about to leave, and no derivative holds for long.
+                let area = metric[0] * metric[2] - metric[1] * metric[1];
+                if full[0] > 0.0 && full[0] * full[2] - full[1] * full[1] > LEAST_CONVEXITY * area {
+                    self.turning = self::inverse(full, MINIMUM_SQUARE);
+                    self.bending = symmetric_product(inverse, bends, self.turning);
+                }
+            }
+            [d] => {
+                let tangent = facet.tangent(point.weights, d);
+                let metric = tangent.length_squared().max(MINIMUM_SQUARE);
+                self.tangents[0] = tangent;
+                self.along = tangent / metric.sqrt();
+                self.turning[0] = metric.recip();
+                let bend = normal.dot(facet.bend(d, d));
+                let full = metric + s * bend;
+                if full > LEAST_CONVEXITY * metric {
+                    self.turning[0] = full.recip();
+                    self.bending[0] = bend / (metric * full);
+                }
+            }
+            _ => {}
+        }
+    }
 }
 
-/// Second variation of the depth along node displacements `v` [m]: one vector per node, so that d2s(v, v') is the sum of
-/// their inner products with v'_j.
+/// The inverse of a symmetric matrix of two rows, its entries 00, 01, 11; its determinant counts as no less than `least`.
 #[inline]
-#[must_use]
-pub fn second_variation(contact: &Contact, v: [DVec3; 3]) -> [DVec3; 3] {
-    let Contact { weights, normal, curvature, .. } = contact;
-    let mut dp = DVec3::ZERO;
-    let mut turn = DVec3::ZERO;
-    for j in 0..3 {
-        dp += v[j] * weights[j];
-        turn += curvature.gradients[j] * normal.dot(v[j]);
-    }
-    let across = dp - *normal * normal.dot(dp) - curvature.along * curvature.along.dot(dp);
-    let carried = across * curvature.inverse_distance - turn;
-    let tilting = turn * curvature.distance + dp;
-    let mut product = [DVec3::ZERO; 3];
-    for j in 0..3 {
-        product[j] = carried * weights[j] - *normal * curvature.gradients[j].dot(tilting);
-    }
-    product
+fn inverse([a, b, c]: [f64; 3], least: f64) -> [f64; 3] {
+    let determinant = (a * c - b * b).max(least);
+    [c / determinant, -b / determinant, a / determinant]
+}
+
+/// The product A B C of symmetric matrices of two rows where that is symmetric.
+#[inline]
+fn symmetric_product(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> [f64; 3] {
+    let ab = [
+        [a[0] * b[0] + a[1] * b[1], a[0] * b[1] + a[1] * b[2]],
+        [a[1] * b[0] + a[2] * b[1], a[1] * b[1] + a[2] * b[2]],
+    ];
+    let entry = |row: [f64; 2], column: [f64; 2]| row[0] * column[0] + row[1] * column[1];
+    [entry(ab[0], [c[0], c[1]]), entry(ab[0], [c[1], c[2]]), entry(ab[1], [c[1], c[2]])]
+}
+
+/// Product of a symmetric matrix of two rows and a vector.
+#[inline]
+fn apply([a, b, c]: [f64; 3], [x, y]: [f64; 2]) -> [f64; 2] {
+    [a * x + b * y, b * x + c * y]
 }
 
 impl Contact {
+    /// A spring of the stiffness kc on the feature that [`measure`] found.
+    #[inline]
+    #[must_use]
+    pub fn new(proxy_node: u32, carriers: Carriers, measured: (DVec3, f64, Curvature)) -> Self {
+        let (normal, depth, curvature) = measured;
+        Self { proxy_node, carriers, normal, depth, share: 1.0, push: depth.max(0.0), multiplier: 0.0, curvature }
+    }
+
     /// Its force over kc: its part of the depth times the node's share [m].
     #[inline]
     #[must_use]
@@ -141,28 +270,69 @@ impl Contact {
         self.share * self.push
     }
 
-    /// A spring of the stiffness kc on the feature that [`measure`] found.
+    /// By how much displacements `v` of its nodes, by their place, move its closest point [m].
     #[inline]
     #[must_use]
-    pub fn new(proxy_node: u32, nodes: [u32; 3], weights: [f64; 3], measured: (DVec3, f64, Curvature)) -> Self {
-        let (normal, depth, curvature) = measured;
-        Self { proxy_node, nodes, weights, normal, depth, share: 1.0, push: depth.max(0.0), multiplier: 0.0, curvature }
+    pub fn moved(&self, v: impl Fn(usize) -> DVec3) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        for (j, &weight) in self.carriers.weights().iter().enumerate() {
+            sum += v(j) * weight;
+        }
+        sum
     }
 
-    /// What displacements `v` of its nodes bring the feature nearer by, to first order [m].
+    /// How displacements `v` of its nodes move its closest point, and turn the surface there, where that matters.
     #[inline]
     #[must_use]
-    pub fn deepening(&self, v: [DVec3; 3]) -> f64 {
-        self.weights[0] * self.normal.dot(v[0])
-            + self.weights[1] * self.normal.dot(v[1])
-            + self.weights[2] * self.normal.dot(v[2])
+    pub fn variation(&self, v: impl Fn(usize) -> DVec3) -> Variation {
+        let mut variation = Variation::translation(self.moved(&v));
+        if self.multiplier != 0.0 {
+            for (tangent, slopes) in variation.tangents.iter_mut().zip(&self.carriers.slopes) {
+                for (j, &slope) in slopes[..self.carriers.count].iter().enumerate() {
+                    *tangent += v(j) * slope;
+                }
+            }
+        }
+        variation
     }
 
-    /// What a force `push` along the depth gives to the feature's nodes: push w_j N [N].
+    /// By how much a variation brings the feature nearer, to first order [m].
     #[inline]
     #[must_use]
-    pub fn spread(&self, push: f64) -> [DVec3; 3] {
-        self.weights.map(|weight| self.normal * (push * weight))
+    pub fn deepening(&self, variation: &Variation) -> f64 {
+        self.normal.dot(variation.point)
+    }
+
+    /// What a force `push` along the depth gives to the closest point: push N [N].
+    #[inline]
+    #[must_use]
+    pub fn spread(&self, push: f64) -> Variation {
+        Variation::translation(self.normal * push)
+    }
+
+    /// What node j, by its place, has of a reaction.
+    #[inline]
+    #[must_use]
+    pub fn at_node(&self, reaction: &Variation, j: usize) -> DVec3 {
+        let Carriers { weights, slopes: [first, second], .. } = &self.carriers;
+        reaction.point * weights[j] + reaction.tangents[0] * first[j] + reaction.tangents[1] * second[j]
+    }
+
+    /// Second variation of the depth along `variation`: the reaction whose work along another variation is d2s of both.
+    #[inline]
+    #[must_use]
+    pub fn second_variation(&self, variation: &Variation) -> Variation {
+        let Self { normal, curvature, .. } = self;
+        let dp = variation.point;
+        let sliding = curvature.tangents.map(|tangent| tangent.dot(dp));
+        let tilting = variation.tangents.map(|tangent| normal.dot(tangent));
+        let bent = apply(curvature.bending, sliding);
+        let turned = apply(curvature.turning, tilting);
+        let carried = apply(curvature.turning, sliding);
+        let across = dp - *normal * normal.dot(dp) - curvature.along * curvature.along.dot(dp);
+        let along = |a: usize| curvature.tangents[a] * (bent[a] - turned[a]);
+        let turn = |a: usize| *normal * -(carried[a] + curvature.distance * turned[a]);
+        Variation { point: across * curvature.inverse_distance + along(0) + along(1), tangents: [turn(0), turn(1)] }
     }
 
     /// Its depth changes in proportion to displacements from here on.
@@ -180,98 +350,123 @@ impl Contact {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::geometry::closest_point::closest_point;
     use crate::random::sequence;
 
-    /// The contact of `x` with one triangle; `outward` decides the side at edges and vertices.
-    fn contact(x: DVec3, radius: f64, corners: [DVec3; 3], outward: DVec3) -> (Feature, Contact) {
-        let point = closest_point(x, corners);
-        let face = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
-        let pseudonormal = if point.feature == Feature::Face { face } else { outward };
-        let measured = measure(x, radius, corners, point.weights, point.feature, pseudonormal);
-        (point.feature, Contact { multiplier: 3.0 * measured.1, ..Contact::new(0, [0, 1, 2], point.weights, measured) })
+    /// A facet on its own nodes, flat or bent, and where they are.
+    struct Sample {
+        nodes: Vec<u32>,
+        positions: Vec<DVec3>,
     }
 
-    /// Product of the Hessian of 1/2 kc depth^2 with `v`.
-    fn hessian_product(contact: &Contact, kc: f64, v: [DVec3; 3]) -> [DVec3; 3] {
-        let bend = second_variation(contact, v);
-        let stretch = contact.normal * (kc * contact.deepening(v));
-        [0, 1, 2].map(|j| stretch * contact.weights[j] + bend[j] * contact.multiplier)
+    impl Sample {
+        fn facet(&self, shift: impl Fn(usize) -> DVec3) -> Facet {
+            let at: Vec<DVec3> = self.positions.iter().enumerate().map(|(j, position)| *position + shift(j)).collect();
+            if self.nodes.len() == 3 {
+                return Facet::flat([at[0], at[1], at[2]]);
+            }
+            SmoothSurface { nodes: vec![std::array::from_fn(|j| j as u32)] }.facet(&at, 0)
+        }
+
+        /// The contact of `x`; `outward` decides the side at edges and vertices.
+        fn contact(&self, x: DVec3, radius: f64, facet: &Facet, outward: DVec3) -> (Feature, Contact) {
+            let point = facet.closest(x);
+            let pseudonormal = if point.feature == Feature::Face { facet.normal(point.weights) } else { outward };
+            let measured = measure(x, radius, facet, &point, pseudonormal);
+            let contact = Contact::new(0, Carriers::new(&self.nodes, &point), measured);
+            (point.feature, Contact { multiplier: 3.0 * measured.1, ..contact })
+        }
     }
 
-    fn inner(a: [DVec3; 3], b: [DVec3; 3]) -> f64 {
-        a.iter().zip(&b).map(|(a, b)| a.dot(*b)).sum()
+    use crate::contact::geometry::smooth::SmoothSurface;
+
+    /// Product of the Hessian of 1/2 kc depth^2 with `v`, times `w`.
+    fn hessian(contact: &Contact, kc: f64, v: &[DVec3], w: &[DVec3]) -> f64 {
+        let (v, w) = (contact.variation(|j| v[j]), contact.variation(|j| w[j]));
+        let stretch = kc * contact.deepening(&v) * contact.deepening(&w);
+        stretch + contact.multiplier * contact.second_variation(&v).dot(&w)
     }
 
-    /// Random triangles, points on either side, all features: gradient and Hessian of 1/2 kc depth^2 against central
+    /// Random facets, flat and bent, points on either side, all features: gradient and Hessian of 1/2 kc depth^2 against central
     /// differences. Errors are of order h^2 times the fourth derivative; points close to a feature are left out.
     #[test]
     fn derivatives_agree_with_finite_differences() {
         let mut next = sequence(7);
-        let mut seen = [0usize; 6];
         let h = 1e-4;
-        for _ in 0..4000 {
-            let mut point = || DVec3::new(next(), next(), next());
-            let corners = [point(), point(), point()];
-            let x = point();
-            let v = [point(), point(), point()];
-            let w = [point(), point(), point()];
-            let outward = point();
-            let radius = 0.1 + next().abs();
-            let kc = 3.0;
-            let at = |s: f64| [0, 1, 2].map(|j| corners[j] + v[j] * s);
-            let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
-            let (feature, here) = contact(x, radius, corners, outward);
-            let (feature_before, before) = contact(x, radius, at(-h), outward);
-            let (feature_after, after) = contact(x, radius, at(h), outward);
-            let clear = here.curvature.distance.abs() > 0.2 && here.normal.dot(outward).abs() > 0.1 && area > 0.3;
-            if feature != feature_before || feature != feature_after || !clear {
-                continue;
+        for count in [3, CARRIERS] {
+            let mut seen = [0usize; 6];
+            for _ in 0..6000 {
+                let mut point = || DVec3::new(next(), next(), next());
+                let mut sample = Sample { nodes: (0..count as u32).collect(), positions: Vec::new() };
+                // Nodes beyond the corners bend the facet by about a third of its size.
+                sample.positions.extend((0..count).map(|_| point()));
+                let x = point();
+                let v: Vec<DVec3> = (0..count).map(|_| point()).collect();
+                let w: Vec<DVec3> = (0..count).map(|_| point()).collect();
+                let outward = point();
+                let radius = 0.1 + next().abs();
+                let kc = 3.0;
+                let facet = sample.facet(|_| DVec3::ZERO);
+                let at = |s: f64| sample.facet(|j| v[j] * s);
+                let area = (facet.corners[1] - facet.corners[0]).cross(facet.corners[2] - facet.corners[0]).length();
+                let (feature, here) = sample.contact(x, radius, &facet, outward);
+                let (feature_before, before) = sample.contact(x, radius, &at(-h), outward);
+                let (feature_after, after) = sample.contact(x, radius, &at(h), outward);
+                let convex = here.curvature.turning.iter().all(|entry| entry.abs() < 30.0);
+                let clear = here.curvature.distance.abs() > 0.2 && here.normal.dot(outward).abs() > 0.1 && area > 0.3;
+                if feature != feature_before || feature != feature_after || !clear || !convex {
+                    continue;
+                }
+                let inside = here.curvature.distance > 0.0;
+                let kind = match feature {
+                    Feature::Vertex(_) => 0,
+                    Feature::Edge(_) => 1,
+                    Feature::Face => 2,
+                };
+                seen[kind + if inside { 3 } else { 0 }] += 1;
+                let slope_along = |c: &Contact, v: &[DVec3]| kc * c.depth * c.deepening(&c.variation(|j| v[j]));
+                let energy = |c: &Contact| 0.5 * kc * c.depth * c.depth;
+                let slope = (energy(&after) - energy(&before)) / (2.0 * h);
+                let expected = slope_along(&here, &v);
+                assert!((slope - expected).abs() < 1e-4 * (1.0 + expected.abs()), "{feature:?} {slope} {expected}");
+                let bend = (slope_along(&after, &w) - slope_along(&before, &w)) / (2.0 * h);
+                let expected = hessian(&here, kc, &v, &w);
+                assert!((bend - expected).abs() < 2e-4 * (1.0 + expected.abs()), "{count} {feature:?} {bend} {expected}");
+                // The reaction at the nodes is the same as on the variation.
+                let reaction = here.second_variation(&here.variation(|j| v[j]));
+                let at_nodes: f64 = (0..count).map(|j| here.at_node(&reaction, j).dot(w[j])).sum();
+                assert!((at_nodes - reaction.dot(&here.variation(|j| w[j]))).abs() < 1e-9 * (1.0 + at_nodes.abs()));
             }
-            let inside = here.curvature.distance > 0.0;
-            let kind = match feature {
-                Feature::Vertex(_) => 0,
-                Feature::Edge(_) => 1,
-                Feature::Face => 2,
-            };
-            seen[kind + if inside { 3 } else { 0 }] += 1;
-            let gradient = |c: &Contact| c.weights.map(|weight| c.normal * (kc * c.depth * weight));
-            let energy = |c: &Contact| 0.5 * kc * c.depth * c.depth;
-            let slope = (energy(&after) - energy(&before)) / (2.0 * h);
-            let expected = inner(gradient(&here), v);
-            assert!((slope - expected).abs() < 1e-4 * (1.0 + expected.abs()), "{feature:?} {slope} {expected}");
-            let bend = (inner(gradient(&after), w) - inner(gradient(&before), w)) / (2.0 * h);
-            let expected = inner(hessian_product(&here, kc, v), w);
-            assert!((bend - expected).abs() < 1e-4 * (1.0 + expected.abs()), "{feature:?} {bend} {expected}");
-            let transposed = inner(hessian_product(&here, kc, w), v);
-            assert!((transposed - expected).abs() < 1e-11 * (1.0 + expected.abs()), "symmetric");
+            assert!(seen.iter().all(|&count| count > 20), "every kind of feature must occur on both sides: {seen:?}");
         }
-        assert!(seen.iter().all(|&count| count > 20), "vertex, edge, face; outside, inside: {seen:?}");
+    }
+
+    /// A flat facet at rest under one corner.
+    fn corner() -> Sample {
+        Sample { nodes: vec![0, 1, 2], positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y] }
     }
 
     /// The second derivative in the direction along which the closest point slides is what frozen geometry leaves out.
     #[test]
     fn a_wrong_second_variation_is_noticed() {
-        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
-        let (_, mut here) = contact(DVec3::new(0.3, 0.3, -0.5), 0.0, corners, DVec3::Z);
+        let sample = corner();
+        let (_, mut here) = sample.contact(DVec3::new(0.3, 0.3, -0.5), 0.0, &sample.facet(|_| DVec3::ZERO), DVec3::Z);
         assert!((here.depth - 0.5).abs() < 1e-15);
         let v = [DVec3::new(0.2, 0.1, 0.4), DVec3::new(-0.3, 0.5, 0.1), DVec3::new(0.7, -0.2, -0.6)];
-        let right = inner(hessian_product(&here, 1.0, v), v);
-        here.curvature.gradients = [DVec3::ZERO; 3];
-        let frozen = inner(hessian_product(&here, 1.0, v), v);
+        let right = hessian(&here, 1.0, &v, &v);
+        here.curvature.turning = [0.0; 3];
+        let frozen = hessian(&here, 1.0, &v, &v);
         assert!((right - frozen).abs() > 0.05);
     }
 
     #[test]
     fn a_node_on_the_feature_itself_gives_finite_numbers() {
-        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let sample = corner();
         for x in [DVec3::ZERO, DVec3::X * 0.5, DVec3::new(0.2, 0.2, 0.0), DVec3::Y] {
             for radius in [0.0, 0.01] {
-                let (_, here) = contact(x, radius, corners, DVec3::Z);
+                let (_, here) = sample.contact(x, radius, &sample.facet(|_| DVec3::ZERO), DVec3::Z);
                 assert!((here.normal - DVec3::Z).length() < 1e-15);
                 assert!((here.depth - radius).abs() < 1e-15);
-                let product = hessian_product(&here, 1.0, [DVec3::X, DVec3::Y, DVec3::Z]);
-                assert!(product.iter().all(|p| p.is_finite()));
+                assert!(hessian(&here, 1.0, &[DVec3::X, DVec3::Y, DVec3::Z], &[DVec3::Z; 3]).is_finite());
             }
         }
     }

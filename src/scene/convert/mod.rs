@@ -12,7 +12,7 @@ mod skin;
 use super::check::Checker;
 use super::error::SceneError;
 use super::file::{ContactTable, NumberOr, SceneTable};
-use super::{Algorithm, ContactSpec, Interpolation, ProxySpec, Rendering, ScanScene, Scene};
+use super::{Algorithm, ContactSpec, ContactSurface, Interpolation, ProxySpec, Rendering, ScanScene, Scene};
 use toml::Spanned;
 
 /// Default relative residual of the contact solver, in the energy norm [1]. Forces are promised to balance K u to 1e-6 of the
@@ -140,12 +140,21 @@ fn contact(checker: &Checker<'_>, table: &Spanned<ContactTable>, proxy: &ProxySp
         Some(value) => *value.get_ref(),
         None => CONTACT_ITERATIONS,
     };
+    let algorithm = table.algorithm.unwrap_or(Algorithm::Energy);
+    if let Some(value) = &table.surface
+        && *value.get_ref() == ContactSurface::Smooth
+        && algorithm == Algorithm::Paper
+    {
+        let message = "the algorithm \"paper\" is defined on the triangles: leave surface out, or take \"energy\"";
+        return Err(checker.error(value.span(), message));
+    }
     Ok(ContactSpec {
         stiffness,
         stiffness_per_length,
-        algorithm: table.algorithm.unwrap_or(Algorithm::Energy),
+        algorithm,
         tolerance: tolerance.unwrap_or(Ok(CONTACT_TOLERANCE))?,
         max_iterations,
         updates: updates(checker, table)?,
+        surface: table.surface.as_ref().map_or_else(ContactSurface::default, |value| *value.get_ref()),
     })
 }

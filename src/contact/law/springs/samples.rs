@@ -1,9 +1,10 @@
 //! Contact springs to test with: points and balls pressed into the sphere.
 
-use super::{Springs, add_contact_hessian};
-use crate::contact::geometry::closest_point::{closest_point, point_at};
+use super::{Slots, Springs, add_contact_hessian};
+use crate::contact::geometry::facet::Facet;
 use crate::contact::geometry::normals;
-use crate::contact::law::depth::{Contact, measure};
+use crate::contact::geometry::smooth::CARRIERS;
+use crate::contact::law::depth::{Carriers, Contact, measure};
 use crate::contact::law::series::distribute_all;
 use crate::contact::linear::support::Support;
 use crate::object::{Compliance, Object};
@@ -16,7 +17,7 @@ use glam::DVec3;
 pub struct Sample {
     support: Support,
     contacts: Vec<Contact>,
-    slots: Vec<[usize; 3]>,
+    slots: Vec<Slots>,
     kc: f64,
 }
 
@@ -35,9 +36,10 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
         let t = random.between(0.0, object.triangles.len() as f64) as usize;
         let middle = corners(t).iter().sum::<DVec3>() / 3.0;
         let x = middle * random.between(0.7, 0.9) + random.vector() * 1e-3;
-        let point = closest_point(x, corners(t));
-        let measured = measure(x, 0.0, corners(t), point.weights, point.feature, middle.normalize());
-        contacts.push(Contact::new(i, object.triangles[t], point.weights, measured));
+        let facet = Facet::flat(corners(t));
+        let point = facet.closest(x);
+        let measured = measure(x, 0.0, &facet, &point, middle.normalize());
+        contacts.push(Contact::new(i, Carriers::new(&object.triangles[t], &point), measured));
     }
     contacts[5].depth = -1e-3;
     for i in 6..8 {
@@ -46,10 +48,11 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
         let shared = object.triangles[t][0];
         let around = (0..object.triangles.len()).filter(|&near| object.triangles[near].contains(&shared));
         for near in around.take(3) {
-            let point = closest_point(x, corners(near));
-            let outward = x - point_at(corners(near), point.weights);
-            let measured = measure(x, 0.008, corners(near), point.weights, point.feature, outward.normalize());
-            contacts.push(Contact::new(i, object.triangles[near], point.weights, measured));
+            let facet = Facet::flat(corners(near));
+            let point = facet.closest(x);
+            let outward = x - facet.point(point.weights);
+            let measured = measure(x, 0.008, &facet, &point, outward.normalize());
+            contacts.push(Contact::new(i, Carriers::new(&object.triangles[near], &point), measured));
         }
     }
     distribute_all(&mut contacts, &mut Vec::new());
@@ -59,7 +62,12 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
         contact.multiplier = bending * kc * contact.force_over_kc();
     }
     let mut support = Support::new(object.surface_nodes);
-    let slots = contacts.iter().map(|contact| contact.nodes.map(|node| support.add(node))).collect();
+    let mut slots = Vec::new();
+    for contact in &contacts {
+        let mut own = [0; CARRIERS];
+        own.iter_mut().zip(contact.carriers.nodes()).for_each(|(slot, &node)| *slot = support.add(node) as u32);
+        slots.push(own);
+    }
     support.gather(&Compliance::new(object));
     Sample { support, contacts, slots, kc }
 }

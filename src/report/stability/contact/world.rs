@@ -217,5 +217,6 @@ pub fn contact(stiffness: f64) -> ContactSpec {
         tolerance: 1e-8,
         max_iterations: ITERATIONS,
         updates: 0,
+        surface: crate::scene::ContactSurface::Facets,
     }
 }

@@ -1,0 +1,189 @@
+//! One facet of the contact surface: a flat triangle, or one that is bent to join its neighbours smoothly.
+//!
+//! With barycentric weights w_k of the corners c_k and edge k joining corners k and k + 1, a point of it is
+//! `p(w) = sum_k w_k c_k + 4 sum_k w_k w_{k+1} s_k`, s_k being the sagitta of edge k: by how much the middle of the edge stands off the
+//! chord. Flat facets have none. A point closest to x is found by Newton's method from the closest point of the flat triangle.
+
+use super::closest_point::{ClosestPoint, Feature, closest_point};
+use super::normals::{area_vector, unit_or_zero};
+use crate::tolerances::{FACET_ITERATIONS, FACET_STEP, MINIMUM_SQUARE};
+use glam::DVec3;
+
+/// A triangle of the contact surface [m].
+#[derive(Clone, Copy, Debug)]
+pub struct Facet {
+    /// Its corners, anticlockwise seen from outside.
+    pub corners: [DVec3; 3],
+    /// The sagittas of its edges; none where it is flat.
+    pub sagittas: Option<[DVec3; 3]>,
+}
+
+/// A direction in which barycentric weights change; the changes sum to zero.
+pub type Direction = [f64; 3];
+
+/// The two directions in which a point moves over a face: towards corners 1 and 2.
+const FACE: [Direction; 2] = [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]];
+
+/// The direction in which a point moves along each edge.
+const EDGES: [[Direction; 1]; 3] = [[[-1.0, 1.0, 0.0]], [[0.0, -1.0, 1.0]], [[1.0, 0.0, -1.0]]];
+
+/// The directions in which a point that lies on `feature` may move on it: two on a face, one on an edge, none on a vertex.
+#[must_use]
+pub fn directions(feature: Feature) -> &'static [Direction] {
+    match feature {
+        Feature::Face => &FACE,
+        Feature::Edge(k) => &EDGES[k],
+        Feature::Vertex(_) => &[],
+    }
+}
+
+/// The factors 4 w_k w_{k+1} of the sagittas at weights `w` [1].
+#[must_use]
+pub fn bubbles(w: [f64; 3]) -> [f64; 3] {
+    [4.0 * w[0] * w[1], 4.0 * w[1] * w[2], 4.0 * w[2] * w[0]]
+}
+
+/// Their derivative at `w` along `d`.
+#[must_use]
+pub fn bubble_slopes(w: [f64; 3], d: Direction) -> [f64; 3] {
+    [0, 1, 2].map(|k| {
+        let next = (k + 1) % 3;
+        4.0 * (d[k] * w[next] + w[k] * d[next])
+    })
+}
+
+impl Facet {
+    /// A flat triangle.
+    #[must_use]
+    pub fn flat(corners: [DVec3; 3]) -> Self {
+        Self { corners, sagittas: None }
+    }
+
+    /// Its point at barycentric weights `w` [m].
+    #[inline]
+    #[must_use]
+    pub fn point(&self, w: [f64; 3]) -> DVec3 {
+        combine(&self.corners, w) + self.sagittas.map_or(DVec3::ZERO, |sagittas| combine(&sagittas, bubbles(w)))
+    }
+
+    /// The derivative of its point at `w` along `d` [m].
+    #[inline]
+    #[must_use]
+    pub fn tangent(&self, w: [f64; 3], d: Direction) -> DVec3 {
+        let bent = |sagittas| combine(&sagittas, bubble_slopes(w, d));
+        combine(&self.corners, d) + self.sagittas.map_or(DVec3::ZERO, bent)
+    }
+
+    /// The second derivative of its point along `d` and `e`, the same everywhere [m].
+    #[inline]
+    #[must_use]
+    pub fn bend(&self, d: Direction, e: Direction) -> DVec3 {
+        self.sagittas.map_or(DVec3::ZERO, |sagittas| combine(&sagittas, bubble_slopes(e, d)))
+    }
+
+    /// Its outward unit normal at `w`; zero where it has none.
+    #[must_use]
+    pub fn normal(&self, w: [f64; 3]) -> DVec3 {
+        unit_or_zero(match self.sagittas {
+            None => area_vector(self.corners),
+            Some(_) => self.tangent(w, FACE[0]).cross(self.tangent(w, FACE[1])),
+        })
+    }
+
+    /// The angle between its two edges at corner k [rad].
+    #[must_use]
+    pub fn angle(&self, k: usize) -> f64 {
+        let mut at = [0.0; 3];
+        at[k] = 1.0;
+        let (left, right) = (self.tangent(at, EDGES[k][0]), -self.tangent(at, EDGES[(k + 2) % 3][0]));
+        left.cross(right).length().atan2(left.dot(right))
+    }
+
+    /// The point of it that is closest to `x`.
+    #[inline]
+    #[must_use]
+    pub fn closest(&self, x: DVec3) -> ClosestPoint {
+        let flat = closest_point(x, self.corners);
+        if self.sagittas.is_none() { flat } else { self.closest_bent(x, flat.weights) }
+    }
+
+    /// The same on a bent facet, searched from `start`.
+    fn closest_bent(&self, x: DVec3, start: [f64; 3]) -> ClosestPoint {
+        if let Some(weights) = self.stationary(x, start) {
+            return ClosestPoint { weights, feature: Feature::Face };
+        }
+        let candidates = [0, 1, 2].map(|k| self.closest_on_edge(x, k, start));
+        let distance = |candidate: &ClosestPoint| x.distance_squared(self.point(candidate.weights));
+        let [mut best, second, third] = candidates;
+        for other in [second, third] {
+            if distance(&other) < distance(&best) {
+                best = other;
+            }
+        }
+        best
+    }
+
+    /// Weights inside of the facet where the distance to `x` is least, if Newton's method from `start` leads there.
+    fn stationary(&self, x: DVec3, start: [f64; 3]) -> Option<[f64; 3]> {
+        let bends = [self.bend(FACE[0], FACE[0]), self.bend(FACE[0], FACE[1]), self.bend(FACE[1], FACE[1])];
+        let mut w = start;
+        for _ in 0..FACET_ITERATIONS {
+            let offset = self.point(w) - x;
+            let (a, b) = (self.tangent(w, FACE[0]), self.tangent(w, FACE[1]));
+            let slope = [offset.dot(a), offset.dot(b)];
+            let metric = [a.dot(a), a.dot(b), b.dot(b)];
+            let full = [0, 1, 2].map(|k| metric[k] + offset.dot(bends[k]));
+            // Where the distance is not convex, the metric alone leads downhill.
+            let [h, i, j] = if full[0] > 0.0 && full[0] * full[2] > full[1] * full[1] { full } else { metric };
+            let determinant = (h * j - i * i).max(MINIMUM_SQUARE);
+            let step = [(i * slope[1] - j * slope[0]) / determinant, (i * slope[0] - h * slope[1]) / determinant];
+            let (u, v) = (w[1] + step[0], w[2] + step[1]);
+            w = [1.0 - u - v, u, v];
+            // Far outside, whence it will not come back.
+            if w.into_iter().any(|weight| weight < -1.0) {
+                return None;
+            }
+            if step[0].abs() + step[1].abs() < FACET_STEP {
+                break;
+            }
+        }
+        w.into_iter().all(|weight| weight >= 0.0).then_some(w)
+    }
+
+    /// The point of edge k that is closest to `x`, searched from the point of the edge that is next to `start`.
+    fn closest_on_edge(&self, x: DVec3, k: usize, start: [f64; 3]) -> ClosestPoint {
+        let (direction, next) = (EDGES[k][0], (k + 1) % 3);
+        let bend = self.bend(direction, direction);
+        let at = |t: f64| {
+            let mut weights = [0.0; 3];
+            (weights[k], weights[next]) = (1.0 - t, t);
+            weights
+        };
+        let sum = start[k] + start[next];
+        let mut t = if sum > 0.0 { start[next] / sum } else { 0.5 };
+        for _ in 0..FACET_ITERATIONS {
+            let offset = self.point(at(t)) - x;
+            let tangent = self.tangent(at(t), direction);
+            let metric = tangent.dot(tangent);
+            let full = metric + offset.dot(bend);
+            let before = t;
+            t -= offset.dot(tangent) / (if full > 0.0 { full } else { metric }).max(MINIMUM_SQUARE);
+            t = t.clamp(0.0, 1.0);
+            if (t - before).abs() < FACET_STEP {
+                break;
+            }
+        }
+        let feature = match t {
+            0.0 => Feature::Vertex(k),
+            1.0 => Feature::Vertex(next),
+            _ => Feature::Edge(k),
+        };
+        ClosestPoint { weights: at(t), feature }
+    }
+}
+
+/// sum_k factor_k vector_k.
+#[inline]
+fn combine(vectors: &[DVec3; 3], factors: [f64; 3]) -> DVec3 {
+    vectors[0] * factors[0] + vectors[1] * factors[1] + vectors[2] * factors[2]
+}
