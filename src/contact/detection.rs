@@ -209,7 +209,7 @@ impl Detection {
         let likely = if moved == 0.0 { known.closest } else { known.last };
         // None was closest where the pass before was not a number.
         if (likely as usize) < model.object.triangles.len() {
-            closest.consider(x, &deformation.facet(model, likely), likely);
+            closest.consider(x, &deformation.facet(model, likely), likely, f64::MAX);
         }
         // Distance within which facets are looked for, and its square for their triangles.
         let near = |closest: &Closest| {
@@ -220,11 +220,12 @@ impl Detection {
         facets.clear();
         if feels || moved != 0.0 {
             deformation.search(model, x, within(&closest), |triangle, facet| {
-                if feels || triangle != likely {
-                    let (point, distance_squared) = closest.consider(x, facet, triangle);
-                    if feels && distance_squared <= near(&closest).powi(2) {
-                        facets.push(Closest { distance_squared, triangle, point });
-                    }
+                if (feels || triangle != likely)
+                    && let Some((point, distance_squared)) = closest.consider(x, facet, triangle, near(&closest))
+                    && feels
+                    && distance_squared <= near(&closest).powi(2)
+                {
+                    facets.push(Closest { distance_squared, triangle, point });
                 }
                 within(&closest)
             });
@@ -279,14 +280,7 @@ fn find_at_rest(surface: &RestSurface, x: DVec3, known: &mut RestDistance) -> Cl
 /// The contact (or near miss, with depth <= 0) of proxy node `i` at `x` with the closest point of `facet`, on the side that
 /// `pseudonormal` tells.
 #[inline(always)]
-fn contact_with(
-    model: &Model,
-    i: usize,
-    x: DVec3,
-    closest: &Closest,
-    facet: &Facet,
-    pseudonormal: DVec3,
-) -> Contact {
+fn contact_with(model: &Model, i: usize, x: DVec3, closest: &Closest, facet: &Facet, pseudonormal: DVec3) -> Contact {
     let radius = model.chain.nodes[i].radius;
     let measured = measure(x, radius, facet, &closest.point, pseudonormal);
     let carriers = Carriers::new(model.surface.carriers(closest.triangle), &closest.point);
@@ -313,8 +307,8 @@ mod tests {
     use crate::proxy::Chain;
     use crate::random::sequence;
     use crate::scene::{
-        Algorithm, ContactSpec, ContactSurface, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
-        ProxySpec, Shape, SpringKind, SpringSpec,
+        Algorithm, ContactSpec, ContactSurface, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec,
+        ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
     };
 
     fn ball() -> Object {
@@ -353,7 +347,7 @@ mod tests {
         for (i, &x) in nodes.iter().enumerate() {
             let mut closest = Closest::none();
             for t in 0..model.object.triangles.len() as u32 {
-                closest.consider(x, &model.surface.facet(positions, t), t);
+                closest.consider(x, &model.surface.facet(positions, t), t, f64::MAX);
             }
             let pseudonormal = model.surface.pseudonormal(positions, closest.triangle, &closest.point);
             let facet = model.surface.facet(positions, closest.triangle);
@@ -371,9 +365,12 @@ mod tests {
         let object = ball();
         let mut next = sequence(3);
         let (mut compared, mut same) = (0, 0);
-        for (radius, surface) in
-            [(0.0, ContactSurface::Facets), (0.01, ContactSurface::Facets), (0.0, ContactSurface::Smooth), (0.01, ContactSurface::Smooth)]
-        {
+        for (radius, surface) in [
+            (0.0, ContactSurface::Facets),
+            (0.01, ContactSurface::Facets),
+            (0.0, ContactSurface::Smooth),
+            (0.01, ContactSurface::Smooth),
+        ] {
             let chain = nodes(30, radius);
             let contact = ContactSpec {
                 stiffness: 1.0,
@@ -382,7 +379,7 @@ mod tests {
                 tolerance: 1e-8,
                 max_iterations: 1,
                 updates: 0,
-        surface,
+                surface,
             };
             let model = Model::new(&object, &chain, contact);
             let mut detection = Detection::new(&model);

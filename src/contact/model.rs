@@ -40,6 +40,8 @@ pub struct Model<'a> {
     pub mobility: f64,
     /// The same for what facets stand off the flat triangles by, where contact is with a smooth surface [m/N].
     bulge_mobility: f64,
+    /// Of each leaf of the surface's tree, whether the compliance covers all nodes of its facets.
+    pub(super) covered_leaves: Arc<Vec<bool>>,
 }
 
 /// How far a displaced surface is from the surface at rest.
@@ -74,8 +76,8 @@ impl<'a> Model<'a> {
             return Ok(Self::new(object, chain, contact));
         }
         let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
-        model.compliance = Arc::new(Compliance::on(object, reach::reached(&model, configurations))?);
-        model.measure_compliance();
+        let nodes = reach::reached(&model, configurations);
+        model.take_compliance(Compliance::on(object, nodes)?);
         Ok(model)
     }
 
@@ -89,6 +91,7 @@ impl<'a> Model<'a> {
             softest: 0.0,
             mobility: 0.0,
             bulge_mobility: 0.0,
+            covered_leaves: Arc::default(),
             compliance: Arc::new(compliance),
             contact,
             kc: 0.0,
@@ -100,10 +103,18 @@ impl<'a> Model<'a> {
         model
     }
 
+    /// Takes `compliance` instead of what there is.
+    pub(super) fn take_compliance(&mut self, compliance: Compliance) {
+        self.compliance = Arc::new(compliance);
+        self.measure_compliance();
+    }
+
     /// Takes from the compliance how far the surface moves, and how stiff rigid contact is.
     fn measure_compliance(&mut self) {
         (self.softest, self.mobility) = softest(&self.compliance);
-        self.bulge_mobility = self.surface.smooth.as_ref().map_or(0.0, |smooth| bulge_mobility(smooth, &self.compliance));
+        self.bulge_mobility =
+            self.surface.smooth.as_ref().map_or(0.0, |smooth| bulge_mobility(smooth, &self.compliance));
+        self.covered_leaves = Arc::new(reach::covered_leaves(&self.surface, &self.compliance));
         self.set_stiffness(self.contact.stiffness);
     }
 
@@ -140,7 +151,10 @@ impl<'a> Model<'a> {
 /// eigenvalue. Nodes that are not covered do not move [m/N].
 fn bulge_mobility(smooth: &SmoothSurface, compliance: &Compliance) -> f64 {
     smooth.bulge_squared(|terms| {
-        let places = terms.iter().filter(|(_, weight)| *weight != 0.0).filter_map(|(node, weight)| Some((compliance.place(*node)?, *weight)));
+        let places = terms
+            .iter()
+            .filter(|(_, weight)| *weight != 0.0)
+            .filter_map(|(node, weight)| Some((compliance.place(*node)?, *weight)));
         let places: Vec<(usize, f64)> = places.collect();
         let mut sum = 0.0;
         for &(i, weight) in &places {

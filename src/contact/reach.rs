@@ -2,15 +2,16 @@
 //!
 //! With |u| <= m everywhere, the closest triangle of the deformed surface to a proxy node that is D from it at rest lies within
 //! D + 2 m of the node at rest (see `detection`). So a result is the same, whatever the compliance leaves out, if it covers all
-//! triangles so near to each touching node. Beforehand m is not known; a surface that gives way to a proxy whose deepest node
+//! leaves of the surface's tree so near to each touching node. Beforehand m is not known; a surface that gives way to a proxy whose deepest node
 //! is d below it moves by about d, hardly by more than [`EXPECTED_MOTION`] d. Results that need more are found and flagged.
 
 use super::detection::Detection;
+use super::geometry::RestSurface;
 use super::model::Model;
 use super::{Equilibrium, Proximity};
 use crate::JointVector;
+use crate::object::Compliance;
 use crate::tolerances::EXPECTED_MOTION;
-use glam::DVec3;
 use rayon::prelude::*;
 
 /// Configurations that one thread takes at a time.
@@ -23,20 +24,27 @@ pub(super) fn reached(model: &Model<'_>, configurations: &[JointVector]) -> Vec<
         .map_init(
             || Proximity::new(model),
             |proximity, share| {
-                let mut marked = vec![false; model.surface.positions.len()];
+                let mut marked = vec![false; model.surface.bounds.leaves.len()];
                 share.iter().for_each(|q| mark(model, proximity, q, &mut marked));
                 marked
             },
         )
         .reduce(
-            || vec![false; model.surface.positions.len()],
+            || vec![false; model.surface.bounds.leaves.len()],
             |mut all, some| {
                 all.iter_mut().zip(some).for_each(|(all, some)| *all |= some);
                 all
             },
         );
-    (0..).zip(marked).filter(|(_, marked)| *marked).map(|(node, _)| node).collect()
+    let mut reached = vec![false; model.surface.positions.len()];
+    for (leaf, _) in model.surface.bounds.leaves.iter().zip(marked).filter(|(_, marked)| *marked) {
+        let carriers = leaf.triangles.iter().flat_map(|&t| model.surface.carriers(t));
+        carriers.for_each(|&node| reached[node as usize] = true);
+    }
+    (0..).zip(reached).filter(|(_, reached)| *reached).map(|(node, _)| node).collect()
 }
+
+/// Marks the leaves of the surface's tree that matter at `q`.
 
 fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marked: &mut [bool]) {
     let gap = proximity.gap(q);
@@ -49,33 +57,39 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
             continue;
         }
         let radius = (clearance + node.radius).abs() + 2.0 * motion;
-        for_facets_within(model, *x - model.surface.centre, radius, |t| {
-            model.surface.carriers(t).iter().for_each(|&node| marked[node as usize] = true);
+        let (x, radius) = (*x - model.surface.centre, radius + model.surface.bulge);
+        let squared = radius * radius + model.surface.bounds.slack(x);
+        model.surface.bounds.walk(x, squared, |leaf| {
+            marked[leaf] = true;
+            squared
         });
     }
 }
 
-/// Whether the compliance covers all that the result depends on, where no point of the surface has moved by more than `moved` [m].
+/// Of each leaf of the tree of `surface`, whether `compliance` covers all nodes of its facets.
+pub(super) fn covered_leaves(surface: &RestSurface<'_>, compliance: &Compliance) -> Vec<bool> {
+    let covered = |t: &u32| surface.carriers(*t).iter().all(|&node| compliance.place(node).is_some());
+    surface.bounds.leaves.iter().map(|leaf| leaf.triangles.iter().all(covered)).collect()
+}
+
+/// Whether the compliance covers all that the result depends on, with all facets in the leaves of the tree that matter, where no point of the surface
+/// has moved by more than `moved` [m].
 pub(super) fn covers(model: &Model<'_>, detection: &Detection, equilibrium: &Equilibrium, moved: f64) -> bool {
     let covered = |node: u32| model.compliance.place(node).is_some();
     let mut within = equilibrium.forces.iter().all(|force| covered(force.node));
     for (i, distance) in detection.distances().enumerate() {
         if equilibrium.touches.iter().any(|touch| touch.proxy_node as usize == i) {
-            for_facets_within(model, detection.nodes()[i], distance.abs() + 2.0 * moved, |t| {
-                within &= model.surface.carriers(t).iter().all(|&node| covered(node));
+            let x = detection.nodes()[i];
+            let radius = distance.abs() + 2.0 * moved + model.surface.bulge;
+            let squared = radius * radius + model.surface.bounds.slack(x);
+            model.surface.bounds.walk(x, squared, |leaf| {
+                within &= model.covered_leaves[leaf];
+                // Nothing more can change.
+                if within { squared } else { -1.0 }
             });
         }
     }
     within
-}
-
-/// Visits the facets that are within `radius` of `x` at rest.
-fn for_facets_within(model: &Model<'_>, x: DVec3, radius: f64, mut visit: impl FnMut(u32)) {
-    let radius = radius + model.surface.bulge;
-    model.surface.bounds.search(x, radius * radius, |t| {
-        visit(t);
-        radius * radius
-    });
 }
 
 #[cfg(test)]
@@ -121,7 +135,7 @@ mod tests {
         let nodes = reached(&whole, &configurations);
         assert!(nodes.len() > 10 && 2 * nodes.len() < object.surface_nodes, "{} nodes", nodes.len());
         let mut some = Model::new(&object, &chain, scene.contact);
-        some.compliance = Compliance::on(&object, nodes).unwrap().into();
+        some.take_compliance(Compliance::on(&object, nodes).unwrap());
         let (mut solver, mut reference) = (Solver::new(&some), Solver::new(&whole));
         let mut touching = 0;
         for q in &configurations {

@@ -16,10 +16,10 @@ pub use effects::{EFFECTS, Effect, Tuning};
 pub use error::{Diagnostic, SceneError};
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
 pub use spec::{
-    Algorithm, AxisSpec, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec, FrictionSpec, GraphicsEffects,
-    GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects, HapticsSpec, Interpolation, JointKind,
-    JointSpec, Material, MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec, Shape, SkinSpec, SpringKind,
-    SpringSpec, StiffeningSpec, Waypoint,
+    Algorithm, AxisSpec, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec, FrictionSpec,
+    GraphicsEffects, GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects, HapticsSpec,
+    Interpolation, JointKind, JointSpec, Material, MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec,
+    Shape, SkinSpec, SpringKind, SpringSpec, StiffeningSpec, Waypoint,
 };
 
 use check::Checker;

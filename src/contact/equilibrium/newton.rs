@@ -137,9 +137,15 @@ impl Newton {
     }
 
     /// The displacement du on the support with which (K + B) du is the force `load` on the support to `tolerance`, B the Hessian of the
-    /// contacts given to [`Newton::factorise`]; `None` where K + B is found not to be positive definite, and then
+    /// contacts given to [`Newton::factorise`], and what it leaves of the load; `None` where K + B is found not to be positive definite, and then
     /// [`Newton::descent`] is a direction in which the energy curves downwards [m].
-    pub fn respond(&mut self, support: &Support, springs: Springs, load: &[f64], tolerance: f64) -> Option<&[f64]> {
+    pub fn respond(
+        &mut self,
+        support: &Support,
+        springs: Springs,
+        load: &[f64],
+        tolerance: f64,
+    ) -> Option<(&[f64], &[f64])> {
         self.force.fill(0.0);
         self.displacement.fill(0.0);
         self.residual.copy_from_slice(load);
@@ -148,7 +154,7 @@ impl Newton {
         let stop = tolerance * tolerance * dot(&self.residual, &self.relieved);
         let mut left = INNER_ITERATIONS_PER_UNKNOWN * support.order();
         self.conjugate_gradients(support, springs, stop, &mut left).ok()?;
-        Some(&self.displacement)
+        Some((&self.displacement, &self.residual))
     }
 
     /// The search direction of the last solve, as a force, and its length in the energy norm [N, sqrt(J)].

@@ -58,10 +58,13 @@ pub(super) fn tangent(
         }
     });
     newton.factorise(support, springs);
+    let mut responses: Vec<Vec<f64>> = Vec::with_capacity(joints);
     for k in 0..joints {
-        let moved = newton.respond(support, springs, &loads[k], RESPONSE_TOLERANCE)?;
-        for (l, load) in loads.iter().enumerate().take(k + 1) {
-            tangent.add(k, l, dot(load, moved));
+        let (moved, residual) = newton.respond(support, springs, &loads[k], RESPONSE_TOLERANCE)?;
+        responses.push(moved.to_vec());
+        for (l, (load, response)) in loads.iter().zip(&responses).enumerate() {
+            // What the residual adds makes the error a product of those of both responses.
+            tangent.add(k, l, dot(load, moved) + dot(response, residual));
         }
     }
     Some(tangent)

@@ -9,7 +9,6 @@
 //!
 //! Each row of a ball's spring is a spring here. In series ([`crate::contact::law::series`]) they share the compliance (1 - e) / kc, and have e / kc each.
 
-use crate::contact::geometry::smooth::CARRIERS;
 use crate::contact::law::springs::Springs;
 use crate::contact::linear::cholesky;
 use crate::contact::linear::rows::add_rows;
@@ -26,6 +25,8 @@ pub struct Woodbury {
     taken: Vec<usize>,
     /// C g_a on the support for each of them, filled up with zeros to whole blocks [m/N].
     columns: Vec<f64>,
+    /// Of an isotropic object, the size of a column at each node, along the row's normal [m/N].
+    scalars: Vec<f64>,
     order: usize,
     /// 1 + mu [1].
     stiffening: f64,
@@ -38,7 +39,7 @@ pub struct Woodbury {
 impl Woodbury {
     /// Takes up the springs for which `touching` is true, on an object stiffened by the factor `stiffening`.
     pub fn set_up(&mut self, support: &Support, springs: Springs, touching: &[bool], stiffening: f64) {
-        let Self { taken, columns, order, factor, pushes, .. } = self;
+        let Self { taken, columns, scalars, order, factor, pushes, .. } = self;
         taken.clear();
         taken.extend((0..touching.len()).filter(|&row| touching[row]));
         let count = taken.len();
@@ -52,15 +53,16 @@ impl Woodbury {
         for (a, &row) in taken.iter().enumerate() {
             let column = &mut columns[a * *order..][..*order];
             let contact = &springs.contacts[row];
-            let mut unit = [(0, [0.0; 3]); CARRIERS];
-            let weights = contact.carriers.weights();
-            for ((load, weight), &slot) in unit.iter_mut().zip(weights).zip(&springs.slots[row]) {
-                *load = (slot as usize, (contact.normal * *weight).to_array());
-            }
-            support.respond(&unit[..weights.len()], column);
+            let isotropic = support.respond_along(contact.normal, carrying(springs, row), scalars, column);
             for (b, &other) in taken[..=a].iter().enumerate() {
                 let given = compliance(springs, row, other) / (springs.kc * springs.contacts[row].share);
-                factor[a * count + b] = springs.deepening(other, column) + stiffening * given;
+                let deepened = if isotropic {
+                    let along = carrying(springs, other).map(|(slot, weight)| weight * scalars[slot]).sum::<f64>();
+                    contact.normal.dot(springs.contacts[other].normal) * along
+                } else {
+                    springs.deepening(other, column)
+                };
+                factor[a * count + b] = deepened + stiffening * given;
             }
         }
         cholesky::factorize(factor, count);
@@ -91,6 +93,12 @@ impl Woodbury {
             force.iter_mut().chain(displacement).for_each(|entry| *entry /= *stiffening);
         }
     }
+}
+
+/// The slots of a row's nodes on the support, with their weights.
+fn carrying(springs: Springs<'_>, row: usize) -> impl Iterator<Item = (usize, f64)> + Clone {
+    let slots = springs.slots[row].iter().map(|&slot| slot as usize);
+    slots.zip(springs.contacts[row].carriers.weights().iter().copied())
 }
 
 /// By how much one row gives way under the force of another, times kc [1].

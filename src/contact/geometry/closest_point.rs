@@ -118,15 +118,15 @@ impl Closest {
     }
 
     /// Takes `facet`, number `t`, instead if it is nearer to `x`, or as near with a lower number; its closest point, and the squared
-    /// distance of that [m^2].
-    pub fn consider(&mut self, x: DVec3, facet: &Facet, t: u32) -> (ClosestPoint, f64) {
-        let point = facet.closest(x);
+    /// distance of that [m^2]. Nothing is done, and none returned, where it is farther than `within` [m].
+    pub fn consider(&mut self, x: DVec3, facet: &Facet, t: u32, within: f64) -> Option<(ClosestPoint, f64)> {
+        let point = facet.closest(x, within)?;
         let distance_squared = x.distance_squared(facet.point(point.weights));
         if distance_squared < self.distance_squared || (distance_squared == self.distance_squared && t < self.triangle)
         {
             *self = Self { distance_squared, triangle: t, point };
         }
-        (point, distance_squared)
+        Some((point, distance_squared))
     }
 }
 

@@ -167,7 +167,7 @@ mod tests {
             let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
             let object = Object::build(&scene.object).unwrap();
             let surface = RestSurface::new(&object, ContactSurface::Facets);
-            let bounds = &surface.distance_bounds;
+            let bounds = DistanceBounds::new(&surface);
             let side = bounds.inverse_side.recip();
             let size = DVec3::from_array(bounds.counts.map(|count| count as f64)) * side;
             let mut random = Random::new(1);

@@ -9,6 +9,9 @@ use super::normals::{area_vector, unit_or_zero};
 use crate::tolerances::{FACET_ITERATIONS, FACET_STEP, MINIMUM_SQUARE};
 use glam::DVec3;
 
+/// The greatest sum of [`bubbles`]: no point of a facet stands off the flat triangle by more than this times its longest sagitta [1].
+pub const MOST_BUBBLES: f64 = 4.0 / 3.0;
+
 /// A triangle of the contact surface [m].
 #[derive(Clone, Copy, Debug)]
 pub struct Facet {
@@ -38,18 +41,17 @@ pub fn directions(feature: Feature) -> &'static [Direction] {
 }
 
 /// The factors 4 w_k w_{k+1} of the sagittas at weights `w` [1].
+#[inline]
 #[must_use]
 pub fn bubbles(w: [f64; 3]) -> [f64; 3] {
     [4.0 * w[0] * w[1], 4.0 * w[1] * w[2], 4.0 * w[2] * w[0]]
 }
 
 /// Their derivative at `w` along `d`.
+#[inline]
 #[must_use]
 pub fn bubble_slopes(w: [f64; 3], d: Direction) -> [f64; 3] {
-    [0, 1, 2].map(|k| {
-        let next = (k + 1) % 3;
-        4.0 * (d[k] * w[next] + w[k] * d[next])
-    })
+    [4.0 * (d[0] * w[1] + w[0] * d[1]), 4.0 * (d[1] * w[2] + w[1] * d[2]), 4.0 * (d[2] * w[0] + w[2] * d[0])]
 }
 
 impl Facet {
@@ -99,32 +101,39 @@ impl Facet {
         left.cross(right).length().atan2(left.dot(right))
     }
 
-    /// The point of it that is closest to `x`.
+    /// The point of it that is closest to `x`; none where a bent facet is farther than `within` [m].
     #[inline]
     #[must_use]
-    pub fn closest(&self, x: DVec3) -> ClosestPoint {
+    pub fn closest(&self, x: DVec3, within: f64) -> Option<ClosestPoint> {
         let flat = closest_point(x, self.corners);
-        if self.sagittas.is_none() { flat } else { self.closest_bent(x, flat.weights) }
+        let Some(sagittas) = self.sagittas else { return Some(flat) };
+        let [a, b, c] = &sagittas;
+        let longest = a.length_squared().max(b.length_squared()).max(c.length_squared()).sqrt();
+        let least = x.distance(combine(&self.corners, flat.weights)) - MOST_BUBBLES * longest;
+        (least <= within || within.is_nan()).then(|| self.closest_bent(x, flat.weights))
     }
 
     /// The same on a bent facet, searched from `start`.
     fn closest_bent(&self, x: DVec3, start: [f64; 3]) -> ClosestPoint {
-        if let Some(weights) = self.stationary(x, start) {
-            return ClosestPoint { weights, feature: Feature::Face };
+        let unbounded = self.stationary(x, start);
+        if unbounded.into_iter().all(|weight| weight >= 0.0) {
+            return ClosestPoint { weights: unbounded, feature: Feature::Face };
         }
-        let candidates = [0, 1, 2].map(|k| self.closest_on_edge(x, k, start));
-        let distance = |candidate: &ClosestPoint| x.distance_squared(self.point(candidate.weights));
-        let [mut best, second, third] = candidates;
-        for other in [second, third] {
-            if distance(&other) < distance(&best) {
-                best = other;
+        // On an edge beyond which the facet would have to go on.
+        let mut best: Option<(f64, ClosestPoint)> = None;
+        for k in (0..3).filter(|k| unbounded[(k + 2) % 3] < 0.0) {
+            let point = self.closest_on_edge(x, k, start);
+            let square = x.distance_squared(self.point(point.weights));
+            if best.is_none_or(|(least, _)| square < least) {
+                best = Some((square, point));
             }
         }
-        best
+        best.map_or(ClosestPoint { weights: start, feature: Feature::Face }, |(_, point)| point)
     }
 
-    /// Weights inside of the facet where the distance to `x` is least, if Newton's method from `start` leads there.
-    fn stationary(&self, x: DVec3, start: [f64; 3]) -> Option<[f64; 3]> {
+    /// Weights where the distance to `x` is least, those of the facet continued beyond its edges; far outside, whence Newton's method will not
+    /// come back, where it has got to.
+    fn stationary(&self, x: DVec3, start: [f64; 3]) -> [f64; 3] {
         let bends = [self.bend(FACE[0], FACE[0]), self.bend(FACE[0], FACE[1]), self.bend(FACE[1], FACE[1])];
         let mut w = start;
         for _ in 0..FACET_ITERATIONS {
@@ -132,22 +141,20 @@ impl Facet {
             let (a, b) = (self.tangent(w, FACE[0]), self.tangent(w, FACE[1]));
             let slope = [offset.dot(a), offset.dot(b)];
             let metric = [a.dot(a), a.dot(b), b.dot(b)];
-            let full = [0, 1, 2].map(|k| metric[k] + offset.dot(bends[k]));
+            let full =
+                [metric[0] + offset.dot(bends[0]), metric[1] + offset.dot(bends[1]), metric[2] + offset.dot(bends[2])];
             // Where the distance is not convex, the metric alone leads downhill.
             let [h, i, j] = if full[0] > 0.0 && full[0] * full[2] > full[1] * full[1] { full } else { metric };
             let determinant = (h * j - i * i).max(MINIMUM_SQUARE);
             let step = [(i * slope[1] - j * slope[0]) / determinant, (i * slope[0] - h * slope[1]) / determinant];
             let (u, v) = (w[1] + step[0], w[2] + step[1]);
             w = [1.0 - u - v, u, v];
-            // Far outside, whence it will not come back.
-            if w.into_iter().any(|weight| weight < -1.0) {
-                return None;
-            }
-            if step[0].abs() + step[1].abs() < FACET_STEP {
+            let far = w.into_iter().any(|weight| weight < -1.0);
+            if far || step[0].abs() + step[1].abs() < FACET_STEP {
                 break;
             }
         }
-        w.into_iter().all(|weight| weight >= 0.0).then_some(w)
+        w
     }
 
     /// The point of edge k that is closest to `x`, searched from the point of the edge that is next to `start`.

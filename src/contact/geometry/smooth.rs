@@ -6,8 +6,7 @@
 //! nodes, a facet of twelve, and the surface passes through all nodes of the mesh. Where a smooth surface with edges of length h
 //! is sampled, normals of neighbouring facets differ by O(h^2) at their edge, instead of by O(h) as those of flat facets do.
 
-use super::facet::{Direction, Facet, bubble_slopes, bubbles};
-use super::normals;
+use super::facet::{Direction, Facet, MOST_BUBBLES, bubble_slopes, bubbles};
 use crate::object::Topology;
 use glam::DVec3;
 
@@ -20,9 +19,6 @@ const ACROSS: f64 = 1.0 / 8.0;
 
 /// Weight of the corners beyond.
 const BEYOND: f64 = -1.0 / 16.0;
-
-/// No point of a facet stands off the flat triangle by more than this times its longest sagitta: the greatest sum of bubbles.
-const MOST_BUBBLES: f64 = 4.0 / 3.0;
 
 /// The facets' nodes.
 pub struct SmoothSurface {
@@ -55,19 +51,25 @@ impl SmoothSurface {
     #[must_use]
     pub fn facet(&self, positions: &[DVec3], t: u32) -> Facet {
         let nodes = &self.nodes[t as usize];
-        let corners = [nodes[0], nodes[1], nodes[2]];
-        let sagittas = [0, 1, 2].map(|k| sagitta(k, nodes.map(|node| positions[node as usize])));
-        Facet { corners: normals::corners(positions, corners), sagittas: Some(sagittas) }
+        let at = |j: usize| positions[nodes[j] as usize];
+        let (corners, opposite) = ([at(0), at(1), at(2)], [at(3), at(4), at(5)]);
+        let mut sagittas = [DVec3::ZERO; 3];
+        for (k, sagitta) in sagittas.iter_mut().enumerate() {
+            let (next, last) = ((k + 1) % 3, (k + 2) % 3);
+            let beyond = opposite[next] + opposite[last] + at(6 + 2 * k) + at(7 + 2 * k);
+            *sagitta = (corners[last] + opposite[k]) * ACROSS + beyond * BEYOND;
+        }
+        Facet { corners, sagittas: Some(sagittas) }
     }
 
     /// By how much the facets stand off the flat triangles at most, with nodes at `positions` [m].
     #[must_use]
     pub fn bulge(&self, positions: &[DVec3]) -> f64 {
-        let longest = |nodes: &[u32; CARRIERS]| {
-            let positions = nodes.map(|node| positions[node as usize]);
-            [0, 1, 2].map(|k| sagitta(k, positions).length()).into_iter().fold(0.0, f64::max)
+        let longest = |t: usize| {
+            let sagittas = self.facet(positions, t as u32).sagittas.into_iter().flatten();
+            sagittas.map(|sagitta| sagitta.length()).fold(0.0, f64::max)
         };
-        MOST_BUBBLES * self.nodes.iter().map(longest).fold(0.0, f64::max)
+        MOST_BUBBLES * (0..self.nodes.len()).map(longest).fold(0.0, f64::max)
     }
 
     /// The greatest of `square` over the sagittas of all edges, each given as its nodes and their weights: where that is the square of a
@@ -92,14 +94,6 @@ pub fn across(triangles: &[[u32; 3]], topology: &Topology, t: usize, k: usize) -
     let across = topology.across[t][k] as usize;
     let end = triangles[t][(k + 1) % 3];
     (across, triangles[across].iter().position(|&corner| corner == end).unwrap_or(0))
-}
-
-/// The sagitta of edge `k` of a facet with nodes at `positions` [m].
-#[inline]
-fn sagitta(k: usize, positions: [DVec3; CARRIERS]) -> DVec3 {
-    let (next, last) = ((k + 1) % 3, (k + 2) % 3);
-    (positions[last] + positions[3 + k]) * ACROSS
-        + (positions[3 + next] + positions[3 + last] + positions[6 + 2 * k] + positions[7 + 2 * k]) * BEYOND
 }
 
 /// Weights of a facet's nodes in a sum of its corners and of its sagittas with these factors.

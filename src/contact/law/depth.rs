@@ -63,7 +63,8 @@ impl Carriers {
     #[inline]
     #[must_use]
     pub fn new(nodes: &[u32], point: &ClosestPoint) -> Self {
-        let mut carriers = Self { count: nodes.len(), nodes: [0; CARRIERS], weights: [0.0; CARRIERS], slopes: [[0.0; CARRIERS]; 2] };
+        let mut carriers =
+            Self { count: nodes.len(), nodes: [0; CARRIERS], weights: [0.0; CARRIERS], slopes: [[0.0; CARRIERS]; 2] };
         carriers.nodes[..nodes.len()].copy_from_slice(nodes);
         let bent = nodes.len() == CARRIERS;
         if bent {
@@ -164,7 +165,13 @@ pub struct Curvature {
 /// `pseudonormal` decides the side; it is N on a face, and stands in for it where x lies on the edge or vertex itself.
 #[inline]
 #[must_use]
-pub fn measure(x: DVec3, radius: f64, facet: &Facet, point: &ClosestPoint, pseudonormal: DVec3) -> (DVec3, f64, Curvature) {
+pub fn measure(
+    x: DVec3,
+    radius: f64,
+    facet: &Facet,
+    point: &ClosestPoint,
+    pseudonormal: DVec3,
+) -> (DVec3, f64, Curvature) {
     let mut curvature = Curvature::default();
     let normal;
     if point.feature == Feature::Face {
@@ -203,8 +210,8 @@ impl Curvature {
                 if facet.sagittas.is_none() {
                     return;
                 }
-                let bends = [facet.bend(d, d), facet.bend(d, e), facet.bend(e, e)].map(|bend| normal.dot(bend));
-                let full = [0, 1, 2].map(|k| metric[k] + s * bends[k]);
+                let bends = [normal.dot(facet.bend(d, d)), normal.dot(facet.bend(d, e)), normal.dot(facet.bend(e, e))];
+                let full = [metric[0] + s * bends[0], metric[1] + s * bends[1], metric[2] + s * bends[2]];
                 // Where the distance is hardly convex the closest point is about to leave, and no derivative holds for long.
                 let area = metric[0] * metric[2] - metric[1] * metric[1];
                 if full[0] > 0.0 && full[0] * full[2] - full[1] * full[1] > LEAST_CONVEXITY * area {
@@ -324,8 +331,8 @@ impl Contact {
     pub fn second_variation(&self, variation: &Variation) -> Variation {
         let Self { normal, curvature, .. } = self;
         let dp = variation.point;
-        let sliding = curvature.tangents.map(|tangent| tangent.dot(dp));
-        let tilting = variation.tangents.map(|tangent| normal.dot(tangent));
+        let sliding = [curvature.tangents[0].dot(dp), curvature.tangents[1].dot(dp)];
+        let tilting = [normal.dot(variation.tangents[0]), normal.dot(variation.tangents[1])];
         let bent = apply(curvature.bending, sliding);
         let turned = apply(curvature.turning, tilting);
         let carried = apply(curvature.turning, sliding);
@@ -350,6 +357,8 @@ impl Contact {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::geometry::facet::Direction;
+    use crate::contact::geometry::smooth::SmoothSurface;
     use crate::random::sequence;
 
     /// A facet on its own nodes, flat or bent, and where they are.
@@ -369,15 +378,13 @@ mod tests {
 
         /// The contact of `x`; `outward` decides the side at edges and vertices.
         fn contact(&self, x: DVec3, radius: f64, facet: &Facet, outward: DVec3) -> (Feature, Contact) {
-            let point = facet.closest(x);
+            let point = facet.closest(x, f64::MAX).unwrap();
             let pseudonormal = if point.feature == Feature::Face { facet.normal(point.weights) } else { outward };
             let measured = measure(x, radius, facet, &point, pseudonormal);
             let contact = Contact::new(0, Carriers::new(&self.nodes, &point), measured);
             (point.feature, Contact { multiplier: 3.0 * measured.1, ..contact })
         }
     }
-
-    use crate::contact::geometry::smooth::SmoothSurface;
 
     /// Product of the Hessian of 1/2 kc depth^2 with `v`, times `w`.
     fn hessian(contact: &Contact, kc: f64, v: &[DVec3], w: &[DVec3]) -> f64 {
@@ -391,7 +398,7 @@ mod tests {
     #[test]
     fn derivatives_agree_with_finite_differences() {
         let mut next = sequence(7);
-        let h = 1e-4;
+        let h = 1e-5;
         for count in [3, CARRIERS] {
             let mut seen = [0usize; 6];
             for _ in 0..6000 {
@@ -411,7 +418,15 @@ mod tests {
                 let (feature, here) = sample.contact(x, radius, &facet, outward);
                 let (feature_before, before) = sample.contact(x, radius, &at(-h), outward);
                 let (feature_after, after) = sample.contact(x, radius, &at(h), outward);
-                let convex = here.curvature.turning.iter().all(|entry| entry.abs() < 30.0);
+                // Where a bent facet is about to let the closest point go, there is no derivative to speak of.
+                let bent = count == CARRIERS && !matches!(feature, Feature::Vertex(_));
+                let foot = facet.closest(x, f64::MAX).unwrap().weights;
+                let off = |d: &Direction| (facet.point(foot) - x).dot(facet.tangent(foot, *d)).abs();
+                if directions(feature).iter().any(|d| off(d) > 1e-9) {
+                    continue;
+                }
+                let convex = here.curvature.turning.iter().all(|entry| entry.abs() < 30.0)
+                    && !(bent && here.curvature.bending == [0.0; 3]);
                 let clear = here.curvature.distance.abs() > 0.2 && here.normal.dot(outward).abs() > 0.1 && area > 0.3;
                 if feature != feature_before || feature != feature_after || !clear || !convex {
                     continue;
@@ -430,7 +445,10 @@ mod tests {
                 assert!((slope - expected).abs() < 1e-4 * (1.0 + expected.abs()), "{feature:?} {slope} {expected}");
                 let bend = (slope_along(&after, &w) - slope_along(&before, &w)) / (2.0 * h);
                 let expected = hessian(&here, kc, &v, &w);
-                assert!((bend - expected).abs() < 2e-4 * (1.0 + expected.abs()), "{count} {feature:?} {bend} {expected}");
+                assert!(
+                    (bend - expected).abs() < 1e-4 * (1.0 + expected.abs()),
+                    "{count} {feature:?} {bend} {expected}"
+                );
                 // The reaction at the nodes is the same as on the variation.
                 let reaction = here.second_variation(&here.variation(|j| v[j]));
                 let at_nodes: f64 = (0..count).map(|j| here.at_node(&reaction, j).dot(w[j])).sum();

@@ -5,6 +5,7 @@
 
 use super::rows::{add_rows, weigh};
 use crate::object::Compliance;
+use glam::DVec3;
 
 /// Nodes in contact, each with a slot; C restricted to them.
 pub struct Support {
@@ -112,16 +113,33 @@ impl Support {
         }
     }
 
-    /// What forces on the nodes in some slots displace the support by [m].
-    pub fn respond(&self, forces: &[(usize, [f64; 3])], displacement: &mut [f64]) {
-        let block = self.rows_per_node * self.rows_per_node * self.nodes.len();
-        let loads = forces.iter().map(|&(slot, force)| (slot * block, force));
+    /// What a force of one newton along `direction`, shared among slots by their weights, displaces the support by [m]. Of an isotropic object,
+    /// for which it returns true, all moves along the direction, by the `scalars` [m].
+    pub fn respond_along(
+        &self,
+        direction: DVec3,
+        weights: impl Iterator<Item = (usize, f64)>,
+        scalars: &mut Vec<f64>,
+        displacement: &mut [f64],
+    ) -> bool {
+        let count = self.nodes.len();
         if self.rows_per_node == 1 {
-            weigh(&self.compliance, loads, displacement);
-        } else {
-            displacement.fill(0.0);
-            add_rows(loads.map(|(start, force)| (&self.compliance[start..start + block], force)), displacement);
+            scalars.clear();
+            scalars.resize(count, 0.0);
+            for (slot, weight) in weights {
+                let row = &self.compliance[slot * count..(slot + 1) * count];
+                scalars.iter_mut().zip(row).for_each(|(sum, entry)| *sum += weight * entry);
+            }
+            for (node, size) in displacement.as_chunks_mut::<3>().0.iter_mut().zip(scalars) {
+                *node = (direction * *size).to_array();
+            }
+            return true;
         }
+        let block = 9 * count;
+        displacement.fill(0.0);
+        let rows = |slot: usize| &self.compliance[slot * block..(slot + 1) * block];
+        add_rows(weights.map(|(slot, weight)| (rows(slot), (direction * weight).to_array())), displacement);
+        false
     }
 
     /// `displacement = C forces` on all surface nodes that the compliance covers, zero on others; `forces` are on A.

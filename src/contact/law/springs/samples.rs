@@ -37,7 +37,7 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
         let middle = corners(t).iter().sum::<DVec3>() / 3.0;
         let x = middle * random.between(0.7, 0.9) + random.vector() * 1e-3;
         let facet = Facet::flat(corners(t));
-        let point = facet.closest(x);
+        let point = facet.closest(x, f64::MAX).unwrap();
         let measured = measure(x, 0.0, &facet, &point, middle.normalize());
         contacts.push(Contact::new(i, Carriers::new(&object.triangles[t], &point), measured));
     }
@@ -49,7 +49,7 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
         let around = (0..object.triangles.len()).filter(|&near| object.triangles[near].contains(&shared));
         for near in around.take(3) {
             let facet = Facet::flat(corners(near));
-            let point = facet.closest(x);
+            let point = facet.closest(x, f64::MAX).unwrap();
             let outward = x - facet.point(point.weights);
             let measured = measure(x, 0.008, &facet, &point, outward.normalize());
             contacts.push(Contact::new(i, Carriers::new(&object.triangles[near], &point), measured));
