@@ -230,6 +230,13 @@ const BROKEN: &[Broken] = &[
     ("stiffness = 1000", "stiffness = 1000\nmax_iterations = 0", "max_iterations", &["at least 1"]),
     ("stiffness = 1000", "stiffness = 1000\nalgorithm = \"magic\"", "magic", &["`energy`", "`paper`", "`linearised`"]),
     ("stiffness = 1000", "stiffness = 1000\nupdates = 2", "updates = 2", &["linearised"]),
+    ("stiffness = 1000", "stiffness = 1000\nsurface = \"round\"", "round", &["facets", "smooth"]),
+    (
+        "stiffness = 1000",
+        "stiffness = 1000\nalgorithm = \"paper\"\nsurface = \"smooth\"",
+        "smooth",
+        &["defined on the triangles", "energy"],
+    ),
     ("stiffness = 1000", "", "[contact]", &["no stiffness", "stiffness_per_length"]),
     ("stiffness = 1000", "stiffness_per_length = 1e5", "[contact]", &["{ at = .. }", "of each node instead"]),
     ("stiffness = 1000", "stiffness = \"rigid\"\nstiffness_per_length = 1e5", "rigid", &["leave out one"]),

@@ -2,7 +2,7 @@
 //!
 //! With |u| <= m everywhere, the closest triangle of the deformed surface to a proxy node that is D from it at rest lies within
 //! D + 2 m of the node at rest (see `detection`). So a result is the same, whatever the compliance leaves out, if it covers all
-//! leaves of the surface's tree so near to each touching node. Beforehand m is not known; a surface that gives way to a proxy whose deepest node
+//! facets so near to each touching node. Beforehand m is not known; a surface that gives way to a proxy whose deepest node
 //! is d below it moves by about d, hardly by more than [`EXPECTED_MOTION`] d. Results that need more are found and flagged.
 
 use super::detection::Detection;
@@ -72,8 +72,7 @@ pub(super) fn covered_leaves(surface: &RestSurface<'_>, compliance: &Compliance)
     surface.bounds.leaves.iter().map(|leaf| leaf.triangles.iter().all(covered)).collect()
 }
 
-/// Whether the compliance covers all that the result depends on, with all facets in the leaves of the tree that matter, where no point of the surface
-/// has moved by more than `moved` [m].
+/// Whether the compliance covers all that the result depends on, where no point of the surface has moved by more than `moved` [m].
 pub(super) fn covers(model: &Model<'_>, detection: &Detection, equilibrium: &Equilibrium, moved: f64) -> bool {
     let covered = |node: u32| model.compliance.place(node).is_some();
     let mut within = equilibrium.forces.iter().all(|force| covered(force.node));
@@ -83,7 +82,10 @@ pub(super) fn covers(model: &Model<'_>, detection: &Detection, equilibrium: &Equ
             let radius = distance.abs() + 2.0 * moved + model.surface.bulge;
             let squared = radius * radius + model.surface.bounds.slack(x);
             model.surface.bounds.walk(x, squared, |leaf| {
-                within &= model.covered_leaves[leaf];
+                if !model.covered_leaves[leaf] {
+                    let near = model.surface.bounds.leaves[leaf].near(x, squared);
+                    within &= near.flat_map(|t| model.surface.carriers(t)).all(|&node| covered(node));
+                }
                 // Nothing more can change.
                 if within { squared } else { -1.0 }
             });

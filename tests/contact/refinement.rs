@@ -78,17 +78,17 @@ fn ripple(torques: &[f64]) -> f64 {
 }
 
 #[test]
-fn torque_converges_at_second_order_as_the_mesh_of_a_smooth_surface_becomes_finer() {
+fn the_mesh_shows_less_through_a_smooth_surface() {
     let on = |subdivisions: u32, surface: &str| {
         let mesh = format!("subdivisions = {subdivisions}");
         let contact = format!("[contact]\nsurface = \"{surface}\"");
         torques(60, &[("subdivisions = 3", &mesh), ("[contact]", &contact), ("spacing = 0.004", "spacing = 0.002")])
     };
-    let [coarse, middle, fine] = [2, 3, 4].map(|subdivisions| on(subdivisions, "smooth"));
-    let size = rms(fine.iter().copied());
-    let (first, second) = (difference(&coarse, &middle), difference(&middle, &fine));
-    assert!(first > 3.48 * second && second < 0.02 * size, "order 1.8 at least: {first} {second} of {size}");
-    // Corners of the facets make the torque ripple, and less than half of that is left without them.
-    let [smooth, flat] = [&middle, &on(3, "facets")].map(|torques| ripple(torques));
-    assert!(smooth < 0.5 * flat, "{smooth} {flat} of {size}");
+    // The change from 642 to 2,562 nodes, and the ripple on the former: corners of the facets make most of both.
+    let [smooth, flat] = ["smooth", "facets"].map(|surface| [3, 4].map(|subdivisions| on(subdivisions, surface)));
+    let size = rms(smooth[1].iter().copied());
+    let [change, change_of_facets] = [&smooth, &flat].map(|[middle, fine]| difference(middle, fine));
+    assert!(change < 0.6 * change_of_facets && change < 0.012 * size, "{change} {change_of_facets} of {size}");
+    let [left, whole] = [&smooth[0], &flat[0]].map(|torques| ripple(torques));
+    assert!(left < 0.5 * whole, "{left} {whole} of {size}");
 }

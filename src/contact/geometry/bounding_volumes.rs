@@ -103,6 +103,14 @@ pub struct Leaf {
     packet: Packet,
 }
 
+impl Leaf {
+    /// Its triangles that at rest are no farther from `x` than the squared radius `bound` [m^2].
+    pub fn near(&self, x: DVec3, bound: f64) -> impl Iterator<Item = u32> {
+        let squares = self.packet.distances_squared(x);
+        self.triangles.iter().copied().zip(squares).filter(move |(_, square)| *square <= bound).map(|(t, _)| t)
+    }
+}
+
 /// The tree.
 pub struct BoundingVolumes {
     /// Level by level from the leaves' own up: the last one is the root.

@@ -1,5 +1,6 @@
 //! Hard cases of contact: stiffness, geometry, meshes, units, kinematics, and the torque as a field over C-space.
 
+mod equilibria;
 mod field;
 mod geometry;
 mod kinematics;
@@ -27,6 +28,7 @@ pub fn cases() -> Vec<Case> {
         case("far from the origin", units::far_away),
         case("continuous torque", field::continuity),
         case("torque from energy", field::curl),
+        case("lowest equilibrium", equilibria::run),
         case("singular arms", kinematics::run),
     ]
 }
