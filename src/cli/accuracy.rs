@@ -10,6 +10,11 @@ use std::path::PathBuf;
 
 /// What to measure, and how much.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize accuracy sphere.toml
+  haptize accuracy sphere.toml --points 20000 --configurations 500     less time, rougher figures
+  haptize accuracy sphere.toml --effects                               also what each effect costs")]
 pub struct Arguments {
     /// The scene's file.
     scene: PathBuf,

@@ -10,6 +10,10 @@ use std::{fmt::Write, thread};
 
 /// No arguments of its own.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize doctor
+  haptize doctor --json")]
 pub struct Arguments {}
 
 /// One thing looked at.

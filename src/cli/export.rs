@@ -9,6 +9,10 @@ use std::path::PathBuf;
 
 /// What to export, and where to.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize export sphere.haptize --format npz
+  haptize export sphere.haptize --format csv -o tables/sphere.csv")]
 pub struct Arguments {
     /// The dataset's file.
     dataset: PathBuf,

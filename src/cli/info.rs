@@ -15,6 +15,10 @@ use std::{
 
 /// What to look at.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize info sphere.haptize
+  haptize info sphere.haptize --json")]
 pub struct Arguments {
     /// The dataset's file.
     dataset: PathBuf,

@@ -28,6 +28,14 @@ use std::{
 
 /// What to play, and how.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize play sphere.haptize
+  haptize play sphere.haptize --motion scrape
+  haptize play sphere.haptize --motion hand.csv --seconds 10 --realtime
+  haptize play sphere.haptize --record session.csv
+  haptize play sphere.haptize --replay session.csv
+  haptize play sponge.haptize --motion scrape --beside sponge_fabric.haptize")]
 pub struct Arguments {
     /// The dataset's file.
     dataset: PathBuf,
@@ -77,8 +85,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     let dataset = Dataset::load(&arguments.dataset)?;
     let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
-    for exceeded in &setup.exceeded {
-        tell(format_args!("haptize: note: {exceeded}"));
+    if let Some(advice) = &setup.advice {
+        tell(format_args!("haptize: note: {advice}"));
     }
     let (played, told) = match &arguments.replay {
         Some(file) => replay(&setup, &dataset, file)?,
@@ -233,9 +241,23 @@ pub fn motion(setup: &Setup, name: &str) -> Result<Motion, Failure> {
     };
     if waypoints.is_empty() {
         let known = "give [motion] in the scene such waypoints and bake it again, or a CSV file by --motion";
-        return Err(format!("the dataset's scene has no motion \"{name}\": {known}").into());
+        return Err(format!(
+            "the dataset's scene has no motion \"{name}\", and its contact is not such that one could be made: {known}"
+        )
+        .into());
+    }
+    if setup.made_motions.contains(&name) {
+        tell(format_args!(
+            "haptize: note: the scene names no {name}; this one was made from where the dataset is in contact"
+        ));
     }
     Ok(Motion::through(waypoints, joints)?)
+}
+
+/// Says in millijoules what was added to the loop's energy, or taken from it.
+fn exchanged(joules: f64) -> String {
+    let verb = if joules > 0.0 { "injected" } else { "removed" };
+    format!("{verb} {:.2} mJ", 1e3 * joules.abs())
 }
 
 /// What was felt, for people.
@@ -248,13 +270,15 @@ pub fn describe(text: &mut String, s: &Summary) -> fmt::Result {
     )?;
     writeln!(
         text,
-        "  continuous   at most {:.4} N m/ms on the proxy, {:.4} on the device",
+        "  steepest     {:.4} N m in a millisecond on the proxy, {:.4} on the device",
         s.max_contact_torque_step, s.max_device_torque_step
     )?;
     writeln!(
         text,
-        "  energy       accounts close to {:.1e} of their turnover; leak {:.2e} J, held torque gave {:.2e} J",
-        s.max_relative_account_residual, s.leak, s.hold_gain
+        "  energy       interpolation {}, sample-and-hold {}; the balance closes to {:.0e} (relative)",
+        exchanged(s.leak),
+        exchanged(s.hold_gain),
+        s.max_relative_account_residual
     )?;
     for (count, what) in [
         (s.outside, "in free space outside the haptized range"),
@@ -284,7 +308,10 @@ pub fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
     line("tick", timing.tick_cost)?;
     line("frame", timing.frame_cost)?;
     let Timing { missed_deadlines, missed_frames, unrecorded, .. } = timing;
-    writeln!(text, "  missed       {missed_deadlines} deadlines, {missed_frames} frames, {unrecorded} records")?;
+    writeln!(
+        text,
+        "  missed       {missed_deadlines} deadlines (ticks left out because an earlier one ran late), {missed_frames} frames, {unrecorded} records"
+    )?;
     let Some(Steal { late, late_beside_steal, seconds }) = timing.steal.filter(|steal| steal.late > 0) else {
         return Ok(());
     };

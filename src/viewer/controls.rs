@@ -14,7 +14,6 @@ use super::{
 use crate::{
     dataset::Dataset,
     gpu::Context,
-    render::passivity::Bound,
     scene::{Algorithm, EFFECTS, Interpolation, Scene, Tuning},
 };
 use eframe::egui::{Align, Button, ComboBox, DragValue, Layout, Response, RichText, Ui};
@@ -67,13 +66,13 @@ impl Controls {
         self.prices.wait();
     }
 
-    /// The panel. `exceeded`: gains beyond their bound; `solvers`: what this machine bakes with. Answers whether the scene is to
-    /// be baked again.
+    /// Shows the panel, and returns whether the scene is to be baked again. `advice`: what is wrong with the gains, if anything;
+    /// `solvers`: what this machine bakes with.
     pub fn show(
         &mut self,
         ui: &mut Ui,
         loaded: &Loaded,
-        exceeded: &[Bound],
+        advice: Option<&str>,
         shown: &mut Shown,
         solvers: &[Solver],
     ) -> bool {
@@ -86,7 +85,7 @@ impl Controls {
                 }
             });
         });
-        self.feel(ui, loaded, exceeded);
+        self.feel(ui, loaded, advice);
         self.effects(ui);
         ui.add_space(GROUP_GAP);
         ui.heading("Scene");
@@ -102,19 +101,19 @@ impl Controls {
         self.haptization(ui, loaded, solvers)
     }
 
-    fn feel(&mut self, ui: &mut Ui, loaded: &Loaded, exceeded: &[Bound]) {
+    fn feel(&mut self, ui: &mut Ui, loaded: &Loaded, advice: Option<&str>) {
         let axes = &loaded.dataset.grid.axes;
         gains::joint(ui, axes, &mut self.joint);
         gains::sliders(ui, axes, self.joint, &mut self.tuning.haptics, &self.original.haptics);
         gains::threshold(ui, &mut self.tuning.haptics);
         self.interpolation(ui, &loaded.dataset);
-        for gain in exceeded {
-            ui.colored_label(ui.visuals().warn_fg_color, RichText::new(gain.to_string()).small());
-        }
-        if exceeded.is_empty() {
-            let palette = palette::of(ui.visuals());
-            ui.colored_label(palette.good, RichText::new("All gains within their passivity bounds").small());
-        }
+        match advice {
+            Some(advice) => ui.colored_label(ui.visuals().warn_fg_color, RichText::new(advice).small()),
+            None => {
+                let good = palette::of(ui.visuals()).good;
+                ui.colored_label(good, RichText::new("All gains within their passivity bounds").small())
+            }
+        };
     }
 
     /// How the torque is interpolated between grid points, and what a tick costs with each way.

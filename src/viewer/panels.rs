@@ -163,7 +163,7 @@ impl Viewer {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
                     gamepad(ui, &self.gamepad);
                     let (controls, loaded) = (&mut session.controls, &session.loaded);
-                    bake = controls.show(ui, loaded, &session.exceeded, &mut self.scene.shown, &self.solvers);
+                    bake = controls.show(ui, loaded, session.advice.as_deref(), &mut self.scene.shown, &self.solvers);
                 });
             });
         let right = share(size.x, SPACE_RANGE);

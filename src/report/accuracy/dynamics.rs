@@ -57,7 +57,7 @@ pub(super) fn graphics(
     study: &mut Accuracy,
 ) -> Result<(), AccuracyError> {
     let Some(graphics) = scene.graphics else {
-        study.notes.push("the graphics is not studied: the scene has no [graphics]".to_owned());
+        study.notes.push("the graphics is not studied: the scene says graphics = false".to_owned());
         return Ok(());
     };
     let none = vec![DVec3::ZERO; object.rest.len()];
