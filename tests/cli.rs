@@ -260,7 +260,7 @@ fn the_demo_needs_nothing_and_leaves_dataset_traces_and_figures() {
     assert!(number("/timing/lateness/p50") >= 0.0);
 
     let files: Vec<_> = told["files"].as_array().unwrap().iter().map(|file| file.as_str().unwrap()).collect();
-    for name in ["sphere.haptize", "trace.csv", "cspace.png", "torque.svg", "press.svg", "object.png"] {
+    for name in ["sphere.haptize", "trace.csv", "cspace.png", "torque.svg", "motion.svg", "object.png"] {
         assert!(files.iter().any(|file| Path::new(file).ends_with(name)), "{name} in {files:?}");
     }
     for file in &files {

@@ -39,7 +39,7 @@ pub(super) fn deepest(own: &Dataset) -> usize {
     (0..own.grid.points()).max_by(|a, b| energy(a).total_cmp(&energy(b))).unwrap_or(0)
 }
 
-/// What is pushed, how, and with which effects.
+/// The object, the push and the effects.
 struct Push<'a> {
     object: &'a Object,
     effects: GraphicsEffects,
