@@ -29,7 +29,7 @@ pub struct Controls {
     joint: Option<usize>,
     /// The scene as it would be baked.
     pub scene: Option<Arc<Scene>>,
-    /// What bakes.
+    /// Backend of the next bake.
     pub solver: Solver,
     /// Whether a change of the scene is baked at once.
     bake_on_change: bool,
@@ -77,10 +77,11 @@ impl Controls {
         solvers: &[Solver],
     ) -> bool {
         ui.horizontal(|ui| {
-            ui.heading("Feel");
+            ui.heading("Feel").on_hover_text("The 1 kHz loop: gains and interpolation, felt at once");
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let changed = self.tuning.haptics != self.original.haptics;
-                if ui.add_enabled(changed, Button::new("Gains of the scene")).clicked() {
+                let reset = ui.add_enabled(changed, Button::new("Reset gains"));
+                if reset.on_hover_text("Takes the gains of the scene again").clicked() {
                     self.tuning.haptics = self.original.haptics.clone();
                 }
             });
@@ -88,7 +89,7 @@ impl Controls {
         self.feel(ui, loaded, advice);
         self.effects(ui);
         ui.add_space(GROUP_GAP);
-        ui.heading("Scene");
+        ui.heading("Scene").on_hover_text("What the 3-D picture shows");
         if loaded.forces.is_some() {
             look(ui, shown);
         } else {
@@ -97,13 +98,14 @@ impl Controls {
             ui.checkbox(&mut shown.ghost, "Device's ghost");
         }
         ui.add_space(GROUP_GAP);
-        ui.heading("Haptization");
+        ui.heading("Haptization").on_hover_text("How the dataset was solved, and solving it again");
         self.haptization(ui, loaded, solvers)
     }
 
     fn feel(&mut self, ui: &mut Ui, loaded: &Loaded, advice: Option<&str>) {
         let axes = &loaded.dataset.grid.axes;
         gains::joint(ui, axes, &mut self.joint);
+        gains::legend(ui);
         gains::sliders(ui, axes, self.joint, &mut self.tuning.haptics, &self.original.haptics);
         gains::threshold(ui, &mut self.tuning.haptics);
         self.interpolation(ui, &loaded.dataset);
@@ -119,7 +121,7 @@ impl Controls {
     /// How the torque is interpolated between grid points, and what a tick costs with each way.
     fn interpolation(&mut self, ui: &mut Ui, dataset: &Dataset) {
         ui.horizontal(|ui| {
-            let label = ui.label("Interpolation");
+            let label = ui.label("Interpolation").on_hover_text("How the torque follows from the grid points around");
             let chosen = &mut self.tuning.haptics.interpolation;
             ComboBox::from_id_salt("interpolation")
                 .width(CHOICE_WIDTH)
@@ -151,7 +153,7 @@ impl Controls {
     /// A box for every effect that the scene names, with its price.
     fn effects(&mut self, ui: &mut Ui) {
         ui.add_space(GROUP_GAP);
-        ui.heading("Effects");
+        ui.heading("Effects").on_hover_text("What the scene adds to plain contact, each with its price");
         let named: Vec<usize> = (0..EFFECTS.len()).filter(|&number| EFFECTS[number].is_in(&self.original)).collect();
         if named.is_empty() {
             let there_are: Vec<String> =
@@ -191,7 +193,8 @@ impl Controls {
         };
         let mut contact = scene.contact;
         ui.horizontal(|ui| {
-            let label = ui.label("Solve");
+            let label =
+                ui.label("Solve").on_hover_text("The algorithm that finds the equilibrium of each configuration");
             ComboBox::from_id_salt("algorithm")
                 .width(CHOICE_WIDTH)
                 .selected_text(algorithm_name(contact.algorithm))
@@ -204,7 +207,7 @@ impl Controls {
                 .labelled_by(label.id);
         });
         ui.horizontal(|ui| {
-            let label = ui.label("on");
+            let label = ui.label("on").on_hover_text("The CPU or a GPU");
             ComboBox::from_id_salt("solver")
                 .width(ui.available_width())
                 .truncate()
@@ -219,7 +222,7 @@ impl Controls {
                 .labelled_by(label.id);
         });
         ui.horizontal(|ui| {
-            let label = ui.label("Contact Kc [N/m]");
+            let label = ui.label("Contact Kc [N/m]").on_hover_text("Stiffness of a contact spring");
             let number = DragValue::new(&mut contact.stiffness).range(CONTACT_STIFFNESS).speed(CONTACT_STIFFNESS_DRAG);
             ui.add(number).labelled_by(label.id);
         });
@@ -238,17 +241,18 @@ impl Controls {
     }
 }
 
-/// What is shown of the scene.
+/// Shows the choices of colour, edges, arrows and ghost.
 fn look(ui: &mut Ui, shown: &mut Shown) {
     ui.horizontal(|ui| {
-        ui.label("Colour");
+        ui.label("Colour").on_hover_text("What the colour of the object means");
         ui.selectable_value(&mut shown.quantity, Quantity::Displacement, "displacement");
         ui.selectable_value(&mut shown.quantity, Quantity::Force, "force");
     });
     ui.horizontal_wrapped(|ui| {
-        ui.checkbox(&mut shown.edges, "Edges");
-        ui.checkbox(&mut shown.forces, "Force arrows");
-        ui.checkbox(&mut shown.ghost, "Device's ghost");
+        ui.checkbox(&mut shown.edges, "Edges").on_hover_text("Edges of the mesh");
+        ui.checkbox(&mut shown.forces, "Force arrows").on_hover_text("Forces of the object on the arm");
+        ui.checkbox(&mut shown.ghost, "Device's ghost")
+            .on_hover_text("Where the device is: the arm that the hand holds");
     });
 }
 

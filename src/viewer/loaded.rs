@@ -29,7 +29,7 @@ pub struct Loaded {
     pub setup: Arc<Setup>,
     /// Contact forces on the object; absent where there is no object to draw.
     pub forces: Option<Arc<ContactForces>>,
-    /// What the bake said, if this window baked it.
+    /// The report of the bake, if this window baked it.
     pub report: Option<Arc<SweepReport>>,
 }
 

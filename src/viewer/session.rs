@@ -33,7 +33,7 @@ pub struct Session {
     slices: Slices,
     cloud: Cloud,
     pub controls: Controls,
-    /// What is wrong with the gains, where they are beyond their passivity bounds.
+    /// A warning about the gains, if they are beyond their passivity bounds.
     pub advice: Option<String>,
     /// Whether the cloud is shown where there is no height for plane and cloud.
     cloud_first: bool,

@@ -123,7 +123,7 @@ fn gains_beyond_their_bound_are_told_and_taken_back() {
     window.harness.step();
     window.wait();
     assert!(window.shows("the gains are not passive"), "no warning of Ks");
-    window.click("Gains of the scene");
+    window.click("Reset gains");
     window.wait();
     assert!(window.shows("All gains within their passivity bounds"));
 }
