@@ -20,7 +20,7 @@ use std::{
     time::SystemTime,
 };
 
-/// What to haptize, and how.
+/// Arguments of `haptize bake`.
 #[derive(clap::Args)]
 #[command(after_help = concat!(
     "\
@@ -32,12 +32,12 @@ Examples:
     adapter_help!()
 ))]
 pub struct Arguments {
-    /// The scene's file.
+    /// The scene.
     scene: PathBuf,
     /// The dataset to write; by default the scene's name in the current folder, ending in .haptize.
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// What solves contact.
+    /// The backend that solves contact.
     #[arg(long, default_value = "auto")]
     backend: BackendChoice,
     /// How contact is solved, instead of as the scene says.
@@ -86,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     Ok(Report { text, json, whole: true })
 }
 
-/// Runs `bake`, dated now, with a progress bar. Ctrl-C stops it after the configurations at hand; afterwards, or again,
+/// Runs `bake`, dated now, with a progress bar. Ctrl-C stops it after the current configurations; afterwards, or again,
 /// Ctrl-C ends the program at once.
 pub fn watched<T, E: Into<Failure>>(
     scene: &Scene,
@@ -110,12 +110,12 @@ pub fn watched<T, E: Into<Failure>>(
     result.map_err(Into::into)
 }
 
-/// Tells on standard error what was noticed on the way.
+/// Prints the warnings of a bake on standard error.
 pub fn warn(report: &SweepReport) {
     report.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
 }
 
-/// What was baked into `file`, for an rms error of `aim` over the rms torque if there was one, for people.
+/// Describes what was baked into `file`, for people; `aim`: the rms error over the rms torque that was asked for, if any.
 pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Option<f64>) -> fmt::Result {
     let SweepReport { points, contact_points, unconverged, overflowed, .. } = report;
     let SweepReport { seconds, configurations_per_second, algorithm, backend, adapter, left_to_cpu, .. } = report;

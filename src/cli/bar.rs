@@ -17,7 +17,7 @@ const BETWEEN_LINES: Duration = Duration::from_secs(5);
 /// How far some work has come.
 pub struct Bar {
     bar: ProgressBar,
-    /// What is counted.
+    /// Name of what is counted.
     unit: &'static str,
     /// Whether it is drawn; a bar that knows no length is not.
     begun: AtomicBool,

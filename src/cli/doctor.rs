@@ -19,15 +19,15 @@ pub struct Arguments {}
 /// One thing looked at.
 #[derive(Serialize)]
 struct Finding {
-    /// What was looked at.
+    /// Subject of the check.
     subject: &'static str,
     /// True where it is as it should be.
     good: bool,
     /// True where haptize cannot work without it.
     essential: bool,
-    /// What was seen.
+    /// Observation.
     seen: String,
-    /// What to do where it is not good; empty where it is.
+    /// Remedy; empty if nothing is wrong.
     remedy: &'static str,
 }
 

@@ -7,7 +7,7 @@ use super::{
 use haptize::dataset::{Dataset, Format};
 use std::path::PathBuf;
 
-/// What to export, and where to.
+/// Arguments of `haptize export`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -16,7 +16,7 @@ Examples:
 pub struct Arguments {
     /// The dataset's file.
     dataset: PathBuf,
-    /// What to write.
+    /// Format of the file.
     #[arg(long)]
     format: Format,
     /// The file to write; by default beside the dataset, with the format's extension.

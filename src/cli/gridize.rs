@@ -26,7 +26,7 @@ use std::{
     time::{Instant, SystemTime},
 };
 
-/// What to gridize, and how finely.
+/// Arguments of `haptize gridize`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -43,10 +43,10 @@ pub struct Arguments {
     /// The dataset to write; by default the first log's name in the current folder, ending in .haptize.
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// A TOML file that says which column is what (datasets/instrument.toml is an example).
+    /// A TOML file that maps columns to quantities (datasets/instrument.toml is an example).
     #[arg(long, value_name = "TOML")]
     columns: Option<PathBuf>,
-    /// A scene whose proxy and gains the dataset is to be felt with; scan logs bring theirs.
+    /// A scene with the arm and the gains to feel the dataset with; scan logs bring theirs.
     #[arg(long)]
     scene: Option<PathBuf>,
     /// Torque above which a configuration counts as contact [N m]; by default what the scan's scene says, three standard
@@ -59,11 +59,11 @@ pub struct Arguments {
     /// Smooth torques within their measured standard deviation first.
     #[arg(long)]
     smooth: bool,
-    /// Say how well the dataset predicts measurements: this share of the samples is left out of a second one, which has to
+    /// Measure how well the dataset predicts measurements: this fraction of the samples is left out of a second one, which has to
     /// predict them.
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true, value_parser = super::fraction)]
     held_out: Option<f64>,
-    /// Say how well the dataset predicts other logs of the same object.
+    /// Measure how well the dataset predicts other logs of the same object.
     #[arg(long, value_name = "LOG", num_args = 1..)]
     against: Vec<PathBuf>,
     /// A folder for figures: samples beside grid, torque, and the hysteresis of imported logs.
@@ -71,7 +71,7 @@ pub struct Arguments {
     figures: Option<PathBuf>,
 }
 
-/// What was read.
+/// The measurements that were read.
 pub struct Source {
     /// The measurements.
     pub samples: Samples,

@@ -13,7 +13,7 @@ use std::{
     path::PathBuf,
 };
 
-/// What to look at.
+/// Arguments of `haptize info`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:

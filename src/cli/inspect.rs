@@ -19,16 +19,16 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// What to look at, and where.
+/// Arguments of `haptize inspect`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   haptize inspect sphere.haptize --q 0.1,1.65,-1.7
   haptize inspect sphere.toml --q=-0.34,1.6,-1.72     with = where the first coordinate is negative")]
 pub struct Arguments {
-    /// A scene's or a dataset's file.
+    /// A scene or a dataset.
     file: PathBuf,
-    /// The configuration: one coordinate a joint [rad or m], separated by commas.
+    /// The configuration: one coordinate per joint [rad or m], separated by commas. Write --q=-0.3,... if the first is negative.
     #[arg(
         long,
         value_name = "A,B,C",

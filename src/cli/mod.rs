@@ -129,10 +129,10 @@ fn command_line() -> clap::Command {
     CommandLine::command()
 }
 
-/// Why a subcommand failed: any room's error. Its message names file and line where there is one, and the remedy.
+/// Why a subcommand failed: any module's error. Its message names file and line if there is one, and the remedy.
 pub type Failure = Box<dyn Error + Send + Sync>;
 
-/// What a subcommand found out or did, for people and for programs.
+/// The result of a subcommand, for people and for programs.
 pub struct Report {
     /// For people: whole lines, the last one ended too.
     pub text: String,

@@ -166,7 +166,7 @@ struct Measured {
 }
 
 impl Measured {
-    /// What was measured, and what was felt of it.
+    /// Returns the measurement together with how it was felt.
     fn felt<'a>(&'a self, (setup, trace): &'a (Setup, Trace)) -> Scanned<'a> {
         let Self { scene, source, dataset } = self;
         Scanned { scene, samples: &source.samples, dataset, chain: &setup.chain, trace }

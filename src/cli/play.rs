@@ -26,7 +26,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// What to play, and how.
+/// Arguments of `haptize play`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -39,28 +39,28 @@ Examples:
 pub struct Arguments {
     /// The dataset's file.
     dataset: PathBuf,
-    /// What the hand does: `press` or `scrape` as in the scene, or a CSV file of times [s] and joint coordinates.
+    /// Motion of the hand: `press` or `scrape` as in the scene, or a CSV file of times [s] and joint coordinates.
     #[arg(long, default_value = "press")]
     motion: String,
-    /// How long; by default as long as the motion [s].
+    /// Duration [s]; by default that of the motion.
     #[arg(long, allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// The device moves exactly as the motion says, whatever the torque, instead of being held by a simulated hand.
+    /// Move the device exactly as the motion says, whatever the torque, instead of letting a simulated hand hold it.
     #[arg(long)]
     exact: bool,
-    /// Against the clock, in a real-time thread where permitted, instead of as fast as it goes.
+    /// Run against the clock, in a real-time thread where permitted, instead of as fast as possible.
     #[arg(long)]
     realtime: bool,
-    /// Records the session into this file: all that the loop was told, and what it answered.
+    /// Record the session into this file: all inputs of the loop and all its outputs.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Has the session in this file again and compares it bit for bit; differences are an error.
+    /// Replay the session in this file and check that it matches bit for bit.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "seconds", "exact", "realtime", "record"])]
     replay: Option<PathBuf>,
     /// The folder to write traces and figures to; by default one in `out/` that is named after dataset and motion.
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Another dataset, felt by the same motion: the forces at the end of both proxies are drawn in one figure.
+    /// Another dataset, played with the same motion: the forces at the ends of both arms are drawn in one figure.
     #[arg(long, value_name = "DATASET", conflicts_with = "replay")]
     beside: Option<PathBuf>,
 }
@@ -144,7 +144,7 @@ fn perform(setup: &Setup, dataset: &Dataset, arguments: &Arguments) -> Result<Pl
     play(setup, dataset, device.as_mut(), seconds, arguments.realtime)
 }
 
-/// Has the session in `file` again. Its figures, and a line that says that it was the same.
+/// Replays the session in `file`. Returns its trace, and a line that says that it matched.
 fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Option<String>), Failure> {
     let recording = Recording::read(file, setup.chain.joints.len())?;
     let mut graphics = setup.graphics(dataset)?;
@@ -260,7 +260,7 @@ fn exchanged(joules: f64) -> String {
     format!("{verb} {:.2} mJ", 1e3 * joules.abs())
 }
 
-/// What was felt, for people.
+/// Describes what was felt, for people.
 pub fn describe(text: &mut String, s: &Summary) -> fmt::Result {
     writeln!(text, "{:.2} s, {} ticks, {:.0} % in contact", s.seconds, s.ticks, 100.0 * s.contact_share)?;
     writeln!(

@@ -21,7 +21,7 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-/// What to scan.
+/// Arguments of `haptize scan`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:

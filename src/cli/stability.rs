@@ -15,12 +15,12 @@ Examples:
   haptize stability contact --no-gpu
   haptize stability --full -o out/stability")]
 pub struct Arguments {
-    /// Only the cases of these rooms: contact, gridization, loop, graphics.
+    /// Modules to test: contact, gridization, loop, graphics; by default all.
     rooms: Vec<String>,
-    /// All that every case varies, instead of a sample that takes a minute: hours for contact, seconds for the other rooms.
+    /// Run all variations of every case instead of a sample that takes a minute: hours for contact, seconds for the other modules.
     #[arg(long)]
     full: bool,
-    /// Leave out what concerns the GPU.
+    /// Skip the cases that need a GPU.
     #[arg(long)]
     no_gpu: bool,
     /// A folder to write the table (Markdown) and a picture of it to.

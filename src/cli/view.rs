@@ -3,7 +3,7 @@
 use super::{Failure, Report};
 use std::path::PathBuf;
 
-/// What to look at.
+/// Arguments of `haptize view`.
 #[derive(clap::Args)]
 #[command(after_help = concat!(
     "\

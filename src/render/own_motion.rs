@@ -44,6 +44,13 @@ pub(super) fn add(scene: &mut Rendering, dataset: &Dataset) -> Vec<&'static str>
     made
 }
 
+/// Whether `point` is off the first and the last line along `joint`, where there are lines enough.
+fn is_inside(grid: &Grid, strides: &[usize], point: usize, joint: usize) -> bool {
+    let count = grid.axes[joint].count;
+    let border = usize::from(count >= FEWEST_LINES);
+    (border..count - border).contains(&(point / strides[joint] % count))
+}
+
 /// A direction along a grid line.
 #[derive(Clone, Copy)]
 struct Along {
@@ -51,7 +58,7 @@ struct Along {
     upwards: bool,
 }
 
-/// What is looked through.
+/// The dataset that is searched.
 struct Search<'a> {
     dataset: &'a Dataset,
     grid: &'a Grid,
@@ -70,7 +77,8 @@ impl<'a> Search<'a> {
         for joint in (1..joints).rev() {
             strides[joint - 1] = strides[joint] * grid.axes[joint].count;
         }
-        let in_contact = |point: &usize| dataset.status(*point) == Status::Contact;
+        let inside = |point: usize| (0..joints).all(|joint| is_inside(grid, &strides, point, joint));
+        let in_contact = |point: &usize| dataset.status(*point) == Status::Contact && inside(*point);
         let contacts = (0..grid.points()).filter(in_contact).count();
         let every = contacts.div_ceil(TRIALS).max(1);
         let trials: Vec<usize> = (0..grid.points()).filter(in_contact).step_by(every).collect();
@@ -88,14 +96,11 @@ impl<'a> Search<'a> {
 
     /// Returns the neighbour of `point`, if there is one to go to: at the grid's border the proxy would be held.
     fn next(&self, point: usize, Along { joint, upwards }: Along) -> Option<usize> {
-        let (stride, count) = (self.strides[joint], self.grid.axes[joint].count);
-        let border = usize::from(count >= FEWEST_LINES);
-        let line = point / stride % count;
-        if upwards {
-            (line + 1 + border < count).then(|| point + stride)
-        } else {
-            (line > border).then(|| point - stride)
-        }
+        let stride = self.strides[joint];
+        let line = point / stride % self.grid.axes[joint].count;
+        let is_last = if upwards { line + 1 == self.grid.axes[joint].count } else { line == 0 };
+        let next = if is_last { None } else { Some(if upwards { point + stride } else { point - stride }) };
+        next.filter(|&next| is_inside(self.grid, &self.strides, next, joint))
     }
 
     /// Returns the free point that is reached from `point` without leaving contact before, and its distance in points.

@@ -18,7 +18,7 @@ use serde::Serialize;
 /// A gain and its passivity bound. Beyond it the loop runs, and may create energy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bound {
-    /// What is bounded, in words, with its joint.
+    /// Name of the gain, with its joint.
     pub what: String,
     /// Its value [N m/rad; 1 for a ratio].
     pub value: f64,

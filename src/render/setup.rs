@@ -36,7 +36,7 @@ pub struct Setup {
     pub bounds: Vec<Bound>,
     /// Those that are exceeded.
     pub exceeded: Vec<Bound>,
-    /// What is wrong with the gains, and what would be passive; absent where all bounds hold.
+    /// A warning about the gains, with values that would be passive; absent if all bounds hold.
     pub advice: Option<String>,
     /// The motions that the scene does not name, made from the dataset's own contact.
     pub made_motions: Vec<&'static str>,
