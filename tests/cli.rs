@@ -42,6 +42,41 @@ fn doctor_says_what_the_machine_offers() {
 }
 
 #[test]
+fn new_writes_scenes_that_bake_and_replaces_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let written = json(folder.path(), &["new", "--from", "mesh", "-o", "my.toml", "--json"]);
+    assert_eq!(written["files"], serde_json::json!(["my.toml", "bean.obj"]));
+    let baked = json(folder.path(), &["bake", "my.toml", "--measure-error", "0", "--json"]);
+    assert!(baked["contact_points"].as_u64() > Some(100), "{baked}");
+    let forecast = &baked["forecast"];
+    let size = std::fs::metadata(folder.path().join("my.haptize")).unwrap().len() as f64;
+    assert!((0.5..2.0).contains(&(forecast["disk"].as_f64().unwrap() / size)), "{forecast}, {size} bytes");
+    assert!(forecast["seconds"].as_f64() > Some(0.0), "{forecast}");
+
+    std::fs::write(folder.path().join("my.toml"), "# mine").unwrap();
+    let output = haptize(folder.path(), &["new", "-o", "my.toml"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("exists already"), "{}", text(&output.stderr));
+    assert_eq!(std::fs::read_to_string(folder.path().join("my.toml")).unwrap(), "# mine");
+    assert_eq!(haptize(folder.path(), &["new"]).status.code(), Some(0));
+    assert!(folder.path().join("sphere.toml").is_file());
+}
+
+#[test]
+fn completions_and_manual_pages_name_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = text(&haptize(folder.path(), &["completions", shell]).stdout);
+        assert!(script.contains("gridize") && script.contains("max-error"), "{shell}: {script}");
+    }
+    let pages = json(folder.path(), &["man", "-o", "pages", "--json"]);
+    let pages = pages["files"].as_array().unwrap().len();
+    assert!(pages > 14, "{pages}");
+    let page = std::fs::read_to_string(folder.path().join("pages/haptize-bake.1")).unwrap();
+    assert!(page.contains("max\\-error") && page.contains("Examples"), "{page}");
+}
+
+#[test]
 fn an_unknown_command_is_a_usage_error() {
     let folder = tempfile::tempdir().unwrap();
     for arguments in [&["bark"][..], &["doctor", "--loud"]] {
@@ -225,7 +260,7 @@ fn the_demo_needs_nothing_and_leaves_dataset_traces_and_figures() {
     assert!(number("/timing/lateness/p50") >= 0.0);
 
     let files: Vec<_> = told["files"].as_array().unwrap().iter().map(|file| file.as_str().unwrap()).collect();
-    for name in ["sphere.haptize", "trace.csv", "cspace.png", "torque.svg", "press.svg", "object.png"] {
+    for name in ["sphere.haptize", "trace.csv", "cspace.png", "torque.svg", "motion.svg", "object.png"] {
         assert!(files.iter().any(|file| Path::new(file).ends_with(name)), "{name} in {files:?}");
     }
     for file in &files {
@@ -298,6 +333,49 @@ fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
     }
     let both = haptize(folder.path(), &["play", "finger.haptize", "--replay", "r.csv", "--realtime"]);
     assert_eq!(both.status.code(), Some(2));
+}
+
+/// The finger on a turning base, stiff enough that the usual damping of the proxy is not passive.
+fn stiff_arm() -> String {
+    let base = "[[proxy.joint]]\nkind = \"revolute\"\naxis = [0.0, 0.0, 1.0]\nlimits = [-0.5, 0.5]\n[[proxy.joint]]";
+    changed("[[proxy.joint]]", base)
+        .replace("axes = [", "axes = [{ start = -0.3, stop = 0.3, count = 7 }, ")
+        .replace("stiffness = 300.0", "stiffness = 3000.0")
+        .replace("stiffness = 1000.0", "stiffness = 10000.0")
+}
+
+#[test]
+fn a_scene_that_names_neither_motions_nor_damping_is_pressed_and_scraped_passively() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("arm.toml"), stiff_arm()).unwrap();
+    json(folder.path(), &["bake", "arm.toml", "--backend", "cpu", "--json"]);
+    for motion in ["press", "scrape"] {
+        let output = haptize(folder.path(), &["play", "arm.haptize", "--motion", motion, "--json"]);
+        let told = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{told}");
+        assert!(told.contains(&format!("the scene names no {motion}")) && !told.contains("not passive"), "{told}");
+        let played: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let touching = played["contact_share"].as_f64().unwrap();
+        assert!((0.1..0.99).contains(&touching), "{motion}: begins and ends free, {touching}");
+        assert_eq!(
+            (&played["held"], &played["limited"]),
+            (&0.into(), &0.into()),
+            "{motion} stays within grid and limits"
+        );
+    }
+
+    // Gains that a scene names are taken as they are; one warning names values, and these are passive.
+    let bake = |damping: &str| {
+        let scene = stiff_arm().replace("[graphics]", &format!("[haptics]\nproxy_damping = {damping}\n[graphics]"));
+        std::fs::write(folder.path().join("named.toml"), scene).unwrap();
+        json(folder.path(), &["bake", "named.toml", "--backend", "cpu", "--json"]);
+        text(&haptize(folder.path(), &["play", "named.haptize", "--seconds", "0.1"]).stderr)
+    };
+    let told = bake("0.02");
+    let advice: Vec<&str> = told.lines().filter(|line| line.contains("not passive")).collect();
+    assert_eq!(advice.len(), 1, "{told}");
+    let named = advice[0].split("proxy_damping = ").nth(1).unwrap();
+    assert!(!bake(named).contains("not passive"), "{named}");
 }
 
 #[test]

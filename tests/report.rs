@@ -307,12 +307,10 @@ fn files_are_complete_and_the_same_twice() {
         "cspace.png",
         "torque.svg",
         "torque.png",
-        "press.svg",
-        "press.png",
+        "motion.svg",
+        "motion.png",
         "energy.svg",
         "energy.png",
-        "force.svg",
-        "force.png",
         "object.png",
     ];
     assert_eq!(names, wanted);
@@ -322,7 +320,28 @@ fn files_are_complete_and_the_same_twice() {
     other.ticks[700].contact_torque[1] += 0.05;
     let differing: Vec<String> =
         once.into_iter().zip(write("other", &other)).filter(|(a, b)| a != b).map(|(a, _)| a.0).collect();
-    assert_eq!(differing, ["press.svg", "press.png", "force.svg", "force.png"]);
+    assert_eq!(differing, ["motion.svg", "motion.png"]);
+}
+
+/// Several figures stand in one page: a name that two clips share must mean one rectangle, or the page clips one figure as the other.
+#[test]
+fn clips_of_equal_names_are_equal_rectangles() {
+    let figures = all(&dataset(&arm(3), &sphere(), counts(3)), &arm(3), &recording(&arm(3), &sphere(), 1000));
+    let mut known = std::collections::BTreeMap::new();
+    for (figure, canvas) in &figures {
+        let svg = canvas.svg();
+        for clip in svg.lines().filter_map(|line| line.split("<clipPath id=\"").nth(1)) {
+            let (name, rest) = clip.split_once('"').unwrap();
+            let rectangle = rest.split("/>").next().unwrap().to_owned();
+            assert!(svg.contains(&format!("url(#{name})")), "{figure}: {name} is not used");
+            assert_eq!(
+                *known.entry(name.to_owned()).or_insert_with(|| rectangle.clone()),
+                rectangle,
+                "{figure}: {name}"
+            );
+        }
+    }
+    assert!(known.len() > 5, "{known:?}");
 }
 
 #[test]
@@ -377,7 +396,7 @@ fn the_press_has_a_curve_for_every_joint_and_shades_every_contact() {
     assert_eq!(contacts, 2);
     assert_eq!(shades, 4 * contacts + 1, "four panels and the legend");
     for title in
-        ["Contact torque on the proxy [N m]", "Proxy configuration [rad]", "Contacting object nodes [1]", "Time [s]"]
+        ["Contact torque on the proxy [N m]", "Motion of the proxy [rad]", "Contacting object nodes [1]", "Time [s]"]
     {
         assert!(svg.contains(title), "{title}");
     }
@@ -388,7 +407,7 @@ fn prismatic_joints_have_panels_of_their_own() {
     let mut trace = recording(&arm(3), &sphere(), 200);
     trace.joints[2].unit = "m".to_owned();
     let canvas = report::press::press(&trace);
-    for title in ["Contact torque on the proxy [N m]", "Contact force on the proxy [N]", "Proxy configuration [m]"] {
+    for title in ["Contact torque on the proxy [N m]", "Contact force on the proxy [N]", "Motion of the proxy [m]"] {
         assert!(says(&canvas, title), "{title}");
     }
     assert!(misplaced_text(&canvas).is_empty());

@@ -5,7 +5,8 @@
 
 use glam::DVec3;
 use haptize::scene::{
-    Algorithm, Diagnostic, GroundNodes, Interpolation, JointKind, Material, Rendering, Scene, SceneError, Shape,
+    Algorithm, Diagnostic, GraphicsEffects, GraphicsSpec, GroundNodes, Interpolation, JointKind, Material, Rendering,
+    Scene, SceneError, Shape,
 };
 use haptize::{JointVector, MAX_JOINTS};
 use std::path::{Path, PathBuf};
@@ -106,7 +107,9 @@ fn what_is_not_said_takes_the_documented_default() {
     let haptics = &scene.haptics;
     assert_eq!((haptics.rate, haptics.threshold, haptics.passivity_factor), (1000.0, 0.5, 1.0));
     assert_eq!(haptics.coupling_stiffness, JointVector::from_slice(&[20.0]));
-    assert!(scene.graphics.is_none() && scene.motion.press.is_empty() && scene.motion.scrape.is_empty());
+    assert_eq!(scene.graphics, Some(GraphicsSpec { rate: 60.0, effects: GraphicsEffects::default() }));
+    assert!(haptics.proxy_damping_is_free && scene.motion.press.is_empty() && scene.motion.scrape.is_empty());
+    assert_eq!(parse(&format!("graphics = false\n{LEAST}")).unwrap().graphics, None);
 
     let sliding = parse(&LEAST.replace("revolute", "prismatic")).unwrap();
     assert!((sliding.haptics.coupling_stiffness[0] - 2000.0).abs() < 1e-9);

@@ -8,24 +8,29 @@ use haptize::{
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// What to measure, and how much.
+/// Arguments of `haptize accuracy`.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize accuracy sphere.toml
+  haptize accuracy sphere.toml --points 20000 --configurations 500     less time, rougher figures
+  haptize accuracy sphere.toml --effects                               also what each effect costs")]
 pub struct Arguments {
     /// The scene's file.
     scene: PathBuf,
     /// The folder to write figures, table and page to.
     #[arg(short, long, default_value = "out/accuracy")]
     output: PathBuf,
-    /// Random configurations that are solved as the reference.
+    /// Number of random configurations that are solved as the reference.
     #[arg(long, default_value_t = 2000)]
     configurations: usize,
-    /// Grids with more points than this are left out.
+    /// Maximum number of points of a grid.
     #[arg(long, default_value_t = 100_000)]
     points: usize,
-    /// Runs of each work that is timed; the least counts.
+    /// Number of timed runs of each measurement; the fastest counts.
     #[arg(long, default_value_t = 5)]
     rounds: usize,
-    /// Price every effect, too: the scene with it and without it, haptized, felt and drawn.
+    /// Also measure what every effect costs: in baking, in a tick and in a frame.
     #[arg(long)]
     effects: bool,
 }

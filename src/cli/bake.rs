@@ -2,7 +2,7 @@
 
 use super::{
     Failure, Report,
-    bar::bar,
+    bar::Bar,
     info,
     interrupt::stop_flag,
     max_error,
@@ -10,10 +10,9 @@ use super::{
     tell,
 };
 use haptize::{
-    haptize::{Aim, BackendChoice, Bake, Bounds, Footprint, Iterations, Lowered, Progress, SweepReport},
+    haptize::{Aim, BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, SweepReport},
     scene::{Algorithm, Scene},
 };
-use indicatif::ProgressBar;
 use std::{
     fmt::{self, Write},
     path::{Path, PathBuf},
@@ -21,33 +20,41 @@ use std::{
     time::SystemTime,
 };
 
-/// What to haptize, and how.
+/// Arguments of `haptize bake`.
 #[derive(clap::Args)]
-#[command(after_help = super::ADAPTER_HELP)]
+#[command(after_help = concat!(
+    "\
+Examples:
+  haptize bake sphere.toml
+  haptize bake sphere.toml --max-error 5%
+  haptize bake sphere.toml --max-error 0.002Nm -o fine.haptize
+  haptize bake sphere.toml --backend gpu --resume",
+    adapter_help!()
+))]
 pub struct Arguments {
-    /// The scene's file.
+    /// The scene.
     scene: PathBuf,
     /// The dataset to write; by default the scene's name in the current folder, ending in .haptize.
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// What solves.
+    /// The backend that solves contact.
     #[arg(long, default_value = "auto")]
     backend: BackendChoice,
-    /// How contact is solved, instead of what the scene says.
+    /// How contact is solved, instead of as the scene says.
     #[arg(long)]
     algorithm: Option<Algorithm>,
     /// Continue a bake that was interrupted.
     #[arg(long)]
     resume: bool,
-    /// Random configurations at which the dataset's error is measured afterwards; 0 leaves it out. By default a tenth of the points in
-    /// contact, at least 100 and at most 1000.
+    /// Number of random configurations at which the dataset's error is measured afterwards; 0 skips this. By default a tenth of
+    /// the points in contact, at least 100 and at most 1000.
     #[arg(long, value_name = "COUNT", conflicts_with = "max_error")]
     measure_error: Option<usize>,
-    /// Choose grid spacing, interpolation and the solver's tolerance for this rms error of the torque, and verify it: a share of
-    /// the torque's own rms over the grid's region (0.01), or a torque ("0.002 N m").
+    /// Choose grid spacing, interpolation and solver tolerance for this rms error of the torque, and verify it: a fraction of the
+    /// torque's own rms over the grid (0.01 or 1%), or a torque ("0.002 N m").
     #[arg(long, value_name = "ERROR", allow_negative_numbers = true)]
     max_error: Option<Aim>,
-    /// Most grid points that --max-error may choose.
+    /// Maximum number of grid points that --max-error may choose.
     #[arg(long, default_value_t = 2_000_000, value_name = "POINTS")]
     max_points: usize,
 }
@@ -79,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     Ok(Report { text, json, whole: true })
 }
 
-/// Runs `bake`, dated now, with a progress bar. Ctrl-C stops it after the configurations at hand; afterwards, or again,
+/// Runs `bake`, dated now, with a progress bar. Ctrl-C stops it after the current configurations; afterwards, or again,
 /// Ctrl-C ends the program at once.
 pub fn watched<T, E: Into<Failure>>(
     scene: &Scene,
@@ -87,27 +94,28 @@ pub fn watched<T, E: Into<Failure>>(
     bake: impl FnOnce(Bake<'_>) -> Result<T, E>,
 ) -> Result<T, Failure> {
     let stop = stop_flag()?;
-    let bar = bar(0, "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
+    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     let mut announced = false;
     let mut progress = |progress: Progress| {
         if !std::mem::replace(&mut announced, true) {
-            bar.suspend(|| announce(&progress));
+            announce(&progress);
         }
-        show(&bar, progress);
+        let message = format!("{} in contact, {:.0}/s", progress.contact_points, progress.rate);
+        bar.set(progress.done as u64, progress.points as u64, message);
     };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
     let result = bake(Bake { scene, backend, measured: None, aim: None, date: &date, stop, progress: &mut progress });
-    bar.finish_and_clear();
+    bar.finish();
     stop.store(true, Ordering::Relaxed);
     result.map_err(Into::into)
 }
 
-/// Tells on standard error what was noticed on the way.
+/// Prints the warnings of a bake on standard error.
 pub fn warn(report: &SweepReport) {
     report.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
 }
 
-/// What was baked into `file`, for an rms error of `aim` over the rms torque if there was one, for people.
+/// Describes what was baked into `file`, for people; `aim`: the rms error over the rms torque that was asked for, if any.
 pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Option<f64>) -> fmt::Result {
     let SweepReport { points, contact_points, unconverged, overflowed, .. } = report;
     let SweepReport { seconds, configurations_per_second, algorithm, backend, adapter, left_to_cpu, .. } = report;
@@ -119,6 +127,13 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Optio
         "  solved       in {seconds:.2} s, {configurations_per_second:.0} configurations a second, {algorithm} on \
          {backend} ({adapter})"
     )?;
+    if let Some(forecast) = report.forecast {
+        let size = std::fs::metadata(file).map_or(0, |file| file.len() as usize);
+        let time = forecast.seconds.map_or(String::new(), |seconds| {
+            format!("{} from rest (predicted {}), ", duration(report.solving_seconds), duration(seconds))
+        });
+        writeln!(text, "  forecast     {time}{} of disk (predicted {})", megabytes(size), megabytes(forecast.disk))?;
+    }
     if *left_to_cpu > 0 {
         writeln!(text, "  by the CPU   {left_to_cpu} of them, which the GPU did not decide")?;
     }
@@ -142,30 +157,43 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Optio
     info::error(text, report.error.as_ref(), aim)
 }
 
-/// What the sweep is going to take, before it begins.
+/// Prints what the sweep is going to take, before it begins.
 fn announce(progress: &Progress) {
     if let Some(remedy) = progress.mesh_ripple.and_then(|ripple| ripple.remedy()) {
         tell(format_args!("haptize: {remedy}"));
     }
-    let range = |Bounds { least, most }| format!("{} to {}", megabytes(least), megabytes(most));
-    let Progress { points, done, footprint: Footprint { memory, disk }, .. } = progress;
-    let disk = match disk.most {
-        0 => String::new(),
-        _ => format!(" and {} of disk (twice that for a moment at the end)", range(*disk)),
+    let Progress { points, done, footprint: Footprint { memory, disk }, forecast, .. } = progress;
+    let resumed = if *done > 0 { format!(", {done} of them done") } else { String::new() };
+    let size = match (disk, forecast) {
+        (Bounds { most: 0, .. }, _) => None,
+        (_, Some(forecast)) => Some(format!("about {}", megabytes(forecast.disk))),
+        (Bounds { least, most }, None) => Some(format!("{} to {}", megabytes(*least), megabytes(*most))),
     };
+    let size = size.map_or(String::new(), |size| format!(" and {size} of disk (twice that for a moment at the end)"));
     tell(format_args!(
-        "haptize: {points} points, {done} of them done; results take {} of memory{disk}, depending on how much touches",
-        range(*memory)
+        "haptize: {points} points{resumed}; results take at most {} of memory{size}",
+        megabytes(memory.most)
     ));
+    let Some(Forecast { contact_fraction, seconds, sampled, .. }) = forecast else { return };
+    let time = seconds.map(|seconds| seconds * points.saturating_sub(*done) as f64 / *points as f64);
+    let time = time.map_or(String::new(), |seconds| format!(", solved in about {}", duration(seconds)));
+    tell(format_args!(
+        "haptize: predicted from {sampled} of them: {:.0} % in contact{time}; finding lower equilibria and measuring accuracy come on top",
+        100.0 * contact_fraction
+    ));
+}
+
+/// Writes a time as people say it: `0.4 s`, `35 s`, `12 min`, `7.5 h`.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 10.0 => format!("{s:.1} s"),
+        s if s < 120.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
 }
 
 /// Rounded up, with unit.
 pub fn megabytes(bytes: usize) -> String {
     format!("{} MB", (bytes as f64 / 1e6).ceil())
-}
-
-fn show(bar: &ProgressBar, progress: Progress) {
-    bar.set_length(progress.points as u64);
-    bar.set_position(progress.done as u64);
-    bar.set_message(format!("{} in contact, {:.0}/s", progress.contact_points, progress.rate));
 }

@@ -1,13 +1,85 @@
-//! Progress bars.
+//! Progress on standard error: a bar on a terminal, a line now and then elsewhere.
 
+use super::tell;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{IsTerminal, stderr};
+use std::{
+    io::{IsTerminal, stderr},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::{Duration, Instant},
+};
 
-/// A bar of `length` steps on standard error, drawn as `template` says; hidden where that is no terminal.
-pub fn bar(length: u64, template: &str) -> ProgressBar {
-    if !stderr().is_terminal() {
-        return ProgressBar::hidden();
+/// Time between two lines [s]: work of a few seconds prints none.
+const BETWEEN_LINES: Duration = Duration::from_secs(5);
+
+/// How far some work has come.
+pub struct Bar {
+    bar: ProgressBar,
+    /// Name of what is counted.
+    unit: &'static str,
+    /// Whether it is drawn; a bar that knows no length is not.
+    begun: AtomicBool,
+    /// When the last line was printed; absent on a terminal.
+    last_line: Option<Mutex<Instant>>,
+}
+
+impl Bar {
+    /// Returns a bar of so many `unit`, without a length yet, drawn as `template` says.
+    pub fn new(unit: &'static str, template: &str) -> Self {
+        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        Self {
+            bar: ProgressBar::hidden().with_style(style),
+            unit,
+            begun: AtomicBool::new(false),
+            last_line: (!stderr().is_terminal()).then(|| Mutex::new(Instant::now())),
+        }
     }
-    let style = ProgressStyle::with_template(template);
-    ProgressBar::new(length).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+
+    /// Shows `done` of `length` steps, and `message`.
+    pub fn set(&self, done: u64, length: u64, message: String) {
+        self.bar.set_length(length);
+        self.bar.set_message(message);
+        self.bar.set_position(done);
+        self.show();
+    }
+
+    /// Adds `steps` to the length.
+    pub fn lengthen(&self, steps: usize) {
+        self.bar.inc_length(steps as u64);
+    }
+
+    /// Adds a step that is done.
+    pub fn step(&self) {
+        self.bar.inc(1);
+        self.show();
+    }
+
+    /// Takes the bar off the terminal.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    fn show(&self) {
+        let Some(last_line) = &self.last_line else {
+            if !self.begun.swap(true, Ordering::Relaxed) {
+                self.bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
+            }
+            return;
+        };
+        let mut last_line = last_line.lock().unwrap_or_else(PoisonError::into_inner);
+        if last_line.elapsed() < BETWEEN_LINES {
+            return;
+        }
+        let (done, length) = (self.bar.position(), self.bar.length().unwrap_or(0));
+        if done == 0 {
+            return;
+        }
+        *last_line = Instant::now();
+        let message = self.bar.message();
+        let message = if message.is_empty() { message } else { format!(", {message}") };
+        let (unit, left) = (self.unit, self.bar.eta().as_secs());
+        tell(format_args!("haptize: {done} of {length} {unit}{message}, about {left} s left"));
+    }
 }

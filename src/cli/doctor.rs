@@ -10,20 +10,24 @@ use std::{fmt::Write, thread};
 
 /// No arguments of its own.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize doctor
+  haptize doctor --json")]
 pub struct Arguments {}
 
 /// One thing looked at.
 #[derive(Serialize)]
 struct Finding {
-    /// What was looked at.
+    /// Subject of the check.
     subject: &'static str,
     /// True where it is as it should be.
     good: bool,
     /// True where haptize cannot work without it.
     essential: bool,
-    /// What was seen.
+    /// Observation.
     seen: String,
-    /// What to do where it is not good; empty where it is.
+    /// Remedy; empty if nothing is wrong.
     remedy: &'static str,
 }
 

@@ -7,12 +7,16 @@ use super::{
 use haptize::dataset::{Dataset, Format};
 use std::path::PathBuf;
 
-/// What to export, and where to.
+/// Arguments of `haptize export`.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize export sphere.haptize --format npz
+  haptize export sphere.haptize --format csv -o tables/sphere.csv")]
 pub struct Arguments {
     /// The dataset's file.
     dataset: PathBuf,
-    /// What to write.
+    /// Format of the file.
     #[arg(long)]
     format: Format,
     /// The file to write; by default beside the dataset, with the format's extension.

@@ -17,7 +17,10 @@ use std::{
     path::Path,
 };
 
-/// What was felt.
+/// Variation of a force below which it is told as a held one [1].
+const STEADY: f64 = 0.25;
+
+/// The result of a playback.
 pub struct Felt {
     provenance: Provenance,
     absent: Vec<&'static str>,
@@ -25,7 +28,7 @@ pub struct Felt {
 }
 
 impl Felt {
-    /// What `trace` felt of the dataset at `path`.
+    /// Returns the result of playing the dataset at `path`, recorded in `trace`.
     pub fn new(path: &Path, dataset: &Dataset, setup: &Setup, trace: &Trace) -> Self {
         Self {
             provenance: dataset.provenance.clone(),
@@ -62,7 +65,7 @@ impl Felt {
     /// For people.
     pub fn describe(&self, text: &mut String) -> fmt::Result {
         for felt in &self.forces {
-            if let Some(Held { axis, mean, variation }) = felt.held() {
+            if let Some(Held { axis, mean, variation }) = felt.held().filter(|held| held.variation < STEADY) {
                 let (percent, name) = (100.0 * variation, &felt.name);
                 write!(text, "  held force   {mean:.3} N along {axis} on {name}, ")?;
                 writeln!(text, "constant to {percent:.1} % over the middle half of the contact")?;

@@ -2,7 +2,7 @@
 
 use super::{
     Failure, Report,
-    bar::bar,
+    bar::Bar,
     output::{self, Kind},
 };
 use haptize::{
@@ -26,8 +26,13 @@ use std::{
     time::{Instant, SystemTime},
 };
 
-/// What to gridize, and how finely.
+/// Arguments of `haptize gridize`.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize gridize sponge.csv --step 0.03
+  haptize gridize sponge.csv --step 0.03 --held-out 0.1 --figures out
+  haptize gridize run1.csv run2.csv --columns instrument.toml --step 0.02,0.02,0.01 --scene arm.toml")]
 pub struct Arguments {
     /// A log written by `haptize scan`, or with --columns any tables of joint positions and torques.
     #[arg(required = true)]
@@ -38,10 +43,10 @@ pub struct Arguments {
     /// The dataset to write; by default the first log's name in the current folder, ending in .haptize.
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// A TOML file that says which column is what (datasets/instrument.toml is an example).
+    /// A TOML file that maps columns to quantities (datasets/instrument.toml is an example).
     #[arg(long, value_name = "TOML")]
     columns: Option<PathBuf>,
-    /// A scene whose proxy and gains the dataset is to be felt with; scan logs bring theirs.
+    /// A scene with the arm and the gains to feel the dataset with; scan logs bring theirs.
     #[arg(long)]
     scene: Option<PathBuf>,
     /// Torque above which a configuration counts as contact [N m]; by default what the scan's scene says, three standard
@@ -54,11 +59,11 @@ pub struct Arguments {
     /// Smooth torques within their measured standard deviation first.
     #[arg(long)]
     smooth: bool,
-    /// Say how well the dataset predicts measurements: this share of the samples is left out of a second one, which has to
+    /// Measure how well the dataset predicts measurements: this fraction of the samples is left out of a second one, which has to
     /// predict them.
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "FRACTION", allow_negative_numbers = true, value_parser = super::fraction)]
     held_out: Option<f64>,
-    /// Say how well the dataset predicts other logs of the same object.
+    /// Measure how well the dataset predicts other logs of the same object.
     #[arg(long, value_name = "LOG", num_args = 1..)]
     against: Vec<PathBuf>,
     /// A folder for figures: samples beside grid, torque, and the hysteresis of imported logs.
@@ -66,7 +71,7 @@ pub struct Arguments {
     figures: Option<PathBuf>,
 }
 
-/// What was read.
+/// The measurements that were read.
 pub struct Source {
     /// The measurements.
     pub samples: Samples,
@@ -197,13 +202,10 @@ pub fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
 
 fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
     let total = total_size(logs);
-    let bar = bar(total, "{wide_bar} {bytes}/{total_bytes}, {msg}, {eta} left");
-    let mut progress = |progress: ImportProgress| {
-        bar.set_position(progress.bytes);
-        bar.set_message(format!("{} rows", progress.rows));
-    };
+    let bar = Bar::new("bytes", "{wide_bar} {bytes}/{total_bytes}, {msg}, {eta} left");
+    let mut progress = |progress: ImportProgress| bar.set(progress.bytes, total, format!("{} rows", progress.rows));
     let imported = import(mapping, logs, &mut progress);
-    bar.finish_and_clear();
+    bar.finish();
     let Imported { samples, branches, report } = imported?;
     let left_out = report.dropped.iter().map(|dropped| dropped.rows as usize).sum();
     let names: Vec<String> = logs.iter().map(|log| log.display().to_string()).collect();

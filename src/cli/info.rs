@@ -13,8 +13,12 @@ use std::{
     path::PathBuf,
 };
 
-/// What to look at.
+/// Arguments of `haptize info`.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize info sphere.haptize
+  haptize info sphere.haptize --json")]
 pub struct Arguments {
     /// The dataset's file.
     dataset: PathBuf,

@@ -1,28 +1,34 @@
 //! `haptize inspect`: one configuration in full.
 
-use super::{Failure, Report};
+use super::{Failure, Report, tell};
 use clap::ValueEnum;
 use glam::DVec3;
 use haptize::{
     JointVector,
     contact::Model,
     dataset::{self, Dataset},
+    field::TorqueField,
     haptize::Inspection,
     object::Object,
-    proxy::Chain,
-    scene::{Algorithm, Scene},
+    proxy::{Chain, Joint},
+    scene::{Algorithm, GridSpec, JointKind, Scene},
+    tolerances::GRID_STEP_SLACK,
 };
 use std::{
     fmt::{self, Write},
     path::{Path, PathBuf},
 };
 
-/// What to look at, and where.
+/// Arguments of `haptize inspect`.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize inspect sphere.haptize --q 0.1,1.65,-1.7
+  haptize inspect sphere.toml --q=-0.34,1.6,-1.72     with = where the first coordinate is negative")]
 pub struct Arguments {
-    /// A scene's or a dataset's file.
+    /// A scene or a dataset.
     file: PathBuf,
-    /// The configuration: one coordinate a joint [rad or m], separated by commas.
+    /// The configuration: one coordinate per joint [rad or m], separated by commas. Write --q=-0.3,... if the first is negative.
     #[arg(
         long,
         value_name = "A,B,C",
@@ -34,7 +40,7 @@ pub struct Arguments {
     q: Vec<f64>,
 }
 
-/// Solves the configuration anew, and beside it tells what a dataset has stored at the nearest grid point.
+/// Solves the configuration. For a dataset, also reports what it interpolates there and what it stores at the nearest grid point.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let q = &arguments.q;
     let (scene, object, dataset) = read(&arguments.file)?;
@@ -43,14 +49,32 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let names: Vec<_> = chain.joints.iter().map(|joint| joint.name.as_str()).collect();
         return Err(format!("--q must be {} finite numbers: {}", names.len(), names.join(",")).into());
     }
+    let warnings = outside(&chain, &scene.grid, q);
+    warnings.iter().for_each(|warning| tell(format_args!("haptize: note: {warning}")));
     let model = Model::reaching(&object, &chain, scene.contact, &[JointVector::from_slice(q)])?;
     let inspection = Inspection::new(&model, q);
     let mut json = serde_json::to_value(&inspection)?;
+    json["warnings"] = warnings.into();
     let mut text = String::new();
-    describe(&mut text, &inspection)?;
+    describe(&mut text, &inspection, &chain)?;
     if let Some(skin) = object.skin {
         json["skin"] = serde_json::to_value(skin)?;
         writeln!(text, "  skin         {skin}")?;
+    }
+    if let Some(dataset) = &dataset {
+        let haptics = &scene.haptics;
+        let field =
+            TorqueField::interpolated(dataset, haptics.interpolation, haptics.threshold, &haptics.boundary_slope)?;
+        let sample = field.sample(q);
+        let difference: Vec<f64> =
+            sample.torque.iter().zip(&inspection.torque).map(|(felt, solved)| felt - solved).collect();
+        json["interpolated"] = serde_json::json!({
+            "interpolation": haptics.interpolation, "torque": *sample.torque, "contact": sample.contact,
+            "difference": difference,
+        });
+        writeln!(text, "the dataset, interpolated here ({}):", haptics.interpolation.name())?;
+        writeln!(text, "  torque       {}", efforts(&sample.torque, &chain))?;
+        writeln!(text, "  difference   {} from what is solved", efforts(&difference, &chain))?;
     }
     if let Some(point) = dataset.as_ref().and_then(|dataset| dataset.grid.nearest(q).map(|point| (dataset, point))) {
         let (dataset, point) = point;
@@ -61,7 +85,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             "forces": dataset.forces(point).map(|f| serde_json::json!({"node": f.node, "force": f.force})).collect::<Vec<_>>(),
         });
         writeln!(text, "stored at point {point}, q = {}: {status}", numbers(&stored))?;
-        writeln!(text, "  torque       {}", numbers(dataset.torque(point)))?;
+        writeln!(text, "  torque       {}", efforts(dataset.torque(point), &chain))?;
     }
     Ok(Report { text, json, whole: true })
 }
@@ -90,15 +114,36 @@ fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
     Ok((scene, object, Some(dataset)))
 }
 
-fn describe(text: &mut String, inspection: &Inspection) -> fmt::Result {
+/// Returns a sentence for each joint of `q` beyond its limits or beyond the grid, where nothing is looked up.
+fn outside(chain: &Chain, grid: &GridSpec, q: &[f64]) -> Vec<String> {
+    let mut found = Vec::new();
+    for ((joint, axis), &q) in chain.joints.iter().zip(&grid.axes).zip(q) {
+        let [least, greatest] = joint.limits;
+        let last = axis.start + (axis.count - 1) as f64 * axis.step;
+        let (name, unit) = (&joint.name, if joint.kind == JointKind::Revolute { "rad" } else { "m" });
+        let slack = GRID_STEP_SLACK * axis.step;
+        if q < least || q > greatest {
+            found.push(format!("{name} = {q} {unit} is beyond the joint's limits, {least} to {greatest}"));
+        } else if q < axis.start - slack || q > last + slack {
+            found.push(format!("{name} = {q} {unit} is beyond the grid, {:.4} to {last:.4}", axis.start));
+        }
+    }
+    found
+}
+
+fn describe(text: &mut String, inspection: &Inspection, chain: &Chain) -> fmt::Result {
     let Inspection { q, status, iterations, residual, energy, gap, torque, proxy_nodes, object_nodes } = inspection;
     writeln!(text, "q = {}: {status}", numbers(q))?;
-    writeln!(text, "  torque       {}", numbers(torque))?;
+    writeln!(text, "  torque       {}", efforts(torque, chain))?;
     writeln!(text, "  energy       {energy:.6} J")?;
     writeln!(text, "  gap          {:.3} mm to the surface at rest", gap * 1e3)?;
     writeln!(text, "  solved       in {iterations} iterations to a residual of {residual:.1e}")?;
-    writeln!(text, "proxy nodes: x [m] (force [N] on object nodes with weights, J by columns)")?;
-    for (number, node) in proxy_nodes.iter().enumerate() {
+    let untouched = proxy_nodes.iter().filter(|node| node.contacts.is_empty()).count();
+    writeln!(
+        text,
+        "proxy nodes in contact: x [m] (force [N] on object nodes with weights, J by columns); {untouched} others are free"
+    )?;
+    for (number, node) in proxy_nodes.iter().enumerate().filter(|(_, node)| !node.contacts.is_empty()) {
         writeln!(text, "  {number:<3} {:<10} {}", node.link, numbers(&node.position.to_array()))?;
         for contact in &node.contacts {
             let carriers =
@@ -106,10 +151,8 @@ fn describe(text: &mut String, inspection: &Inspection) -> fmt::Result {
             let carriers = carriers.collect::<Vec<_>>().join(" ");
             writeln!(text, "      force {} on {carriers}", numbers(&contact.force.to_array()))?;
         }
-        if !node.contacts.is_empty() {
-            let columns: Vec<_> = node.jacobian.iter().map(|column| numbers(&column.to_array())).collect();
-            writeln!(text, "      J     {}", columns.join("  "))?;
-        }
+        let columns: Vec<_> = node.jacobian.iter().map(|column| numbers(&column.to_array())).collect();
+        writeln!(text, "      J     {}", columns.join("  "))?;
     }
     writeln!(text, "object nodes pushed: n [m], displacement [mm], force [N]")?;
     for (number, node) in object_nodes.iter().enumerate().filter(|(_, node)| node.force != DVec3::ZERO) {
@@ -118,6 +161,13 @@ fn describe(text: &mut String, inspection: &Inspection) -> fmt::Result {
         writeln!(text, "  {number:<5} {position} {moved} {force}")?;
     }
     Ok(())
+}
+
+/// Writes joint efforts, each with its unit.
+fn efforts(values: &[f64], chain: &Chain) -> String {
+    let unit = |kind| if kind == JointKind::Revolute { "N m" } else { "N" };
+    let one = |(value, joint): (&f64, &Joint)| format!("{} {value:.5} {}", joint.name, unit(joint.kind));
+    values.iter().zip(&chain.joints).map(one).collect::<Vec<_>>().join(", ")
 }
 
 fn numbers(values: &[f64]) -> String {

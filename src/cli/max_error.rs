@@ -11,7 +11,7 @@ use std::{fmt::Write, path::Path};
 /// torque has kinks and jumps make it vary by a third with a hundred.
 const MEASURED: usize = 400;
 
-/// What is asked for.
+/// The accuracy that is asked for.
 pub struct Wanted<'a> {
     /// The error to stay below.
     pub aim: Aim,
@@ -50,7 +50,7 @@ pub fn run(scene: &Scene, wanted: &Wanted<'_>, backend: BackendChoice) -> Result
     Ok(Report { text, json, whole: is_kept })
 }
 
-/// What was chosen, and what it is going to take, before it begins.
+/// Prints the choice and its predicted cost, before the bake begins.
 fn state(pilot: &Pilot, choice: &Choice) {
     let best = pilot.prospects.first().map_or(0.0, |best| best.order);
     tell(format_args!(

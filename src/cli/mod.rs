@@ -10,9 +10,18 @@
 //!
 //! Exit codes: 0 the work is whole, 1 it failed or is not whole, 2 the command line itself is wrong (given by clap).
 
+/// Which adapter draws and computes, for the help of commands that use one.
+macro_rules! adapter_help {
+    () => {
+        "\n\nWith several GPUs the fastest is used. Set WGPU_ADAPTER_NAME to part of a GPU's name to choose another; `haptize \
+         doctor` lists them."
+    };
+}
+
 mod accuracy;
 mod bake;
 mod bar;
+mod completions;
 mod demo;
 mod doctor;
 mod export;
@@ -21,7 +30,9 @@ mod gridize;
 mod info;
 mod inspect;
 mod interrupt;
+mod man;
 mod max_error;
+mod new;
 mod output;
 mod paper;
 mod play;
@@ -29,20 +40,26 @@ mod scan;
 mod stability;
 mod view;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::{
     error::Error,
     io::{self, ErrorKind, Write},
     process::ExitCode,
 };
 
-/// Which adapter draws and computes, for the commands that use one.
-const ADAPTER_HELP: &str = "Of several graphics adapters the best is taken. The environment variable WGPU_ADAPTER_NAME, set to \
-                            a part of its name, takes another; `haptize doctor` lists them.";
-
-/// Haptize: contact solved beforehand for every joint configuration, felt at 1 kHz.
+/// Precomputed contact between an arm and a deformable object, rendered at 1 kHz.
 #[derive(Parser)]
-#[command(version, after_help = "Without a command: a demo. A soft sphere is haptized, pressed and drawn, into ./out.")]
+#[command(
+    name = "haptize",
+    version,
+    after_help = "\
+Examples:
+  haptize                                the demo: bakes, presses and draws a soft sphere, into ./out
+  haptize new                            writes a commented scene, sphere.toml
+  haptize bake sphere.toml               solves contact at every point of its grid
+  haptize play sphere.haptize            feels the result with a simulated hand
+  haptize view sphere.haptize            opens it in a window"
+)]
 struct CommandLine {
     #[command(subcommand)]
     command: Option<Command>,
@@ -53,29 +70,35 @@ struct CommandLine {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Show what accuracy costs in time: error against spacing, interpolation, tolerance and more, with figures.
+    /// Measure what accuracy costs in time: error against spacing, interpolation, tolerance and more, with figures.
     Accuracy(accuracy::Arguments),
-    /// Haptize a scene: solve contact at every point of its grid.
+    /// Solve contact at every point of a scene's grid and write the dataset.
     Bake(bake::Arguments),
-    /// Say what this machine offers: threads, graphics adapters, real-time rights.
+    /// Print the completion script of a shell.
+    Completions(completions::Arguments),
+    /// Report what this machine offers: threads, graphics adapters, real-time priority.
     Doctor(doctor::Arguments),
-    /// Write a dataset for other programs.
+    /// Convert a dataset for other programs.
     Export(export::Arguments),
-    /// Make a dataset of scattered measurements: a scan's log, or any tables of joint positions and torques.
+    /// Interpolate scattered measurements onto a grid: a scan's log, or tables of joint positions and torques.
     Gridize(gridize::Arguments),
-    /// Say what a dataset holds, after checking all of it.
+    /// Check a dataset and summarise it.
     Info(info::Arguments),
-    /// Solve one configuration and tell all of it.
+    /// Solve one configuration and print every detail, beside what a dataset interpolates there.
     Inspect(inspect::Arguments),
+    /// Write the manual pages.
+    Man(man::Arguments),
+    /// Write a commented scene to begin with.
+    New(new::Arguments),
     /// Remake the figures and numbers of the paper, with a table that compares them.
     Paper(paper::Arguments),
-    /// Feel a dataset through a simulated hand: traces and figures.
+    /// Feel a dataset with a simulated hand: traces and figures.
     Play(play::Arguments),
-    /// Haptize a real object by touching it on a rig (the one that ships is simulated).
+    /// Measure a real object by touching it with a rig (the rig that ships is simulated).
     Scan(scan::Arguments),
-    /// Run the hard cases of every room on this machine, and say what stayed within its bound.
+    /// Run the stress tests of every module and compare the worst value of each measure with its limit.
     Stability(stability::Arguments),
-    /// See and press a dataset in a window.
+    /// Open a dataset or a scene in a window.
     View(view::Arguments),
 }
 
@@ -84,11 +107,14 @@ impl Command {
         match self {
             Self::Accuracy(arguments) => accuracy::run(arguments),
             Self::Bake(arguments) => bake::run(arguments),
+            Self::Completions(arguments) => completions::run(arguments),
             Self::Doctor(arguments) => doctor::run(arguments),
             Self::Export(arguments) => export::run(arguments),
             Self::Gridize(arguments) => gridize::run(arguments),
             Self::Info(arguments) => info::run(arguments),
             Self::Inspect(arguments) => inspect::run(arguments),
+            Self::Man(arguments) => man::run(arguments),
+            Self::New(arguments) => new::run(arguments),
             Self::Paper(arguments) => paper::run(arguments),
             Self::Play(arguments) => play::run(arguments),
             Self::Scan(arguments) => scan::run(arguments),
@@ -98,10 +124,15 @@ impl Command {
     }
 }
 
-/// Why a subcommand failed: any room's error. Its message names file and line where there is one, and the remedy.
+/// Returns the command line as it is parsed.
+fn command_line() -> clap::Command {
+    CommandLine::command()
+}
+
+/// Why a subcommand failed: any module's error. Its message names file and line if there is one, and the remedy.
 pub type Failure = Box<dyn Error + Send + Sync>;
 
-/// What a subcommand found out or did, for people and for programs.
+/// The result of a subcommand, for people and for programs.
 pub struct Report {
     /// For people: whole lines, the last one ended too.
     pub text: String,
@@ -130,6 +161,13 @@ pub fn run() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Parses a fraction: `0.05` or `5%`.
+fn fraction(text: &str) -> Result<f64, String> {
+    let (digits, scale) = text.trim().strip_suffix('%').map_or((text.trim(), 1.0), |digits| (digits.trim(), 0.01));
+    let number = digits.parse::<f64>().map_err(|_| "give a fraction such as 0.05 or 5%".to_owned())?;
+    Ok(number * scale)
 }
 
 /// Prints a line on standard error. It may be closed or full: then there is nobody to tell, and the work goes on.
@@ -174,11 +212,29 @@ fn explain(error: &(dyn Error + 'static)) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_consistent() {
-        CommandLine::command().debug_assert();
+        command_line().debug_assert();
+    }
+
+    #[test]
+    fn every_command_shows_examples_that_parse() {
+        let mut line = command_line();
+        line.build();
+        let helps = line.get_subcommands().filter(|command| command.get_name() != "help").cloned();
+        for command in std::iter::once(command_line()).chain(helps) {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            let examples: Vec<&str> = help.lines().filter_map(|line| line.strip_prefix("  haptize")).collect();
+            assert!(help.starts_with("Examples:\n  haptize") && !examples.is_empty(), "{}", command.get_name());
+            for example in examples {
+                // The command ends at a redirection or where its explanation begins.
+                let words = example.split('>').next().unwrap_or_default().split("  ").next().unwrap_or_default();
+                let words = words.split_whitespace().map(|word| word.trim_matches('"'));
+                let parsed = CommandLine::try_parse_from(std::iter::once("haptize").chain(words));
+                assert!(parsed.is_ok(), "{example}: {}", parsed.err().map_or(String::new(), |error| error.to_string()));
+            }
+        }
     }
 
     #[derive(Debug, thiserror::Error)]

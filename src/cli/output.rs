@@ -16,6 +16,8 @@ pub enum Kind {
     Table,
     /// NumPy's archive.
     Archive,
+    /// A manual page.
+    Page,
 }
 
 impl Kind {
@@ -25,6 +27,7 @@ impl Kind {
             // Safetensors: the length of the header, which is a JSON object.
             Self::Dataset => start.len() > 8 && start[8] == b'{' && start[..8].ends_with(&[0, 0, 0]),
             Self::Archive => start.starts_with(b"PK"),
+            Self::Page => start.starts_with(b"."),
             Self::Table => {
                 let other = ["toml", "obj", "ply", "stl", "msh"];
                 let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
@@ -38,6 +41,7 @@ impl Kind {
             Self::Dataset => "a dataset",
             Self::Table => "a table",
             Self::Archive => "an archive",
+            Self::Page => "a manual page",
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     Failure, Report, bake,
-    bar::bar,
+    bar::Bar,
     gridize::{self, Source},
     interrupt::stop_flag,
     play,
@@ -30,7 +30,6 @@ use haptize::{
     },
     scene::{ScanScene, Scene},
 };
-use indicatif::ProgressBar;
 use std::{
     fmt::Write as _,
     io::{ErrorKind, Write as _},
@@ -54,6 +53,10 @@ const INSTANTS: usize = 6;
 
 /// Where the figures go.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize paper
+  haptize paper -o figures")]
 pub struct Arguments {
     /// The folder to write figures, tables, datasets and scan logs to; files of an earlier run are replaced.
     #[arg(short, long, default_value = "out/paper")]
@@ -163,7 +166,7 @@ struct Measured {
 }
 
 impl Measured {
-    /// What was measured, and what was felt of it.
+    /// Returns the measurement together with how it was felt.
     fn felt<'a>(&'a self, (setup, trace): &'a (Setup, Trace)) -> Scanned<'a> {
         let Self { scene, source, dataset } = self;
         Scanned { scene, samples: &source.samples, dataset, chain: &setup.chain, trace }
@@ -173,17 +176,17 @@ impl Measured {
 /// Scans and gridizes all specimens, side by side.
 fn scan_all(folder: &Path) -> Result<[Measured; 3], Failure> {
     let stop = stop_flag()?;
-    let bar = bar(0, "{wide_bar} {pos}/{len} points, {eta} left");
+    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {eta} left");
     let measure = |specimen: Specimen| specimen.measure(folder, stop, &bar);
     let (bare, (fabric, side)) = rayon::join(|| measure(BARE), || rayon::join(|| measure(FABRIC), || measure(SIDE)));
-    bar.finish_and_clear();
+    bar.finish();
     stop.store(true, Ordering::Relaxed);
     Ok([bare?, fabric?, side?])
 }
 
 impl Specimen {
     /// Scans, and gridizes what was measured.
-    fn measure(self, folder: &Path, stop: &AtomicBool, bar: &ProgressBar) -> Result<Measured, Failure> {
+    fn measure(self, folder: &Path, stop: &AtomicBool, bar: &Bar) -> Result<Measured, Failure> {
         let scene = ScanScene::parse(self.scene, Path::new("datasets").join(self.name).with_extension("toml"))?;
         let log = folder.join(self.name).with_extension("csv");
         match std::fs::remove_file(&log) {
@@ -195,9 +198,9 @@ impl Specimen {
         let mut announced = false;
         let mut progress = |progress: ScanProgress| {
             if !std::mem::replace(&mut announced, true) {
-                bar.inc_length(progress.points as u64);
+                bar.lengthen(progress.points);
             }
-            bar.inc(1);
+            bar.step();
         };
         let report = scan::measure(&scene, &log, Course::default(), stop, &mut progress)?;
         if !report.whole {

@@ -26,33 +26,41 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// What to play, and how.
+/// Arguments of `haptize play`.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize play sphere.haptize
+  haptize play sphere.haptize --motion scrape
+  haptize play sphere.haptize --motion hand.csv --seconds 10 --realtime
+  haptize play sphere.haptize --record session.csv
+  haptize play sphere.haptize --replay session.csv
+  haptize play sponge.haptize --motion scrape --beside sponge_fabric.haptize")]
 pub struct Arguments {
     /// The dataset's file.
     dataset: PathBuf,
-    /// What the hand does: `press` or `scrape` as in the scene, or a CSV file of times [s] and joint coordinates.
+    /// Motion of the hand: `press` or `scrape` as in the scene, or a CSV file of times [s] and joint coordinates.
     #[arg(long, default_value = "press")]
     motion: String,
-    /// How long; by default as long as the motion [s].
+    /// Duration [s]; by default that of the motion.
     #[arg(long, allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// The device moves exactly as the motion says, whatever the torque, instead of being held by a simulated hand.
+    /// Move the device exactly as the motion says, whatever the torque, instead of letting a simulated hand hold it.
     #[arg(long)]
     exact: bool,
-    /// Against the clock, in a real-time thread where permitted, instead of as fast as it goes.
+    /// Run against the clock, in a real-time thread where permitted, instead of as fast as possible.
     #[arg(long)]
     realtime: bool,
-    /// Records the session into this file: all that the loop was told, and what it answered.
+    /// Record the session into this file: all inputs of the loop and all its outputs.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Has the session in this file again and compares it bit for bit; differences are an error.
+    /// Replay the session in this file and check that it matches bit for bit.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "seconds", "exact", "realtime", "record"])]
     replay: Option<PathBuf>,
     /// The folder to write traces and figures to; by default one in `out/` that is named after dataset and motion.
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Another dataset, felt by the same motion: the forces at the end of both proxies are drawn in one figure.
+    /// Another dataset, played with the same motion: the forces at the ends of both arms are drawn in one figure.
     #[arg(long, value_name = "DATASET", conflicts_with = "replay")]
     beside: Option<PathBuf>,
 }
@@ -77,8 +85,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     let dataset = Dataset::load(&arguments.dataset)?;
     let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
-    for exceeded in &setup.exceeded {
-        tell(format_args!("haptize: note: {exceeded}"));
+    if let Some(advice) = &setup.advice {
+        tell(format_args!("haptize: note: {advice}"));
     }
     let (played, told) = match &arguments.replay {
         Some(file) => replay(&setup, &dataset, file)?,
@@ -136,7 +144,7 @@ fn perform(setup: &Setup, dataset: &Dataset, arguments: &Arguments) -> Result<Pl
     play(setup, dataset, device.as_mut(), seconds, arguments.realtime)
 }
 
-/// Has the session in `file` again. Its figures, and a line that says that it was the same.
+/// Replays the session in `file`. Returns its trace, and a line that says that it matched.
 fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Option<String>), Failure> {
     let recording = Recording::read(file, setup.chain.joints.len())?;
     let mut graphics = setup.graphics(dataset)?;
@@ -233,12 +241,26 @@ pub fn motion(setup: &Setup, name: &str) -> Result<Motion, Failure> {
     };
     if waypoints.is_empty() {
         let known = "give [motion] in the scene such waypoints and bake it again, or a CSV file by --motion";
-        return Err(format!("the dataset's scene has no motion \"{name}\": {known}").into());
+        return Err(format!(
+            "the dataset's scene has no motion \"{name}\", and its contact is not such that one could be made: {known}"
+        )
+        .into());
+    }
+    if setup.made_motions.contains(&name) {
+        tell(format_args!(
+            "haptize: note: the scene names no {name}; this one was made from where the dataset is in contact"
+        ));
     }
     Ok(Motion::through(waypoints, joints)?)
 }
 
-/// What was felt, for people.
+/// Says in millijoules what was added to the loop's energy, or taken from it.
+fn exchanged(joules: f64) -> String {
+    let verb = if joules > 0.0 { "injected" } else { "removed" };
+    format!("{verb} {:.2} mJ", 1e3 * joules.abs())
+}
+
+/// Describes what was felt, for people.
 pub fn describe(text: &mut String, s: &Summary) -> fmt::Result {
     writeln!(text, "{:.2} s, {} ticks, {:.0} % in contact", s.seconds, s.ticks, 100.0 * s.contact_share)?;
     writeln!(
@@ -248,13 +270,15 @@ pub fn describe(text: &mut String, s: &Summary) -> fmt::Result {
     )?;
     writeln!(
         text,
-        "  continuous   at most {:.4} N m/ms on the proxy, {:.4} on the device",
+        "  steepest     {:.4} N m in a millisecond on the proxy, {:.4} on the device",
         s.max_contact_torque_step, s.max_device_torque_step
     )?;
     writeln!(
         text,
-        "  energy       accounts close to {:.1e} of their turnover; leak {:.2e} J, held torque gave {:.2e} J",
-        s.max_relative_account_residual, s.leak, s.hold_gain
+        "  energy       interpolation {}, sample-and-hold {}; the balance closes to {:.0e} (relative)",
+        exchanged(s.leak),
+        exchanged(s.hold_gain),
+        s.max_relative_account_residual
     )?;
     for (count, what) in [
         (s.outside, "in free space outside the haptized range"),
@@ -284,7 +308,10 @@ pub fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
     line("tick", timing.tick_cost)?;
     line("frame", timing.frame_cost)?;
     let Timing { missed_deadlines, missed_frames, unrecorded, .. } = timing;
-    writeln!(text, "  missed       {missed_deadlines} deadlines, {missed_frames} frames, {unrecorded} records")?;
+    writeln!(
+        text,
+        "  missed       {missed_deadlines} deadlines (ticks left out because an earlier one ran late), {missed_frames} frames, {unrecorded} records"
+    )?;
     let Some(Steal { late, late_beside_steal, seconds }) = timing.steal.filter(|steal| steal.late > 0) else {
         return Ok(());
     };

@@ -2,7 +2,7 @@
 
 use super::{
     Failure, Report,
-    bar::bar,
+    bar::Bar,
     interrupt::stop_flag,
     output::{self, Kind},
     tell,
@@ -21,8 +21,13 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-/// What to scan.
+/// Arguments of `haptize scan`.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize scan sponge.toml
+  haptize scan sponge.toml --resume
+  haptize scan sponge.toml --guided 60")]
 pub struct Arguments {
     /// The scene's file; its [scan] says where the device goes.
     scene: PathBuf,
@@ -57,15 +62,13 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     output::check(&output, Kind::Table, [arguments.scene.as_path()])?;
     let stop = stop_flag()?;
-    let bar = bar(0, "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
+    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     let mut progress = |progress: ScanProgress| {
-        bar.set_length(progress.points as u64);
-        bar.set_position(progress.done as u64);
-        bar.set_message(format!("{:.0} s on the rig", progress.time));
+        bar.set(progress.done as u64, progress.points as u64, format!("{:.0} s on the rig", progress.time));
     };
     let course = Course { resume: arguments.resume, guided: arguments.guided };
     let result = measure(&scene, &output, course, stop, &mut progress);
-    bar.finish_and_clear();
+    bar.finish();
     stop.store(true, Ordering::Relaxed);
     let report = result?;
     let mut json = serde_json::to_value(&report)?;

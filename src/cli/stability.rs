@@ -1,6 +1,6 @@
 //! `haptize stability`: the hard cases of contact, gridization, loops and graphics, on this machine and its adapter.
 
-use super::{Failure, Report, bar::bar};
+use super::{Failure, Report, bar::Bar};
 use haptize::{
     gpu::{AdapterChoice, Context},
     report::stability::{Bound, Case, Effort, Outcome, Setting, cases, table, write_all},
@@ -9,13 +9,18 @@ use std::{path::PathBuf, sync::Arc, time::Instant};
 
 /// Which cases, on what.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize stability
+  haptize stability contact --no-gpu
+  haptize stability --full -o out/stability")]
 pub struct Arguments {
-    /// Only the cases of these rooms: contact, gridization, loop, graphics.
+    /// Modules to test: contact, gridization, loop, graphics; by default all.
     rooms: Vec<String>,
-    /// All that every case varies, instead of a sample that takes a minute: hours for contact, seconds for the other rooms.
+    /// Run all variations of every case instead of a sample that takes a minute: hours for contact, seconds for the other modules.
     #[arg(long)]
     full: bool,
-    /// Leave out what concerns the GPU.
+    /// Skip the cases that need a GPU.
     #[arg(long)]
     no_gpu: bool,
     /// A folder to write the table (Markdown) and a picture of it to.
@@ -29,19 +34,18 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let (gpu, adapter) = adapter(arguments.no_gpu);
     let effort = if arguments.full { Effort::Full } else { Effort::Sample };
     let setting = Setting { effort, gpu };
-    let bar = bar(cases.len() as u64, "{wide_bar} {pos}/{len} cases, {msg}, {elapsed}");
+    let bar = Bar::new("cases", "{wide_bar} {pos}/{len} cases, {msg}, {elapsed}");
     let started = Instant::now();
     let (mut outcomes, mut spent) = (Vec::new(), Vec::new());
-    for case in &cases {
+    for (done, case) in cases.iter().enumerate() {
         let began = Instant::now();
-        bar.set_message(format!("{}: {}", case.room, case.name));
+        bar.set(done as u64, cases.len() as u64, format!("{}: {}", case.room, case.name));
         // A case that cannot be run has not passed.
         let found = (case.run)(&setting).unwrap_or_else(|error| vec![not_run(case, &error)]);
         outcomes.extend(found.into_iter().map(|outcome| (case.room, outcome)));
         spent.push((case, began.elapsed().as_secs_f64()));
-        bar.inc(1);
     }
-    bar.finish_and_clear();
+    bar.finish();
     let seconds = started.elapsed().as_secs_f64();
     let failed = outcomes.iter().filter(|(_, outcome)| !outcome.passed()).count();
     let rows: Vec<_> = outcomes

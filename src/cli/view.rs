@@ -3,9 +3,16 @@
 use super::{Failure, Report};
 use std::path::PathBuf;
 
-/// What to look at.
+/// Arguments of `haptize view`.
 #[derive(clap::Args)]
-#[command(after_help = super::ADAPTER_HELP)]
+#[command(after_help = concat!(
+    "\
+Examples:
+  haptize view                           the sphere of the demo
+  haptize view sphere.haptize
+  haptize view sphere.haptize --screenshot window.png --motion scrape --time 2.5 --dark",
+    adapter_help!()
+))]
 pub struct Arguments {
     /// A scene, which is baked first, or a dataset; without one the paper's sphere.
     file: Option<PathBuf>,

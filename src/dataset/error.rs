@@ -10,7 +10,7 @@ pub enum Error {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's message.
         source: io::Error,
     },
     /// The folder is missing or read-only, or the disk is full. Whatever stood at `path` before is still there.
@@ -20,7 +20,7 @@ pub enum Error {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's message.
         source: io::Error,
     },
     /// Not a file of this program.
@@ -28,7 +28,7 @@ pub enum Error {
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What gave it away.
+        /// The evidence.
         reason: String,
     },
     /// Another version of the format.
@@ -36,9 +36,9 @@ pub enum Error {
     Version {
         /// The file.
         path: PathBuf,
-        /// What the file says.
+        /// The file's version.
         found: String,
-        /// What this program writes.
+        /// This program's version.
         expected: &'static str,
     },
     /// Cut short, altered, or never right.
@@ -46,7 +46,7 @@ pub enum Error {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong in it.
+        /// The defect.
         reason: String,
     },
     /// A dataset in memory that contradicts itself and so was not written.
@@ -54,7 +54,7 @@ pub enum Error {
     Inconsistent {
         /// The file that was to be written.
         path: PathBuf,
-        /// What contradicts what.
+        /// The contradiction.
         reason: String,
     },
 }

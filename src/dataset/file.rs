@@ -43,7 +43,7 @@ use std::{
 #[cfg(target_endian = "big")]
 compile_error!("dataset columns are read where they lie, which needs a little-endian machine");
 
-/// What `format` says in files that this code reads and writes.
+/// Value of `format` in files that this code reads and writes.
 pub(super) const FORMAT: &str = "haptize dataset 1";
 /// How every header begins; the checksum's digits follow.
 pub(super) const OPENING: &[u8] = br#"{"__metadata__":{"checksum":""#;
@@ -192,7 +192,7 @@ impl Dataset {
     }
 }
 
-/// What the header tells beside the tensors.
+/// The header's entries beside the tensors.
 #[derive(Clone, Copy)]
 pub(crate) struct Heading<'a> {
     pub(crate) grid: &'a Grid,

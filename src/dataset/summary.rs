@@ -4,7 +4,7 @@ use super::{Axis, Dataset, Provenance};
 use crate::contact::Status;
 use serde::Serialize;
 
-/// What a dataset holds.
+/// Key figures of a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// The grid's axes.
@@ -79,7 +79,7 @@ impl Dataset {
         counts
     }
 
-    /// What the dataset holds, in a few numbers.
+    /// Returns the key figures of the dataset.
     #[must_use]
     pub fn summary(&self) -> Summary {
         let points = self.grid.points();

@@ -26,7 +26,7 @@ pub enum FieldError {
         column: &'static str,
         /// Number of the grid point.
         point: usize,
-        /// What is there.
+        /// The value found.
         value: f64,
     },
     /// Not a single grid point was computed.

@@ -37,7 +37,7 @@ pub struct TorqueField {
     interpolant: Interpolant,
 }
 
-/// What is interpolated.
+/// The interpolated quantity.
 enum Interpolant {
     Layered(Layered),
     Potential(Potential),
@@ -63,7 +63,7 @@ pub struct Sample {
     pub flags: Flags,
 }
 
-/// What the corners of a cell have in common, whatever is interpolated.
+/// Flags and contact of a cell's corners, whatever is interpolated.
 #[derive(Default)]
 struct Corners {
     flags: Flags,

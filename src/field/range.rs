@@ -42,7 +42,7 @@ pub struct HaptizedRange {
     beyond: Option<Beyond>,
 }
 
-/// What is known of the space beyond the grid.
+/// Knowledge of the space beyond the grid.
 struct Beyond {
     /// Joints that can leave the grid.
     open: [bool; MAX_JOINTS],

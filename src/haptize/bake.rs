@@ -78,6 +78,8 @@ impl Bake<'_> {
         sweep.find_lowest(&model)?;
         sweep.measure_error(&model, &scene.haptics, measured)?;
         sweep.aim_at(aim);
+        let is_timed = matches!(backend, ChosenBackend::Cpu(_));
+        sweep.predict(&mut backend, is_timed)?;
         let run = Run { chunk: backend.chunk(), stop, progress };
         Ok(sweep_with(&sweep, &mut backend, run)?)
     }

@@ -92,10 +92,10 @@ impl Sweep<'_> {
         let Begun { mut tally, mut provenance } = begun;
         let (points, resumed, start) = (self.grid.points(), tally.points, Instant::now());
         let left_before = backend.left_to_cpu();
-        let mesh_ripple = self.mesh_ripple();
+        let (mesh_ripple, forecast) = (self.mesh_ripple(), self.forecast);
         let mut tell = |tally: &Tally, rate| {
             let (done, contact_points) = (tally.points, tally.statuses.in_contact());
-            (run.progress)(Progress { done, points, contact_points, rate, footprint, mesh_ripple });
+            (run.progress)(Progress { done, points, contact_points, rate, footprint, forecast, mesh_ripple });
         };
         tell(&tally, 0.0);
         let (free_space, mut skipped) = (self.free_space(), 0);
@@ -138,6 +138,7 @@ impl Sweep<'_> {
             solved_points: tally.points - resumed,
             left_to_cpu: backend.left_to_cpu() - left_before,
             lowered: None,
+            solving: start.elapsed(),
             time: start.elapsed(),
         };
         Ok(Solved { tally, facts, provenance })

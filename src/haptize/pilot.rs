@@ -55,12 +55,16 @@ impl FromStr for Aim {
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |digits: &str| digits.trim().parse::<f64>().ok().filter(|aim| aim.is_finite() && *aim > 0.0);
         let absolute = ["N m", "Nm", "N*m"].iter().find_map(|unit| text.trim().strip_suffix(unit));
-        let aim = match absolute {
-            Some(digits) => number(digits).map(Self::Absolute),
-            None => number(text).filter(|aim| *aim < 1.0).map(Self::Relative),
+        let percent = text.trim().strip_suffix('%');
+        let aim = match (absolute, percent) {
+            (Some(digits), _) => number(digits).map(Self::Absolute),
+            (None, Some(digits)) => {
+                number(digits).map(|percent| percent / 100.0).filter(|aim| *aim < 1.0).map(Self::Relative)
+            }
+            (None, None) => number(text).filter(|aim| *aim < 1.0).map(Self::Relative),
         };
         aim.ok_or_else(|| {
-            "give a share of the rms torque between 0 and 1, such as 0.01, or a torque, such as \"0.002 N m\"".into()
+            "give a fraction of the rms torque below 1, such as 0.01 or 1%, or a torque, such as \"0.002 N m\"".into()
         })
     }
 }

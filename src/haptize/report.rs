@@ -1,6 +1,6 @@
 //! What a sweep did, in numbers.
 
-use super::{Footprint, Lowered, tally::Tally};
+use super::{Footprint, Forecast, Lowered, tally::Tally};
 use crate::contact::MeshRipple;
 use crate::dataset::{MeasuredError, Provenance};
 use crate::object::Skin;
@@ -36,6 +36,8 @@ pub struct SweepReport {
     pub error: Option<MeasuredError>,
     /// Wall time of this run [s].
     pub seconds: f64,
+    /// Of this, solving the points from rest [s].
+    pub solving_seconds: f64,
     /// Points solved by this run, over its wall time [1/s].
     pub configurations_per_second: f64,
     /// `cpu` or `gpu`.
@@ -46,6 +48,9 @@ pub struct SweepReport {
     pub algorithm: String,
     /// Memory and disk, as they were stated before the sweep.
     pub footprint: Footprint,
+    /// What was expected before the sweep, from a sample of its points; absent where the grid was too small to be sampled.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub forecast: Option<Forecast>,
     /// The object's skin beside its mesh; absent where it has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<Skin>,
@@ -67,7 +72,8 @@ pub struct Iterations {
 
 impl SweepReport {
     pub(super) fn of(tally: &Tally, run: RunFacts, provenance: &Provenance, object_warnings: &[String]) -> Self {
-        let RunFacts { footprint, skipped_points, resumed_points, solved_points, left_to_cpu, lowered, time } = run;
+        let RunFacts { footprint, skipped_points, resumed_points, solved_points, left_to_cpu, lowered, solving, time } =
+            run;
         let contact_points = tally.statuses.in_contact();
         let seconds = time.as_secs_f64();
         Self {
@@ -86,12 +92,14 @@ impl SweepReport {
             lowered,
             error: provenance.error.clone(),
             seconds,
+            solving_seconds: solving.as_secs_f64(),
             // A clock that did not move is taken for its own resolution.
             configurations_per_second: solved_points as f64 / time.max(Duration::from_nanos(1)).as_secs_f64(),
             backend: provenance.backend.clone(),
             adapter: provenance.adapter.clone(),
             algorithm: provenance.algorithm.clone(),
             footprint,
+            forecast: None,
             skin: None,
             mesh_ripple: provenance.mesh_ripple,
             warnings: object_warnings.iter().chain(&provenance.notices).cloned().collect(),
@@ -109,5 +117,7 @@ pub(super) struct RunFacts {
     /// By the backend.
     pub left_to_cpu: usize,
     pub lowered: Option<Lowered>,
+    /// Of `time`, solving from rest.
+    pub solving: Duration,
     pub time: Duration,
 }

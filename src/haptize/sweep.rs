@@ -4,7 +4,7 @@
 //! is cut into chunks, and an interrupted sweep continues where it stopped (see [`Sweep::bake`]).
 
 use super::{
-    Backend, Footprint, FreeSpace, SweepError, SweepReport,
+    Backend, Footprint, Forecast, FreeSpace, SweepError, SweepReport,
     assembly::{self, Results},
     chunks::{Begun, Solved, together},
     columns::{Columns, Replaced, Rows, Shape},
@@ -40,8 +40,10 @@ pub struct Progress {
     pub contact_points: usize,
     /// Points a second, of this run; 0 before the first chunk [1/s].
     pub rate: f64,
-    /// What the sweep takes up.
+    /// Memory and disk that the sweep takes, at least and at most.
     pub footprint: Footprint,
+    /// What the sweep is expected to take, where its points were sampled.
+    pub forecast: Option<Forecast>,
     /// How much a contact point feels the mesh, where that was looked at.
     pub mesh_ripple: Option<MeshRipple>,
 }
@@ -67,7 +69,7 @@ pub struct Sweep<'a> {
     /// What is kept of each point until the dataset is whole.
     pub(super) shape: Shape,
     /// Whether the dataset holds contact forces.
-    with_forces: bool,
+    pub(super) with_forces: bool,
     /// The object's skin.
     skin: Option<Skin>,
     /// What was noticed about the object.
@@ -77,6 +79,8 @@ pub struct Sweep<'a> {
     /// Whose lowest equilibria are found; `None` where those from rest are taken.
     lowest: Option<&'a Model<'a>>,
     error: Option<ErrorCheck<'a>>,
+    /// See [`Progress::forecast`].
+    pub(super) forecast: Option<Forecast>,
     /// Number of nodes of the proxy.
     pub(super) proxy_nodes: usize,
 }
@@ -140,6 +144,7 @@ impl<'a> Sweep<'a> {
             model: None,
             lowest: None,
             error: None,
+            forecast: None,
             proxy_nodes: scene.proxy.joints.iter().map(|joint| joint.nodes.len()).sum(),
         })
     }
@@ -363,7 +368,7 @@ impl<'a> Sweep<'a> {
     fn report(&self, solved: Solved) -> (SweepReport, Provenance) {
         let Solved { tally, facts, provenance } = solved;
         let report = SweepReport::of(&tally, facts, &provenance, &self.warnings);
-        (SweepReport { skin: self.skin, ..report }, provenance)
+        (SweepReport { skin: self.skin, forecast: self.forecast, ..report }, provenance)
     }
 
     /// How free space is found, where it is.

@@ -55,7 +55,7 @@ pub struct Accounts {
     /// Energy that the contact torque gave beyond what the object had stored, field_work + U - U_0; zero for datasets
     /// without energy.
     pub leak: f64,
-    /// What the device's port took in: minus the sum of (torque on the device) . (device displacement).
+    /// Energy that the device's port took in: minus the sum of (torque on the device) . (device displacement).
     pub port_work: f64,
     /// Least that the device's own damping bd took, sum of T bd w_k^2.
     pub device_dissipation: f64,
@@ -107,7 +107,7 @@ impl Accounts {
         ]
     }
 
-    /// What the balance of proxy and coupling leaves unexplained: rounding, and nothing else [J].
+    /// Returns the residual of the balance of proxy and coupling: rounding, and nothing else [J].
     #[must_use]
     pub fn residual(&self) -> f64 {
         let given = self.initial + self.absorbed() + self.stop_work;
@@ -119,7 +119,7 @@ impl Accounts {
         given - taken - self.kinetic - self.spring - self.bristles
     }
 
-    /// What the proxy and its coupling have taken in and not given back [J]: never less than `-initial`.
+    /// Returns the energy that the proxy and its coupling have taken in and not given back [J]: never less than `-initial`.
     #[must_use]
     pub fn absorbed(&self) -> f64 {
         self.coupling_work + self.channel_work + self.field_work

@@ -38,7 +38,7 @@ pub struct Channels {
     proxy_damping: JointVector,
 }
 
-/// What the channels remember.
+/// State of the channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChannelState {
     /// w_{k-1} [rad/s].
@@ -105,7 +105,7 @@ impl Channels {
         state.proxy_velocity = *proxy;
     }
 
-    /// What the channels add to the torque on the device under the `contact` torque tau_bar on the proxy [N m].
+    /// Returns what the channels add to the torque on the device under the `contact` torque tau_bar on the proxy [N m].
     #[must_use]
     pub fn device_torque(&self, state: &ChannelState, contact: &JointVector) -> JointVector {
         let [_, c2, _, c4] = self.spec.channels;
@@ -118,7 +118,7 @@ impl Channels {
         torque
     }
 
-    /// What the channels add to the torque on the proxy, whose inertia is that of `stage` [N m].
+    /// Returns what the channels add to the torque on the proxy, whose inertia is that of `stage` [N m].
     #[must_use]
     pub fn proxy_torque(&self, state: &ChannelState, stage: &Stage) -> JointVector {
         let [c1, _, c3, _] = self.spec.channels;

@@ -52,7 +52,7 @@ impl Coupling {
         torque
     }
 
-    /// What acts on the proxy: coupling, damping bv, the `contact` torque tau_bar and `stops`.
+    /// Returns the forces on the proxy: coupling, damping bv, the `contact` torque tau_bar and `stops`.
     #[must_use]
     pub fn proxy_load(
         &self,

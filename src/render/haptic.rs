@@ -44,7 +44,7 @@ pub struct Haptics {
     period: f64,
 }
 
-/// What one tick hands to the next.
+/// State that one tick hands to the next.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     /// Proxy.
@@ -64,7 +64,7 @@ pub struct State {
     effects: Option<EffectState>,
 }
 
-/// What a tick is told.
+/// Input of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inputs {
     /// Device position y_k [rad or m].
@@ -77,7 +77,7 @@ pub struct Inputs {
     pub interval: f64,
 }
 
-/// What a tick answers. All but `torque` is for recording and drawing.
+/// Output of a tick. All but `torque` is for recording and drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Output {
     /// For the device until the next tick [N m or N].

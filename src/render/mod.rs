@@ -12,6 +12,7 @@ pub mod haptic;
 mod held;
 pub mod npmi;
 pub mod object_motion;
+mod own_motion;
 pub mod passivity;
 pub mod realtime;
 pub mod recording;

@@ -42,11 +42,11 @@ pub struct ObjectMotion<'object> {
 /// Nodes that one thread takes at least: some microseconds of work.
 const NODES_TOGETHER: usize = 1024;
 
-/// What moves with inertia.
+/// State of an object with inertia.
 struct Dynamics {
-    /// Of 2M/T + B + (T/2) K.
+    /// Factor of 2M/T + B + (T/2) K.
     factor: Factor,
-    /// Of K, if it has any [N/m].
+    /// Multiples of the identity that are the blocks of K, if it is isotropic [N/m].
     scales: Option<Vec<f64>>,
     /// v [m/s].
     velocity: Vec<DVec3>,

@@ -18,7 +18,7 @@ use serde::Serialize;
 /// A gain and its passivity bound. Beyond it the loop runs, and may create energy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bound {
-    /// What is bounded, in words, with its joint.
+    /// Name of the gain, with its joint.
     pub what: String,
     /// Its value [N m/rad; 1 for a ratio].
     pub value: f64,
@@ -79,6 +79,72 @@ fn encoder_bound(spec: &HapticsSpec, joint: usize) -> f64 {
 /// c2 Ks, the stiffness of the object that four channels hand to the device; none without them [N m/rad].
 fn handed_stiffness(spec: &HapticsSpec, joint: usize) -> f64 {
     spec.effects.four_channel.map_or(0.0, |channels| channels.channels[1] * spec.boundary_slope[joint])
+}
+
+/// Returns `spec` with its proxy damping bv raised as far as the slope Ks and the stiffness of `field` ask for; unchanged where it is
+/// passive.
+#[must_use]
+pub fn damped(spec: &HapticsSpec, field: &TorqueField) -> HapticsSpec {
+    let mut damped = spec.clone();
+    for (damping, slope) in damped.proxy_damping.iter_mut().zip(spec.boundary_slope.iter()) {
+        *damping = damping.max(slope / (spec.rate * spec.passivity_factor));
+    }
+    let mut slopes = damped.proxy_damping;
+    slopes.iter_mut().enumerate().for_each(|(joint, slope)| *slope = greatest_slope(&damped, joint));
+    let ratio = field.relative_stiffness(&slopes);
+    if ratio > 1.0 && ratio.is_finite() {
+        damped.proxy_damping.iter_mut().for_each(|damping| *damping *= ratio * (1.0 + ROUNDING));
+    }
+    damped
+}
+
+/// Keeps a bound that is met exactly from being exceeded by rounding [1].
+const ROUNDING: f64 = 1e-12;
+
+/// Returns what is wrong with the gains of `spec` in one sentence, and the values that would be passive in another; `None` where all
+/// bounds hold.
+#[must_use]
+pub fn advice(spec: &HapticsSpec, field: &TorqueField, bounds: &[Bound]) -> Option<String> {
+    let exceeded = || bounds.iter().filter(|bound| bound.is_exceeded());
+    let worst = exceeded().max_by(|a, b| (a.value / a.safe).total_cmp(&(b.value / b.safe)))?;
+    let others = match exceeded().count() - 1 {
+        0 => String::new(),
+        1 => ", and 1 gain more".into(),
+        count => format!(", and {count} gains more"),
+    };
+    let joints = field.joints();
+    let passive = damped(spec, field);
+    let mut remedies = Vec::new();
+    if passive.proxy_damping != spec.proxy_damping {
+        remedies.push(format!("proxy_damping = {}", list(passive.proxy_damping.iter().copied())));
+    }
+    let stiffness = |joint| spec.coupling_stiffness[joint] + handed_stiffness(spec, joint);
+    if (0..joints).any(|joint| stiffness(joint) > wall_bound(spec, joint)) {
+        let damping =
+            |joint| (0.5 * stiffness(joint) / spec.rate + spec.coupling_damping[joint]).max(spec.device_damping[joint]);
+        remedies.push(format!("device_damping = {} if the device has that much", list((0..joints).map(damping))));
+    }
+    if (0..joints).any(|joint| spec.coupling_stiffness[joint] > greatest_stiffness(spec, joint)) {
+        let least = |joint: usize| spec.coupling_stiffness[joint].min(greatest_stiffness(spec, joint));
+        remedies.push(format!("or else coupling_stiffness = {}", list((0..joints).map(least))));
+    }
+    Some(format!(
+        "the gains are not passive, so the loop may create energy: {} is {:.4}, at most {:.4} is safe{others}. Set in [haptics]: {}",
+        worst.what,
+        worst.value,
+        worst.safe,
+        remedies.join("; ")
+    ))
+}
+
+/// Writes numbers as the scene takes them: one for all joints, or a list.
+fn list(values: impl Iterator<Item = f64>) -> String {
+    // Rounded away from the bound by less than a part in a thousand.
+    let texts: Vec<String> = values.map(|value| format!("{}", (value * 1.0005 * 1e4).ceil() / 1e4)).collect();
+    match texts.split_first() {
+        Some((first, rest)) if rest.iter().all(|text| text == first) => first.clone(),
+        _ => format!("[{}]", texts.join(", ")),
+    }
 }
 
 /// All bounds on the gains of `spec`, with `field` and the names of the joints.

@@ -23,8 +23,8 @@ use std::{
     time::Duration,
 };
 
-/// Ticks that the ring to the recorder holds: four seconds at 1 kHz.
-const RING: usize = 4096;
+/// Ticks that the ring to the recorder holds: sixteen seconds at 1 kHz, for a window at rest reads them every ten.
+const RING: usize = 1 << 14;
 
 /// Late ticks that the ring to the recorder holds.
 const LATE_RING: usize = 1024;
@@ -233,7 +233,7 @@ pub fn run(
     })
 }
 
-/// What the graphics thread leaves.
+/// Result of the graphics thread.
 #[derive(Default)]
 struct Drawn {
     frames: Vec<Frame>,

@@ -62,7 +62,7 @@ pub enum RecordingError {
         file: PathBuf,
         /// Line number, from one.
         line: usize,
-        /// What is wrong.
+        /// The defect.
         what: String,
         /// Joints of the proxy.
         joints: usize,
@@ -75,17 +75,17 @@ const GREATEST_FILE: u64 = 4 << 30;
 /// Most frames of a tick: those of a second at the highest rate. A loop that rests longer has long missed its deadlines.
 const MAX_FRAMES: u32 = 10_000;
 
-/// What the comment with the first position begins with.
+/// Beginning of the comment with the first position.
 const START: &str = "# start";
 
-/// What the comment with the frames' instants begins with.
+/// Beginning of the comment with the frames' instants.
 const KEPT: &str = "# frames";
 
 /// Numbers of a row before its vectors: elapsed, interval, age, restart, frames.
 const SCALARS: usize = 5;
 
 impl Recording {
-    /// What `trace` recorded. Every tick of the session must be in it.
+    /// Returns the recording of `trace`, which must hold every tick of the session.
     #[must_use]
     pub fn of(trace: &Trace) -> Self {
         let row = |tick: &Tick| Row {

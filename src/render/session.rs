@@ -40,7 +40,7 @@ pub enum SessionError {
     Thread(&'static str),
 }
 
-/// What graphics needs to know of a tick.
+/// The part of a tick that graphics needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Latest {
     /// Time of the tick [s]; negative before the first.

@@ -6,6 +6,7 @@ use super::{
     graphics::{Graphics, GraphicsError},
     haptic::{Haptics, JointsError},
     npmi::{InertiaError, Npmi},
+    own_motion,
     passivity::{self, Bound},
     session::Plan,
     trace::JointLabel,
@@ -35,6 +36,10 @@ pub struct Setup {
     pub bounds: Vec<Bound>,
     /// Those that are exceeded.
     pub exceeded: Vec<Bound>,
+    /// A warning about the gains, with values that would be passive; absent if all bounds hold.
+    pub advice: Option<String>,
+    /// The motions that the scene does not name, made from the dataset's own contact.
+    pub made_motions: Vec<&'static str>,
 }
 
 /// A dataset cannot be rendered.
@@ -92,13 +97,16 @@ impl Setup {
         if dataset.scene.trim().is_empty() {
             return Err(SetupError::NoScene);
         }
-        let scene = Rendering::parse(&dataset.scene, "scene")?;
+        let mut scene = Rendering::parse(&dataset.scene, "scene")?;
         let chain = Chain::new(&scene.proxy);
         let (grid, joints) = (dataset.grid.joints(), chain.joints.len());
         if grid != joints {
             return Err(SetupError::Joints { grid, chain: joints });
         }
-        let (haptics, bounds) = haptic_loop(dataset, &chain, &scene, &scene.haptics)?;
+        let made_motions = own_motion::add(&mut scene, dataset);
+        let Loop { haptics, bounds, gains, advice } = haptic_loop(dataset, &chain, &scene, &scene.haptics)?;
+        // From here on the gains are as any others.
+        scene.haptics = HapticsSpec { proxy_damping_is_free: false, ..gains };
         let exceeded = bounds.iter().filter(|bound| bound.is_exceeded()).cloned().collect();
         let object = match (&scene.object, &scene.graphics, &dataset.contacts, &dataset.surface) {
             (Some(object), Some(_), Some(_), Some(surface)) => Some(surface.object(object)?),
@@ -107,17 +115,17 @@ impl Setup {
                 None => None,
             },
         };
-        Ok(Self { scene, chain, haptics: Arc::new(haptics), object, bounds, exceeded })
+        Ok(Self { scene, chain, haptics: Arc::new(haptics), object, bounds, exceeded, advice, made_motions })
     }
 
-    /// The haptic loop of `dataset`, from which this was made, with `gains` in the place of the scene's; and which of them
-    /// are beyond their passivity bound.
+    /// Returns the haptic loop of `dataset`, from which this was made, with `gains` in the place of the scene's; and what is wrong with
+    /// them where they are beyond their passivity bounds.
     ///
     /// # Errors
     /// When they do not make a loop.
-    pub fn retuned(&self, dataset: &Dataset, gains: &HapticsSpec) -> Result<(Haptics, Vec<Bound>), SetupError> {
-        let (haptics, bounds) = haptic_loop(dataset, &self.chain, &self.scene, gains)?;
-        Ok((haptics, bounds.into_iter().filter(Bound::is_exceeded).collect()))
+    pub fn retuned(&self, dataset: &Dataset, gains: &HapticsSpec) -> Result<(Haptics, Option<String>), SetupError> {
+        let Loop { haptics, advice, .. } = haptic_loop(dataset, &self.chain, &self.scene, gains)?;
+        Ok((haptics, advice))
     }
 
     /// A simulated device in a hand that follows `motion`.
@@ -146,14 +154,19 @@ impl Setup {
     }
 }
 
-/// The haptic loop over `dataset`, with `gains` in the place of those of its `scene`; and their passivity bounds.
-fn haptic_loop(
-    dataset: &Dataset,
-    chain: &Chain,
-    scene: &Rendering,
-    gains: &HapticsSpec,
-) -> Result<(Haptics, Vec<Bound>), SetupError> {
+/// A haptic loop and what is known of its gains.
+struct Loop {
+    haptics: Haptics,
+    bounds: Vec<Bound>,
+    /// As they were given, those left to the dataset chosen.
+    gains: HapticsSpec,
+    advice: Option<String>,
+}
+
+/// Makes the haptic loop over `dataset`, with `gains` in the place of those of its `scene`.
+fn haptic_loop(dataset: &Dataset, chain: &Chain, scene: &Rendering, gains: &HapticsSpec) -> Result<Loop, SetupError> {
     let field = TorqueField::interpolated(dataset, gains.interpolation, gains.threshold, &gains.boundary_slope)?;
+    let gains = if gains.proxy_damping_is_free { passivity::damped(gains, &field) } else { gains.clone() };
     let npmi = match gains.proxy_inertia {
         ProxyInertia::Configuration => Npmi::of_chain(chain)?,
         ProxyInertia::Constant => {
@@ -163,10 +176,12 @@ fn haptic_loop(
             Npmi::new(&chain.inertia(&pose), &limits)?
         }
     };
-    let bounds = passivity::bounds(gains, &field, &labels(&dataset.grid));
+    let bounds = passivity::bounds(&gains, &field, &labels(&dataset.grid));
+    let advice = passivity::advice(&gains, &field, &bounds);
     let effects = ContactEffects::new(&gains.effects, dataset, chain, &scene.text, &scene.path)?;
     let range = HaptizedRange::new(dataset, chain)?;
-    Ok((Haptics::new(field, npmi, gains)?.with_range(range).with_effects(effects), bounds))
+    let haptics = Haptics::new(field, npmi, &gains)?.with_range(range).with_effects(effects);
+    Ok(Loop { haptics, bounds, gains, advice })
 }
 
 /// Names and units of the grid's joints.

@@ -81,7 +81,7 @@ impl StealObserver {
         }
     }
 
-    /// What was found, once the counters have been read for the last time; none where there are no counters.
+    /// Returns the result, once the counters have been read for the last time; none if there are no counters.
     #[must_use]
     pub fn finish(mut self) -> Option<Steal> {
         for tick in std::mem::take(&mut self.pending) {

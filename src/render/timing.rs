@@ -43,10 +43,10 @@ pub struct Bin {
     pub count: u64,
 }
 
-/// What a real-time session says about time.
+/// Punctuality and costs of a real-time session.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Timing {
-    /// What the system did not grant, in words; empty if the thread had its priority and its memory locked.
+    /// Requests that the system refused, in words; empty if the thread had its priority and its memory locked.
     pub refused: Vec<String>,
     /// From a tick's deadline to its beginning.
     pub lateness: Percentiles,

@@ -19,7 +19,7 @@ use std::io::{self, Write};
 pub struct Tick {
     /// Since the start [s].
     pub time: f64,
-    /// What the loop was told, as it was.
+    /// Input of the loop, unchanged.
     pub inputs: Inputs,
     /// Whether a fault was cleared before the tick.
     pub restart: bool,
@@ -82,7 +82,7 @@ pub struct Trace {
     pub shown: Vec<f64>,
 }
 
-/// What one wants to know of a session at a glance.
+/// Key figures of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// Ticks recorded.

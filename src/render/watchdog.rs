@@ -19,7 +19,7 @@ use crate::{
     tolerances::{GREATEST_INPUT, GREATEST_INTERVAL, GREATEST_POSITION_AGE, LEAST_INTERVAL, PACE_WINDOW},
 };
 
-/// What the inputs are held against.
+/// Limits of the inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Watchdog {
     /// T [s].
@@ -50,7 +50,7 @@ impl Watchdog {
     /// Whether `inputs` are good, the position before having been `before`.
     ///
     /// # Errors
-    /// What is wrong with them.
+    /// The first fault of the inputs.
     pub fn check(&self, inputs: &Inputs, before: &JointVector) -> Result<(), Fault> {
         self.check_position(&inputs.position)?;
         if inputs.age > GREATEST_POSITION_AGE || inputs.age.is_nan() {

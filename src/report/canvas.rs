@@ -61,7 +61,7 @@ pub struct TextStyle {
     pub weight: Weight,
     /// Its colour.
     pub colour: Colour,
-    /// What the position means.
+    /// The point of the text that lies at its position.
     pub anchor: Anchor,
 }
 
@@ -96,14 +96,13 @@ pub struct Canvas {
     height: f64,
     marks: String,
     pictures: Vec<(f64, f64, Picture)>,
-    clips: usize,
 }
 
 impl Canvas {
     /// An empty white sheet.
     #[must_use]
     pub fn new(width: f64, height: f64) -> Self {
-        Self { width, height, marks: String::new(), pictures: Vec::new(), clips: 0 }
+        Self { width, height, marks: String::new(), pictures: Vec::new() }
     }
 
     /// Extent of the sheet.
@@ -178,14 +177,11 @@ impl Canvas {
 
     /// Draws `marks` on the part of the sheet inside `area` only.
     pub fn clipped(&mut self, area: Area, marks: impl FnOnce(&mut Self)) {
-        self.clips += 1;
-        let name = self.clips;
+        let [x, y, width, height] = [area.x, area.y, area.width, area.height].map(Number);
+        // Named after its rectangle: of several sheets in one page, only equal clips have equal names.
+        let name = format!("clip_{x}_{y}_{width}_{height}");
         self.mark(format_args!(
-            r#"<clipPath id="clip{name}"><rect x="{}" y="{}" width="{}" height="{}"/></clipPath><g clip-path="url(#clip{name})">"#,
-            Number(area.x),
-            Number(area.y),
-            Number(area.width),
-            Number(area.height)
+            r#"<clipPath id="{name}"><rect x="{x}" y="{y}" width="{width}" height="{height}"/></clipPath><g clip-path="url(#{name})">"#
         ));
         marks(self);
         self.mark(format_args!("</g>"));

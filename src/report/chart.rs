@@ -57,7 +57,7 @@ pub struct Stack {
     pub lanes: Vec<Lane>,
     /// Intervals of the horizontal axis shaded in all panels.
     pub shaded: Vec<[f64; 2]>,
-    /// What the shade means.
+    /// Meaning of the shade.
     pub shade_name: String,
 }
 

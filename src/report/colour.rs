@@ -55,7 +55,7 @@ pub const WHITE: Colour = Colour::hex(0xff_ff_ff);
 /// One colour a series; a seventh series starts again.
 #[must_use]
 pub fn series(number: usize) -> Colour {
-    const PALETTE: [u32; 6] = [0x00_72_b2, 0xd5_5e_00, 0x00_9e_73, 0xcc_79_a7, 0x56_b4_e9, 0xe6_9f_00];
+    const PALETTE: [u32; 6] = [0x00_72_b2, 0xd5_5e_00, 0x00_9e_73, 0xcc_79_a7, 0x3f_48_54, 0xe6_9f_00];
     Colour::hex(PALETTE[number % PALETTE.len()])
 }
 

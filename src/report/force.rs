@@ -32,10 +32,10 @@ pub fn end_force(chain: &Chain, q: &JointVector, torque: &JointVector) -> Option
     regular.then(|| jacobian.transpose().inverse() * DVec3::new(a, b, c))
 }
 
-/// What a hand felt at the end of the proxy, tick by tick.
+/// Force that a hand felt at the end of the proxy, tick by tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EndForce {
-    /// What was felt, for the legend.
+    /// Name of the dataset, for the legend.
     pub name: String,
     /// Time [s] and force [N]; no numbers where the arm is singular.
     pub forces: Vec<(f64, DVec3)>,
@@ -58,7 +58,8 @@ impl EndForce {
     /// The force of `trace`; `None` where the chain has not three joints and a contact node.
     #[must_use]
     pub fn new(name: &str, chain: &Chain, trace: &Trace) -> Option<Self> {
-        if chain.joints.len() != 3 || chain.nodes.is_empty() {
+        let at_the_end = chain.nodes.iter().all(|node| node.link + 1 == chain.joints.len());
+        if chain.joints.len() != 3 || chain.nodes.is_empty() || !at_the_end {
             return None;
         }
         let force = |tick: &Tick| end_force(chain, &tick.proxy, &tick.contact_torque).unwrap_or(DVec3::NAN);
@@ -68,7 +69,7 @@ impl EndForce {
         Some(Self { name: name.to_owned(), forces, contact: longest })
     }
 
-    /// What [`Held`] says; `None` without contact or where the force is not known throughout.
+    /// Returns the held force; `None` without contact or if the force is not known throughout.
     #[must_use]
     pub fn held(&self) -> Option<Held> {
         let [from, to] = self.contact?;

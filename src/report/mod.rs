@@ -39,7 +39,7 @@ pub enum ReportError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's message.
         source: std::io::Error,
     },
     /// The sheet could not be rasterised.
@@ -49,7 +49,7 @@ pub enum ReportError {
         width: u32,
         /// Pixels down.
         height: u32,
-        /// What the rasteriser said.
+        /// The rasteriser's message.
         reason: String,
     },
     /// The data cannot be drawn at all: their parts contradict each other.
@@ -57,7 +57,7 @@ pub enum ReportError {
     Data {
         /// Which figure.
         figure: &'static str,
-        /// What does not fit, and what to do.
+        /// The contradiction, and the remedy.
         reason: String,
     },
 }
@@ -68,8 +68,8 @@ const INSTANTS: usize = 6;
 /// Writes all figures that the data allow into `folder`, which is made if it is missing, and returns their paths.
 ///
 /// `cspace.png` (Fig. 3) and `torque.{svg,png}` show the dataset; with a recording of the proxy `chain` also
-/// `press.{svg,png}` (Fig. 5), `energy.{svg,png}`, with three joints `force.{svg,png}` (Fig. 8) and, where it has frames and the dataset a surface, `object.png`
-/// (Fig. 6).
+/// `motion.{svg,png}` (Fig. 5), `energy.{svg,png}`, with three joints of which the last link alone touches `force.{svg,png}` (Fig. 8) and,
+/// where it has frames and the dataset a surface, `object.png` (Fig. 6).
 ///
 /// # Errors
 /// [`ReportError::Write`] when a file cannot be written, [`ReportError::Data`] when recording, chain and dataset do not
@@ -82,7 +82,7 @@ pub fn write_figures(
     let mut written = vec![write_png(folder, "cspace", &space::space(dataset))?];
     written.extend(write_both(folder, "torque", &slices::slices(dataset))?);
     if let Some((chain, trace)) = recording {
-        written.extend(write_both(folder, "press", &press::press(trace))?);
+        written.extend(write_both(folder, "motion", &press::press(trace))?);
         written.extend(write_both(folder, "energy", &press::energy(trace))?);
         if let Some(force) = force::EndForce::new("", chain, trace) {
             written.extend(write_both(folder, "force", &force::force(&[force], trace))?);

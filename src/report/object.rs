@@ -114,7 +114,7 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
     let entries = [
         Entry { name: "proxy node".to_owned(), colour: PROXY_NODE, mark: Mark::Dot },
         Entry {
-            name: format!("contact force, longest {} N", ticks::number(scene.greatest_force, 2)),
+            name: format!("force on the arm, longest {} N", ticks::number(scene.greatest_force, 2)),
             colour: FORCE,
             mark: Mark::Line,
         },
@@ -141,7 +141,7 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
     Ok(canvas)
 }
 
-/// What all instants share.
+/// Everything that all instants share.
 struct Scene<'a> {
     chain: &'a Chain,
     rest: &'a [DVec3],
@@ -179,22 +179,22 @@ impl<'a> Scene<'a> {
         for instant in instants {
             // Proxy nodes at the object, not the whole arm.
             framed.extend(instant.pose.nodes.iter().filter(|x| x.distance(centre) < 1.3 * radius));
-            framed.extend(scene.arrows(instant).into_iter().map(|(tail, _)| tail));
+            framed.extend(scene.arrows(instant).into_iter().map(|(_, tip)| tip));
         }
         let direction = view(centre, instants, forces().sum());
         scene.camera = Camera::framing(&framed, direction, CELL.map(|side| (side * PIXELS) as usize));
         scene
     }
 
-    /// Tail and tip of each force arrow: the tip pushes on the node.
+    /// Returns tail and tip of the arrow of each force on the arm, as it is felt and as the window draws it: away from the node that pushes.
     fn arrows(&self, instant: &Instant) -> Vec<(DVec3, DVec3)> {
         // The greatest force is a little shorter than the object's radius; those under a fiftieth of it would be specks.
         let scale = 0.7 * self.radius / self.greatest_force.max(f64::MIN_POSITIVE);
         let visible = instant.forces.iter().filter(|force| force.force.length() > 0.02 * self.greatest_force);
         visible
             .filter_map(|force| {
-                let tip = *instant.nodes.get(force.node as usize)?;
-                Some((tip - scale * force.force, tip))
+                let tail = *instant.nodes.get(force.node as usize)?;
+                Some((tail, tail - scale * force.force))
             })
             .collect()
     }
@@ -305,15 +305,15 @@ mod tests {
     }
 
     #[test]
-    fn the_arrow_of_a_force_ends_at_its_node() {
+    fn the_arrow_of_a_force_begins_at_its_node_and_pushes_the_arm_out() {
         let (nodes, triangles) = octahedron();
         let chain = Chain { joints: vec![], nodes: vec![] };
         let instants = [instant(&nodes, 0.02)];
         let scene = Scene::new(&chain, &nodes, &triangles, &instants);
         let [(tail, tip)] = scene.arrows(&instants[0])[..] else { panic!("one arrow") };
-        assert_eq!(tip, instants[0].nodes[4]);
-        assert!((tail - tip).normalize().abs_diff_eq(DVec3::Z, 1e-12), "the force pushes down, from above");
-        let [red, _, blue] = at(&scene.picture(&instants[0]), &scene, tail.lerp(tip, 0.3)).map(f64::from);
+        assert_eq!(tail, instants[0].nodes[4]);
+        assert!((tip - tail).normalize().abs_diff_eq(DVec3::Z, 1e-12), "the node is pushed down and pushes up");
+        let [red, _, blue] = at(&scene.picture(&instants[0]), &scene, tail.lerp(tip, 0.6)).map(f64::from);
         assert!(red > 3.0 * blue, "an orange shaft: {red} {blue}");
     }
 }

@@ -105,7 +105,7 @@ pub struct Panel {
 /// A mark in a legend.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// What it stands for.
+    /// Name of what it marks.
     pub name: String,
     /// Its colour.
     pub colour: Colour,

@@ -17,7 +17,7 @@ use crate::{
 pub struct Prediction {
     /// Samples to be predicted.
     pub samples: usize,
-    /// Of these, how many the dataset predicts.
+    /// Number of these that the dataset predicts.
     pub predicted: usize,
     /// Root mean square of predicted less measured torque, a joint each [N m or N].
     pub rms: Vec<f64>,

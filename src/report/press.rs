@@ -14,7 +14,7 @@ use crate::{
     },
 };
 
-/// Joint contact torque, configuration and number of contacting object nodes against time, contact shaded (Fig. 5).
+/// Draws joint contact torque, change of configuration and number of contacting object nodes against time, contact shaded (Fig. 5).
 #[must_use]
 pub fn press(trace: &Trace) -> Canvas {
     titled("Multi-point contact felt through the 1 kHz loop", trace)
@@ -23,11 +23,17 @@ pub fn press(trace: &Trace) -> Canvas {
 /// Draws the figure of [`press`] under another title.
 #[must_use]
 pub fn titled(headline: &str, trace: &Trace) -> Canvas {
-    let mut lanes = per_joint(trace, ["Contact torque on the proxy", "Contact force on the proxy"], true, |tick| {
-        &tick.contact_torque
-    });
-    lanes.extend(per_joint(trace, ["Torque on the device", "Force on the device"], true, |tick| &tick.device_torque));
-    lanes.extend(per_joint(trace, ["Proxy configuration"; 2], false, |tick| &tick.proxy));
+    let mut lanes =
+        per_joint(trace, ["Contact torque on the proxy", "Contact force on the proxy"], true, |tick, joint| {
+            tick.contact_torque.get(joint).copied()
+        });
+    lanes.extend(per_joint(trace, ["Torque on the device", "Force on the device"], true, |tick, joint| {
+        tick.device_torque.get(joint).copied()
+    }));
+    let start = trace.ticks.first().map_or_else(|| JointVector::zeros(trace.joints.len()), |tick| tick.proxy);
+    lanes.extend(per_joint(trace, ["Motion of the proxy"; 2], false, |tick, joint| {
+        Some(tick.proxy.get(joint)? - start.get(joint)?)
+    }));
     // A measured dataset knows no nodes.
     if trace.ticks.iter().all(|tick| !tick.contact) || trace.ticks.iter().any(|tick| tick.contact_nodes > 0) {
         let nodes = curve(trace, "", colour::series(0), |tick| f64::from(tick.contact_nodes));
@@ -41,7 +47,7 @@ pub fn titled(headline: &str, trace: &Trace) -> Canvas {
     stack(headline, trace, lanes)
 }
 
-/// Where the energy of proxy and coupling comes from, is kept and goes, and what the balance leaves unexplained.
+/// Draws where the energy of proxy and coupling comes from, is kept and goes.
 #[must_use]
 pub fn energy(trace: &Trace) -> Canvas {
     type Account = (&'static str, fn(&Accounts) -> f64);
@@ -79,7 +85,6 @@ pub fn energy(trace: &Trace) -> Canvas {
     if knows_energy {
         lanes.push(lane("Created by interpolating the torque [mJ]", &[("", |accounts| accounts.leak)]));
     }
-    lanes.push(Lane { height: 70.0, ..lane("Unexplained in the balance [mJ]", &[("", Accounts::residual)]) });
     stack("Energy accounts of proxy and coupling", trace, lanes)
 }
 
@@ -96,15 +101,15 @@ fn stack(headline: &str, trace: &Trace, lanes: Vec<Lane>) -> Canvas {
 
 /// A panel for each unit that occurs among the joints, with a curve for each joint of that unit; `names` are those of the
 /// quantity for joints in radians and in metres.
-fn per_joint(trace: &Trace, names: [&str; 2], torque: bool, value: impl Fn(&Tick) -> &JointVector) -> Vec<Lane> {
+fn per_joint(trace: &Trace, names: [&str; 2], torque: bool, value: impl Fn(&Tick, usize) -> Option<f64>) -> Vec<Lane> {
     let occurs = |unit: &str| trace.joints.iter().any(|joint| joint.unit == unit);
     let units = ["rad", "m"].into_iter().zip(names).filter(|(unit, _)| occurs(unit));
     let lanes = units.map(|(unit, what)| {
         let of_unit = trace.joints.iter().enumerate().filter(|(_, joint)| joint.unit == unit);
-        let symbol = if torque { "τ" } else { "q" };
+        let symbol = if torque { "τ" } else { "Δq" };
         let curves = of_unit.map(|(number, joint)| {
             let name = format!("{symbol}{} {}", subscript(number + 1), joint.name);
-            curve(trace, &name, colour::series(number), |tick| value(tick).get(number).copied().unwrap_or(f64::NAN))
+            curve(trace, &name, colour::series(number), |tick| value(tick, number).unwrap_or(f64::NAN))
         });
         let unit = if torque { torque_unit(unit) } else { unit };
         Lane { title: format!("{what} [{unit}]"), curves: curves.collect(), height: 130.0, counts: false }

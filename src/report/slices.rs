@@ -43,6 +43,9 @@ pub fn slices(dataset: &Dataset) -> Canvas {
     canvas
 }
 
+/// Least range of a colour map over the greatest torque of any joint of the same unit [1]: noise of a hundredth of what is felt stays pale.
+const LEAST_SHARE: f64 = 0.05;
+
 const WIDTH: f64 = 860.0;
 const TOP: f64 = 72.0;
 
@@ -56,7 +59,7 @@ struct Slice {
     strides: [usize; 2],
 }
 
-/// What lies on a plane.
+/// Number of points and size of torques on a plane.
 #[derive(Default)]
 struct Tally {
     points: usize,
@@ -126,13 +129,18 @@ impl Slice {
 
     fn draw(&self, canvas: &mut Canvas, dataset: &Dataset, joint: usize, area: Area) {
         let cells = self.cells(dataset);
-        let torque = |cell| {
+        let torque = |cell, joint: usize| {
             let point = self.point(dataset, cell);
             if dataset.status(point) == Status::Outside { f64::NAN } else { dataset.torque(point)[joint] }
         };
         let all = || (0..cells[0]).flat_map(|x| (0..cells[1]).map(move |y| [x, y]));
-        let bound =
-            all().map(torque).filter(|value| value.is_finite()).fold(0.0, |bound: f64, value| bound.max(value.abs()));
+        let greatest = |joint: usize| {
+            all().map(|cell| torque(cell, joint).abs()).filter(|size| size.is_finite()).fold(0.0, f64::max)
+        };
+        // A joint that hardly feels anything is drawn pale beside those of its unit, not as vividly as these.
+        let of_unit =
+            (0..dataset.grid.joints()).filter(|other| dataset.grid.axes[*other].unit == dataset.grid.axes[joint].unit);
+        let bound = greatest(joint).max(LEAST_SHARE * of_unit.map(greatest).fold(0.0, f64::max));
         let map = ColourMap::Diverging { bound: if bound > 0.0 { bound } else { 1.0 } };
         let panel = Panel { area, across: self.scale(dataset, 0), up: self.scale(dataset, 1) };
         panel.grid(canvas, true);
@@ -140,7 +148,7 @@ impl Slice {
         let corner = |x: f64, y: f64| panel.place((self.coordinate(dataset, 0, x), self.coordinate(dataset, 1, y)));
         canvas.clipped(area, |canvas| {
             for [x, y] in all() {
-                let value = torque([x, y]);
+                let value = torque([x, y], joint);
                 let (left, bottom) = corner(x as f64 - 0.5, y as f64 - 0.5);
                 let (right, top) = corner(x as f64 + 0.5, y as f64 + 0.5);
                 // Neighbours overlap by a little, lest the sheet shine through between them.
@@ -218,13 +226,19 @@ impl Slice {
                 format!("q{} {} = {} {}", subscript(joint + 1), axis.name, ticks::number(q[joint], 3), axis.unit)
             })
             .collect();
-        if fixed.is_empty() { "the whole grid".to_owned() } else { format!("at {}", fixed.join(", ")) }
+        if fixed.is_empty() {
+            return "the whole grid".to_owned();
+        }
+        format!("at {}", fixed.join(", "))
     }
 
     fn legend(&self, canvas: &mut Canvas, dataset: &Dataset) {
         let entry = |name: &str, colour, mark| Entry { name: name.to_owned(), colour, mark };
         let statuses = || (0..dataset.grid.points()).map(|point| dataset.status(point));
         let mut entries = Vec::new();
+        if statuses().any(|status| status == Status::Free) {
+            entries.push(entry("free", colour::WHITE, Mark::Box));
+        }
         if !self.boundary(dataset, self.cells(dataset)).is_empty() {
             entries.push(entry("contact boundary", colour::INK, Mark::Line));
         }

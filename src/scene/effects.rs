@@ -186,18 +186,22 @@ impl Scene {
     pub fn with_effects(&self, graphics: bool, effects: &[Effect]) -> Result<Self, SceneError> {
         let mut text = table_of(self);
         if !graphics {
-            text.remove("graphics");
+            text.insert("graphics".into(), false.into());
+        } else if !text.get("graphics").is_some_and(Value::is_table) {
+            text.insert("graphics".into(), Table::new().into());
         }
         for Effect { table, key, .. } in EFFECTS {
             if let Some(Value::Table(table)) = text.get_mut(table) {
                 table.remove(key);
             }
         }
-        let named = effects.iter().map(|effect| (effect.table, Some((effect.key, effect.value(self)))));
-        for (table, entry) in graphics.then_some(("graphics", None)).into_iter().chain(named) {
-            let table = text.entry(table).or_insert_with(|| Value::Table(Table::new()));
-            if let (Some(table), Some((key, value))) = (table.as_table_mut(), entry) {
-                table.insert(key.to_owned(), value);
+        for effect in effects {
+            let table = text.entry(effect.table).or_insert_with(|| Table::new().into());
+            if !table.is_table() {
+                *table = Table::new().into();
+            }
+            if let Some(table) = table.as_table_mut() {
+                table.insert(effect.key.to_owned(), effect.value(self));
             }
         }
         let Self { text, haptics, graphics, .. } = Self::parse(&text.to_string(), &self.path)?;

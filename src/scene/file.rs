@@ -4,7 +4,7 @@
 
 use super::{Algorithm, ContactSurface, Cover, Interpolation, JointKind, ProxyInertia, SpringKind};
 use serde::Deserialize;
-use serde::de::{Deserializer, SeqAccess, Visitor};
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer};
 use toml::Spanned;
 
 pub(super) type Number = Spanned<f64>;
@@ -21,7 +21,7 @@ pub(super) struct SceneTable {
     pub scan: Option<Spanned<ScanTable>>,
     #[serde(default)]
     pub haptics: HapticsTable,
-    pub graphics: Option<GraphicsTable>,
+    pub graphics: Option<GraphicsEntry>,
     #[serde(default)]
     pub motion: MotionTable,
 }
@@ -208,7 +208,40 @@ pub(super) struct HandTable {
     pub inertia: Option<Spanned<PerJoint>>,
 }
 
-#[derive(Deserialize)]
+/// The graphics loop, or `false` for none.
+pub(super) enum GraphicsEntry {
+    Off,
+    Loop(GraphicsTable),
+}
+
+impl<'de> Deserialize<'de> for GraphicsEntry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct FalseOrTable;
+
+        impl<'de> Visitor<'de> for FalseOrTable {
+            type Value = GraphicsEntry;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("the table [graphics], or false")
+            }
+
+            fn visit_bool<E: serde::de::Error>(self, value: bool) -> Result<GraphicsEntry, E> {
+                if value {
+                    return Err(E::invalid_value(serde::de::Unexpected::Bool(true), &self));
+                }
+                Ok(GraphicsEntry::Off)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<GraphicsEntry, A::Error> {
+                GraphicsTable::deserialize(MapAccessDeserializer::new(map)).map(GraphicsEntry::Loop)
+            }
+        }
+
+        deserializer.deserialize_any(FalseOrTable)
+    }
+}
+
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GraphicsTable {
     pub rate: Option<Number>,

@@ -45,7 +45,7 @@ pub struct Scene {
     pub grid: GridSpec,
     /// The 1 kHz loop.
     pub haptics: HapticsSpec,
-    /// The graphics loop. Absent: no graphics loop, and no contact forces are stored.
+    /// The graphics loop. Absent where the scene says `graphics = false`: then no contact forces are stored.
     pub graphics: Option<GraphicsSpec>,
     /// Motions to play.
     pub motion: MotionSpec,

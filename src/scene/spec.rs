@@ -300,6 +300,8 @@ pub struct HapticsSpec {
     pub passivity_factor: f64,
     /// Extra damping bv of the proxy at each joint [N m s/rad].
     pub proxy_damping: JointVector,
+    /// Whether the scene leaves bv to the dataset, which raises it as far as passivity asks.
+    pub proxy_damping_is_free: bool,
     /// Which inertia the proxy moves with.
     pub proxy_inertia: ProxyInertia,
     /// Stiffness Kvc of the virtual coupling at each joint [N m/rad].

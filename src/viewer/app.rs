@@ -12,6 +12,7 @@ use super::{
     session::Session,
 };
 use crate::{
+    JointVector,
     gpu::{ADAPTER_VARIABLE, Context, GpuError},
     render::timing::Timing,
     scene::Scene,
@@ -23,7 +24,7 @@ use std::{
     sync::Arc,
 };
 
-/// What is opened first.
+/// The scene or file that is opened first.
 #[derive(Clone, Debug)]
 pub enum Start {
     /// The paper's sphere, baked.
@@ -63,21 +64,27 @@ pub struct Viewer {
     pub(super) plots: Plots,
     pub(super) files: Files,
     pub(super) job: Option<Job>,
-    /// What this machine bakes with, and what is chosen of it.
+    /// Backends of this machine, and the chosen one.
     pub(super) solvers: Vec<Solver>,
     pub(super) solver: Solver,
-    /// What went wrong, until it is dismissed.
+    /// The last error, until it is dismissed.
     pub(super) error: Option<String>,
     /// Frames of the window a second, over the last ones, where it goes by the clock.
     pub(super) frame_rate: Option<f64>,
+    /// Whether the steps from a scene to what is felt are shown.
+    pub(super) shows_steps: bool,
+    /// Where proxy and device were when they last moved, and since when [s].
+    shown_at: (JointVector, JointVector),
+    /// See `shown_at`.
+    still: f64,
 }
 
-/// What is left of a window: all but what was drawn.
+/// The state that outlives a window: all but its graphics.
 pub struct Rescue {
-    /// What is felt; its loop goes on.
+    /// The open session, whose loop goes on.
     session: Option<Session>,
     gamepad: Gamepad,
-    /// What was being made.
+    /// The task that was under way.
     task: Option<Task>,
     solver: Solver,
     shown: Shown,
@@ -86,6 +93,15 @@ pub struct Rescue {
 
 /// Samples a pixel of the 3-D scene, for smooth edges.
 const SAMPLES: u32 = 4;
+
+/// Time after which what does not move is at rest [s]: the object's vibration has died down.
+const SETTLED: f64 = 2.0;
+
+/// Motion of a joint between two frames that is none, over its grid step [1]: what a pixel does not show.
+const UNMOVED: f64 = 1e-3;
+
+/// Longest time between two frames of a moving window [s]; a longer one was at rest.
+const LONGEST_FRAME: f64 = 1.0;
 
 /// Share of the latest frame in the frame rate that is shown [1].
 const LATEST: f64 = 0.1;
@@ -113,6 +129,9 @@ impl Viewer {
             solver: Solver::Auto,
             error: None,
             frame_rate: None,
+            shows_steps: pace == Pace::Clock,
+            shown_at: (JointVector::zeros(0), JointVector::zeros(0)),
+            still: 0.0,
         })
     }
 
@@ -128,7 +147,7 @@ impl Viewer {
         }
     }
 
-    /// What a window on another device can [`Viewer::resume`] from.
+    /// Returns the state from which a window on another device can [`Viewer::resume`].
     pub fn rescue(&mut self, egui: &egui::Context) -> Rescue {
         Rescue {
             session: self.session.take(),
@@ -221,7 +240,7 @@ impl Viewer {
         }
     }
 
-    /// What went wrong last, if that has not been dismissed.
+    /// Returns the last error, if it has not been dismissed.
     #[must_use]
     pub fn error(&self) -> Option<&str> {
         self.error.as_deref()
@@ -266,9 +285,19 @@ impl Viewer {
         self.scene.tip_in(rect)
     }
 
+    /// Whether nothing moves and nothing is made, so that another frame would look the same.
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        let busy = |session: &Session| session.feel.guide().is_running() || session.is_retuning();
+        self.job.is_none()
+            && !self.session.as_ref().is_some_and(busy)
+            && !self.scene.is_redrawing()
+            && self.still > SETTLED
+    }
+
     /// Lets `elapsed` [s] go by: the loop where it runs by steps, the object, and what is in the background.
     pub fn advance(&mut self, elapsed: f64, egui: &egui::Context) {
-        if self.pace == Pace::Clock && elapsed > 0.0 {
+        if self.pace == Pace::Clock && elapsed > 0.0 && elapsed < LONGEST_FRAME {
             let rate = self.frame_rate.map_or(elapsed, |rate| (1.0 - LATEST) / rate + LATEST * elapsed).recip();
             self.frame_rate = Some(rate);
         }
@@ -286,6 +315,16 @@ impl Viewer {
         session.feel.step((elapsed / session.loaded.setup.haptics.period()).round() as usize);
         session.history.collect(&mut session.feel);
         let latest = session.feel.latest();
+        let axes = session.loaded.dataset.grid.axes.iter();
+        let moved = |now: &[f64], before: &[f64]| {
+            axes.clone().zip(now).zip(before).any(|((axis, now), before)| (now - before).abs() > UNMOVED * axis.step)
+        };
+        let (proxy, device) = self.shown_at;
+        if proxy.len() != latest.proxy.len() || moved(&latest.proxy, &proxy) || moved(&latest.device, &device) {
+            (self.shown_at, self.still) = ((latest.proxy, latest.device), 0.0);
+        } else {
+            self.still += elapsed;
+        }
         if let Err(error) = self.scene.advance(&session.loaded, &latest, elapsed) {
             self.error = Some(not_drawn(error));
         }

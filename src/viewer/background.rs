@@ -10,7 +10,7 @@ pub struct Coming<T> {
     made: mpsc::Receiver<T>,
 }
 
-/// What is said of a thread that ended without its result.
+/// Message for a thread that ended without its result.
 pub const ENDED: &str = "the work ended unexpectedly; please report this";
 
 impl<T: Send + 'static> Coming<T> {
@@ -52,7 +52,7 @@ impl<T: Send + 'static> Coming<T> {
 
 /// Something that is made anew in the background whenever something else is wanted of it; what there is stays in use until then.
 pub struct Following<W, T> {
-    /// What it was made as, or could not be; none before there is any.
+    /// The result, or why there is none; absent before the first.
     last: Option<W>,
     coming: Option<(W, Coming<T>)>,
 }

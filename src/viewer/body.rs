@@ -17,11 +17,12 @@ use std::sync::Arc;
 /// The object as it is drawn.
 pub struct Body {
     nodes: Nodes,
-    /// What is drawn.
+    /// Buffers from which the surface is drawn.
     pub surface: Surface,
     /// n0 [m].
     rest: Vec<Vec3>,
-    /// Greatest displacement at rest under the dataset's largest contact forces [m], and the largest of these on a node [N].
+    /// Largest displacement at rest [m] and contact force on a node [N] of the motions that can be played; of the whole dataset where
+    /// these touch nothing.
     pub extremes: [f64; 2],
 }
 
@@ -121,15 +122,26 @@ impl Body {
     }
 }
 
-/// See [`Body::extremes`]: at the grid point with the most energy, or with the largest torque.
+/// Instants of a motion that are looked at for [`Body::extremes`].
+const INSTANTS: usize = 50;
+
+/// Returns [`Body::extremes`]: those at the grid point with the most energy, or with the largest torque.
 fn extremes(loaded: &Loaded) -> [f64; 2] {
     let dataset = &loaded.dataset;
     let weight = |point: usize| match &dataset.energy {
         Some(energy) => energy[point],
         None => dataset.torque(point).iter().map(|tau| tau * tau).sum(),
     };
-    let converged = (0..dataset.grid.points()).filter(|&point| dataset.status(point) == Status::Contact);
-    let deepest = converged.max_by(|&a, &b| weight(a).total_cmp(&weight(b)));
+    let deepest = |points: &mut dyn Iterator<Item = usize>| {
+        let converged = points.filter(|&point| dataset.status(point) == Status::Contact);
+        converged.max_by(|&a, &b| weight(a).total_cmp(&weight(b)))
+    };
+    let motions = loaded.motions();
+    let instants = motions.iter().flat_map(|(_, motion)| {
+        (0..INSTANTS).map(|k| motion.at(motion.duration() * k as f64 / (INSTANTS - 1) as f64).0)
+    });
+    let shown = deepest(&mut instants.filter_map(|q| dataset.grid.nearest(&q)));
+    let deepest = shown.or_else(|| deepest(&mut (0..dataset.grid.points())));
     let (Some(object), Some(point)) = (&loaded.setup.object, deepest) else { return [0.0; 2] };
     let mut displacement = vec![DVec3::ZERO; object.rest.len()];
     for contact in dataset.forces(point) {

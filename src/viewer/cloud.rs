@@ -41,7 +41,7 @@ pub struct Cloud {
     camera: Camera,
     /// Grid lines of the joints beyond the third, and the points on them.
     points: Option<(Vec<usize>, Vec<Point>)>,
-    /// Of the first three joints every such grid line is shown.
+    /// Stride of the grid lines that are shown, along the first three joints.
     pitch: usize,
     high: f64,
 }

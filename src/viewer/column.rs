@@ -8,7 +8,7 @@ use crate::{
 };
 use eframe::egui::Color32;
 
-/// What a cell's colour says.
+/// Quantity that a cell's colour shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Column {
     /// Torque of a joint, by its number.
@@ -17,7 +17,7 @@ pub enum Column {
     Energy,
     /// Smallest signed distance at rest.
     Gap,
-    /// What became of the point.
+    /// Status of the point.
     Status,
     /// Relative residual.
     Residual,

@@ -14,7 +14,6 @@ use super::{
 use crate::{
     dataset::Dataset,
     gpu::Context,
-    render::passivity::Bound,
     scene::{Algorithm, EFFECTS, Interpolation, Scene, Tuning},
 };
 use eframe::egui::{Align, Button, ComboBox, DragValue, Layout, Response, RichText, Ui};
@@ -30,7 +29,7 @@ pub struct Controls {
     joint: Option<usize>,
     /// The scene as it would be baked.
     pub scene: Option<Arc<Scene>>,
-    /// What bakes.
+    /// Backend of the next bake.
     pub solver: Solver,
     /// Whether a change of the scene is baked at once.
     bake_on_change: bool,
@@ -67,29 +66,30 @@ impl Controls {
         self.prices.wait();
     }
 
-    /// The panel. `exceeded`: gains beyond their bound; `solvers`: what this machine bakes with. Answers whether the scene is to
-    /// be baked again.
+    /// Shows the panel, and returns whether the scene is to be baked again. `advice`: what is wrong with the gains, if anything;
+    /// `solvers`: what this machine bakes with.
     pub fn show(
         &mut self,
         ui: &mut Ui,
         loaded: &Loaded,
-        exceeded: &[Bound],
+        advice: Option<&str>,
         shown: &mut Shown,
         solvers: &[Solver],
     ) -> bool {
         ui.horizontal(|ui| {
-            ui.heading("Feel");
+            ui.heading("Feel").on_hover_text("The 1 kHz loop: gains and interpolation, felt at once");
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let changed = self.tuning.haptics != self.original.haptics;
-                if ui.add_enabled(changed, Button::new("Gains of the scene")).clicked() {
+                let reset = ui.add_enabled(changed, Button::new("Reset gains"));
+                if reset.on_hover_text("Takes the gains of the scene again").clicked() {
                     self.tuning.haptics = self.original.haptics.clone();
                 }
             });
         });
-        self.feel(ui, loaded, exceeded);
+        self.feel(ui, loaded, advice);
         self.effects(ui);
         ui.add_space(GROUP_GAP);
-        ui.heading("Scene");
+        ui.heading("Scene").on_hover_text("What the 3-D picture shows");
         if loaded.forces.is_some() {
             look(ui, shown);
         } else {
@@ -98,29 +98,30 @@ impl Controls {
             ui.checkbox(&mut shown.ghost, "Device's ghost");
         }
         ui.add_space(GROUP_GAP);
-        ui.heading("Haptization");
+        ui.heading("Haptization").on_hover_text("How the dataset was solved, and solving it again");
         self.haptization(ui, loaded, solvers)
     }
 
-    fn feel(&mut self, ui: &mut Ui, loaded: &Loaded, exceeded: &[Bound]) {
+    fn feel(&mut self, ui: &mut Ui, loaded: &Loaded, advice: Option<&str>) {
         let axes = &loaded.dataset.grid.axes;
         gains::joint(ui, axes, &mut self.joint);
+        gains::legend(ui);
         gains::sliders(ui, axes, self.joint, &mut self.tuning.haptics, &self.original.haptics);
         gains::threshold(ui, &mut self.tuning.haptics);
         self.interpolation(ui, &loaded.dataset);
-        for gain in exceeded {
-            ui.colored_label(ui.visuals().warn_fg_color, RichText::new(gain.to_string()).small());
-        }
-        if exceeded.is_empty() {
-            let palette = palette::of(ui.visuals());
-            ui.colored_label(palette.good, RichText::new("All gains within their passivity bounds").small());
-        }
+        match advice {
+            Some(advice) => ui.colored_label(ui.visuals().warn_fg_color, RichText::new(advice).small()),
+            None => {
+                let good = palette::of(ui.visuals()).good;
+                ui.colored_label(good, RichText::new("All gains within their passivity bounds").small())
+            }
+        };
     }
 
     /// How the torque is interpolated between grid points, and what a tick costs with each way.
     fn interpolation(&mut self, ui: &mut Ui, dataset: &Dataset) {
         ui.horizontal(|ui| {
-            let label = ui.label("Interpolation");
+            let label = ui.label("Interpolation").on_hover_text("How the torque follows from the grid points around");
             let chosen = &mut self.tuning.haptics.interpolation;
             ComboBox::from_id_salt("interpolation")
                 .width(CHOICE_WIDTH)
@@ -152,7 +153,7 @@ impl Controls {
     /// A box for every effect that the scene names, with its price.
     fn effects(&mut self, ui: &mut Ui) {
         ui.add_space(GROUP_GAP);
-        ui.heading("Effects");
+        ui.heading("Effects").on_hover_text("What the scene adds to plain contact, each with its price");
         let named: Vec<usize> = (0..EFFECTS.len()).filter(|&number| EFFECTS[number].is_in(&self.original)).collect();
         if named.is_empty() {
             let there_are: Vec<String> =
@@ -192,7 +193,8 @@ impl Controls {
         };
         let mut contact = scene.contact;
         ui.horizontal(|ui| {
-            let label = ui.label("Solve");
+            let label =
+                ui.label("Solve").on_hover_text("The algorithm that finds the equilibrium of each configuration");
             ComboBox::from_id_salt("algorithm")
                 .width(CHOICE_WIDTH)
                 .selected_text(algorithm_name(contact.algorithm))
@@ -205,7 +207,7 @@ impl Controls {
                 .labelled_by(label.id);
         });
         ui.horizontal(|ui| {
-            let label = ui.label("on");
+            let label = ui.label("on").on_hover_text("The CPU or a GPU");
             ComboBox::from_id_salt("solver")
                 .width(ui.available_width())
                 .truncate()
@@ -220,7 +222,7 @@ impl Controls {
                 .labelled_by(label.id);
         });
         ui.horizontal(|ui| {
-            let label = ui.label("Contact Kc [N/m]");
+            let label = ui.label("Contact Kc [N/m]").on_hover_text("Stiffness of a contact spring");
             let number = DragValue::new(&mut contact.stiffness).range(CONTACT_STIFFNESS).speed(CONTACT_STIFFNESS_DRAG);
             ui.add(number).labelled_by(label.id);
         });
@@ -239,17 +241,18 @@ impl Controls {
     }
 }
 
-/// What is shown of the scene.
+/// Shows the choices of colour, edges, arrows and ghost.
 fn look(ui: &mut Ui, shown: &mut Shown) {
     ui.horizontal(|ui| {
-        ui.label("Colour");
+        ui.label("Colour").on_hover_text("What the colour of the object means");
         ui.selectable_value(&mut shown.quantity, Quantity::Displacement, "displacement");
         ui.selectable_value(&mut shown.quantity, Quantity::Force, "force");
     });
     ui.horizontal_wrapped(|ui| {
-        ui.checkbox(&mut shown.edges, "Edges");
-        ui.checkbox(&mut shown.forces, "Force arrows");
-        ui.checkbox(&mut shown.ghost, "Device's ghost");
+        ui.checkbox(&mut shown.edges, "Edges").on_hover_text("Edges of the mesh");
+        ui.checkbox(&mut shown.forces, "Force arrows").on_hover_text("Forces of the object on the arm");
+        ui.checkbox(&mut shown.ghost, "Device's ghost")
+            .on_hover_text("Where the device is: the arm that the hand holds");
     });
 }
 

@@ -27,7 +27,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// What drives the ticks.
+/// The source of ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// The clock, in a thread with real-time priority where that is permitted.
@@ -53,17 +53,17 @@ pub struct Feel {
 /// How often the hand's goal is moved.
 const GUIDE_PERIOD: Duration = Duration::from_millis(2);
 
-/// Ticks and costs that wait for the window: four seconds at 1 kHz.
-const RING: usize = 4096;
+/// Ticks and costs that wait for the window: sixteen seconds at 1 kHz, for a window at rest looks at them every ten.
+const RING: usize = 1 << 14;
 
-/// What the haptic thread is given.
+/// Everything that the haptic thread owns.
 struct Body {
     haptics: Arc<Haptics>,
     device: Timed,
     stop: Arc<AtomicBool>,
 }
 
-/// What the haptic thread gives back before its first tick.
+/// The ends of the buffers that the haptic thread returns before its first tick.
 type Seen = (rtrb::Consumer<Tick>, triple_buffer::Output<Latest>, Option<ClearFault>);
 
 impl Feel {
@@ -146,7 +146,7 @@ impl Feel {
         *self.latest.read()
     }
 
-    /// What the system did not grant the haptic thread; told once.
+    /// Returns the requests of the haptic thread that the system refused, once.
     #[must_use]
     pub fn refused(&self) -> Option<Vec<String>> {
         self.refused.try_recv().ok()

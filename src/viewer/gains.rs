@@ -1,8 +1,8 @@
 //! Gains of the loop as sliders, each with its passivity bound drawn on it, and the contact threshold.
 
 use super::{
-    number, palette,
-    theme::{self, FINE_GAP, MARK_HEIGHT, MARK_WIDTH, NUMBER_WIDTH},
+    legend, number, palette,
+    theme::{self, FINE_GAP, MARK_HEIGHT, MARK_WIDTH, NUMBER_WIDTH, SAMPLE},
 };
 use crate::{
     JointVector,
@@ -10,7 +10,7 @@ use crate::{
     render::passivity,
     scene::{HapticsSpec, Interpolation},
 };
-use eframe::egui::{self, ComboBox, DragValue, Response, Slider, SliderClamping, Stroke, Ui, lerp, pos2};
+use eframe::egui::{self, ComboBox, DragValue, Response, Slider, SliderClamping, Stroke, Ui, lerp, pos2, vec2};
 use std::ops::RangeInclusive;
 
 /// One gain of the loop.
@@ -101,6 +101,14 @@ pub fn joint(ui: &mut Ui, axes: &[Axis], chosen: &mut Option<usize>) {
             .response
             .labelled_by(label.id);
     });
+}
+
+/// Says what the mark on the sliders means.
+pub fn legend(ui: &mut Ui) {
+    let sample = legend::entry(ui, SAMPLE, "passive up to this mark");
+    let half = 0.5 * SAMPLE.y;
+    let ends = [sample.center() - vec2(0.0, half), sample.center() + vec2(0.0, half)];
+    ui.painter().line_segment(ends, Stroke::new(MARK_WIDTH, palette::of(ui.visuals()).good));
 }
 
 /// A slider for each of `gains`, of one joint or of all; `original` are the scene's.

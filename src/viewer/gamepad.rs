@@ -6,7 +6,7 @@
 use super::pad::{JOINTS, Pad};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What the hand is asked to do.
+/// The motion that is asked of the hand.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wish {
     /// How fast each joint is to move, as a share of the speed of keys.
@@ -44,7 +44,7 @@ impl Gamepad {
         gamepad
     }
 
-    /// What the hand is asked to do now; a reset is told once.
+    /// Returns the motion that is asked of the hand now; a reset is returned once.
     #[must_use]
     pub fn wish(&self) -> Wish {
         let mut now = self.lock();

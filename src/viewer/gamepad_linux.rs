@@ -98,7 +98,7 @@ fn open(device: &Path) -> io::Result<File> {
     OpenOptions::new().read(true).custom_flags(libc::O_NONBLOCK).open(device)
 }
 
-/// What is said of a gamepad that cannot be opened; one that has just been unplugged is none.
+/// Returns the message for a gamepad that cannot be opened; none if it was just unplugged.
 fn refused(device: &Path, error: &io::Error) -> Found {
     let remedy = match error.kind() {
         ErrorKind::NotFound => return Found::None,

@@ -2,6 +2,7 @@
 
 use super::{gamepad::Wish, loaded::Loaded, pad::JOINTS};
 use crate::{JointVector, device::Motion, scene::Waypoint};
+use eframe::egui;
 
 /// The hand's leader. Time is told to it: it has no clock.
 #[derive(Clone, Debug)]
@@ -27,6 +28,10 @@ pub struct Guide {
     keys: Option<[f64; JOINTS]>,
     /// Since the window last said so [s].
     silence: f64,
+    /// The window that shows the hand, which rests while nothing moves; none where there is no window.
+    window: Option<egui::Context>,
+    /// Since it was last asked to draw [s].
+    unasked: f64,
 }
 
 /// Time in which the hand is led to the beginning of a motion [s].
@@ -42,6 +47,9 @@ const LONGEST: f64 = 0.1;
 /// Longest time that a window says nothing and still has the keyboard [s]: one that is hidden or hangs must not hold a key
 /// down, while a slow rasteriser's draws a frame in a fifth of that.
 const LONGEST_SILENCE: f64 = 1.0;
+
+/// Least time between two frames that a moving hand asks for [s].
+const BETWEEN_FRAMES: f64 = 1.0 / 60.0;
 
 impl Guide {
     /// The hand rests at the beginning of the first motion.
@@ -60,6 +68,8 @@ impl Guide {
             way_home: None,
             keys: None,
             silence: 0.0,
+            window: None,
+            unasked: 0.0,
         };
         guide.point(loaded.start());
         guide
@@ -104,12 +114,9 @@ impl Guide {
         }
     }
 
-    /// Stops the motion where it is, or lets it go on; from its beginning where it has ended.
+    /// Stops the motion where it is, or lets it go on.
     pub fn toggle(&mut self) {
         self.running = !self.running;
-        if self.running && self.time().is_some_and(|(time, duration)| time >= duration) {
-            self.time = 0.0;
-        }
     }
 
     /// Goes to `time` in the motion that leads [s].
@@ -130,6 +137,11 @@ impl Guide {
     /// a gamepad are meant for it.
     pub fn hear(&mut self, keys: Option<[f64; JOINTS]>) {
         (self.keys, self.silence) = (keys, 0.0);
+    }
+
+    /// Takes note of the window that shows the hand, which is asked to draw when the hand moves.
+    pub fn shown_in(&mut self, window: &egui::Context) {
+        self.window.get_or_insert_with(|| window.clone());
     }
 
     /// The hand moves the first joints at `speeds`, from -1 to 1 each, for `elapsed` [s]; nobody takes the lead where all are 0.
@@ -153,7 +165,9 @@ impl Guide {
 
     /// Does what keys and the gamepad's `wish` ask for, and lets `elapsed` [s] go by; answers with where the hand is led now.
     pub fn follow(&mut self, wish: &Wish, elapsed: f64) -> JointVector {
+        let before = self.goal;
         self.silence += elapsed;
+        self.unasked += elapsed;
         if let Some(keys) = self.keys.filter(|_| self.silence < LONGEST_SILENCE) {
             if wish.reset {
                 self.go_home();
@@ -162,7 +176,13 @@ impl Guide {
                 std::array::from_fn(|joint| (keys[joint] + wish.speeds[joint]).clamp(-1.0, 1.0));
             self.steer(&speeds, elapsed);
         }
-        self.advance(elapsed)
+        let goal = self.advance(elapsed);
+        // A window at rest is silent: it has to speak again before a gamepad is heard.
+        if (goal != before || *wish != Wish::default()) && self.unasked >= BETWEEN_FRAMES {
+            self.unasked = 0.0;
+            self.window.iter().for_each(egui::Context::request_repaint);
+        }
+        goal
     }
 
     /// `elapsed` [s] go by; answers with where the hand is led now.
@@ -177,7 +197,11 @@ impl Guide {
         if let Some((_, motion)) = self.playing.and_then(|number| self.motions.get(number)) {
             if self.running {
                 self.time += elapsed;
-                self.running = self.time < motion.duration();
+                if self.time >= motion.duration() {
+                    // From the beginning again; where that is elsewhere, the hand is led there first.
+                    let (end, begin) = (motion.at(motion.duration()).0, motion.at(0.0).0);
+                    (self.time, self.from) = (if end == begin { 0.0 } else { -LEAD_IN }, end);
+                }
             }
             self.time = self.time.min(motion.duration());
             self.goal = motion.at(self.time).0;
@@ -214,6 +238,8 @@ mod tests {
             way_home: None,
             keys: Some([0.0; JOINTS]),
             silence: f64::NEG_INFINITY,
+            window: None,
+            unasked: 0.0,
         }
     }
 
@@ -290,6 +316,23 @@ mod tests {
         // It is back.
         guide.hear(Some([0.0; JOINTS]));
         assert!(guide.follow(&wish([1.0, 0.0]), 2e-3)[0] > stopped[0]);
+    }
+
+    #[test]
+    fn a_motion_begins_again_without_a_blow() {
+        let ends = [(0.0, [0.0, 0.0]), (1.0, [0.5, 0.1])];
+        let waypoints = ends.map(|(time, q)| Waypoint { time, q: JointVector::from_slice(&q) });
+        let mut guide = Guide { motions: vec![("press", Motion::through(&waypoints, 2).unwrap())], ..guide() };
+        guide.play(0);
+        let (mut before, mut fastest, mut ends) = (guide.goal(), 0.0_f64, 0);
+        for _ in 0..2000 {
+            let now = guide.follow(&Wish::default(), 2e-3);
+            fastest = fastest.max((now[0] - before[0]).abs() / 2e-3);
+            ends += usize::from(now[0] > 0.499 && before[0] <= 0.499);
+            before = now;
+        }
+        assert!(ends >= 2 && guide.is_running(), "{ends} times in 4 s");
+        assert!(fastest < 1.01 * 1.875 * 0.5 / LEAD_IN, "{fastest}");
     }
 
     #[test]

@@ -15,7 +15,7 @@ const KEPT: usize = 20_000;
 const STILL: Duration = Duration::from_secs(2);
 const SETTLING: Duration = Duration::from_millis(200);
 
-/// What was felt lately, and how punctually.
+/// The latest ticks, and how punctual they were.
 #[derive(Clone)]
 pub struct History {
     ticks: VecDeque<Tick>,
@@ -129,7 +129,7 @@ impl History {
         &self.still
     }
 
-    /// What the system did not grant, in words.
+    /// Returns the requests that the system refused, in words.
     #[must_use]
     pub fn refused(&self) -> &[String] {
         &self.refused

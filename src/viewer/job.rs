@@ -28,7 +28,7 @@ use std::{
     time::SystemTime,
 };
 
-/// What is to be done.
+/// The work to be done.
 #[derive(Clone)]
 pub enum Task {
     /// Open a scene, and bake it, or a dataset.
@@ -37,7 +37,7 @@ pub enum Task {
     Bake(Arc<Scene>, Option<Surface>),
 }
 
-/// What bakes.
+/// The backend of a bake.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Solver {
     /// The window's adapter if it is a hardware GPU, else the CPU.
@@ -56,7 +56,7 @@ impl Solver {
         [Self::Auto, Self::Cpu].into_iter().chain(crate::gpu::adapters().into_iter().map(Self::Adapter)).collect()
     }
 
-    /// What it stands for.
+    /// Returns what the name stands for.
     #[must_use]
     pub fn what(&self) -> String {
         match self {
@@ -105,7 +105,7 @@ pub enum Outcome {
 
 /// A job under way. Dropping it cancels it.
 pub struct Job {
-    /// What it does.
+    /// The work that it does.
     pub task: Task,
     /// The same, for its progress bar.
     pub title: String,

@@ -8,7 +8,6 @@ use crate::{
     render::{
         graphics::ContactForces,
         haptic::Haptics,
-        passivity::Bound,
         setup::{Setup, SetupError},
     },
     scene::{HapticsSpec, Scene, Tuning},
@@ -30,7 +29,7 @@ pub struct Loaded {
     pub setup: Arc<Setup>,
     /// Contact forces on the object; absent where there is no object to draw.
     pub forces: Option<Arc<ContactForces>>,
-    /// What the bake said, if this window baked it.
+    /// The report of the bake, if this window baked it.
     pub report: Option<Arc<SweepReport>>,
 }
 
@@ -66,13 +65,13 @@ impl Loaded {
         Tuning { haptics: scene.haptics.clone(), graphics: drawn.map(|graphics| graphics.effects).unwrap_or_default() }
     }
 
-    /// The haptic loop with `gains`, and which of them are beyond their passivity bound.
+    /// Returns the haptic loop with `gains`, and what is wrong with them where they are beyond their passivity bounds.
     ///
     /// # Errors
     /// When they do not make a loop.
-    pub fn tuned(&self, gains: &HapticsSpec) -> Result<(Arc<Haptics>, Vec<Bound>), SetupError> {
-        let (haptics, exceeded) = self.setup.retuned(&self.dataset, gains)?;
-        Ok((Arc::new(haptics), exceeded))
+    pub fn tuned(&self, gains: &HapticsSpec) -> Result<(Arc<Haptics>, Option<String>), SetupError> {
+        let (haptics, advice) = self.setup.retuned(&self.dataset, gains)?;
+        Ok((Arc::new(haptics), advice))
     }
 
     /// Whether the dataset tells which nodes of the object are in contact. What was measured on a real object does not.

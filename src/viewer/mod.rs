@@ -53,6 +53,7 @@ mod shapes;
 mod slices;
 mod stage;
 mod steering;
+mod steps;
 mod theme;
 mod window;
 
@@ -90,13 +91,13 @@ pub enum ViewError {
     /// There is a display, but no window to be had.
     #[error("no window can be opened: {0}. haptize view --screenshot FILE.png draws one picture without a window")]
     Window(String),
-    /// What shows the window gave up: most often the display is gone.
+    /// The windowing system gave up: most often the display is gone.
     #[error(
         "the window ended unexpectedly: {0}. Start haptize view again; if the display was there all the time, please report \
          this with the output of haptize doctor"
     )]
     Ended(String),
-    /// What was to be shown cannot be opened.
+    /// The file cannot be opened.
     #[error("{0}")]
     Open(String),
     /// The picture cannot be written.

@@ -81,7 +81,7 @@ fn scale(ui: &Ui, painter: &Painter, rect: Rect, palette: &Palette, camera: &Cam
     painter.text(at, Align2::CENTER_BOTTOM, label, theme::small(), ui.visuals().text_color());
 }
 
-/// What the surface's colours say.
+/// Draws the key of the surface's colours.
 fn colours(ui: &Ui, painter: &Painter, rect: Rect, body: &Body, quantity: Quantity) {
     let (title, top) = match quantity {
         Quantity::Displacement => ("displacement [mm]", 1e3 * body.extremes[0]),

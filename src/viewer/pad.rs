@@ -1,7 +1,7 @@
 //! From what a gamepad's sticks, triggers and buttons report to the speeds of joints. Pure: whence the reports come is in
 //! `gamepad.rs`.
 
-/// What can be moved from its middle or its rest.
+/// A stick axis or a trigger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Axis {
     LeftX,
@@ -12,7 +12,7 @@ pub enum Axis {
     RightTrigger,
 }
 
-/// What can be pressed.
+/// A button.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Button {
     LeftBumper,

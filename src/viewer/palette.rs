@@ -7,7 +7,7 @@ use eframe::egui::{Color32, CornerRadius, Shadow, Stroke, Visuals, style::Handle
 /// Strength of lines that only help to read others, over their colour's own [1].
 pub const FAINT: f32 = 0.45;
 
-/// What is not egui's own business.
+/// Colours of everything that egui does not draw itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Palette {
     /// Behind the 3-D scene and the plots.
@@ -43,17 +43,14 @@ pub fn egui_colour(colour: Colour) -> Color32 {
     Color32::from_rgb(red, green, blue).gamma_multiply(colour.opacity)
 }
 
-/// Colour of series `number` in a plot: Okabe and Ito's, on dark ground the blue in its lighter shade, on light ground the three
-/// light ones in a darker shade, since a line is thin.
+/// Colour of series `number` in a plot: Okabe and Ito's, on dark ground the blue in its lighter shade, on light ground the light ones
+/// in a darker shade, since a line is thin. The fifth is a grey instead of their second blue.
 #[must_use]
 pub fn series(number: usize, dark: bool) -> Color32 {
-    const ON_DARK: [usize; 6] = [4, 5, 2, 3, 0, 1];
-    const DARKENED: [u32; 3] = [0xb0_52_8a, 0x2a_86_bd, 0xa8_74_00];
-    egui_colour(match number % ON_DARK.len() {
-        number if dark => colour::series(ON_DARK[number]),
-        number @ 3.. => Colour::hex(DARKENED[number - 3]),
-        number => colour::series(number),
-    })
+    const LIGHT: [u32; 6] = [0x00_72_b2, 0xd5_5e_00, 0x00_9e_73, 0xb0_52_8a, 0x3f_48_54, 0x8f_7a_00];
+    const DARK: [u32; 6] = [0x56_b4_e9, 0xe6_9f_00, 0x00_9e_73, 0xcc_79_a7, 0xdd_e2_e9, 0xf0_e4_42];
+    let colours = if dark { DARK } else { LIGHT };
+    egui_colour(Colour::hex(colours[number % colours.len()]))
 }
 
 /// The palette that goes with `visuals`.
@@ -159,12 +156,12 @@ pub fn dark() -> Visuals {
     visuals.selection.stroke = Stroke::new(HAIRLINE, egui_colour(Colour::hex(0xc5_e4_f8)));
     visuals.error_fg_color = egui_colour(Colour::hex(0xff_7d_94));
     visuals.warn_fg_color = egui_colour(Colour::hex(0xf5_a3_5c));
-    visuals.hyperlink_color = egui_colour(colour::series(4));
+    visuals.hyperlink_color = egui_colour(Colour::hex(0x56_b4_e9));
     visuals.faint_bg_color = egui_colour(Colour::hex(0x22_27_2f));
     visuals
 }
 
-/// What both themes have in common: text in `ink`, notes in `soft`, fields on `ground`, panels on `panel`.
+/// Sets what both themes have in common: text in `ink`, notes in `soft`, fields on `ground`, panels on `panel`.
 fn dress(visuals: &mut Visuals, ink: Color32, soft: Color32, ground: Color32, panel: Color32) {
     visuals.widgets.noninteractive.fg_stroke.color = ink;
     visuals.weak_text_color = Some(soft);
@@ -211,6 +208,20 @@ mod tests {
         };
         let [a, b] = [luminance(a) + 0.05, luminance(b) + 0.05];
         a.max(b) / a.min(b)
+    }
+
+    /// Least distance of two series' colours, in sRGB's 0 to 255: the second blue was 48 from the first.
+    const APART: f32 = 70.0;
+
+    #[test]
+    fn six_series_are_told_apart() {
+        for dark in [false, true] {
+            for (a, b) in (0..6).flat_map(|a| (a + 1..6).map(move |b| (a, b))) {
+                let [one, other] = [a, b].map(|number| series(number, dark).to_array().map(f32::from));
+                let apart = (0..3).map(|k| (one[k] - other[k]).powi(2)).sum::<f32>().sqrt();
+                assert!(apart >= APART, "{a} and {b}, dark {dark}: {apart}");
+            }
+        }
     }
 
     /// Least contrast of text (WCAG 2.2, level AA, 1.4.3), and of what tells something without being text (1.4.11).

@@ -10,7 +10,7 @@ use super::{
     number,
     plots::{self, Plots},
     session::Session,
-    steering,
+    steering, steps,
     theme::{
         self, BAR_MARGIN, CONTROLS_RANGE, CONTROLS_WIDTH, GAP, GROUP_GAP, LEAST_MOTION, LONE_BUTTON, MESSAGE_WIDTH,
         MOTION_WIDTH, NAME_SHARE, NARROW, PANEL_MARGIN, PAUSE_WIDTH, PLOTS_RANGE, PROGRESS, PROGRESS_HEIGHT,
@@ -59,7 +59,12 @@ impl Viewer {
                 if ui.button("Reset view").on_hover_text("Or double-click the scene").clicked() {
                     self.scene.reset_view();
                 }
-                ui.menu_button("Help", help).response.on_hover_text("What pointer and keys do");
+                let shows_steps = &mut self.shows_steps;
+                let menu = ui.menu_button("Help", |ui| {
+                    help(ui);
+                    *shows_steps |= ui.button("Three steps").on_hover_text("From a scene to a force").clicked();
+                });
+                menu.response.on_hover_text("What pointer and keys do");
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.opening_and_motions(ui, name_width));
             });
         });
@@ -71,7 +76,7 @@ impl Viewer {
             name(ui, &session.loaded, name_width);
         }
         ui.add_space(GAP);
-        if ui.button("Open…").clicked() {
+        if ui.button("Open…").on_hover_text("A scene (.toml) or a dataset (.haptize)").clicked() {
             self.files.toggle();
         }
         let computed = self.session.as_ref().is_some_and(|session| session.loaded.report.is_some());
@@ -84,7 +89,7 @@ impl Viewer {
         }
     }
 
-    /// What computes, and how the loop fares.
+    /// Shows which adapter draws, and how the loop is doing.
     fn status(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             let adapter = self.context.adapter();
@@ -102,9 +107,12 @@ impl Viewer {
                 let colour = if held { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
                 ui.colored_label(colour, RichText::new(contact).small());
                 ui.separator();
-                let unit =
-                    theme::units(session.loaded.dataset.grid.axes.iter().map(|axis| axis.effort_unit().to_owned()));
-                ui.label(RichText::new(format!("torque {} {unit}", number(tick.contact_torque.norm()))).small());
+                let units = session.loaded.dataset.grid.axes.iter().map(|axis| axis.effort_unit().to_owned());
+                let sizes = theme::by_unit(units).into_iter().map(|(unit, joints)| {
+                    let size = joints.iter().map(|&joint| tick.contact_torque[joint].powi(2)).sum::<f64>().sqrt();
+                    format!("{} {} {unit}", if unit == "N" { "force" } else { "torque" }, number(size))
+                });
+                ui.label(RichText::new(sizes.collect::<Vec<_>>().join(", ")).small());
                 if let Some(fault) = tick.fault {
                     ui.separator();
                     ui.colored_label(ui.visuals().error_fg_color, RichText::new(fault.to_string()).small());
@@ -163,7 +171,7 @@ impl Viewer {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
                     gamepad(ui, &self.gamepad);
                     let (controls, loaded) = (&mut session.controls, &session.loaded);
-                    bake = controls.show(ui, loaded, &session.exceeded, &mut self.scene.shown, &self.solvers);
+                    bake = controls.show(ui, loaded, session.advice.as_deref(), &mut self.scene.shown, &self.solvers);
                 });
             });
         let right = share(size.x, SPACE_RANGE);
@@ -174,7 +182,11 @@ impl Viewer {
         if !narrow {
             plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
         }
+        let shows_steps = &mut self.shows_steps;
         CentralPanel::no_frame().show(ui, |ui| {
+            if *shows_steps {
+                *shows_steps = steps::show(ui, &session.loaded);
+            }
             if let Err(error) = self.scene.show(ui, &session.loaded, &session.feel) {
                 self.error = Some(not_drawn(error));
             }
@@ -186,7 +198,7 @@ impl Viewer {
         }
     }
 
-    /// What is shown before there is anything to feel.
+    /// Shows the progress of what is being opened, before there is anything to feel.
     fn welcome(&mut self, ui: &mut Ui) {
         ui.vertical_centered(|ui| {
             // Somewhat above the middle, where one looks first.
@@ -253,7 +265,7 @@ fn name(ui: &mut Ui, loaded: &Loaded, width: f32) {
     }
 }
 
-/// What is known of a gamepad, where there is one.
+/// Shows the name of the gamepad if there is one, or why it cannot be read.
 fn gamepad(ui: &mut Ui, gamepad: &Gamepad) {
     match gamepad.found() {
         Found::None => {}
@@ -262,7 +274,7 @@ fn gamepad(ui: &mut Ui, gamepad: &Gamepad) {
     }
 }
 
-/// What pointer and keys do.
+/// Lists the actions of pointer and keys.
 fn help(ui: &mut Ui) {
     Grid::new("help").spacing(vec2(GROUP_GAP, GAP)).show(ui, |ui| {
         for (how, what) in steering::HELP.into_iter().chain(plots::HELP) {
@@ -295,7 +307,8 @@ fn motions(ui: &mut Ui, guide: &mut Guide) {
     }
     for (number, name) in names.iter().enumerate() {
         let title = format!("{}{}", name[..1].to_uppercase(), &name[1..]);
-        if ui.selectable_label(chosen == Some(number), title).clicked() {
+        let what = "The hand follows this motion of the scene, over and over";
+        if ui.selectable_label(chosen == Some(number), title).on_hover_text(what).clicked() {
             guide.play(number);
             chosen = Some(number);
         }
@@ -341,7 +354,7 @@ fn bar(ui: &Ui) -> Frame {
     Frame::new().fill(ui.visuals().panel_fill).inner_margin(BAR_MARGIN)
 }
 
-/// What is touched, in words; `known`: whether the dataset tells which nodes of the object are.
+/// Returns the state of contact in words. `known`: whether the dataset holds the nodes in contact.
 fn contact(tick: &Tick, known: bool) -> String {
     match tick.contact {
         _ if tick.flags.contains(Flags::HELD) => "held at the border of the haptized range".into(),

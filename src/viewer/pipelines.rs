@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// Gamma-encoded, as the window takes textures.
 pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-/// Of the depth buffer.
+/// Format of the depth buffer.
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 const COMMON: &str = include_str!("../../shaders/draw_common.wgsl");
 const SURFACE: &str = include_str!("../../shaders/draw_surface.wgsl");

@@ -9,6 +9,7 @@ use super::{
     theme::{self, CURVE, DASHES, FINE_CURVE, FINE_GAP, GAP, GROUP_GAP, HAIRLINE, SAMPLE, SPAN_WIDTH},
 };
 use crate::{
+    JointVector,
     dataset::replace_file,
     render::{
         timing::{Durations, Percentiles},
@@ -20,7 +21,7 @@ use eframe::egui::{self, Button, RichText, Ui, vec2};
 use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};
 use std::path::{Path, PathBuf};
 
-/// What is plotted.
+/// The quantity that is plotted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tab {
     /// Contact torque and torque on the device.
@@ -38,9 +39,9 @@ pub enum Tab {
 
 /// The panel's state.
 pub struct Plots {
-    /// What is plotted.
+    /// The quantity that is plotted.
     pub tab: Tab,
-    /// What is shown while paused.
+    /// The ticks that are shown while paused.
     frozen: Option<History>,
     /// Length of the time axis [s].
     seconds: f64,
@@ -51,7 +52,7 @@ pub struct Plots {
 /// Lengths of the time axis that can be chosen [s]: a touch, a motion of the scene, all that is kept.
 const SPANS: [f64; 3] = [2.0, 6.0, 18.0];
 
-/// What the pointer does over frozen plots and the plane of C-space, for the window's help.
+/// Actions of the pointer over frozen plots and the plane of C-space, for the window's help.
 pub const HELP: [(&str, &str); 3] = [
     ("Frozen plots: drag", "move along"),
     ("Right-drag, Ctrl-wheel", "zoom into a plot"),
@@ -89,14 +90,14 @@ impl Plots {
     pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, history: &mut History, folder: &Path) -> bool {
         let mut hold_still = false;
         ui.horizontal_wrapped(|ui| {
-            for (tab, name) in [
-                (Tab::Torque, "Torque"),
-                (Tab::Configuration, "Configuration"),
-                (Tab::Contacts, "Contacts"),
-                (Tab::Energy, "Energy"),
-                (Tab::Timing, "Timing"),
+            for (tab, name, what) in [
+                (Tab::Torque, "Torque", "Contact torque on the proxy, and torque on the device"),
+                (Tab::Configuration, "Configuration", "Joint positions of proxy and device"),
+                (Tab::Contacts, "Contacts", "Object nodes in contact"),
+                (Tab::Energy, "Energy", "Where the loop's energy is kept and goes"),
+                (Tab::Timing, "Timing", "Cost of a tick, and how punctual ticks are"),
             ] {
-                ui.selectable_value(&mut self.tab, tab, name);
+                ui.selectable_value(&mut self.tab, tab, name).on_hover_text(what);
             }
             ui.separator();
             let mut paused = self.frozen.is_some();
@@ -153,36 +154,45 @@ impl Plots {
 
     fn torque(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
         let axes = &loaded.dataset.grid.axes;
-        let unit = theme::units(axes.iter().map(|axis| axis.effort_unit().to_owned()));
-        let joints = axes.iter().enumerate().flat_map(|(joint, axis)| {
-            let felt = (
-                format!("{} contact", axis.name),
-                joint,
-                false,
-                Box::new(move |tick: &Tick| tick.contact_torque[joint]) as Get,
-            );
-            let told = (
-                format!("{} device", axis.name),
-                joint,
-                true,
-                Box::new(move |tick: &Tick| tick.device_torque[joint]) as Get,
-            );
-            [felt, told]
+        let groups = theme::by_unit(axes.iter().map(|axis| axis.effort_unit().to_owned()));
+        let get = |of: fn(&Tick) -> &JointVector, joint| Box::new(move |tick: &Tick| of(tick)[joint]) as Get;
+        self.groups(ui, groups, |ui, unit, joints| {
+            let lines = joints.iter().flat_map(|&joint| {
+                let name = &axes[joint].name;
+                [
+                    (format!("{name} contact"), joint, false, get(|tick| &tick.contact_torque, joint)),
+                    (format!("{name} device"), joint, true, get(|tick| &tick.device_torque, joint)),
+                ]
+            });
+            let what = if unit == "N" { "force" } else { "torque" };
+            self.lines(ui, history, &format!("{what} [{unit}]"), lines.collect());
         });
-        self.lines(ui, history, &format!("torque [{unit}]"), joints.collect());
     }
 
     fn configuration(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
         let axes = &loaded.dataset.grid.axes;
-        let unit = theme::units(axes.iter().map(|axis| axis.unit.clone()));
-        let joints = axes.iter().enumerate().flat_map(|(joint, axis)| {
-            let proxy =
-                (format!("{} proxy", axis.name), joint, false, Box::new(move |tick: &Tick| tick.proxy[joint]) as Get);
-            let device =
-                (format!("{} device", axis.name), joint, true, Box::new(move |tick: &Tick| tick.device[joint]) as Get);
-            [proxy, device]
+        let groups = theme::by_unit(axes.iter().map(|axis| axis.unit.clone()));
+        let get = |of: fn(&Tick) -> &JointVector, joint| Box::new(move |tick: &Tick| of(tick)[joint]) as Get;
+        self.groups(ui, groups, |ui, unit, joints| {
+            let lines = joints.iter().flat_map(|&joint| {
+                let name = &axes[joint].name;
+                [
+                    (format!("{name} proxy"), joint, false, get(|tick| &tick.proxy, joint)),
+                    (format!("{name} device"), joint, true, get(|tick| &tick.device, joint)),
+                ]
+            });
+            self.lines(ui, history, &format!("q [{unit}]"), lines.collect());
         });
-        self.lines(ui, history, &format!("q [{unit}]"), joints.collect());
+    }
+
+    /// Draws a plot for each unit, one below the other.
+    fn groups(&self, ui: &mut Ui, groups: Vec<(String, Vec<usize>)>, draw: impl Fn(&mut Ui, &str, &[usize])) {
+        let between = ui.spacing().item_spacing.y;
+        for (number, (unit, joints)) in groups.iter().enumerate() {
+            let left = (groups.len() - number) as f32;
+            let height = (ui.available_height() - (left - 1.0) * between) / left;
+            ui.allocate_ui(vec2(ui.available_width(), height), |ui| ui.vertical(|ui| draw(ui, unit, joints)));
+        }
     }
 
     fn contacts(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
@@ -282,7 +292,7 @@ fn absent(ui: &mut Ui, what: &str) {
 /// A number of a tick.
 type Get<'a> = Box<dyn Fn(&Tick) -> f64 + 'a>;
 
-/// What is plotted and the names of the lines, above their plot: beside it, a short plot leaves no room for its axis' name.
+/// Shows quantity and names of the lines above their plot: beside it, a short plot leaves no room for its axis' name.
 fn names(ui: &mut Ui, label: &str, lines: &[(String, usize, bool, Get<'_>)]) {
     let dark = ui.visuals().dark_mode;
     ui.horizontal_wrapped(|ui| {
@@ -307,7 +317,8 @@ fn names(ui: &mut Ui, label: &str, lines: &[(String, usize, bool, Get<'_>)]) {
 fn plot<'a>(ui: &Ui, id: impl std::fmt::Debug, x: &str, y: &str) -> Plot<'a> {
     Plot::new(format!("{id:?}"))
         .custom_x_axes(vec![theme::across(x)])
-        .custom_y_axes(vec![theme::upward(y)])
+        .custom_y_axes(vec![theme::upward(y).formatter(theme::mark_number)])
+        .y_grid_spacer(theme::marks)
         .allow_scroll(false)
         .set_margin_fraction(vec2(0.0, AROUND))
         .show_background(false)
@@ -351,6 +362,7 @@ fn timing(ui: &mut Ui, history: &History) {
                         if whole { number_of(10.0_f64.powf(power)) } else { String::new() }
                     };
                     plot(ui, ("timing", number), &format!("{title} [µs]"), "ticks")
+                        .y_grid_spacer(egui_plot::log_grid_spacer(10))
                         .default_x_bounds(DECADES[0], DECADES[1])
                         .include_y(0.0)
                         .include_x(DECADES[0])

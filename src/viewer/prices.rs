@@ -19,7 +19,7 @@ use std::{
     time::Instant,
 };
 
-/// What something costs.
+/// The cost of something.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Price {
     /// It is being measured.
@@ -51,7 +51,7 @@ impl Estimate {
         Self { median: found[REPEATS / 2], least: found[0], greatest: found[REPEATS - 1] }
     }
 
-    /// What cannot be told from nothing is smaller than this [us]; none where it can be.
+    /// Upper bound of a cost too small to be measured [us]; absent where it was measured.
     fn noise(self) -> Option<f64> {
         (self.least <= 0.0 && self.greatest >= 0.0).then(|| self.greatest.max(-self.least))
     }
@@ -63,7 +63,7 @@ impl Estimate {
 }
 
 impl Price {
-    /// Of something whole [us]; none where it does not work.
+    /// Returns the price of something whole [us]; none if it does not work.
     #[must_use]
     pub fn cost(self) -> Option<String> {
         match self {
@@ -73,7 +73,7 @@ impl Price {
         }
     }
 
-    /// Of an effect that is part `of` a tick or a frame.
+    /// Returns the price of an effect that is part `of` a tick or a frame.
     #[must_use]
     pub fn told(self, of: &str) -> String {
         match self {
@@ -90,7 +90,7 @@ impl Price {
         }
     }
 
-    /// What that says.
+    /// Returns an explanation of the price.
     #[must_use]
     pub fn meaning(self) -> String {
         match self {
@@ -111,7 +111,7 @@ fn microseconds(time: f64) -> String {
     if time.abs() < WHOLE { format!("{time:.2}") } else { format!("{time:.0}") }
 }
 
-/// What has a price.
+/// Something with a price.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Item {
     /// An effect, by its number in [`EFFECTS`]: with it over without it.
@@ -120,7 +120,7 @@ pub enum Item {
     Tick(Interpolation),
 }
 
-/// What everything costs, as far as it is known.
+/// The prices of everything, as far as they are known.
 pub struct Prices {
     known: Vec<(Item, Price)>,
     news: Option<mpsc::Receiver<(Item, Price)>>,

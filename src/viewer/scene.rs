@@ -26,7 +26,7 @@ use eframe::{
 use glam::Vec3;
 use std::sync::Arc;
 
-/// What is shown of the scene, as the user wants it.
+/// The parts of the scene that the user wants to see.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shown {
     /// The triangles' edges.
@@ -35,7 +35,7 @@ pub struct Shown {
     pub forces: bool,
     /// Where the device is, as a translucent proxy.
     pub ghost: bool,
-    /// What the surface's colour says.
+    /// Quantity that the surface's colour shows.
     pub quantity: Quantity,
 }
 
@@ -51,7 +51,7 @@ pub struct SceneView {
     redrawing: Following<GraphicsEffects, Result<Option<Body>, FrameError>>,
     pose: Pose,
     ghost: Pose,
-    /// What is shown.
+    /// The parts that are shown.
     pub shown: Shown,
     /// Extent of the scene [m].
     extent: f32,
@@ -183,7 +183,10 @@ impl SceneView {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "3-D scene"));
         // Not longer than that: the hand's thread waits for its guide, and to draw takes long.
-        self.steering.steer(ui, &response, rect, &loaded.setup.chain, &self.pose, &mut feel.guide());
+        let mut guide = feel.guide();
+        guide.shown_in(ui.ctx());
+        self.steering.steer(ui, &response, rect, &loaded.setup.chain, &self.pose, &mut guide);
+        drop(guide);
         let palette = palette::of(ui.visuals());
         let texture = self.draw(rect, ui.ctx().pixels_per_point(), &palette)?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     JointVector,
     gpu::Context,
-    render::{haptic::Haptics, passivity::Bound, setup::SetupError},
+    render::{haptic::Haptics, setup::SetupError},
     scene::HapticsSpec,
 };
 use eframe::egui::Ui;
@@ -33,14 +33,14 @@ pub struct Session {
     slices: Slices,
     cloud: Cloud,
     pub controls: Controls,
-    /// Gains that are beyond their bound.
-    pub exceeded: Vec<Bound>,
+    /// A warning about the gains, if they are beyond their passivity bounds.
+    pub advice: Option<String>,
     /// Whether the cloud is shown where there is no height for plane and cloud.
     cloud_first: bool,
 }
 
-/// A loop, and which of its gains are beyond their bound.
-type Tuned = (Arc<Haptics>, Vec<Bound>);
+/// A loop, and what is wrong with its gains.
+type Tuned = (Arc<Haptics>, Option<String>);
 
 impl Session {
     /// Begins to feel `loaded`.
@@ -60,22 +60,10 @@ impl Session {
         let history = History::new(haptics.period()).ok_or("no memory for histograms; close other programs")?;
         let feel = Feel::start(haptics, &gains, Guide::new(&loaded), gamepad.clone(), pace)?;
         let (slices, cloud) = (Slices::new(&loaded.dataset), Cloud::new(&loaded.dataset));
-        let exceeded = loaded.setup.exceeded.clone();
+        let advice = loaded.setup.advice.clone();
         let retuning = Following::new(Some(gains));
         let gamepad = gamepad.clone();
-        Ok(Self {
-            loaded,
-            feel,
-            history,
-            gamepad,
-            pace,
-            retuning,
-            slices,
-            cloud,
-            controls,
-            exceeded,
-            cloud_first: false,
-        })
+        Ok(Self { loaded, feel, history, gamepad, pace, retuning, slices, cloud, controls, advice, cloud_first: false })
     }
 
     /// Makes anew what belongs to a window and a device that are gone; the loop goes on. `context` is the new one, `wake` is called
@@ -139,12 +127,12 @@ impl Session {
 
     /// Goes on with another loop, the hand where it is.
     fn go_on(&mut self, made: Result<Tuned, SetupError>) -> Result<(), String> {
-        let (haptics, exceeded) = made.map_err(|error| error.to_string())?;
+        let (haptics, advice) = made.map_err(|error| error.to_string())?;
         let guide = self.feel.guide().clone();
         self.history.collect(&mut self.feel);
         self.feel = Feel::start(haptics, &self.controls.tuning.haptics, guide, self.gamepad.clone(), self.pace)?;
         self.history.begin_anew();
-        self.exceeded = exceeded;
+        self.advice = advice;
         Ok(())
     }
 }

@@ -46,7 +46,7 @@ pub struct Slices {
     drawn: Option<(Key, TextureHandle, ColourMap)>,
 }
 
-/// What a picture depends on.
+/// Everything that a picture depends on.
 #[derive(Clone, PartialEq)]
 struct Key {
     column: Column,

@@ -21,7 +21,7 @@ pub struct Surface {
     triangles: u32,
 }
 
-/// What the surface's colour says.
+/// Quantity that the surface's colour shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quantity {
     /// Size of the displacement [m].
@@ -36,7 +36,7 @@ pub enum Quantity {
 pub struct Look {
     /// Gamma-encoded background, 0 to 1.
     pub background: [f32; 3],
-    /// What the surface's colour says.
+    /// Quantity that the surface's colour shows.
     pub quantity: Quantity,
     /// Displacement [m] or force [N] at the top of the colour map.
     pub colour_top: f32,

@@ -15,7 +15,7 @@ pub struct Steering {
     pub grip: Option<Grip>,
 }
 
-/// What pointer and keys do over the scene, for the window's help.
+/// Actions of pointer and keys over the scene, for the window's help.
 pub const HELP: [(&str, &str); 9] = [
     ("Drag a node of the arm", "move the device"),
     ("A, D", "turn its first joint"),

@@ -3,7 +3,7 @@
 
 use super::palette;
 use eframe::egui::{self, FontFamily, FontId, Margin, Rangef, RichText, TextStyle, Theme, vec2};
-use egui_plot::AxisHints;
+use egui_plot::{AxisHints, GridInput, GridMark};
 
 // --- Distances ---
 
@@ -23,7 +23,7 @@ const MENU_MARGIN: Margin = Margin::same(8);
 const WINDOW_MARGIN: Margin = Margin::same(14);
 /// Inside a button.
 const BUTTON_PADDING: egui::Vec2 = vec2(8.0, 3.0);
-/// Of what lies below a heading and belongs to it.
+/// Indentation of what lies below a heading and belongs to it.
 const INDENT: f32 = 12.0;
 /// Radius of corners.
 pub const ROUNDING: u8 = 4;
@@ -130,6 +130,8 @@ pub const PLANE_SHARE: f32 = 0.58;
 pub const KEY_HEIGHT: f32 = 52.0;
 /// See [`KEY_HEIGHT`].
 pub const LEAST_MAP: f32 = 80.0;
+/// Width of the first screen's steps.
+pub const STEPS_WIDTH: f32 = 300.0;
 /// Width of a message, and of the chooser of files; its height, that of its list, and the width of its field.
 pub const MESSAGE_WIDTH: f32 = 560.0;
 /// See [`MESSAGE_WIDTH`].
@@ -157,6 +159,19 @@ pub fn units(all: impl Iterator<Item = String>) -> String {
     units.join(" or ")
 }
 
+/// Returns the joints of each unit, in the order in which units first occur: quantities of different units share no axis.
+#[must_use]
+pub fn by_unit(units: impl Iterator<Item = String>) -> Vec<(String, Vec<usize>)> {
+    let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
+    for (joint, unit) in units.enumerate() {
+        match groups.iter_mut().find(|(known, _)| *known == unit) {
+            Some((_, joints)) => joints.push(joint),
+            None => groups.push((unit, vec![joint])),
+        }
+    }
+    groups
+}
+
 fn axis<'a>(hints: AxisHints<'a>, label: &str) -> AxisHints<'a> {
     hints.label(RichText::new(label).size(AXIS_NAME)).tick_label_font(small())
 }
@@ -171,6 +186,36 @@ pub fn across<'a>(label: &str) -> AxisHints<'a> {
 #[must_use]
 pub fn upward<'a>(label: &str) -> AxisHints<'a> {
     axis(AxisHints::new_y().label_spacing(Rangef::new(11.0, 15.0)).min_thickness(36.0), label)
+}
+
+/// Marks on an axis up, at most about so many: what is read at a glance.
+const MARKS: f64 = 6.0;
+/// Least distance of two marks over the least distance of grid lines [1]: room for a line of small letters.
+const LEGIBLE: f64 = 2.0;
+
+/// Returns the marks of an axis up: 1, 2 or 5 times a power of ten apart, so that every range has several with their numbers.
+#[must_use]
+pub fn marks(input: GridInput) -> Vec<GridMark> {
+    let (low, high) = input.bounds;
+    let rough = ((high - low) / MARKS).max(LEGIBLE * input.base_step_size);
+    if !(rough > 0.0 && rough.is_finite()) {
+        return Vec::new();
+    }
+    let power = 10.0_f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= rough);
+    let step = step.unwrap_or(rough);
+    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+    (first..=last).map(|k| GridMark { value: k as f64 * step, step_size: step }).collect()
+}
+
+/// Writes the number at a mark with the digits that tell it from the next one.
+#[must_use]
+pub fn mark_number(mark: GridMark, _: &std::ops::RangeInclusive<f64>) -> String {
+    if mark.value != 0.0 && mark.step_size < 1e-4 {
+        return format!("{:.0e}", mark.value);
+    }
+    let decimals = (-mark.step_size.log10()).ceil().max(0.0) as usize;
+    format!("{:.decimals$}", mark.value + 0.0)
 }
 
 /// Gives `ctx` type, spacing and both sets of colours.
@@ -193,4 +238,29 @@ pub fn apply(ctx: &egui::Context) {
         style.spacing.menu_margin = MENU_MARGIN;
         style.spacing.window_margin = WINDOW_MARGIN;
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_range_has_several_marks_with_numbers_of_their_own() {
+        for (low, high) in [(0.0, 0.095), (-0.003, 0.0902), (-1.7, 0.3), (0.0, 19.0), (-2e-7, 9e-7), (4.98, 5.02)] {
+            let marks = marks(GridInput { bounds: (low, high), base_step_size: 0.03 * (high - low) });
+            let mut numbers: Vec<String> = marks.iter().map(|&mark| mark_number(mark, &(low..=high))).collect();
+            let count = numbers.len();
+            assert!((3..=7).contains(&count), "{low} to {high}: {numbers:?}");
+            for (mark, number) in marks.iter().zip(&numbers) {
+                let told: f64 = number.parse().unwrap();
+                assert!(
+                    (told - mark.value).abs() < 1e-3 * mark.step_size + 1e-12 * mark.value.abs(),
+                    "{number}: {}",
+                    mark.value
+                );
+            }
+            numbers.dedup();
+            assert_eq!(numbers.len(), count);
+        }
+    }
 }

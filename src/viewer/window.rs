@@ -18,6 +18,10 @@ use std::{
 /// Time between two frames where nothing but the loop moves [s]: 60 a second.
 const FRAME: Duration = Duration::from_micros(16_667);
 
+/// Time between two frames of a window at rest [s]: pointer, keys, a hand that moves and background work ask for one at once, and what
+/// is left is a fault of the loop or a late tick.
+const AT_REST: Duration = Duration::from_secs(10);
+
 /// Least time that a window lasts which was opened anew, for another one to be opened when its device is lost, too [s]: one that
 /// is lost again and again is no use.
 const LEAST_LIFE: Duration = Duration::from_secs(30);
@@ -46,7 +50,7 @@ pub fn open(start: Start) -> Result<(), ViewError> {
     }
 }
 
-/// What a window begins with.
+/// The state that a window begins with.
 enum Begin {
     Start(Start),
     Resume(Box<Rescue>, String),
@@ -99,7 +103,7 @@ fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<(Rescue, String)>
     }
 }
 
-/// What a panic said.
+/// Returns the message of a panic.
 fn words(panic: &(dyn Any + Send)) -> &str {
     let whole = panic.downcast_ref::<String>().map(String::as_str);
     whole.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("without a word")
@@ -109,7 +113,7 @@ struct App {
     viewer: Viewer,
     last: Instant,
     egui: egui::Context,
-    /// What is left of it, once it is closed.
+    /// Its state, once it is closed.
     leave: Rc<Cell<Option<Rescue>>>,
 }
 
@@ -127,7 +131,7 @@ impl eframe::App for App {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
             return;
         }
-        ui.ctx().request_repaint_after(FRAME);
+        ui.ctx().request_repaint_after(if self.viewer.is_at_rest() { AT_REST } else { FRAME });
     }
 }
 

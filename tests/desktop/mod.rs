@@ -18,6 +18,7 @@ pub fn haptics(joints: usize) -> HapticsSpec {
         boundary_slope: all(10.0),
         passivity_factor: 2.0,
         proxy_damping: all(0.02),
+        proxy_damping_is_free: false,
         proxy_inertia: ProxyInertia::Constant,
         coupling_stiffness: all(15.0),
         coupling_damping: all(0.01),

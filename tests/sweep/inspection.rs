@@ -27,8 +27,15 @@ fn an_inspection_tells_the_same_from_scene_and_dataset() {
     assert_eq!(from_dataset["stored"]["point"], 9 + 8);
     let torque = |value: &serde_json::Value| serde_json::from_value::<Vec<f64>>(value["torque"].clone()).unwrap();
     assert!(relative_error(&torque(&from_dataset["stored"]), &torque(&from_dataset)) < 1e-6);
-    from_scene["stored"] = from_dataset["stored"].clone();
+    // A grid point: every interpolation passes through what is stored there.
+    assert!(relative_error(&torque(&from_dataset["interpolated"]), &torque(&from_dataset)) < 1e-6);
+    for key in ["stored", "interpolated"] {
+        from_scene[key] = from_dataset[key].clone();
+    }
     assert_eq!(from_scene, from_dataset);
+    assert_eq!(from_scene["warnings"].as_array().map(Vec::len), Some(0));
+    let beyond = haptize(&["inspect", "small.toml", "--q=-9.0,0.042"]);
+    assert!(beyond["warnings"][0].as_str().unwrap().contains("beyond the joint's limits"), "{beyond}");
 }
 
 #[test]

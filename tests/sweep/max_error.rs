@@ -97,12 +97,14 @@ fn an_error_that_no_grid_keeps_is_refused_before_anything_is_written() {
         assert_eq!(std::fs::read(folder.output()).unwrap(), earlier);
         assert_eq!(folder.names(), ["a.haptize", "a.toml"]);
     }
-    for wrong in ["0", "-0.1", "1.5", "N m", "0.1 N", "nan"] {
+    for wrong in ["0", "-0.1", "1.5", "150%", "%", "N m", "0.1 N", "nan"] {
         let output = haptize(folder.0.path(), &["bake", "a.toml", &format!("--max-error={wrong}")]);
         assert_eq!(output.status.code(), Some(2), "{wrong}");
         assert!(String::from_utf8_lossy(&output.stderr).contains("0.002 N m"), "{wrong}");
     }
-    assert_eq!("0.01".parse(), Ok(Aim::Relative(0.01)));
+    for text in ["0.05", "5%", "5 %"] {
+        assert_eq!(text.parse(), Ok(Aim::Relative(0.05)));
+    }
     assert_eq!("0.002 N m".parse(), Ok(Aim::Absolute(0.002)));
 }
 

@@ -59,7 +59,7 @@ fn the_memory_stated_is_the_memory_of_the_columns() {
     assert_eq!(columns.least + 16 * summary.contacts.unwrap() + fixed, summary.bytes);
     assert_eq!(columns.most - columns.least, POINTS * 16 * 9);
     // Without graphics there are no forces to keep.
-    let blind = Scene::parse(&SCENE.replace("graphics = {}", ""), "small.toml").unwrap();
+    let blind = Scene::parse(&SCENE.replace("graphics = {}", "graphics = false"), "small.toml").unwrap();
     let disk = sweep_of(&blind, "none", "").footprint(10, false).disk;
     assert_eq!(disk.least, disk.most);
     // With friction there are those on the proxy's three nodes.

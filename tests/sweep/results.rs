@@ -57,7 +57,7 @@ fn the_dataset_is_what_the_backend_answered_at_every_grid_point() {
 #[test]
 fn a_sweep_in_memory_saves_the_same_file() {
     let folder = Folder::new();
-    let blind = Scene::parse(&SCENE.replace("graphics = {}", ""), "small.toml").unwrap();
+    let blind = Scene::parse(&SCENE.replace("graphics = {}", "graphics = false"), "small.toml").unwrap();
     for scene in [scene(), blind] {
         let sweep = sweep_of(&scene, "none", "2012-03-04T00:00:00Z");
         let run = Run { chunk: 10, stop: &AtomicBool::new(false), progress: &mut |_| () };
@@ -177,7 +177,7 @@ fn forces_are_stored_only_for_a_scene_with_graphics() {
         let run = Run { chunk: 10, stop: &stop, progress: &mut |_| () };
         sweep_of(scene, "none", "").run(&mut MadeUp::default(), run).unwrap().0
     };
-    let blind = Scene::parse(&SCENE.replace("graphics = {}", ""), "small.toml").unwrap();
+    let blind = Scene::parse(&SCENE.replace("graphics = {}", "graphics = false"), "small.toml").unwrap();
     assert!(run(&scene()).contacts.is_some());
     assert!(run(&blind).contacts.is_none());
 }

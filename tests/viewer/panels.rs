@@ -31,6 +31,21 @@ fn every_panel_is_there_and_answers() {
 }
 
 #[test]
+fn the_three_steps_are_shown_from_the_help_and_taken_away() {
+    let mut window = Window::sphere();
+    assert!(!window.shows("1  Solve"), "a picture shows no steps unless asked");
+    window.click("Help");
+    window.click("Three steps");
+    window.pass(0.1);
+    for step in ["1  Solve", "2  Store", "3  Look up"] {
+        assert!(window.shows(step), "{step}");
+    }
+    window.click("Got it");
+    window.pass(0.1);
+    assert!(!window.shows("1  Solve"));
+}
+
+#[test]
 fn nothing_overlaps_in_the_least_window_however_long_the_name_and_however_many_the_joints() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("long.toml");

@@ -6,7 +6,7 @@ mod npz;
 use super::{Dataset, Error};
 use std::path::{Path, PathBuf};
 
-/// What to export to.
+/// Format of an export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
     /// NumPy archive, uncompressed: `numpy.load(FILE)["torque"]`.

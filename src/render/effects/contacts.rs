@@ -20,7 +20,7 @@ pub struct Contacts {
     forces: Vec<[f32; 3]>,
 }
 
-/// What touches one proxy node.
+/// The contact of one proxy node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Touch {
     /// On the proxy node [N].

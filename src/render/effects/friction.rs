@@ -43,7 +43,7 @@ pub struct Friction {
     damping: f64,
 }
 
-/// What a bristle does during a step.
+/// Motion of a bristle during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Mode {
     /// It holds, as far as is known.

@@ -40,11 +40,11 @@ pub(super) struct Pending<'a> {
     pub stage: &'a Stage,
     /// T [s].
     pub interval: f64,
-    /// What acts beside the effects.
+    /// Forces beside those of the effects.
     pub load: Load,
 }
 
-/// What the effects remember, and their work space.
+/// State of the effects, and their work space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectState {
     /// Force of each proxy node's contacts and share of them, one per node.
@@ -55,7 +55,7 @@ pub struct EffectState {
     bristles: Vec<Bristle>,
 }
 
-/// What friction remembers of a proxy node.
+/// State of the friction at a proxy node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Bristle {
     /// In the world [m].

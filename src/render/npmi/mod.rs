@@ -75,7 +75,7 @@ pub struct Motion {
     momentum: JointVector,
 }
 
-/// What acts on the proxy during a step.
+/// Forces on the proxy during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
     /// K of each joint, not negative [N m/rad].
@@ -90,7 +90,7 @@ pub struct Load {
     pub stops: Stops,
 }
 
-/// What happened in a step.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     /// v_hat [rad/s or m/s].

@@ -7,7 +7,7 @@ use serde::Serialize;
 /// Errors that are asked for, relative to the rms of the torque [1].
 pub(super) const TARGETS: [f64; 7] = [0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01];
 
-/// What to take for one error.
+/// The grid to take for one error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Offer {
     /// Relative to the rms of the torque [1].
@@ -58,7 +58,7 @@ impl Accuracy {
     }
 }
 
-/// What limits the accuracy of a scene.
+/// A limit of a scene's accuracy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Limit {
     /// `grid`, `mesh` or `link nodes`.

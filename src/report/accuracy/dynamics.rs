@@ -39,7 +39,7 @@ pub(super) fn deepest(own: &Dataset) -> usize {
     (0..own.grid.points()).max_by(|a, b| energy(a).total_cmp(&energy(b))).unwrap_or(0)
 }
 
-/// What is pushed, how, and with which effects.
+/// The object, the push and the effects.
 struct Push<'a> {
     object: &'a Object,
     effects: GraphicsEffects,
@@ -57,7 +57,7 @@ pub(super) fn graphics(
     study: &mut Accuracy,
 ) -> Result<(), AccuracyError> {
     let Some(graphics) = scene.graphics else {
-        study.notes.push("the graphics is not studied: the scene has no [graphics]".to_owned());
+        study.notes.push("the graphics is not studied: the scene says graphics = false".to_owned());
         return Ok(());
     };
     let none = vec![DVec3::ZERO; object.rest.len()];

@@ -34,10 +34,10 @@ use crate::{
 use serde::Serialize;
 use std::time::Instant;
 
-/// What draws the configurations of the reference.
+/// Seed of the reference's configurations.
 const SEED: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// What is varied.
+/// The quantity that is varied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Study {
@@ -70,7 +70,7 @@ pub enum Study {
 /// Ratio of times, with the spread of the runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Cost {
-    /// Of the runs [1].
+    /// Median of the runs [1].
     pub median: f64,
     /// [1]
     pub least: f64,
@@ -81,7 +81,7 @@ pub struct Cost {
 /// One setting and what it gave.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// What is varied.
+    /// The quantity that is varied.
     pub study: Study,
     /// Curve that it belongs to.
     pub series: String,
@@ -128,7 +128,7 @@ pub struct Accuracy {
     pub rounds: usize,
     /// Configurations of the reference.
     pub configurations: usize,
-    /// Of which in contact.
+    /// Number of these in contact.
     pub in_contact: usize,
     /// Left out, because the reference itself did not converge there.
     pub left_out: usize,
@@ -150,9 +150,9 @@ pub struct Accuracy {
     pub rows: Vec<Row>,
     /// Work around loops in the scene's own dataset.
     pub loops: Vec<Loops>,
-    /// What could not be measured here, and why.
+    /// Measurements that could not be made here, and why.
     pub notes: Vec<String>,
-    /// What effects cost, where they were priced ([`effects::price`]).
+    /// Costs of the effects, if they were priced ([`effects::price`]).
     pub effects: Option<effects::Effects>,
 }
 
@@ -294,5 +294,5 @@ impl Cost {
     }
 }
 
-/// What solves: the CPU, so that the figures are the same on every machine.
+/// The backend: the CPU, so that the figures are the same on every machine.
 const BACKEND: BackendChoice = BackendChoice::Cpu;

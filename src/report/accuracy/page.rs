@@ -120,7 +120,7 @@ fn study_name(study: Study) -> &'static str {
     }
 }
 
-/// What to take for which error, and what was measured, for people.
+/// Describes which grid to take for which error, and what was measured, for people.
 ///
 /// # Errors
 /// None in a `String`.
@@ -205,8 +205,8 @@ fn page(
         html,
         "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>What accuracy costs: {name}</title>\n<style>\
          body{{font:16px/1.5 system-ui,sans-serif;max-width:980px;margin:2em auto;padding:0 1em;color:#222b36}}\
-         table{{border-collapse:collapse;font-size:14px}}td,th{{padding:.2em .8em;text-align:right;border-bottom:1px \
-         solid #e2e6ec}}td:first-child,th:first-child{{text-align:left}}svg{{max-width:100%;height:auto}}</style>\n\
+         table{{border-collapse:collapse;font-size:14px}}td,th{{padding:.2em .8em;text-align:right;white-space:nowrap;\
+         border-bottom:1px solid #e2e6ec}}td:first-child,th:first-child{{text-align:left}}svg{{max-width:100%;height:auto}}</style>\n\
          <h1>What accuracy costs in time: {name}</h1>\n<p>Reference: {} random configurations solved directly to a \
          residual of {:.0e}, {} in contact, {} left out because contact did not converge there. The rms torque is {:.4} \
          N m; the reference itself errs by {:.1e} N m. Times are ratios, the least of {} runs; accuracy is the same in every \
@@ -222,7 +222,7 @@ fn page(
     html.push_str(
         "<h2>For which error take what</h2>\n<table><tr><th>error<th>interpolation<th>spacing<th>points<th>bake time",
     );
-    html.push_str("<th></tr>\n");
+    html.push_str("<th>how known</tr>\n");
     for offer in offers(accuracy) {
         writeln!(
             html,
@@ -252,7 +252,7 @@ fn page(
     html.push_str(
         "<h2>All rows</h2>\n<table><tr><th>study<th>series<th>setting<th>points or iterations<th>solved<th>bytes<th>time",
     );
-    html.push_str("<th>median<th>most<th>rms<th>worst<th><th>relative</tr>\n");
+    html.push_str("<th>median<th>most<th>rms<th>worst<th>unit<th>relative</tr>\n");
     for row in &accuracy.rows {
         writeln!(
             html,

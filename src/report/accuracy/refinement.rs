@@ -40,7 +40,7 @@ struct Variant {
     setting: String,
 }
 
-/// What a study varies, in words.
+/// Returns the quantity that a study varies, in words.
 pub(super) fn name(study: Study) -> &'static str {
     match study {
         Study::Mesh => "mesh",

@@ -22,7 +22,7 @@ pub enum Value {
     Count(usize),
     /// Something measured or set.
     Number(f64),
-    /// What the text says without a number.
+    /// A statement of the paper without a number.
     Words(String),
 }
 
@@ -52,11 +52,11 @@ impl From<&str> for Value {
 pub struct Row {
     /// Section of the paper.
     pub section: &'static str,
-    /// What is compared, with its unit.
+    /// The quantity, with its unit.
     pub quantity: &'static str,
-    /// What the paper says.
+    /// The paper's value.
     pub paper: Value,
-    /// What was found here.
+    /// The value found here.
     pub ours: Value,
     /// Whether both are the same in the digits shown.
     pub same: bool,
@@ -84,9 +84,9 @@ pub struct FigureNote {
     pub number: u32,
     /// Name of its files, without extension; empty where there is none.
     pub file: &'static str,
-    /// What the paper shows.
+    /// Content of the paper's figure.
     pub paper: &'static str,
-    /// What ours shows, and why it differs.
+    /// Content of this figure, and why it differs.
     pub ours: &'static str,
 }
 

@@ -24,7 +24,7 @@ use crate::{
 pub struct Sphere<'a> {
     /// Its scene.
     pub scene: &'a Scene,
-    /// What it was haptized to.
+    /// The dataset.
     pub dataset: &'a Dataset,
     /// The press (Figs. 5 and 6).
     pub press: &'a Trace,
@@ -35,7 +35,7 @@ pub struct Sphere<'a> {
 pub struct Scanned<'a> {
     /// Its scene.
     pub scene: &'a ScanScene,
-    /// What was measured.
+    /// The measurements.
     pub samples: &'a Samples,
     /// The measurements on the uniform grid.
     pub dataset: &'a Dataset,

@@ -68,7 +68,7 @@ impl Raster {
         }
     }
 
-    /// What it is seen through.
+    /// Returns the camera.
     #[must_use]
     pub fn camera(&self) -> &Camera {
         &self.camera

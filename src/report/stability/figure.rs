@@ -61,7 +61,7 @@ fn share(outcome: &Outcome) -> f64 {
     }
 }
 
-/// What the picture shows in one row: the figures of one measure of one case.
+/// One row of the picture: the figures of one measure of one case.
 struct Row<'a> {
     case: &'a str,
     measure: &'a str,

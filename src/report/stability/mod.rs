@@ -43,13 +43,13 @@ pub type Failure = Box<dyn Error + Send + Sync>;
 pub struct Case {
     /// Where it belongs: `contact`, `gridization`, `loop`, `graphics`.
     pub room: &'static str,
-    /// What is hard about it, in a few words.
+    /// The difficulty, in a few words.
     pub name: &'static str,
     /// Runs it. An error means that it could not be run, not that it failed its bound.
     pub run: fn(&Setting) -> Result<Vec<Outcome>, Failure>,
 }
 
-/// What a figure must keep.
+/// The limit of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bound {
@@ -73,13 +73,13 @@ impl fmt::Display for Bound {
 pub struct Outcome {
     /// Name of the case.
     pub case: String,
-    /// What was varied, and over which range.
+    /// The quantity that was varied, and its range.
     pub varied: String,
-    /// What is measured, with its unit in brackets.
+    /// The measure, with its unit in brackets.
     pub measure: String,
     /// The worst figure found, in that unit.
     pub worst: f64,
-    /// What it must keep.
+    /// Its limit.
     pub bound: Bound,
     /// Counts, iterations, times: what stands beside the figure without being judged; may be empty.
     pub note: String,

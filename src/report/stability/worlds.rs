@@ -17,7 +17,8 @@ pub const HALF_SPACE_STIFFNESS: f64 = 5.0;
 #[must_use]
 pub fn block_scene(haptics: &str) -> String {
     format!(
-        "[object]
+        "graphics = false
+[object]
 mesh = {{ file = \"block.obj\" }}
 springs = {{ kind = \"isotropic\", stiffness = 300.0 }}
 ground = {{ stiffness = 100.0 }}

@@ -63,6 +63,7 @@ pub(super) fn convert(
         passivity_factor: factor?,
         boundary_slope: vector("boundary_slope", &table.boundary_slope, true, Gain(15.0))?,
         proxy_damping: vector("proxy_damping", &table.proxy_damping, false, Gain(0.02))?,
+        proxy_damping_is_free: table.proxy_damping.is_none(),
         proxy_inertia: table.proxy_inertia.unwrap_or(ProxyInertia::Constant),
         coupling_stiffness: vector("coupling_stiffness", &table.coupling_stiffness, true, Gain(20.0))?,
         coupling_damping: vector("coupling_damping", &table.coupling_damping, false, Gain(0.01))?,

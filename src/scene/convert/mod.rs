@@ -11,7 +11,7 @@ mod skin;
 
 use super::check::Checker;
 use super::error::SceneError;
-use super::file::{ContactTable, NumberOr, SceneTable};
+use super::file::{ContactTable, GraphicsEntry, GraphicsTable, NumberOr, SceneTable};
 use super::{Algorithm, ContactSpec, ContactSurface, Interpolation, ProxySpec, Rendering, ScanScene, Scene};
 use toml::Spanned;
 
@@ -64,7 +64,12 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
     let proxy = proxy::convert(checker, &table.proxy)?;
     let joints = &proxy.joints;
     let object = table.object.as_ref().map(|object| object::convert(checker, object)).transpose()?;
-    let graphics = table.graphics.as_ref().map(|own| graphics::convert(checker, own, object.as_ref())).transpose()?;
+    // A virtual object is drawn unless the scene says no; a real one moves by no forces that are known.
+    let graphics = match &table.graphics {
+        Some(GraphicsEntry::Loop(own)) => Some(graphics::convert(checker, own, object.as_ref())?),
+        None if object.is_some() => Some(graphics::convert(checker, &GraphicsTable::default(), object.as_ref())?),
+        None | Some(GraphicsEntry::Off) => None,
+    };
     // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no energy.
     let solved = table.contact.as_ref().is_some_and(|own| own.get_ref().algorithm != Some(Algorithm::Paper));
     let interpolation = if object.is_some() && solved { Interpolation::Potential } else { Interpolation::Linear };

@@ -23,7 +23,7 @@ const BETWEEN: f64 = 22.0;
 /// Room for a number beside the dots.
 const NUMBER: f64 = 34.0;
 
-/// What each effect costs.
+/// Draws the cost of each effect.
 #[must_use]
 pub(in super::super) fn figure(effects: &Effects) -> Canvas {
     let rows = effects.prices.len() as f64;

@@ -24,7 +24,7 @@ struct Variant {
     name: String,
     setting: String,
     scene: Scene,
-    /// Of an effect: numbers of the whole scene with it and without it.
+    /// For an effect: the numbers of the whole scene with it and without it.
     within: Option<[usize; 2]>,
 }
 
@@ -263,7 +263,7 @@ fn motion(scene: &Scene, own: &Dataset) -> Result<Motion, AccuracyError> {
     Ok(Motion::through(&waypoints, own.grid.joints())?)
 }
 
-/// What is drawn on the GPU.
+/// The object on the GPU.
 struct Device {
     adapter: Option<String>,
     /// One per variant; none without graphics.

@@ -21,7 +21,7 @@ use super::Cost;
 use crate::gpu::FrameCost;
 use serde::Serialize;
 
-/// What a variant of the scene costs, relative to another.
+/// Cost of a variant of the scene, relative to another.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Costs {
     /// Haptization on the CPU.
@@ -47,7 +47,7 @@ impl Costs {
     }
 }
 
-/// What one variant of the scene costs.
+/// Cost of one variant of the scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Price {
     /// `plain`, `graphics`, the key of an effect, or `whole`.
@@ -56,9 +56,9 @@ pub struct Price {
     pub setting: String,
     /// Over the baseline.
     pub alone: Costs,
-    /// Of an effect: the whole scene with it over the whole without it; none where they cannot act together.
+    /// For an effect: the whole scene with it over the whole without it; absent if they cannot act together.
     pub within: Option<Costs>,
-    /// What the graphics takes of the GPU: nothing without graphics; unknown without an adapter.
+    /// GPU memory of the graphics [bytes]: zero without graphics, absent without an adapter.
     pub device: Option<FrameCost>,
     /// Size of the dataset without the scene's text [B].
     pub dataset_bytes: usize,
@@ -72,7 +72,7 @@ impl Price {
     }
 }
 
-/// What the baselines themselves take, least of the rounds.
+/// Cost of the baselines themselves, minimum of the rounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Baseline {
     /// Haptization of the plain scene [s].
@@ -92,7 +92,7 @@ pub struct Effects {
     pub prices: Vec<Price>,
     /// Rounds that were timed.
     pub rounds: usize,
-    /// What costs are relative to.
+    /// The baseline of the relative costs.
     pub baseline: Baseline,
     /// Share of the ticks in contact, in the plain scene [1].
     pub in_contact: f64,
@@ -100,7 +100,7 @@ pub struct Effects {
     pub nodes: usize,
     /// The adapter, where there is one.
     pub adapter: Option<String>,
-    /// What could not be priced here, and why.
+    /// Effects that could not be priced here, and why.
     pub notes: Vec<String>,
 }
 

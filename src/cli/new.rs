@@ -1,0 +1,115 @@
+//! `haptize new`: a commented scene to begin with, one of those that are part of the program.
+
+use super::{Failure, Report};
+use clap::ValueEnum;
+use haptize::dataset::replace_file;
+use std::{
+    io::Write as _,
+    path::{Path, PathBuf},
+};
+
+/// Which scene to begin with, and where to write it.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize new                            writes sphere.toml
+  haptize new --from mesh -o my.toml     writes my.toml, and bean.obj beside it
+
+Next: edit the file, then `haptize bake` it (`haptize scan` it for sponge and sponge-side).")]
+pub struct Arguments {
+    /// The scene to begin with.
+    #[arg(long, default_value = "sphere")]
+    from: Example,
+    /// The file to write; by default the scene's name in the current folder, ending in .toml.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+}
+
+/// A scene that is part of the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Example {
+    /// A sphere with a skin under an arm of three joints: converges with mesh, contact nodes and grid.
+    Sphere,
+    /// The paper's sphere of 102 nodes joined by springs.
+    Paper,
+    /// A triangle mesh from a file under an arm of four joints, one of them prismatic.
+    Mesh,
+    /// A spongy block, scanned by a simulated rig and scraped.
+    Sponge,
+    /// The same block under a fabric.
+    SpongeFabric,
+    /// The same block, touched from the side.
+    SpongeSide,
+}
+
+/// The mesh that `mesh.toml` names.
+const BEAN: (&str, &str) = ("bean.obj", include_str!("../../datasets/bean.obj"));
+
+impl Example {
+    /// Returns the default name of the scene's file, and its text.
+    fn scene(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Sphere => ("sphere.toml", include_str!("../../datasets/sphere.toml")),
+            Self::Paper => ("paper.toml", include_str!("../../datasets/paper.toml")),
+            Self::Mesh => ("mesh.toml", include_str!("../../datasets/mesh.toml")),
+            Self::Sponge => ("sponge.toml", include_str!("../../datasets/sponge.toml")),
+            Self::SpongeFabric => ("sponge_fabric.toml", include_str!("../../datasets/sponge_fabric.toml")),
+            Self::SpongeSide => ("sponge_side.toml", include_str!("../../datasets/sponge_side.toml")),
+        }
+    }
+
+    /// Returns name and text of the mesh that the scene reads, if it reads one.
+    fn mesh(self) -> Option<(&'static str, &'static str)> {
+        (self == Self::Mesh).then_some(BEAN)
+    }
+
+    fn is_scanned(self) -> bool {
+        matches!(self, Self::Sponge | Self::SpongeFabric | Self::SpongeSide)
+    }
+}
+
+/// Writes the scene, and the mesh that it reads. No file is replaced.
+pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    let (name, text) = arguments.from.scene();
+    let scene = arguments.output.clone().unwrap_or_else(|| name.into());
+    let mut files = vec![(scene.clone(), text)];
+    files.extend(arguments.from.mesh().map(|(name, text)| (scene.with_file_name(name), text)));
+    let missing = |(path, text): &(PathBuf, &str)| -> Result<bool, Failure> {
+        match std::fs::read(path) {
+            Ok(found) if found == text.as_bytes() => Ok(false),
+            Ok(_) => Err(taken(path)),
+            Err(_) if path.exists() => Err(taken(path)),
+            Err(_) => Ok(true),
+        }
+    };
+    let missing = files.iter().map(missing).collect::<Result<Vec<_>, _>>()?;
+    for ((path, text), _) in files.iter().zip(&missing).filter(|(_, missing)| **missing) {
+        replace_file(path, |out| out.write_all(text.as_bytes()))
+            .map_err(|error| format!("cannot write {}: {error}; give another place by -o", path.display()))?;
+    }
+    let names: Vec<String> = files.iter().map(|(path, _)| path.display().to_string()).collect();
+    let next = if arguments.from.is_scanned() { "scan" } else { "bake" };
+    let text = format!("wrote {}\nnext: haptize {next} {}\n", names.join(" and "), scene.display());
+    Ok(Report { text, json: serde_json::json!({ "files": names }), whole: true })
+}
+
+fn taken(path: &Path) -> Failure {
+    format!("{}: this file exists already, and nothing is written: name another by -o", path.display()).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use haptize::scene::{ScanScene, Scene};
+
+    #[test]
+    fn every_example_is_a_valid_scene_of_the_kind_that_its_next_step_reads() {
+        for example in Example::value_variants() {
+            let (name, text) = example.scene();
+            let (scene, scan) = (Scene::parse(text, name), ScanScene::parse(text, name));
+            assert_eq!((scene.is_ok(), scan.is_ok()), (!example.is_scanned(), example.is_scanned()), "{name}");
+            let mesh = example.mesh().map_or("", |(mesh, _)| mesh);
+            assert_eq!(text.contains("[object.mesh]"), !mesh.is_empty() && text.contains(mesh), "{name}");
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! What a sweep is going to take, from a sample of its points.
+//!
+//! Points of the grid are drawn at random and solved by the sweep's own backend. The fraction of them in contact, the number of contact
+//! forces and the time per point follow.
+
+use super::{
+    Backend, Sweep,
+    columns::{Columns, Shape},
+};
+use crate::{JointVector, random::Random};
+use serde::Serialize;
+use std::time::Instant;
+
+/// Number of points that are solved at once.
+const PORTION: usize = 64;
+
+/// Maximum number of portions: the fraction in contact is then known to some hundredths.
+const PORTIONS: usize = 8;
+
+/// Time after which no further portion is solved [s]: expensive contact is sampled less.
+const LONGEST: f64 = 0.5;
+
+/// Grids with fewer points are not sampled: they are done as soon.
+const FEWEST_POINTS: usize = 2 * PORTION * PORTIONS;
+
+/// Seed of the sample.
+const SEED: u64 = 0x2545_f491_4f6c_dd1d;
+
+/// What a sweep is expected to take.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Forecast {
+    /// Fraction of the points in contact [1].
+    pub contact_fraction: f64,
+    /// Solving all points from rest, without the search for lower equilibria and the measurement of the error; absent for a GPU, whose
+    /// time for few points says nothing of many [s].
+    pub seconds: Option<f64>,
+    /// The dataset on disk [bytes].
+    pub disk: usize,
+    /// Points that were sampled.
+    pub sampled: usize,
+}
+
+impl Sweep<'_> {
+    /// Samples the sweep's points with `backend`, and keeps the forecast that follows. `is_timed`: whether a sample's time counts.
+    ///
+    /// # Errors
+    /// Those of the backend.
+    pub fn predict<B: Backend>(&mut self, backend: &mut B, is_timed: bool) -> Result<(), B::Error> {
+        let points = self.grid.points();
+        if points < FEWEST_POINTS {
+            return Ok(());
+        }
+        let mut random = Random::new(SEED);
+        let (mut sampled, mut touching, mut contacts, mut touches) = (0, 0, 0, 0);
+        let start = Instant::now();
+        while sampled < PORTION * PORTIONS && start.elapsed().as_secs_f64() < LONGEST {
+            let drawn = (0..PORTION).map(|_| (random.between(0.0, points as f64) as usize).min(points - 1));
+            let drawn: Vec<JointVector> = drawn.map(|point| self.grid.configuration(point)).collect();
+            sampled += drawn.len();
+            for equilibrium in backend.solve(&drawn)? {
+                touching += usize::from(equilibrium.status.is_in_contact());
+                contacts += equilibrium.forces.len();
+                touches += equilibrium.touches.len();
+            }
+        }
+        let per_sample = points as f64 / sampled.max(1) as f64;
+        let seconds = per_sample * start.elapsed().as_secs_f64();
+        let all = |of_sample: usize| (per_sample * of_sample as f64).round() as usize;
+        let stored = Shape { with_forces: self.with_forces, ..self.shape };
+        let [contacts, touches] = [(contacts, stored.with_forces), (touches, stored.with_touches)]
+            .map(|(rows, is_stored)| if is_stored { all(rows) } else { 0 });
+        self.forecast = Some(Forecast {
+            contact_fraction: touching as f64 / sampled.max(1) as f64,
+            seconds: is_timed.then_some(seconds),
+            disk: Columns::bytes(points, stored.width(), contacts, touches),
+            sampled,
+        });
+        Ok(())
+    }
+}
