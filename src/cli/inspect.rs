@@ -1,13 +1,13 @@
 //! `haptize inspect`: one configuration in full.
 
-use super::{Failure, Report};
+use super::{Failure, Report, tell};
 use clap::ValueEnum;
 use glam::DVec3;
 use haptize::{
     JointVector,
     contact::Model,
     dataset::{self, Dataset},
-    haptize::Inspection,
+    haptize::{Inspection, build_object},
     object::Object,
     proxy::Chain,
     scene::{Algorithm, Scene},
@@ -48,6 +48,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut json = serde_json::to_value(&inspection)?;
     let mut text = String::new();
     describe(&mut text, &inspection)?;
+    object.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
+    json["object_warnings"] = object.warnings.clone().into();
     if let Some(skin) = object.skin {
         json["skin"] = serde_json::to_value(skin)?;
         writeln!(text, "  skin         {skin}")?;
@@ -72,7 +74,7 @@ fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
         Ok(dataset) => dataset,
         Err(dataset::Error::Foreign { .. }) => {
             let scene = Scene::load(path)?;
-            let object = Object::build(&scene.object)?;
+            let object = build_object(&scene)?;
             return Ok((scene, object, None));
         }
         Err(error) => return Err(error.into()),
@@ -84,7 +86,9 @@ fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
         )
         .into());
     };
-    let mut scene = Scene::parse(&dataset.scene, path)?;
+    let wrong = |why: String| format!("{}: the scene in the dataset: {why}", path.display());
+    let mut scene = Scene::parse(&dataset.scene, "scene").map_err(|error| wrong(error.to_string()))?;
+    dataset.check_scene().map_err(wrong)?;
     scene.contact.algorithm = Algorithm::from_str(&dataset.provenance.algorithm, true)?;
     let object = surface.object(&scene.object)?;
     Ok((scene, object, Some(dataset)))

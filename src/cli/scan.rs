@@ -3,7 +3,7 @@
 use super::{
     Failure, Report,
     bar::bar,
-    interrupt::stop_flag,
+    interrupt,
     output::{self, Kind},
     tell,
 };
@@ -18,7 +18,7 @@ use haptize::{
 };
 use std::{
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::atomic::AtomicBool,
 };
 
 /// What to scan.
@@ -56,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             .with_extension("csv"),
     };
     output::check(&output, Kind::Table, [arguments.scene.as_path()])?;
-    let stop = stop_flag()?;
+    let stop = interrupt::stop_flag();
     let bar = bar(0, "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     let mut progress = |progress: ScanProgress| {
         bar.set_length(progress.points as u64);
@@ -66,7 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let course = Course { resume: arguments.resume, guided: arguments.guided };
     let result = measure(&scene, &output, course, stop, &mut progress);
     bar.finish_and_clear();
-    stop.store(true, Ordering::Relaxed);
+    interrupt::over();
     let report = result?;
     let mut json = serde_json::to_value(&report)?;
     json["file"] = output.display().to_string().into();

@@ -54,6 +54,9 @@ pub enum SetupError {
         /// Joints of the chain.
         chain: usize,
     },
+    /// Scene and dataset contradict each other.
+    #[error("the dataset contradicts itself: {0}: bake it again")]
+    Contradiction(String),
     /// Scene and dataset do not make a loop.
     #[error(transparent)]
     Loop(#[from] JointsError),
@@ -98,6 +101,7 @@ impl Setup {
         if grid != joints {
             return Err(SetupError::Joints { grid, chain: joints });
         }
+        dataset.check_scene().map_err(SetupError::Contradiction)?;
         let (haptics, bounds) = haptic_loop(dataset, &chain, &scene, &scene.haptics)?;
         let exceeded = bounds.iter().filter(|bound| bound.is_exceeded()).cloned().collect();
         let object = match (&scene.object, &scene.graphics, &dataset.contacts, &dataset.surface) {
