@@ -106,6 +106,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let earlier = output::check(&output, Kind::Dataset, inputs.clone())?;
     let names = report::FIGURES.into_iter().chain(FIGURES);
     let folder = arguments.figures.as_ref().map(|folder| Folder::check(folder, names, inputs)).transpose()?;
+    if let Some(folder) = &folder {
+        folder.keep_apart(&output)?;
+    }
     let mapping = arguments.columns.as_deref().map(Mapping::load).transpose()?;
     let mut source = read(&arguments.logs, mapping.as_ref())?;
     if let Some(path) = &arguments.scene {

@@ -136,11 +136,16 @@ pub fn run() -> ExitCode {
 
 /// Answers a command line that is wrong, or asks for help.
 fn usage(error: &clap::Error) -> ExitCode {
-    // Where nobody listens there is nobody to tell.
-    let _ = error.print();
+    let text = error.render().to_string();
+    if printable(&text) == text {
+        // In colour on a terminal. Where nobody listens there is nobody to tell.
+        let _ = error.print();
+    } else {
+        tell(format_args!("{}", text.trim_end()));
+    }
     // It could not be parsed, so that the option is looked for in the words themselves.
     if error.use_stderr() && std::env::args_os().any(|word| word == "--json") {
-        print_error(&error.render().to_string());
+        print_error(&text);
     }
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(1))
 }

@@ -107,7 +107,9 @@ pub fn check<'a>(output: &Path, kind: Kind, inputs: impl IntoIterator<Item = &'a
 /// A folder that a command fills with files whose names it knows.
 pub struct Folder {
     path: PathBuf,
-    /// Files of such names that are there.
+    /// Files that the command may write.
+    files: Vec<PathBuf>,
+    /// Those of them that are there.
     earlier: Vec<PathBuf>,
 }
 
@@ -123,15 +125,25 @@ impl Folder {
         inputs: impl IntoIterator<Item = &'a Path> + Clone,
     ) -> Result<Self, Failure> {
         probe(path, path.ancestors().find(|folder| folder.exists()).unwrap_or(Path::new("")))?;
-        let mut earlier = Vec::new();
-        for name in names {
-            let file = path.join(name);
-            if fs::symlink_metadata(&file).is_ok() {
-                check(&file, Kind::of(&file), inputs.clone())?;
-                earlier.push(file);
-            }
+        let files: Vec<PathBuf> = names.into_iter().map(|name| path.join(name)).collect();
+        let earlier: Vec<PathBuf> = files.iter().filter(|file| fs::symlink_metadata(file).is_ok()).cloned().collect();
+        for file in &earlier {
+            check(file, Kind::of(file), inputs.clone())?;
         }
-        Ok(Self { path: path.to_owned(), earlier })
+        Ok(Self { path: path.to_owned(), files, earlier })
+    }
+
+    /// Checks that `output`, which the same command writes, is none of the folder's files.
+    ///
+    /// # Errors
+    /// When it is one of them, which would be written over it.
+    pub fn keep_apart(&self, output: &Path) -> Result<(), Failure> {
+        let output_place = place(output);
+        if self.files.iter().any(|file| place(file) == output_place) {
+            let why = "a file of this name is written into the folder, too; name another file";
+            return Err(format!("{}: {why}", output.display()).into());
+        }
+        Ok(())
     }
 
     /// Removes what an earlier run has left and this one has not `written` anew, and tells what was replaced and removed.
@@ -167,6 +179,14 @@ fn probe(output: &Path, folder: &Path) -> Result<(), Failure> {
         let (output, folder) = (output.display(), folder.display());
         format!("{output}: cannot be written: {folder}: {error}; make the folder, or choose another output (-o)").into()
     })
+}
+
+/// Where a file is or is to be, by one name.
+fn place(file: &Path) -> PathBuf {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder =
+        fs::canonicalize(folder).or_else(|_| std::path::absolute(folder)).unwrap_or_else(|_| folder.to_owned());
+    file.file_name().map_or_else(|| folder.clone(), |name| folder.join(name))
 }
 
 /// Whether two paths lead to one file.

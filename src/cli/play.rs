@@ -76,6 +76,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let recorded = asked.map(|file| output::check(file, Kind::Table, inputs().chain(moved()))).transpose()?;
     let filled =
         Folder::check(&folder, FILES.into_iter().chain(report::FIGURES), inputs().chain(moved()).collect::<Vec<_>>())?;
+    if let Some(file) = asked {
+        filled.keep_apart(file)?;
+    }
     let dataset = Dataset::load(&arguments.dataset)?;
     let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
     for exceeded in &setup.exceeded {

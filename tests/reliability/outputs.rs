@@ -149,6 +149,8 @@ fn a_folder_holds_the_files_of_one_run_and_it_is_told_what_was_replaced() {
     let mut left = files(&offline);
     left.insert("notes.txt".into());
     assert_eq!(names(&home.path().join("o")), left);
+    refused(home.path(), &["play", "x.haptize", "--record", "o/../o/trace.csv", "-o", "o"], "into the folder, too");
+    refused(home.path(), &["play", "x.haptize", "--record", "new/press.svg", "-o", "new"], "cannot be written");
     for again in [
         &["stability", "gridization", "--no-gpu", "-o", "s"][..],
         &["accuracy", "scene.toml", "--points", "16", "--configurations", "8", "--rounds", "1", "--effects", "-o", "a"],
