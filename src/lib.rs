@@ -87,6 +87,7 @@ pub mod tolerances;
 
 mod joint_matrix;
 mod joint_vector;
+pub mod memory;
 mod random;
 
 pub use joint_matrix::JointMatrix;

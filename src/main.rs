@@ -2,6 +2,9 @@
 
 mod cli;
 
+#[global_allocator]
+static ALLOCATOR: cli::Remembering = cli::Remembering;
+
 fn main() -> std::process::ExitCode {
     // Mesa's device-select layer reorders adapters, which haptize ranks itself, and prints errors where there is no
     // display. This is the layer's own switch.

@@ -447,6 +447,49 @@ fn no_output_destroys_an_input() {
     assert_eq!(haptize(folder.path(), &["bake", "finger.toml"]).status.code(), Some(0), "its own output is replaced");
 }
 
+/// Every failure, that of the command line too, is one JSON object where that is asked for.
+#[test]
+fn every_failure_is_one_json_object() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("finger.toml"), FINGER).unwrap();
+    std::fs::write(folder.path().join("out"), "a file, not a folder").unwrap();
+    let failed: [&[&str]; 13] = [
+        &[],
+        &["accuracy", "none.toml"],
+        &["bake", "none.toml"],
+        &["bake", "finger.toml", "-o", "none/f.haptize"],
+        &["export", "none.haptize", "--format", "csv"],
+        &["gridize", "none.csv", "--step", "1"],
+        &["info", "none.haptize"],
+        &["inspect", "finger.toml", "--q=1,2"],
+        &["paper", "-o", "finger.toml"],
+        &["play", "none.haptize"],
+        &["scan", "none.toml"],
+        &["stability", "kitchen", "--no-gpu"],
+        &["view", "finger.toml", "--screenshot", "w.jpg"],
+    ];
+    let wrong: [&[&str]; 7] = [
+        &["bark"],
+        &["--loud"],
+        &["bake"],
+        &["bake", "finger.toml", "--max-error", "much"],
+        &["inspect", "finger.toml"],
+        &["view", "finger.toml", "--size", "0x0"],
+        &["play", "f.haptize", "--replay", "r.csv", "--realtime"],
+    ];
+    for (code, arguments) in failed.map(|arguments| (1, arguments)).into_iter().chain(wrong.map(|a| (2, a))) {
+        let output = haptize(folder.path(), &[arguments, &["--json"]].concat());
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|why| panic!("{arguments:?}: {why}"));
+        let error = told["error"].as_str().unwrap();
+        assert!(!error.is_empty() && message.contains(error), "{arguments:?}: {error} and {message}");
+    }
+    for asked in ["--help", "--version"] {
+        assert_eq!(haptize(folder.path(), &["--json", asked]).status.code(), Some(0));
+    }
+}
+
 /// Nobody need listen: with standard error full, a bake goes on.
 #[cfg(target_os = "linux")]
 #[test]

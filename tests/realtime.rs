@@ -196,6 +196,20 @@ fn a_loop_that_keeps_missing_its_deadlines_lets_go_without_a_jump_and_says_why()
     assert_eq!(run(0.008).0, None);
 }
 
+#[test]
+fn the_first_deadline_comes_after_the_system_has_granted_what_it_grants() {
+    let data = object(3);
+    let haptics = build(&data);
+    let mut hand = hand(3);
+    let (mut body, Ends { mut late, .. }) = HapticLoop::new(&haptics, &mut hand).unwrap();
+    // As long as memory may take to be locked.
+    std::thread::sleep(Duration::from_millis(200));
+    body.begin();
+    body.tick();
+    // A busy machine makes the tick late, too, by far less.
+    assert!(!late.pop().is_ok_and(|tick| tick.by > Duration::from_millis(150)));
+}
+
 /// Friction and contact damping as the tests feel them.
 fn rubbing() -> HapticEffects {
     HapticEffects {

@@ -53,6 +53,22 @@ fn diagnostic(text: &str) -> Diagnostic {
 }
 
 #[test]
+fn the_joints_of_the_shipped_scenes_reach_what_is_haptized_and_no_farther() {
+    for name in ["sphere", "mesh", "paper"] {
+        let scene = Scene::load(format!("{}/datasets/{name}.toml", env!("CARGO_MANIFEST_DIR"))).unwrap();
+        for (joint, axis) in scene.proxy.joints.iter().zip(&scene.grid.axes) {
+            let ends = [axis.start, axis.start + (axis.count - 1) as f64 * axis.step];
+            for (limit, end) in joint.limits.iter().zip(ends) {
+                assert!((limit - end).abs() <= axis.step, "{name}, {}: limit {limit}, grid to {end}", joint.name);
+            }
+            // But for the digits that a scene gives.
+            let beyond = (ends[0] - joint.limits[0]).max(joint.limits[1] - ends[1]);
+            assert!(beyond < 1e-3 * axis.step, "{name}, {}: {beyond} beyond the grid", joint.name);
+        }
+    }
+}
+
+#[test]
 fn spheres_have_the_papers_grid() {
     for name in ["paper.toml", "sphere.toml"] {
         let scene = shipped(name);

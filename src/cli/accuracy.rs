@@ -1,6 +1,6 @@
 //! `haptize accuracy`: what accuracy costs in time, for one scene.
 
-use super::{Failure, Report, tell};
+use super::{Failure, Report, output::Folder, tell};
 use haptize::{
     report::accuracy::{self, Extent},
     scene::Scene,
@@ -43,6 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         points: arguments.points,
         rounds: arguments.rounds.max(1),
     };
+    let folder = Folder::check(&arguments.output, accuracy::FILES, [arguments.scene.as_path()])?;
     let mut progress = |what: &str| tell(format_args!("haptize: {what} ..."));
     let mut found = accuracy::measure(&scene, extent, &mut progress)?;
     if arguments.effects {
@@ -56,5 +57,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut text = String::new();
     accuracy::describe(&mut text, &found)?;
     text.push_str(&format!("{} files in {}\n", files.len(), arguments.output.display()));
+    folder.close(&files, &mut text, &mut json)?;
     Ok(Report { text, json, whole: true })
 }

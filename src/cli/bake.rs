@@ -3,20 +3,19 @@
 use super::{
     Failure, Report,
     bar::Bar,
-    info,
-    interrupt::stop_flag,
-    max_error,
+    info, interrupt, max_error,
     output::{self, Kind},
     tell,
 };
 use haptize::{
-    haptize::{Aim, BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, SweepReport},
+    haptize::{
+        Aim, BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, Sweep, SweepReport,
+    },
     scene::{Algorithm, Scene},
 };
 use std::{
     fmt::{self, Write},
     path::{Path, PathBuf},
-    sync::atomic::Ordering,
     time::SystemTime,
 };
 
@@ -70,10 +69,13 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file")?)
             .with_extension("haptize"),
     };
-    output::check(&output, Kind::Dataset, [arguments.scene.as_path()])?;
+    let earlier = output::check(&output, Kind::Dataset, [arguments.scene.as_path()])?;
+    output::check(&Sweep::growing_of(&output), Kind::Dataset, [])?;
     if let Some(aim) = arguments.max_error {
         let wanted = max_error::Wanted { aim, points: arguments.max_points, output: &output, resume: arguments.resume };
-        return max_error::run(&scene, &wanted, arguments.backend);
+        let mut report = max_error::run(&scene, &wanted, arguments.backend)?;
+        earlier.tell(&mut report.text, &mut report.json);
+        return Ok(report);
     }
     let bake = |bake: Bake<'_>| bake.to_file(&output, arguments.resume);
     let report = watched(&scene, arguments.backend, |own| bake(Bake { measured: arguments.measure_error, ..own }))?;
@@ -82,18 +84,18 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     json["file"] = output.display().to_string().into();
     let mut text = String::new();
     describe(&mut text, &output, &report, None)?;
+    earlier.tell(&mut text, &mut json);
     // Every point was solved and says what became of it: that is the whole work.
     Ok(Report { text, json, whole: true })
 }
 
-/// Runs `bake`, dated now, with a progress bar. Ctrl-C stops it after the current configurations; afterwards, or again,
-/// Ctrl-C ends the program at once.
+/// Runs `bake`, dated now, with a progress bar. Ctrl-C stops it.
 pub fn watched<T, E: Into<Failure>>(
     scene: &Scene,
     backend: BackendChoice,
     bake: impl FnOnce(Bake<'_>) -> Result<T, E>,
 ) -> Result<T, Failure> {
-    let stop = stop_flag()?;
+    let stop = interrupt::stop_flag();
     let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     let mut announced = false;
     let mut progress = |progress: Progress| {
@@ -106,7 +108,7 @@ pub fn watched<T, E: Into<Failure>>(
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
     let result = bake(Bake { scene, backend, measured: None, aim: None, date: &date, stop, progress: &mut progress });
     bar.finish();
-    stop.store(true, Ordering::Relaxed);
+    interrupt::over();
     result.map_err(Into::into)
 }
 

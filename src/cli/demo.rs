@@ -4,8 +4,8 @@
 //! The press runs twice: as fast as it goes, which gives the same trace and figures on every machine, and against the
 //! clock, which shows what a tick costs on this one and how punctual it is.
 
-use super::{Failure, Report, bake, play, tell};
-use haptize::{dataset::Dataset, haptize::BackendChoice, render::setup::Setup, scene::Scene};
+use super::{Failure, Report, bake, output::Folder, play, tell};
+use haptize::{dataset::Dataset, haptize::BackendChoice, render::setup::Setup, report, scene::Scene};
 use std::{
     fmt::Write,
     path::{Path, PathBuf},
@@ -17,13 +17,18 @@ const SCENE: &str = include_str!("../../datasets/sphere.toml");
 /// Where everything goes.
 const FOLDER: &str = "out";
 
+/// The dataset's file there.
+const DATASET: &str = "sphere.haptize";
+
 /// Runs the demo.
 pub fn run() -> Result<Report, Failure> {
     let folder = Path::new(FOLDER);
     std::fs::create_dir_all(folder)
         .map_err(|error| format!("cannot make the folder ./{FOLDER}: {error}; change to a folder of yours"))?;
+    let names = play::FILES.into_iter().chain(report::FIGURES).chain([DATASET]);
+    let earlier = Folder::check(folder, names, [])?;
     let scene = Scene::parse(SCENE, "datasets/sphere.toml")?;
-    let file: PathBuf = folder.join("sphere.haptize");
+    let file: PathBuf = folder.join(DATASET);
 
     tell(format_args!("haptizing the sphere, contact at {} configurations ...", points(&scene)));
     let (baked, sweep) = bake::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
@@ -61,7 +66,8 @@ pub fn run() -> Result<Report, Failure> {
     }
     writeln!(text, "written: {}", names.join(" "))?;
     writeln!(text, "next: haptize info {0}, haptize play {0} --motion scrape, haptize --help", file.display())?;
-    let json = serde_json::json!({ "bake": sweep, "press": press, "timing": played.timing, "files": names });
+    let mut json = serde_json::json!({ "bake": sweep, "press": press, "timing": played.timing, "files": names });
+    earlier.close(&files, &mut text, &mut json)?;
     Ok(Report { text, json, whole: true })
 }
 

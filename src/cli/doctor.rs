@@ -35,7 +35,12 @@ struct Finding {
 pub fn run(_: &Arguments) -> Result<Report, Failure> {
     let threads = thread::available_parallelism().map_or(1, usize::from);
     let adapters = adapters();
-    let automatic = if adapters.iter().any(|adapter| adapter.hardware) { "gpu" } else { "cpu" };
+    let named = std::env::var(ADAPTER_VARIABLE).ok().filter(|name| !name.is_empty() && adapters.is_empty());
+    let automatic = match &named {
+        Some(_) => "none",
+        None if adapters.iter().any(|adapter| adapter.hardware) => "gpu",
+        None => "cpu",
+    };
     let findings = [writing(), scheduling(), locking()];
     let whole = findings.iter().all(|finding| finding.good || !finding.essential);
 
@@ -43,6 +48,12 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
     writeln!(text, "haptize {} on {} {}", env!("CARGO_PKG_VERSION"), std::env::consts::OS, std::env::consts::ARCH)?;
     writeln!(text, "CPU threads            {threads}")?;
     match adapters.as_slice() {
+        [] if named.is_some() => writeln!(
+            text,
+            "graphics adapters      none whose name contains {:?}, which {ADAPTER_VARIABLE} asks for: set it to a part of a name, or \
+             unset it to see all",
+            named.as_deref().unwrap_or_default()
+        )?,
         [] => writeln!(
             text,
             "graphics adapters      none found: `--backend gpu` needs a Vulkan driver, nothing else does"

@@ -33,7 +33,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         Format::Npz => Kind::Archive,
         Format::Csv => Kind::Table,
     };
-    output::check(&output, kind, [arguments.dataset.as_path()])?;
+    let inputs = [arguments.dataset.as_path()];
+    let earlier = output::check(&output, kind, inputs)?;
+    let beside = arguments.format.beside(&output).filter(|file| file.symlink_metadata().is_ok());
+    if let Some(beside) = &beside {
+        output::check(beside, kind, inputs)?;
+    }
     let files = dataset.export(&output, arguments.format)?;
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     let absent = dataset.absent();
@@ -41,5 +46,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if !absent.is_empty() {
         text += &format!("  not there    {}\n", absent.join(", "));
     }
-    Ok(Report { text, json: serde_json::json!({ "files": names, "absent": absent }), whole: true })
+    let mut json = serde_json::json!({ "files": names, "absent": absent });
+    earlier.tell(&mut text, &mut json);
+    if let Some(stale) = beside.filter(|beside| !files.contains(beside)) {
+        std::fs::remove_file(&stale).map_err(|error| format!("cannot remove {}: {error}", stale.display()))?;
+        text += &format!("  removed      {}, which an earlier export had left\n", stale.display());
+        json["removed"] = stale.display().to_string().into();
+    }
+    Ok(Report { text, json, whole: true })
 }

@@ -14,7 +14,7 @@ use haptize::{
 use serde_json::{Value, json};
 use std::{
     fmt::{self, Write},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 /// Variation of a force below which it is told as a held one [1].
@@ -49,10 +49,9 @@ impl Felt {
         Ok(())
     }
 
-    /// Draws the forces of all datasets in one figure.
-    pub fn draw(&self, folder: &Path, trace: &Trace) -> Result<(), Failure> {
-        report::write_both(folder, "force", &force(&self.forces, trace))?;
-        Ok(())
+    /// Draws the forces of all datasets in one figure, and returns its files.
+    pub fn draw(&self, folder: &Path, trace: &Trace) -> Result<[PathBuf; 2], Failure> {
+        Ok(report::write_both(folder, "force", &force(&self.forces, trace))?)
     }
 
     /// For programs.

@@ -3,7 +3,7 @@
 use super::{
     Failure, Report,
     bar::Bar,
-    output::{self, Kind},
+    output::{self, Folder, Kind},
 };
 use haptize::{
     dataset::Dataset,
@@ -71,6 +71,9 @@ pub struct Arguments {
     figures: Option<PathBuf>,
 }
 
+/// Figures beside [`report::FIGURES`].
+const FIGURES: [&str; 4] = ["gridized.svg", "gridized.png", "hysteresis.svg", "hysteresis.png"];
+
 /// The measurements that were read.
 pub struct Source {
     /// The measurements.
@@ -104,7 +107,13 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let started = Instant::now();
     let output = output(arguments)?;
     let inputs = arguments.logs.iter().chain(&arguments.against).chain(&arguments.columns).chain(&arguments.scene);
-    output::check(&output, Kind::Dataset, inputs.map(PathBuf::as_path))?;
+    let inputs = inputs.map(PathBuf::as_path);
+    let earlier = output::check(&output, Kind::Dataset, inputs.clone())?;
+    let names = report::FIGURES.into_iter().chain(FIGURES);
+    let folder = arguments.figures.as_ref().map(|folder| Folder::check(folder, names, inputs)).transpose()?;
+    if let Some(folder) = &folder {
+        folder.keep_apart(&output)?;
+    }
     let mapping = arguments.columns.as_deref().map(Mapping::load).transpose()?;
     let mut source = read(&arguments.logs, mapping.as_ref())?;
     if let Some(path) = &arguments.scene {
@@ -153,6 +162,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         writeln!(text, "  figures      {} files in {}", figures.len(), folder.display())?;
     }
     writeln!(text, "  {seconds:.2} s, of these {reading:.2} s for reading")?;
+    earlier.tell(&mut text, &mut json);
+    if let Some(folder) = folder {
+        folder.close(&figures, &mut text, &mut json["folder"])?;
+    }
     Ok(Report { text, json, whole: true })
 }
 

@@ -34,14 +34,21 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     json["file"] = path.display().to_string().into();
     json["file_bytes"] = file_bytes.into();
     json["absent"] = dataset.absent().into();
+    let contradiction = dataset.check_scene().err();
+    json["contradiction"] = contradiction.clone().into();
     let mut text = String::new();
-    writeln!(text, "{}: {} points, {:.1} MB, sound", path.display(), summary.points, file_bytes as f64 / 1e6)?;
+    let state = if contradiction.is_some() { "intact" } else { "sound" };
+    writeln!(text, "{}: {} points, {:.1} MB, {state}", path.display(), summary.points, file_bytes as f64 / 1e6)?;
+    if let Some(contradiction) = &contradiction {
+        writeln!(text, "  scene        does not describe this dataset: {contradiction}")?;
+        writeln!(text, "               no command but info and export takes it: bake the scene again")?;
+    }
     describe(&mut text, &summary, &dataset.absent())?;
     if let Some(skin) = skin(&dataset) {
         json["skin"] = serde_json::to_value(skin)?;
         writeln!(text, "  skin         {skin}")?;
     }
-    Ok(Report { text, json, whole: true })
+    Ok(Report { text, json, whole: contradiction.is_none() })
 }
 
 /// The skin of the object, where the dataset's scene has one.

@@ -8,7 +8,7 @@ use haptize::{
     contact::Model,
     dataset::{self, Dataset},
     field::TorqueField,
-    haptize::Inspection,
+    haptize::{Inspection, build_object},
     object::Object,
     proxy::{Chain, Joint},
     scene::{Algorithm, GridSpec, JointKind, Scene},
@@ -57,6 +57,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     json["warnings"] = warnings.into();
     let mut text = String::new();
     describe(&mut text, &inspection, &chain)?;
+    object.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
+    json["object_warnings"] = object.warnings.clone().into();
     if let Some(skin) = object.skin {
         json["skin"] = serde_json::to_value(skin)?;
         writeln!(text, "  skin         {skin}")?;
@@ -96,7 +98,7 @@ fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
         Ok(dataset) => dataset,
         Err(dataset::Error::Foreign { .. }) => {
             let scene = Scene::load(path)?;
-            let object = Object::build(&scene.object)?;
+            let object = build_object(&scene)?;
             return Ok((scene, object, None));
         }
         Err(error) => return Err(error.into()),
@@ -108,7 +110,9 @@ fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
         )
         .into());
     };
-    let mut scene = Scene::parse(&dataset.scene, path)?;
+    let wrong = |why: String| format!("{}: the scene in the dataset: {why}", path.display());
+    let mut scene = Scene::parse(&dataset.scene, "scene").map_err(|error| wrong(error.to_string()))?;
+    dataset.check_scene().map_err(wrong)?;
     scene.contact.algorithm = Algorithm::from_str(&dataset.provenance.algorithm, true)?;
     let object = surface.object(&scene.object)?;
     Ok((scene, object, Some(dataset)))

@@ -1,23 +1,101 @@
-//! Ctrl-C: the first asks the work under way to stop at the next good place, the second ends the program at once.
+//! Ctrl-C, SIGTERM and SIGHUP: honoured within a second, however long what is under way takes.
+//!
+//! Work that can stop at a good place takes [`stop_flag`] and looks at it. What has not stopped after [`GRACE`] is left: files that are
+//! half written are removed, and the program ends. A bake's part and a scan's log are on the disk by then. All other work ends at once,
+//! and so does everything at a second signal. A signal that the program was started to ignore (`nohup`) stays ignored.
 
-use super::Failure;
-use std::sync::atomic::{AtomicBool, Ordering};
+use super::{Failure, last_words};
+use haptize::dataset::discard_unfinished;
+use std::{
+    sync::{
+        atomic::{AtomicBool, Ordering},
+        mpsc,
+    },
+    thread,
+    time::Duration,
+};
 
 /// Exit code of a program that Ctrl-C ended, as shells have it: 128 and the signal's number.
 const INTERRUPTED: i32 = 130;
 
-/// Returns the flag that Ctrl-C raises, lowered. While it is raised, Ctrl-C ends the program: work that is over raises it.
-pub fn stop_flag() -> Result<&'static AtomicBool, Failure> {
-    static STOP: AtomicBool = AtomicBool::new(false);
-    STOP.store(false, Ordering::Relaxed);
-    let handler = || {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(INTERRUPTED);
+/// How long work may take to stop: with all that follows, less than a second.
+const GRACE: Duration = Duration::from_millis(700);
+
+/// How long saying so may take where nobody reads.
+const LAST_WORDS: Duration = Duration::from_millis(100);
+
+/// Raised when work is to stop.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// Whether there is work that looks at [`STOP`].
+static IS_STOPPABLE: AtomicBool = AtomicBool::new(false);
+
+/// Listens for signals from now on. With `json` the end by a signal is told on standard output, too.
+pub fn listen(json: bool) -> Result<(), Failure> {
+    let ignored = ignored();
+    ctrlc::set_handler(move || {
+        let is_first = !STOP.swap(true, Ordering::Relaxed);
+        if is_first && IS_STOPPABLE.load(Ordering::Relaxed) {
+            thread::sleep(GRACE);
+            if !IS_STOPPABLE.load(Ordering::Relaxed) {
+                return;
+            }
         }
+        end(json);
+    })?;
+    ignore(&ignored);
+    Ok(())
+}
+
+/// Returns the flag that a signal raises, lowered. Whoever takes it looks at it, and calls [`over`] afterwards.
+pub fn stop_flag() -> &'static AtomicBool {
+    STOP.store(false, Ordering::Relaxed);
+    IS_STOPPABLE.store(true, Ordering::Relaxed);
+    &STOP
+}
+
+/// Ends the work that looked at the flag: what follows is ended by a signal at once.
+pub fn over() {
+    IS_STOPPABLE.store(false, Ordering::Relaxed);
+}
+
+/// Ends the program. Whoever holds standard output may be waiting for its reader: that must not hold this up.
+fn end(json: bool) {
+    discard_unfinished();
+    let (told, done) = mpsc::channel();
+    thread::spawn(move || {
+        last_words("interrupted; an unfinished bake or scan keeps what it has done: --resume continues it", json);
+        let _ = told.send(());
+    });
+    let _ = done.recv_timeout(LAST_WORDS);
+    std::process::exit(INTERRUPTED);
+}
+
+/// Signals that the program was started to ignore, of those that are listened for.
+#[cfg(unix)]
+fn ignored() -> Vec<libc::c_int> {
+    let is_ignored = |signal: &libc::c_int| {
+        // SAFETY: zero is valid for each of its numbers.
+        let mut action: libc::sigaction = unsafe { std::mem::zeroed() };
+        // SAFETY: `action` is valid for writing, and no action is given to be set.
+        let known = unsafe { libc::sigaction(*signal, std::ptr::null(), &raw mut action) } == 0;
+        known && action.sa_sigaction == libc::SIG_IGN
     };
-    match ctrlc::set_handler(handler) {
-        // The handler of earlier work stays, which is the same.
-        Ok(()) | Err(ctrlc::Error::MultipleHandlers) => Ok(&STOP),
-        Err(error) => Err(error.into()),
+    [libc::SIGINT, libc::SIGTERM, libc::SIGHUP].into_iter().filter(is_ignored).collect()
+}
+
+/// Ignores `signals`.
+#[cfg(unix)]
+fn ignore(signals: &[libc::c_int]) {
+    for &signal in signals {
+        // SAFETY: no handler of this program is involved.
+        unsafe { libc::signal(signal, libc::SIG_IGN) };
     }
 }
+
+/// Elsewhere than on Unix no signal is ignored.
+#[cfg(not(unix))]
+fn ignored() {}
+
+#[cfg(not(unix))]
+fn ignore(_: &()) {}

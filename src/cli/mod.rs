@@ -8,7 +8,8 @@
 //! here only once it works. It never prints its result itself: it returns a [`Report`], and `--json` (an option of every
 //! subcommand) decides here which half of it goes to standard output. Notes and progress go to standard error.
 //!
-//! Exit codes: 0 the work is whole, 1 it failed or is not whole, 2 the command line itself is wrong (given by clap).
+//! Exit codes: 0 the work is whole, 1 it failed or is not whole, 2 the command line itself is wrong (given by clap), 130 a signal ended
+//! it.
 
 /// Which adapter draws and computes, for the help of commands that use one.
 macro_rules! adapter_help {
@@ -32,6 +33,7 @@ mod inspect;
 mod interrupt;
 mod man;
 mod max_error;
+mod memory;
 mod new;
 mod output;
 mod paper;
@@ -39,6 +41,8 @@ mod play;
 mod scan;
 mod stability;
 mod view;
+
+pub use memory::Remembering;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use std::{
@@ -144,20 +148,18 @@ pub struct Report {
 
 /// Runs what the command line asks for.
 pub fn run() -> ExitCode {
-    let line = CommandLine::parse();
-    let report = start_threads().and_then(|()| line.command.as_ref().map_or_else(demo::run, Command::run));
+    let line = match CommandLine::try_parse() {
+        Ok(line) => line,
+        Err(error) => return usage(&error),
+    };
+    memory::tell_shortage(line.json);
+    let begun = interrupt::listen(line.json).and_then(|()| start_threads());
+    let report = begun.and_then(|()| line.command.as_ref().map_or_else(demo::run, Command::run));
     match report.and_then(|report| print(&report, line.json).map(|()| report.whole)) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(failure) => {
-            let message = explain(failure.as_ref());
-            tell(format_args!("haptize: {message}"));
-            if line.json {
-                let report =
-                    Report { text: String::new(), json: serde_json::json!({ "error": message }), whole: false };
-                // Where standard output is what failed there is nobody left to tell.
-                let _ = print(&report, true);
-            }
+            last_words(&explain(failure.as_ref()), line.json);
             ExitCode::FAILURE
         }
     }
@@ -170,9 +172,52 @@ fn fraction(text: &str) -> Result<f64, String> {
     Ok(number * scale)
 }
 
+/// Answers a command line that is wrong, or asks for help.
+fn usage(error: &clap::Error) -> ExitCode {
+    let text = error.render().to_string();
+    if printable(&text) == text {
+        // In colour on a terminal. Where nobody listens there is nobody to tell.
+        let _ = error.print();
+    } else {
+        tell(format_args!("{}", text.trim_end()));
+    }
+    // It could not be parsed, so that the option is looked for in the words themselves.
+    if error.use_stderr() && std::env::args_os().any(|word| word == "--json") {
+        print_error(&text);
+    }
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(1))
+}
+
+/// Tells why the program ends: on standard error, and with `json` in one object on standard output.
+fn last_words(message: &str, json: bool) {
+    tell(format_args!("haptize: {message}"));
+    if json {
+        print_error(message);
+    }
+}
+
+/// Prints the object of a failure. Where standard output is what failed there is nobody left to tell.
+fn print_error(message: &str) {
+    let json = serde_json::json!({ "error": message.trim_end() });
+    let _ = print(&Report { text: String::new(), json, whole: false }, true);
+}
+
 /// Prints a line on standard error. It may be closed or full: then there is nobody to tell, and the work goes on.
 fn tell(line: std::fmt::Arguments<'_>) {
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = writeln!(io::stderr(), "{}", printable(&line.to_string()));
+}
+
+/// Returns `text` with its control characters spelt as `\u001b`: names and texts of files must not command a terminal.
+fn printable(text: &str) -> String {
+    let mut printable = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c.is_control() && c != '\n' {
+            printable += &format!("\\u{:04x}", u32::from(c));
+        } else {
+            printable.push(c);
+        }
+    }
+    printable
 }
 
 /// Starts the threads that all work shares: where the system gives none, this is an error here and a panic later.
@@ -185,7 +230,8 @@ fn start_threads() -> Result<(), Failure> {
 /// Prints one half of `report`. A reader that has seen enough (`haptize info ... | head`) is no failure.
 fn print(report: &Report, json: bool) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    let printed = if json { writeln!(out, "{:#}", report.json) } else { write!(out, "{}", report.text) };
+    let text = if json { format!("{:#}\n", report.json) } else { report.text.clone() };
+    let printed = write!(out, "{}", printable(&text));
     match printed.and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(format!("cannot write to standard output: {error}; free some space or redirect it elsewhere").into())
@@ -235,6 +281,15 @@ mod tests {
                 assert!(parsed.is_ok(), "{example}: {}", parsed.err().map_or(String::new(), |error| error.to_string()));
             }
         }
+    }
+
+    #[test]
+    fn nothing_that_is_printed_commands_a_terminal() {
+        let text = "a\u{1b}[31mred\u{7}\r\u{9b}2J\tz\nä";
+        assert_eq!(printable(text), "a\\u001b[31mred\\u0007\\u000d\\u009b2J\\u0009z\nä");
+        // The same escapes are JSON's.
+        let json = serde_json::json!({ "error": text }).to_string();
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&printable(&json)).unwrap()["error"], text);
     }
 
     #[derive(Debug, thiserror::Error)]

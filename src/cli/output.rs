@@ -1,10 +1,15 @@
-//! What a command may write over: never one of its inputs, and no file of another kind.
+//! What a command writes: never over one of its inputs, over a file of another kind, or over what is no regular file. What is
+//! replaced is told.
 
 use super::Failure;
+use haptize::dataset::resolved;
+use serde_json::{Value, json};
 use std::{
+    fmt::Write,
     fs::{self, File},
     io::{self, Read},
-    path::Path,
+    path::{Path, PathBuf},
+    time::SystemTime,
 };
 
 /// Kind of a file that a command writes.
@@ -18,18 +23,38 @@ pub enum Kind {
     Archive,
     /// A manual page.
     Page,
+    /// A picture, in PNG.
+    Picture,
+    /// A drawing, in SVG.
+    Drawing,
+    /// Text for people or programs: Markdown, HTML, JSON.
+    Text,
 }
 
 impl Kind {
-    /// Whether the file that begins with `start` is of this kind.
+    /// Kind of the figure or table called `name`, by its extension.
+    fn of(name: &Path) -> Self {
+        match name.extension().and_then(|extension| extension.to_str()) {
+            Some("haptize") => Self::Dataset,
+            Some("png") => Self::Picture,
+            Some("svg") => Self::Drawing,
+            Some("csv") => Self::Table,
+            _ => Self::Text,
+        }
+    }
+
+    /// Whether the file at `path` that begins with `start` is of this kind.
     fn is(self, path: &Path, start: &[u8]) -> bool {
         match self {
             // Safetensors: the length of the header, which is a JSON object.
             Self::Dataset => start.len() > 8 && start[8] == b'{' && start[..8].ends_with(&[0, 0, 0]),
             Self::Archive => start.starts_with(b"PK"),
             Self::Page => start.starts_with(b"."),
+            Self::Picture => start.starts_with(b"\x89PNG"),
+            Self::Drawing => start.windows(4).any(|word| word == b"<svg"),
+            Self::Text => !start.contains(&0),
             Self::Table => {
-                let other = ["toml", "obj", "ply", "stl", "msh"];
+                let other = ["toml", "obj", "ply", "stl", "msh", "md", "json"];
                 let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
                 !start.contains(&0) && !other.iter().any(|other| extension == *other)
             }
@@ -42,29 +67,130 @@ impl Kind {
             Self::Table => "a table",
             Self::Archive => "an archive",
             Self::Page => "a manual page",
+            Self::Picture => "a PNG picture",
+            Self::Drawing => "an SVG drawing",
+            Self::Text => "text",
         }
     }
 }
 
-/// Whether a file of `kind` may be written to `output` by a command that reads `inputs`.
+/// A file that is going to be replaced, where there is one.
+pub struct Earlier(Option<(u64, SystemTime)>);
+
+impl Earlier {
+    /// Tells what was replaced: its size and its date.
+    pub fn tell(&self, text: &mut String, json: &mut Value) {
+        let Some((bytes, time)) = self.0 else { return };
+        let date = humantime::format_rfc3339_seconds(time).to_string();
+        let _ = writeln!(text, "  replaced     an earlier file of {bytes} bytes from {date}");
+        json["replaced"] = json!({ "bytes": bytes, "date": date });
+    }
+}
+
+/// Checks that a file of `kind` may be written to `output` by a command that reads `inputs`.
 ///
 /// # Errors
-/// When `output` is one of the inputs, by whatever name, is there and no regular file, or holds something of another kind.
-pub fn check<'a>(output: &Path, kind: Kind, inputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
-    let refused = |why: &str| Err(format!("{}: {why}; nothing is written: name another file", output.display()).into());
-    let Ok(there) = fs::metadata(output) else { return Ok(()) };
-    if !there.is_file() {
-        return refused("this is no regular file");
-    }
+/// When `output` is one of the inputs, by whatever name, is there and no regular file, holds something of another kind, or lies in a
+/// folder that cannot be written to.
+pub fn check<'a>(output: &Path, kind: Kind, inputs: impl IntoIterator<Item = &'a Path>) -> Result<Earlier, Failure> {
+    let refused = |why: &str| format!("{}: {why}; nothing is written: name another file", output.display());
+    let file = resolved(output).map_err(|error| refused(&error.to_string()))?;
+    probe(output, file.parent().unwrap_or(Path::new("")))?;
+    let Ok(there) = fs::metadata(&file) else { return Ok(Earlier(None)) };
     if inputs.into_iter().any(|input| is_same(output, input)) {
-        return refused("this is also an input, which would be lost");
+        return Err(refused("this is also an input, which would be lost").into());
     }
     let mut start = Vec::new();
-    let read = File::open(output).and_then(|file| file.take(512).read_to_end(&mut start));
+    let read = File::open(&file).and_then(|file| file.take(512).read_to_end(&mut start));
     if read.is_ok() && !start.is_empty() && !kind.is(output, &start) {
-        return refused(&format!("there is a file already that is not {}", kind.name()));
+        return Err(refused(&format!("there is a file already that is not {}", kind.name())).into());
     }
-    Ok(())
+    Ok(Earlier(Some((there.len(), there.modified().unwrap_or(SystemTime::UNIX_EPOCH)))))
+}
+
+/// A folder that a command fills with files whose names it knows.
+pub struct Folder {
+    path: PathBuf,
+    /// Files that the command may write.
+    files: Vec<PathBuf>,
+    /// Those of them that are there.
+    earlier: Vec<PathBuf>,
+}
+
+impl Folder {
+    /// Checks that a command which reads `inputs` may write files called `names` into the folder at `path`. The folder need not be
+    /// there yet.
+    ///
+    /// # Errors
+    /// When the folder cannot be written to, or one of the files may not be replaced; see [`check`].
+    pub fn check<'a>(
+        path: &Path,
+        names: impl IntoIterator<Item = &'a str>,
+        inputs: impl IntoIterator<Item = &'a Path> + Clone,
+    ) -> Result<Self, Failure> {
+        probe(path, path.ancestors().find(|folder| folder.exists()).unwrap_or(Path::new("")))?;
+        let files: Vec<PathBuf> = names.into_iter().map(|name| path.join(name)).collect();
+        let earlier: Vec<PathBuf> = files.iter().filter(|file| fs::symlink_metadata(file).is_ok()).cloned().collect();
+        for file in &earlier {
+            check(file, Kind::of(file), inputs.clone())?;
+        }
+        Ok(Self { path: path.to_owned(), files, earlier })
+    }
+
+    /// Checks that `output`, which the same command writes, is none of the folder's files.
+    ///
+    /// # Errors
+    /// When it is one of them, which would be written over it.
+    pub fn keep_apart(&self, output: &Path) -> Result<(), Failure> {
+        let output_place = place(output);
+        if self.files.iter().any(|file| place(file) == output_place) {
+            let why = "a file of this name is written into the folder, too; name another file";
+            return Err(format!("{}: {why}", output.display()).into());
+        }
+        Ok(())
+    }
+
+    /// Removes what an earlier run has left and this one has not `written` anew, and tells what was replaced and removed.
+    ///
+    /// # Errors
+    /// When such a file cannot be removed.
+    pub fn close(self, written: &[PathBuf], text: &mut String, json: &mut Value) -> Result<(), Failure> {
+        let (replaced, stale): (Vec<_>, Vec<_>) = self.earlier.into_iter().partition(|file| written.contains(file));
+        for file in &stale {
+            fs::remove_file(file).map_err(|error| {
+                format!("cannot remove {}, which an earlier run has left: {error}; remove it", file.display())
+            })?;
+        }
+        let names = |files: &[PathBuf]| -> Vec<String> {
+            files.iter().map(|file| file.strip_prefix(&self.path).unwrap_or(file).display().to_string()).collect()
+        };
+        if !replaced.is_empty() {
+            let _ = writeln!(text, "  replaced     {} files of an earlier run", replaced.len());
+        }
+        if !stale.is_empty() {
+            let _ = writeln!(text, "  removed      {}, which an earlier run had left", names(&stale).join(", "));
+        }
+        json["replaced"] = names(&replaced).into();
+        json["removed"] = names(&stale).into();
+        Ok(())
+    }
+}
+
+/// Checks that `folder`, in which `output` is to be, can be written to: before an hour's work, not after it.
+fn probe(output: &Path, folder: &Path) -> Result<(), Failure> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    tempfile::tempfile_in(folder).map(drop).map_err(|error| {
+        let (output, folder) = (output.display(), folder.display());
+        format!("{output}: cannot be written: {folder}: {error}; make the folder, or choose another output (-o)").into()
+    })
+}
+
+/// Where a file is or is to be, by one name.
+fn place(file: &Path) -> PathBuf {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder =
+        fs::canonicalize(folder).or_else(|_| std::path::absolute(folder)).unwrap_or_else(|_| folder.to_owned());
+    file.file_name().map_or_else(|| folder.clone(), |name| folder.join(name))
 }
 
 /// Whether two paths lead to one file.

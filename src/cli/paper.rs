@@ -4,7 +4,8 @@ use super::{
     Failure, Report, bake,
     bar::Bar,
     gridize::{self, Source},
-    interrupt::stop_flag,
+    interrupt,
+    output::Folder,
     play,
     scan::{self, Course},
     tell,
@@ -14,7 +15,7 @@ use haptize::{
     haptize::{
         BackendChoice,
         gridize::{GridizeOptions, Interpolation},
-        scan::ScanProgress,
+        scan::{ScanLog, ScanProgress},
     },
     render::{setup::Setup, trace::Trace},
     report::{
@@ -32,9 +33,9 @@ use haptize::{
 };
 use std::{
     fmt::Write as _,
-    io::{ErrorKind, Write as _},
+    io::Write as _,
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::atomic::AtomicBool,
     time::Instant,
 };
 
@@ -50,6 +51,38 @@ const STEP: f64 = 0.03;
 
 /// Instants of Fig. 6.
 const INSTANTS: usize = 6;
+
+/// Files that it writes.
+const FILES: [&str; 28] = [
+    "paper.haptize",
+    "sponge.csv",
+    "sponge.haptize",
+    "sponge_fabric.csv",
+    "sponge_fabric.haptize",
+    "sponge_side.csv",
+    "sponge_side.haptize",
+    "fig2-procedure.svg",
+    "fig2-procedure.png",
+    "fig3-cspace.png",
+    "fig4-gridization.svg",
+    "fig4-gridization.png",
+    "fig5-press.svg",
+    "fig5-press.png",
+    "fig6-deformation.png",
+    "fig7-sponge.png",
+    "fig8-scrape.svg",
+    "fig8-scrape.png",
+    "fig9-side-press.svg",
+    "fig9-side-press.png",
+    "torque.svg",
+    "torque.png",
+    "energy.svg",
+    "energy.png",
+    "scrape.svg",
+    "scrape.png",
+    "table.md",
+    "table.json",
+];
 
 /// Where the figures go.
 #[derive(clap::Args)]
@@ -67,6 +100,13 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let started = Instant::now();
     let folder = &arguments.output;
+    let earlier = Folder::check(folder, FILES, [])?;
+    for log in FILES.iter().filter(|name| name.ends_with(".csv")).map(|name| folder.join(name)) {
+        if log.exists() && !ScanLog::is_simulated(&log) {
+            let why = "is no log of a simulated scan, and is not replaced: move it away, or give another folder by -o";
+            return Err(format!("{}: {why}", log.display()).into());
+        }
+    }
     std::fs::create_dir_all(folder)
         .map_err(|error| format!("cannot make the folder {}: {error}; give another by -o", folder.display()))?;
     let scene = Scene::parse(SPHERE, "datasets/paper.toml")?;
@@ -112,7 +152,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         files.push(file);
     }
     let seconds = started.elapsed().as_secs_f64();
-    describe(&comparison, folder, seconds, json, &files)
+    let mut report = describe(&comparison, folder, seconds, json, &files)?;
+    let data = FILES.iter().filter(|name| name.ends_with(".csv") || name.ends_with(".haptize"));
+    files.extend(data.map(|name| folder.join(name)));
+    earlier.close(&files, &mut report.text, &mut report.json)?;
+    Ok(report)
 }
 
 fn describe(
@@ -175,12 +219,12 @@ impl Measured {
 
 /// Scans and gridizes all specimens, side by side.
 fn scan_all(folder: &Path) -> Result<[Measured; 3], Failure> {
-    let stop = stop_flag()?;
+    let stop = interrupt::stop_flag();
     let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {eta} left");
     let measure = |specimen: Specimen| specimen.measure(folder, stop, &bar);
     let (bare, (fabric, side)) = rayon::join(|| measure(BARE), || rayon::join(|| measure(FABRIC), || measure(SIDE)));
     bar.finish();
-    stop.store(true, Ordering::Relaxed);
+    interrupt::over();
     Ok([bare?, fabric?, side?])
 }
 
@@ -189,11 +233,8 @@ impl Specimen {
     fn measure(self, folder: &Path, stop: &AtomicBool, bar: &Bar) -> Result<Measured, Failure> {
         let scene = ScanScene::parse(self.scene, Path::new("datasets").join(self.name).with_extension("toml"))?;
         let log = folder.join(self.name).with_extension("csv");
-        match std::fs::remove_file(&log) {
-            Err(error) if error.kind() != ErrorKind::NotFound => {
-                return Err(format!("cannot replace {}: {error}", log.display()).into());
-            }
-            _ => {}
+        if log.exists() {
+            std::fs::remove_file(&log).map_err(|error| format!("cannot replace {}: {error}", log.display()))?;
         }
         let mut announced = false;
         let mut progress = |progress: ScanProgress| {

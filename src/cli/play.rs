@@ -3,11 +3,11 @@
 use super::{
     Failure, Report,
     felt::Felt,
-    output::{self, Kind},
+    output::{self, Folder, Kind},
     tell,
 };
 use haptize::{
-    dataset::{Dataset, replace_file},
+    dataset::{Axis, Dataset, replace_file},
     device::{Device, Motion, Recorded},
     render::{
         realtime,
@@ -68,6 +68,9 @@ pub struct Arguments {
 /// Shapes of the object that are kept.
 const SNAPSHOTS: usize = 60;
 
+/// Files beside [`report::FIGURES`].
+pub const FILES: [&str; 4] = ["trace.csv", "frames.csv", "jitter.svg", "jitter.png"];
+
 /// Longest session [s]: all its ticks are kept in memory, half a gigabyte for each ten minutes at 1 kHz.
 const LONGEST: f64 = 3600.0;
 
@@ -77,11 +80,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         || [&arguments.dataset].into_iter().chain(&arguments.beside).chain(&arguments.replay).map(PathBuf::as_path);
     let moved = || std::iter::once(Path::new(&arguments.motion));
     let folder = folder(arguments);
-    if let Some(file) = &arguments.record {
-        output::check(file, Kind::Table, inputs().chain(moved()))?;
-    }
-    for trace in ["trace.csv", "frames.csv"] {
-        output::check(&folder.join(trace), Kind::Table, inputs().chain(moved()))?;
+    let asked = arguments.record.as_ref();
+    let recorded = asked.map(|file| output::check(file, Kind::Table, inputs().chain(moved()))).transpose()?;
+    let filled =
+        Folder::check(&folder, FILES.into_iter().chain(report::FIGURES), inputs().chain(moved()).collect::<Vec<_>>())?;
+    if let Some(file) = asked {
+        filled.keep_apart(file)?;
     }
     let dataset = Dataset::load(&arguments.dataset)?;
     let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
@@ -104,7 +108,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut felt = Felt::new(&arguments.dataset, &dataset, &setup, &played.trace);
     if let Some(path) = &arguments.beside {
         felt.beside(path, motion(&setup, &arguments.motion)?, played.trace.summary().seconds)?;
-        felt.draw(&folder, &played.trace)?;
+        let drawn = felt.draw(&folder, &played.trace)?;
+        files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
     }
     let summary = played.trace.summary();
     let fault = played.trace.ticks.iter().find_map(|tick| Some((tick.time, tick.fault?.to_string())));
@@ -118,6 +123,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     json["files"] = files.iter().map(|file| Value::from(file.display().to_string())).collect();
     let mut text = told.unwrap_or_default();
     describe(&mut text, &summary)?;
+    if summary.held > 0 {
+        let unit = |axis: &Axis| format!("{}/{}", axis.effort_unit(), axis.unit);
+        let gains = setup.scene.haptics.coupling_stiffness.iter().zip(&dataset.grid.axes);
+        let gains: Vec<String> = gains.map(|(stiffness, axis)| format!("{stiffness} {}", unit(axis))).collect();
+        writeln!(text, "  border       holds the device with the coupling's stiffness Kvc: {}", gains.join(", "))?;
+    }
     felt.describe(&mut text)?;
     if let Some((time, reason)) = &fault {
         writeln!(text, "  fault        at {time:.4} s the torque went to zero: {reason}; play again to clear it")?;
@@ -128,7 +139,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if let Some(file) = &arguments.record {
         writeln!(text, "recorded in {}", file.display())?;
     }
+    if let Some(recorded) = recorded {
+        recorded.tell(&mut text, &mut json["recording"]);
+    }
     writeln!(text, "traces and figures in {}", folder.display())?;
+    filled.close(&files, &mut text, &mut json)?;
     Ok(Report { text, json, whole: fault.is_none() })
 }
 
@@ -160,7 +175,6 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Opti
     Ok((Played { trace, timing: None }, Some(told)))
 }
 
-/// Writes what `played` recorded to `file`.
 /// Where traces and figures go.
 fn folder(arguments: &Arguments) -> PathBuf {
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -169,6 +183,7 @@ fn folder(arguments: &Arguments) -> PathBuf {
     arguments.output.clone().unwrap_or_else(named)
 }
 
+/// Writes what `played` recorded to `file`.
 fn record(played: &Played, file: &Path) -> Result<(), Failure> {
     let lost = played.timing.as_ref().map_or(0, |timing| timing.unrecorded);
     if lost > 0 {
@@ -237,7 +252,12 @@ pub fn motion(setup: &Setup, name: &str) -> Result<Motion, Failure> {
     let waypoints = match name {
         "press" => &setup.scene.motion.press,
         "scrape" => &setup.scene.motion.scrape,
-        file => return Ok(Motion::from_csv(Path::new(file), joints)?),
+        file if Path::new(file).exists() => return Ok(Motion::from_csv(Path::new(file), joints)?),
+        file => {
+            let known =
+                "the scene in the dataset may name the motions `press` and `scrape`; a CSV file gives any other";
+            return Err(format!("{file}: cannot be read: there is no such file; {known}").into());
+        }
     };
     if waypoints.is_empty() {
         let known = "give [motion] in the scene such waypoints and bake it again, or a CSV file by --motion";

@@ -3,7 +3,7 @@
 use super::{
     Failure, Report,
     bar::Bar,
-    interrupt::stop_flag,
+    interrupt,
     output::{self, Kind},
     tell,
 };
@@ -18,7 +18,7 @@ use haptize::{
 };
 use std::{
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::atomic::AtomicBool,
 };
 
 /// Arguments of `haptize scan`.
@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             .with_extension("csv"),
     };
     output::check(&output, Kind::Table, [arguments.scene.as_path()])?;
-    let stop = stop_flag()?;
+    let stop = interrupt::stop_flag();
     let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     let mut progress = |progress: ScanProgress| {
         bar.set(progress.done as u64, progress.points as u64, format!("{:.0} s on the rig", progress.time));
@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let course = Course { resume: arguments.resume, guided: arguments.guided };
     let result = measure(&scene, &output, course, stop, &mut progress);
     bar.finish();
-    stop.store(true, Ordering::Relaxed);
+    interrupt::over();
     let report = result?;
     let mut json = serde_json::to_value(&report)?;
     json["file"] = output.display().to_string().into();

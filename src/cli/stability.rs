@@ -1,9 +1,9 @@
 //! `haptize stability`: the hard cases of contact, gridization, loops and graphics, on this machine and its adapter.
 
-use super::{Failure, Report, bar::Bar};
+use super::{Failure, Report, bar::Bar, output::Folder};
 use haptize::{
     gpu::{AdapterChoice, Context},
-    report::stability::{Bound, Case, Effort, Outcome, Setting, cases, table, write_all},
+    report::stability::{Bound, Case, Effort, FILES, Outcome, Setting, cases, table, write_all},
 };
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
@@ -31,6 +31,7 @@ pub struct Arguments {
 /// Runs the cases one after another; whole only if every figure keeps its bound.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let cases = chosen(arguments)?;
+    let folder = arguments.output.as_ref().map(|folder| Folder::check(folder, FILES, [])).transpose()?;
     let (gpu, adapter) = adapter(arguments.no_gpu);
     let effort = if arguments.full { Effort::Full } else { Effort::Sample };
     let setting = Setting { effort, gpu };
@@ -63,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     spent.sort_by(|a, b| b.1.total_cmp(&a.1));
     let row = |(case, seconds): &(&Case, f64)| serde_json::json!({ "room": case.room, "case": case.name, "seconds": seconds });
-    let json = serde_json::json!({
+    let mut json = serde_json::json!({
         "outcomes": rows, "failed": failed, "adapter": adapter, "seconds": seconds,
         "spent": spent.iter().map(row).collect::<Vec<_>>(),
         "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
@@ -81,8 +82,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let longest: Vec<String> =
         spent.iter().take(3).map(|(case, seconds)| format!("{} {seconds:.1} s", case.name)).collect();
     text += &format!("longest: {}\n", longest.join(", "));
-    if let Some(folder) = &arguments.output {
-        text += &format!("{} files in {}\n", files.len(), folder.display());
+    if let (Some(path), Some(folder)) = (&arguments.output, folder) {
+        text += &format!("{} files in {}\n", files.len(), path.display());
+        folder.close(&files, &mut text, &mut json)?;
     }
     Ok(Report { text, json, whole: failed == 0 })
 }

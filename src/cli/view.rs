@@ -45,12 +45,17 @@ fn size(text: &str) -> Result<[f32; 2], String> {
 /// Opens the window, or draws it.
 #[cfg(feature = "viewer")]
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    use super::output::{self, Kind};
     use haptize::viewer::{self, Picture, Start};
     let start = arguments.file.clone().map_or(Start::Sphere, Start::File);
     let Some(file) = &arguments.screenshot else {
         viewer::open(start)?;
         return Ok(Report { text: String::new(), json: serde_json::json!({}), whole: true });
     };
+    if !file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+        return Err(format!("{}: the picture is a PNG file: give a name that ends in .png", file.display()).into());
+    }
+    let earlier = output::check(file, Kind::Picture, arguments.file.as_deref())?;
     if !(0.0..=60.0).contains(&arguments.time) {
         return Err(format!("cannot play {} s: give --time from 0 to 60", arguments.time).into());
     }
@@ -68,8 +73,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         ..Picture::default()
     };
     viewer::screenshot(&start, &picture, file)?;
-    let json = serde_json::json!({ "file": file.display().to_string() });
-    Ok(Report { text: format!("wrote {}\n", file.display()), json, whole: true })
+    let (mut text, mut json) =
+        (format!("wrote {}\n", file.display()), serde_json::json!({ "file": file.display().to_string() }));
+    earlier.tell(&mut text, &mut json);
+    Ok(Report { text, json, whole: true })
 }
 
 /// Says how to get the viewer.

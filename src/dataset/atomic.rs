@@ -1,12 +1,15 @@
 //! Files that appear whole or not at all.
 //!
 //! The contents go to a temporary file in the same folder, are flushed to the disk, and take the name in one rename:
-//! a crash, a full disk or a killed process leaves the old file or the new one, never a half.
+//! a crash, a full disk or a killed process leaves the old file or the new one, never a half. Who ends the process on purpose removes
+//! the temporary files by [`discard_unfinished`].
 
 use std::{
-    fs::File,
+    collections::BTreeSet,
+    fs::{self, File},
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 use tempfile::{NamedTempFile, TempPath};
 
@@ -27,8 +30,8 @@ impl<'a, P: AsRef<Path> + ?Sized> From<&'a P> for Target<'a> {
 }
 
 impl<'a> Target<'a> {
-    /// The file is called `growing` until it is whole. Nobody else may write there meanwhile; what a killed process has left there
-    /// is overwritten.
+    /// The file is called `growing` until it is whole. Nobody else may write there meanwhile; a regular file that a killed process has
+    /// left there is removed.
     #[must_use]
     pub fn growing(path: &'a Path, growing: &'a Path) -> Self {
         Self { path, growing: Some(growing) }
@@ -41,13 +44,52 @@ impl<'a> Target<'a> {
     }
 }
 
-/// The regular file that `path` leads to, through symbolic links, or where it is to appear.
-fn resolved(path: &Path) -> io::Result<PathBuf> {
+/// Temporary files that are being written.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// A temporary file that is listed in [`UNFINISHED`] as long as this lives.
+struct Unfinished(PathBuf);
+
+impl Unfinished {
+    fn begin(path: &Path) -> Self {
+        unfinished().insert(path.to_owned());
+        Self(path.to_owned())
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        unfinished().remove(&self.0);
+    }
+}
+
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    // A set of paths is whole after every call, so a panic elsewhere leaves nothing half-written.
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the files that are being written, and lets no other begin: for who ends the process at once.
+pub fn discard_unfinished() {
+    let unfinished = unfinished();
+    for path in unfinished.iter() {
+        // A file that has just taken its final name is no longer there.
+        let _ = fs::remove_file(path);
+    }
+    std::mem::forget(unfinished);
+}
+
+/// Returns the regular file that `path` leads to through symbolic links, or `path` itself where nothing is there yet.
+///
+/// # Errors
+/// When it leads to a folder, a device or a pipe, or is a link to nothing.
+pub fn resolved(path: &Path) -> io::Result<PathBuf> {
     match path.canonicalize() {
-        Ok(found) if found.is_file() => Ok(found),
-        Ok(_) => Err(io::Error::new(io::ErrorKind::InvalidInput, "this is a folder, a device or a pipe: name a file")),
+        Ok(found) if found.is_file() => Ok(if path.is_symlink() { found } else { path.to_owned() }),
+        Ok(_) => {
+            Err(io::Error::new(io::ErrorKind::InvalidInput, "this is no regular file but a folder, a device or a pipe"))
+        }
         Err(_) if path.is_symlink() => {
-            Err(io::Error::new(io::ErrorKind::NotFound, "this is a link to a file that is not there: remove it"))
+            Err(io::Error::new(io::ErrorKind::NotFound, "this is a link to a file that is not there"))
         }
         Err(_) => Ok(path.to_owned()),
     }
@@ -68,7 +110,10 @@ pub fn replace_file<'a>(
         _ => Path::new("."),
     };
     let temporary = match growing {
-        Some(growing) => NamedTempFile::from_parts(File::create(growing)?, TempPath::try_from_path(growing)?),
+        Some(growing) => {
+            clear(growing)?;
+            NamedTempFile::from_parts(File::create_new(growing)?, TempPath::try_from_path(growing)?)
+        }
         None => {
             let mut builder = tempfile::Builder::new();
             builder.prefix(".haptize-").suffix(".tmp");
@@ -78,16 +123,31 @@ pub fn replace_file<'a>(
             builder.tempfile_in(folder)?
         }
     };
+    let _unfinished = Unfinished::begin(temporary.path());
     let mut writer = BufWriter::with_capacity(BUFFER, temporary.as_file());
     write(&mut writer)?;
     writer.flush()?;
     drop(writer);
     temporary.as_file().sync_all()?;
     temporary.persist(path).map_err(|error| error.error)?;
-    // The new name must survive a power cut too.
+    // The new name is to survive a power cut, too. The file is in its place by now, so that a folder that may not be read or cannot be
+    // flushed is no failure: the system then flushes it in its own time.
     #[cfg(unix)]
-    File::open(folder)?.sync_all()?;
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
     Ok(())
+}
+
+/// Removes the regular file that a killed process has left at `path`. Through a link nothing is removed.
+fn clear(path: &Path) -> io::Result<()> {
+    match fs::symlink_metadata(path) {
+        Ok(there) if there.is_file() => fs::remove_file(path),
+        Ok(_) => {
+            let why = format!("{} is in the way and no regular file: move it away", path.display());
+            Err(io::Error::new(io::ErrorKind::InvalidInput, why))
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(error),
+    }
 }
 
 #[cfg(test)]
@@ -152,6 +212,19 @@ mod tests {
         .unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
         assert_eq!(names(folder.path()), ["a.bin"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_at_the_growing_name_is_no_way_to_another_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, growing, other] = ["a.bin", "a.bin.new", "other"].map(|name| folder.path().join(name));
+        std::fs::write(&other, b"precious").unwrap();
+        std::os::unix::fs::symlink("other", &growing).unwrap();
+        let refused = replace_file(Target::growing(&path, &growing), |w| w.write_all(b"new")).unwrap_err();
+        assert!(refused.to_string().contains("move it away"), "{refused}");
+        assert_eq!(std::fs::read(&other).unwrap(), b"precious");
+        assert!(growing.is_symlink() && !path.exists());
     }
 
     #[test]

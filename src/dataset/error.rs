@@ -1,5 +1,6 @@
 //! What can be wrong with a dataset file, each with the file's name and the remedy.
 
+use crate::memory::Shortage;
 use std::{io, path::PathBuf};
 
 /// A dataset could not be read, written or exported.
@@ -12,6 +13,14 @@ pub enum Error {
         path: PathBuf,
         /// The system's message.
         source: io::Error,
+    },
+    /// It is larger than the memory that is left.
+    #[error("{path}: does not fit in memory: {shortage}")]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// What is needed and what there is.
+        shortage: Shortage,
     },
     /// The folder is missing or read-only, or the disk is full. Whatever stood at `path` before is still there.
     #[error(

@@ -6,6 +6,7 @@
 //! Points are numbered with the last axis fastest.
 
 mod accuracy;
+mod agreement;
 mod atomic;
 mod check;
 mod column;
@@ -20,7 +21,7 @@ mod surface;
 
 pub use accuracy::{InterpolationError, MeasuredError};
 pub(crate) use atomic::BUFFER;
-pub use atomic::{Target, replace_file};
+pub use atomic::{Target, discard_unfinished, replace_file, resolved};
 pub use column::Column;
 pub use error::Error;
 pub use export::Format;

@@ -4,7 +4,10 @@ use super::{
     Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, check,
     file::{CHECKSUM, CONTACTS, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, TOUCHES, digits},
 };
-use crate::JointMatrix;
+use crate::{
+    JointMatrix,
+    memory::{self, Shortage},
+};
 use memmap2::{Mmap, MmapMut};
 use safetensors::tensor::{Metadata as Tensors, TensorInfo};
 use std::{
@@ -24,7 +27,10 @@ impl Dataset {
         let read = |source| Error::Read { path: path.into(), source };
         let file = regular_file(path).map_err(read)?;
         // SAFETY: the map is read-only and private to this process; what changing the file meanwhile does is said in `file.rs`.
-        let map = unsafe { Mmap::map(&file) }.map_err(read)?;
+        let map = unsafe { Mmap::map(&file) }.map_err(|source| match source.kind() {
+            io::ErrorKind::OutOfMemory => no_room(path, &file),
+            _ => read(source),
+        })?;
         decode(path, map)
     }
 
@@ -38,10 +44,17 @@ impl Dataset {
         let length = file.metadata().map_err(read)?.len();
         // A map of no bytes is refused by some systems; one zero byte is refused by the checks.
         let bytes = usize::try_from(length).map_err(|error| read(io::Error::other(error)))?;
-        let mut map = MmapMut::map_anon(bytes.max(1)).map_err(read)?;
+        memory::check(bytes).map_err(|shortage| Error::Memory { path: path.into(), shortage })?;
+        let mut map = MmapMut::map_anon(bytes.max(1)).map_err(|_| no_room(path, &file))?;
         file.read_exact(&mut map[..bytes]).map_err(read)?;
         decode(path, map.make_read_only().map_err(read)?)
     }
+}
+
+/// The error of a file that does not fit in memory.
+fn no_room(path: &Path, file: &File) -> Error {
+    let needed = file.metadata().map_or(0, |file| usize::try_from(file.len()).unwrap_or(usize::MAX));
+    Error::Memory { path: path.into(), shortage: Shortage { needed, left: memory::left().unwrap_or(0) } }
 }
 
 /// Opens `path` unless it is a folder, a pipe or a device, which cannot be mapped or might never end.

@@ -25,6 +25,14 @@ pub enum MotionError {
     /// No waypoint at all.
     #[error("the motion has no waypoints: give it at least one")]
     Empty,
+    /// A file without a sample.
+    #[error("{}: holds no sample; each line gives a time in seconds and {joints} coordinates, separated by commas", .file.display())]
+    NoSample {
+        /// The motion's file.
+        file: PathBuf,
+        /// Number of joints of the proxy.
+        joints: usize,
+    },
     /// A waypoint's time does not come after the one before.
     #[error("waypoint {waypoint} of the motion is at {time} s, not after the one before it")]
     Time {
@@ -131,7 +139,10 @@ impl Motion {
             }
             header_possible = false;
         }
-        if waypoints.is_empty() { Err(MotionError::Empty) } else { Ok(Self { waypoints, smooth: false }) }
+        if waypoints.is_empty() {
+            return Err(MotionError::NoSample { file: file.into(), joints });
+        }
+        Ok(Self { waypoints, smooth: false })
     }
 
     /// Number of joints.
@@ -264,8 +275,8 @@ mod tests {
             let message = read(text, 2).unwrap_err().to_string();
             assert!(message.contains(expected), "{message}");
         }
-        assert!(matches!(read(b"", 2), Err(MotionError::Empty)));
-        assert!(matches!(read(b"time,a,b\n", 2), Err(MotionError::Empty)));
+        assert!(matches!(read(b"", 2), Err(MotionError::NoSample { .. })));
+        assert!(matches!(read(b"time,a,b\n", 2), Err(MotionError::NoSample { .. })));
         assert!(matches!(Motion::from_csv(Path::new("/nowhere.csv"), 2), Err(MotionError::Read { .. })));
     }
 

@@ -1,7 +1,7 @@
 //! Why a dataset cannot be rendered, and what to do.
 
 use super::stencil::LatticeError;
-use crate::JointVector;
+use crate::{JointVector, memory::Shortage};
 
 /// A dataset cannot be rendered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -43,6 +43,11 @@ pub enum FieldError {
         /// The interpolation, as the scene names it.
         interpolation: &'static str,
     },
+    /// The interpolation needs more memory than is left.
+    #[error(
+        "the interpolation: {0}; or set interpolation = \"linear\" in [haptics], which takes less, or take a coarser grid"
+    )]
+    Memory(#[from] Shortage),
     /// The threshold is not in 0 <= Ith < 1.
     #[error("the contact index threshold is {0}; it must be at least 0 and below 1 (the paper uses 0.5)")]
     Threshold(f64),

@@ -33,6 +33,11 @@ pub(super) struct Hermite {
 }
 
 impl Hermite {
+    /// Returns the memory of the polynomials on `lattice` [bytes].
+    pub fn bytes(lattice: &Lattice) -> usize {
+        lattice.points().saturating_mul(size_of::<f64>() << lattice.joints())
+    }
+
     /// The function with `values` and gradients `slopes` at the points of `lattice`, and the second derivative along axes a and b
     /// that `mixed` gives for (point, a, b), where it gives one.
     ///

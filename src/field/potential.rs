@@ -30,7 +30,7 @@ use super::{
     points::{Checked, Generations},
     stencil::{Lattice, Stencil},
 };
-use crate::{JointVector, tolerances::LEAST_ENERGY};
+use crate::{JointVector, memory, tolerances::LEAST_ENERGY};
 use rayon::prelude::*;
 
 /// The potential of one dataset.
@@ -59,6 +59,7 @@ impl Potential {
             return Err(FieldError::Missing { column: "energy", interpolation: "potential" });
         }
         let (lattice, count) = (data.lattice, data.points.len());
+        memory::check(Hermite::bytes(lattice))?;
         let is_free = |p: &usize| data.points[*p].is_present() && !data.points[*p].in_contact;
         let free_energy = (0..count).find(is_free).map_or(Ok(0.0), |point| data.energy(point))?;
         let zeros = JointVector::zeros(lattice.joints());

@@ -9,12 +9,40 @@ use crate::{
     proxy::Chain,
     scene::Scene,
 };
-use std::{path::Path, sync::atomic::AtomicBool};
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
+
+/// The object of a scene cannot be built.
+#[derive(Debug, thiserror::Error)]
+#[error("{}:{line}: {source}", .path.display())]
+pub struct SceneObjectError {
+    /// The scene's file.
+    path: PathBuf,
+    /// Line of the object in it, from one.
+    line: usize,
+    source: ObjectError,
+}
+
+/// Builds the object of `scene`.
+///
+/// # Errors
+/// Where it is refused, with its line in the scene.
+pub fn build_object(scene: &Scene) -> Result<Object, SceneObjectError> {
+    Object::build(&scene.object).map_err(|source| {
+        let line = scene.text.lines().position(|line| line.trim_start_matches([' ', '[']).starts_with("object"));
+        SceneObjectError { path: scene.path.clone(), line: line.map_or(1, |line| line + 1), source }
+    })
+}
 
 /// A scene could not be haptized.
 #[derive(Debug, thiserror::Error)]
 pub enum BakeError {
-    /// The object cannot be built.
+    /// The scene's object is refused.
+    #[error(transparent)]
+    Scene(#[from] SceneObjectError),
+    /// The object is too large for contact.
     #[error(transparent)]
     Object(#[from] ObjectError),
     /// No backend.
@@ -67,7 +95,7 @@ impl Bake<'_> {
         sweep_with: impl FnOnce(&Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, SweepError>,
     ) -> Result<T, BakeError> {
         let Self { scene, backend, measured, aim, date, stop, progress } = self;
-        let object = Object::build(&scene.object)?;
+        let object = build_object(scene)?;
         let chain = Chain::new(&scene.proxy);
         let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
         model.with_tangent = scene.uses_tangent();

@@ -4,7 +4,7 @@ use super::{Backend, CpuBackend, WithFallback};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model},
-    gpu::{AdapterChoice, Context, GpuError, GpuSolver},
+    gpu::{ADAPTER_VARIABLE, AdapterChoice, Context, GpuError, GpuSolver, adapters},
 };
 use std::sync::Arc;
 
@@ -53,8 +53,12 @@ impl<'a> ChosenBackend<'a> {
         match choice {
             BackendChoice::Cpu => Self::cpu(model),
             BackendChoice::Gpu => Ok(Self::gpu(AdapterChoice::Any, model)?),
-            // Where the GPU cannot take the scene the CPU can.
-            BackendChoice::Auto => Self::gpu(AdapterChoice::Hardware, model).or_else(|_| Self::cpu(model)),
+            BackendChoice::Auto => match Self::gpu(AdapterChoice::Hardware, model) {
+                // Who names an adapter that is not there would not notice that the CPU took its place.
+                Err(error @ GpuError::NoAdapter { .. }) if is_named_in_vain() => Err(error.into()),
+                // Where the GPU cannot take the scene the CPU can.
+                opened => opened.or_else(|_| Self::cpu(model)),
+            },
         }
     }
 
@@ -100,6 +104,11 @@ impl<'a> ChosenBackend<'a> {
             Self::Gpu { chunk, .. } => *chunk,
         }
     }
+}
+
+/// Whether the environment names an adapter that this machine does not have.
+fn is_named_in_vain() -> bool {
+    std::env::var(ADAPTER_VARIABLE).is_ok_and(|name| !name.is_empty()) && adapters().is_empty()
 }
 
 impl Backend for ChosenBackend<'_> {

@@ -8,8 +8,21 @@ use super::{
     report::RunFacts,
     tally::Tally,
 };
-use crate::{JointVector, contact::Equilibrium, dataset::Provenance};
-use std::{ops::Range, path::Path, sync::atomic::Ordering, time::Instant};
+use crate::{
+    JointVector,
+    contact::{Equilibrium, SHARE},
+    dataset::Provenance,
+};
+use std::{
+    ops::Range,
+    path::Path,
+    sync::atomic::Ordering,
+    time::{Duration, Instant},
+};
+
+/// How long a chunk is to take: so much work a killed bake loses, and so long a stop waits at most. A configuration that takes longer
+/// makes it longer.
+const CHUNK_TIME: Duration = Duration::from_millis(250);
 
 /// Where a sweep's results go as they come.
 pub(super) trait Store {
@@ -72,6 +85,31 @@ pub(super) fn together(solved: usize) -> usize {
     solved.max(1 << 16)
 }
 
+/// Size of the next chunk in configurations: doubled and halved so that chunks take about [`CHUNK_TIME`].
+struct ChunkSize {
+    size: usize,
+    /// A share for each thread, so that none is idle.
+    least: usize,
+    most: usize,
+}
+
+impl ChunkSize {
+    /// Begins with the least, since nothing is known of the time yet. At most `most`.
+    fn new(most: usize) -> Self {
+        let least = most.min(SHARE * rayon::current_num_threads());
+        Self { size: least, least, most }
+    }
+
+    /// Takes in that a chunk with so many configurations took `time`.
+    fn adapt(&mut self, configurations: usize, time: Duration) {
+        if time > CHUNK_TIME {
+            self.size = (self.size / 2).max(self.least);
+        } else if configurations == self.size && 2 * time < CHUNK_TIME {
+            self.size = self.size.saturating_mul(2).min(self.most);
+        }
+    }
+}
+
 /// A stretch of points under way.
 struct Chunk {
     points: Range<usize>,
@@ -99,7 +137,7 @@ impl Sweep<'_> {
         };
         tell(&tally, 0.0);
         let (free_space, mut skipped) = (self.free_space(), 0);
-        let most = run.chunk.clamp(1, points);
+        let mut size = ChunkSize::new(run.chunk.clamp(1, points));
         let mut columns = Columns::default();
         while tally.points < points {
             let slab = free_space.as_ref().map_or(0..points, |free_space| free_space.slab(tally.points));
@@ -110,8 +148,10 @@ impl Sweep<'_> {
                 if run.stop.load(Ordering::Relaxed) {
                     return Err(SweepError::Stopped { done: first, points, part: store.path().map(Into::into) });
                 }
-                let chunk = self.cut(first..slab.end, most, free_gap);
+                let chunk = self.cut(first..slab.end, size.size, free_gap);
+                let begun = Instant::now();
                 let equilibria = solved(backend, &chunk.configurations, chunk.points.clone())?;
+                size.adapt(chunk.configurations.len(), begun.elapsed());
                 for notice in backend.notices() {
                     let notice = format!("from grid point {first} on: {notice}");
                     store.note(&notice)?;
@@ -180,4 +220,34 @@ pub(super) fn solved<B: Backend>(
         return Err(SweepError::Miscount { asked: configurations.len(), found: equilibria.len() });
     }
     Ok(equilibria)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// After 40 chunks in which a configuration takes `each`: the time of a chunk, and its configurations.
+    fn settled(each: Duration) -> (Duration, usize) {
+        let mut size = ChunkSize::new(1 << 14);
+        for _ in 0..40 {
+            size.adapt(size.size, each * size.size as u32);
+        }
+        (each * size.size as u32, size.size)
+    }
+
+    #[test]
+    fn chunks_take_about_a_quarter_of_a_second_however_long_a_configuration_takes() {
+        let least = SHARE * rayon::current_num_threads();
+        assert_eq!(settled(Duration::from_micros(1)).1, 1 << 14);
+        for each in [Duration::from_micros(30), Duration::from_micros(200), Duration::from_millis(1)] {
+            let (time, size) = settled(each);
+            assert!(time <= CHUNK_TIME && (2 * time >= CHUNK_TIME / 2 || size == least), "{each:?}: {time:?}, {size}");
+        }
+        assert_eq!(settled(Duration::from_secs(9)).1, least);
+        // A chunk that skips free points is no reason for a larger one.
+        let mut size = ChunkSize::new(1 << 14);
+        size.adapt(1, Duration::ZERO);
+        assert_eq!(size.size, least);
+        assert_eq!(ChunkSize::new(3).size, 3);
+    }
 }

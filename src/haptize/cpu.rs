@@ -54,3 +54,34 @@ impl Backend for CpuBackend<'_> {
         Ok(self.pool.install(|| self.solvers.map(configurations, |solver, q| solver.solve(q))))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{object::Object, proxy::Chain, scene::Scene};
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    #[test]
+    fn a_solver_that_a_panic_has_left_solves_like_a_new_one() {
+        let scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
+        let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+        let model = Model::new(&object, &chain, scene.contact);
+        let solvers = Solvers::new(&model, 1);
+        let configurations: Vec<JointVector> = super::super::sample(&scene).into_iter().step_by(37).take(64).collect();
+        let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let torques = || -> Vec<JointVector> {
+            pool.install(|| solvers.map(&configurations, |solver, q| solver.solve(q).torque))
+        };
+        let before = torques();
+        assert!(before.iter().any(|torque| torque.norm() > 0.0), "some are in contact");
+        let broken = catch_unwind(AssertUnwindSafe(|| {
+            pool.install(|| {
+                solvers.map(&configurations, |solver, q| {
+                    assert!(solver.solve(q).torque.norm() == 0.0, "a panic in the middle of the work, on purpose");
+                })
+            })
+        }));
+        assert!(broken.is_err());
+        assert_eq!(torques(), before);
+    }
+}

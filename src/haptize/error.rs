@@ -1,6 +1,6 @@
 //! Why a sweep ended early, what was kept of it, and what to do.
 
-use crate::dataset;
+use crate::{dataset, memory::Shortage};
 use std::{
     collections::TryReserveError,
     io,
@@ -23,6 +23,17 @@ pub enum SweepError {
         bytes: usize,
         /// What the allocator said.
         source: TryReserveError,
+    },
+    /// The columns need more memory than is left.
+    #[error(
+        "the grid's {points} points do not fit in memory: {shortage}; or haptize into a file (`haptize bake`), which takes little \
+             memory whatever the grid"
+    )]
+    Shortage {
+        /// Grid points.
+        points: usize,
+        /// What is needed and what there is.
+        shortage: Shortage,
     },
     /// The backend failed; what was solved before is in the part, where there is one.
     #[error("the backend failed at grid points {first} to {last}: {source}")]

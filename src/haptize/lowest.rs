@@ -104,6 +104,9 @@ pub(super) fn correct(
                 .collect();
             lowered.searches += searches.iter().map(|(_, starts)| starts.len()).sum::<usize>();
             let results = solvers.map(&searches, |solver, (point, starts)| {
+                if stop.load(Ordering::Relaxed) {
+                    return None;
+                }
                 let before = around.table.result(*point);
                 let starts = starts.iter().map(|&n| around.table.forces(n));
                 let lowest = lower(solver, &grid.configuration(*point), Some(&before), starts)?;
@@ -112,6 +115,9 @@ pub(super) fn correct(
                 Some((*point, row))
             });
             found.extend(results.into_iter().flatten());
+        }
+        if stop.load(Ordering::Relaxed) {
+            return None;
         }
         if found.is_empty() {
             break;

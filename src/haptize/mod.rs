@@ -26,7 +26,7 @@ mod sweep;
 mod table;
 mod tally;
 
-pub use bake::{Bake, BakeError, sample};
+pub use bake::{Bake, BakeError, SceneObjectError, build_object, sample};
 pub use choice::{BackendChoice, BackendError, ChosenBackend};
 pub use cpu::CpuBackend;
 pub use error::SweepError;

@@ -9,7 +9,7 @@
 //! not promised.
 
 use super::{
-    BackendChoice, Bake, BakeError, ChosenBackend, Footprint, Sweep,
+    BackendChoice, Bake, BakeError, ChosenBackend, Footprint, Sweep, build_object,
     reference::{Reference, ReferenceError, equilibria},
     sample, spacing,
 };
@@ -170,8 +170,8 @@ struct Ground {
 }
 
 impl Ground {
-    fn new(scene: &Scene) -> Result<Self, ObjectError> {
-        Ok(Self { object: Object::build(&scene.object)?, chain: Chain::new(&scene.proxy) })
+    fn new(scene: &Scene) -> Result<Self, BakeError> {
+        Ok(Self { object: build_object(scene)?, chain: Chain::new(&scene.proxy) })
     }
 
     fn model(&self, scene: &Scene) -> Result<Model<'_>, ObjectError> {

@@ -17,7 +17,8 @@ use super::{
 };
 use crate::{
     contact::{MeshRipple, Model},
-    dataset::{Axis, Contacts, Dataset, Grid, Heading, Provenance, Surface, Target},
+    dataset::{self, Axis, Contacts, Dataset, Grid, Heading, Provenance, Surface, Target},
+    memory,
     object::{Object, Skin},
     scene::{HapticsSpec, JointKind, Scene},
 };
@@ -244,6 +245,12 @@ impl<'a> Sweep<'a> {
         with_suffix(output, ".part")
     }
 
+    /// Name that the file `output` has while it is put together.
+    #[must_use]
+    pub fn growing_of(output: &Path) -> PathBuf {
+        with_suffix(output, ".growing")
+    }
+
     /// Sweeps in memory.
     ///
     /// # Errors
@@ -251,6 +258,7 @@ impl<'a> Sweep<'a> {
     pub fn run<B: Backend>(&self, backend: &mut B, mut run: Run<'_>) -> Result<(Dataset, SweepReport), SweepError> {
         let footprint = self.footprint(run.chunk, true);
         let (points, bytes) = (self.grid.points(), footprint.memory.least);
+        memory::check(bytes).map_err(|shortage| SweepError::Shortage { points, shortage })?;
         let mut columns = Columns::with_room(points, self.shape.width()).map_err(|source| SweepError::Memory {
             points,
             bytes,
@@ -283,6 +291,8 @@ impl<'a> Sweep<'a> {
         if output.is_dir() {
             return Err(SweepError::IsFolder { path: output.into() });
         }
+        // The part grows beside the file that a link leads to: only there can that be replaced.
+        let output = &dataset::resolved(output).map_err(|source| SweepError::Folder { path: output.into(), source })?;
         let mut binding = Binding {
             grid: self.grid.clone(),
             scene: self.scene.clone(),
@@ -302,7 +312,7 @@ impl<'a> Sweep<'a> {
         let footprint = self.footprint(run.chunk, false);
         let begun = Begun { tally, provenance };
         // Nobody else writes there: the part is locked.
-        let growing = with_suffix(output, ".growing");
+        let growing = Self::growing_of(output);
         let target = Target::growing(output, &growing);
         let stop = run.stop;
         let kept_in = part.path().to_path_buf();

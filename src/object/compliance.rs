@@ -8,6 +8,7 @@
 //! there is to store and to multiply with, instead of nine.
 
 use super::{Factor, Object, ObjectError};
+use crate::memory;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -32,7 +33,7 @@ const ABSENT: u32 = u32::MAX;
 /// columns stays in cache.
 const COLUMNS_PER_SOLVE: usize = 32;
 
-/// Most memory that the dense compliance may take [B]: it is what a laptop can hold beside everything else.
+/// Most memory that the dense compliance may take, where so much is left [B]: it is what a laptop can hold beside everything else.
 const MAX_BYTES: usize = 4 << 30;
 
 impl Compliance {
@@ -50,8 +51,9 @@ impl Compliance {
     pub fn on(object: &Object, nodes: Vec<u32>) -> Result<Self, ObjectError> {
         let order = nodes.len().saturating_mul(object.factor.rows_per_node());
         let bytes = order.saturating_mul(order).saturating_mul(size_of::<f64>());
-        if bytes > MAX_BYTES {
-            return Err(ObjectError::TooLarge { nodes: nodes.len(), bytes, limit: MAX_BYTES });
+        let limit = memory::left().map_or(MAX_BYTES, |left| left.min(MAX_BYTES));
+        if bytes > limit {
+            return Err(ObjectError::TooLarge { nodes: nodes.len(), bytes, limit });
         }
         Ok(Self::of(&object.factor, object.rest.len(), object.surface_nodes, nodes))
     }

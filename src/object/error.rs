@@ -41,8 +41,8 @@ pub enum ObjectError {
     },
     /// The dense compliance would not fit in memory.
     #[error(
-        "the proxy reaches {nodes} surface nodes, which need {} GiB of compliance, more than {} GiB: use a coarser surface or \
-         a smaller grid", .bytes >> 30, .limit >> 30
+        "the proxy reaches {nodes} surface nodes, which need {} MB of compliance, more than the {} MB of memory that it may take: use \
+         a coarser surface or a smaller grid, or close other programs", .bytes.div_ceil(1_000_000), .limit / 1_000_000
     )]
     TooLarge {
         /// Surface nodes that the proxy reaches.

@@ -10,7 +10,7 @@ use super::{
     haptic::{Haptics, Inputs, State},
     trace::{Frame, JointLabel, Tick, Trace},
 };
-use crate::{JointVector, device::Device};
+use crate::{JointVector, device::Device, memory};
 
 /// How long, and what to keep of the object's shape.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,6 +77,8 @@ impl Plan {
 
     /// Room for all ticks.
     pub(super) fn new_ticks(&self) -> Result<Vec<Tick>, SessionError> {
+        memory::check(self.ticks.saturating_mul(size_of::<Tick>()))
+            .map_err(|shortage| SessionError::Resources(format!("{} ticks: {shortage}", self.ticks)))?;
         let mut ticks = Vec::new();
         ticks.try_reserve_exact(self.ticks).map_err(|error| SessionError::Resources(error.to_string()))?;
         Ok(ticks)

@@ -59,6 +59,9 @@ pub enum SetupError {
         /// Joints of the chain.
         chain: usize,
     },
+    /// Scene and dataset contradict each other.
+    #[error("the dataset contradicts itself: {0}: bake it again")]
+    Contradiction(String),
     /// Scene and dataset do not make a loop.
     #[error(transparent)]
     Loop(#[from] JointsError),
@@ -103,6 +106,7 @@ impl Setup {
         if grid != joints {
             return Err(SetupError::Joints { grid, chain: joints });
         }
+        dataset.check_scene().map_err(SetupError::Contradiction)?;
         let made_motions = own_motion::add(&mut scene, dataset);
         let Loop { haptics, bounds, gains, advice } = haptic_loop(dataset, &chain, &scene, &scene.haptics)?;
         // From here on the gains are as any others.

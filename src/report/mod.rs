@@ -24,9 +24,16 @@ pub mod space;
 pub mod stability;
 mod ticks;
 
-use crate::{dataset::Dataset, proxy::Chain, render::trace::Trace};
+use crate::{
+    dataset::{Dataset, replace_file},
+    proxy::Chain,
+    render::trace::Trace,
+};
 use canvas::Canvas;
-use std::path::{Path, PathBuf};
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
 
 /// Pixels a point in PNG files: sharp on dense screens and in print.
 pub const PIXELS: f64 = 2.0;
@@ -61,6 +68,20 @@ pub enum ReportError {
         reason: String,
     },
 }
+
+/// Files that [`write_figures`] may write.
+pub const FIGURES: [&str; 10] = [
+    "cspace.png",
+    "torque.svg",
+    "torque.png",
+    "press.svg",
+    "press.png",
+    "energy.svg",
+    "energy.png",
+    "force.svg",
+    "force.png",
+    "object.png",
+];
 
 /// Instants shown of the deforming object.
 const INSTANTS: usize = 6;
@@ -114,7 +135,7 @@ pub fn write_png(folder: &Path, name: &str, canvas: &Canvas) -> Result<PathBuf, 
 
 fn write(path: PathBuf, bytes: &[u8]) -> Result<PathBuf, ReportError> {
     let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
-    match made.and_then(|()| std::fs::write(&path, bytes)) {
+    match made.and_then(|()| replace_file(&path, |file| file.write_all(bytes))) {
         Ok(()) => Ok(path),
         Err(source) => Err(ReportError::Write { path, source }),
     }

@@ -42,7 +42,7 @@ impl Checker<'_> {
             return Ok(value);
         }
         let reason = if value.is_finite() && value.abs() > LARGEST {
-            format!("{key} is {value}: no quantity in SI units is larger than {LARGEST:.0e} here; check its unit")
+            format!("{key} is {value:e}: no quantity in SI units is larger than {LARGEST:.0e} here; check its unit")
         } else {
             format!("{key} is {value}: it must be {range}")
         };

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The file cannot be read at all.
-    #[error("{}: cannot read the scene: {reason}", .path.display())]
+    #[error("{}: cannot read the scene: {reason}; check the path and its permissions", .path.display())]
     Unreadable {
         /// The scene file.
         path: PathBuf,

@@ -21,6 +21,17 @@ struct Entry {
     folder: bool,
 }
 
+/// See [`Files::fresh`].
+pub fn fresh(folder: &Path, name: &str, extension: &str) -> PathBuf {
+    let is_plain = |c: char| c.is_alphanumeric() || c == '_' || c == '.';
+    let name: String = name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect();
+    let name = if name.trim_matches(['.', '-']).is_empty() { "haptize" } else { &name };
+    let numbered = (2..).map(|number| format!("{name}-{number}"));
+    let mut files =
+        std::iter::once(name.to_owned()).chain(numbered).map(|name| folder.join(format!("{name}.{extension}")));
+    files.find(|file| file.symlink_metadata().is_err()).unwrap_or_default()
+}
+
 /// Files opened before that are kept.
 const RECENT: usize = 6;
 
@@ -35,6 +46,13 @@ impl Files {
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// Returns a file of the folder that is not there yet: `name` and the extension, with a number between them where needed.
+    /// What is no letter, digit, dot or underscore in `name` becomes a hyphen.
+    #[must_use]
+    pub fn fresh(&self, name: &str, extension: &str) -> PathBuf {
+        fresh(&self.folder, name, extension)
     }
 
     /// Remembers that `file` was opened.
@@ -144,6 +162,22 @@ fn list(folder: &Path) -> Result<Vec<Entry>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_saved_replaces_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = Files::new(folder.path().to_owned());
+        for expected in ["a-b-c.haptize", "a-b-c-2.haptize", "a-b-c-3.haptize"] {
+            let file = files.fresh("a/b c", "haptize");
+            assert_eq!(file, folder.path().join(expected));
+            std::fs::write(file, "").unwrap();
+        }
+        for name in ["", "..", "../../x", "\u{1b}[2J", "-"] {
+            let file = files.fresh(name, "csv");
+            assert_eq!(file.parent(), Some(folder.path()), "{name:?}");
+            std::fs::write(file, "").unwrap();
+        }
+    }
 
     #[test]
     fn a_folder_lists_folders_then_scenes_and_datasets_only() {

@@ -10,8 +10,7 @@ use crate::{
     contact::Model,
     dataset::{Dataset, Surface},
     gpu::{AdapterChoice, AdapterSummary, Context, GpuError, GpuSolver},
-    haptize::{BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, sample},
-    object::Object,
+    haptize::{BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, build_object, sample},
     proxy::Chain,
     scene::Scene,
 };
@@ -234,7 +233,10 @@ fn bake(
     stop: &AtomicBool,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Loaded, Failure> {
-    let object = surface.map_or_else(|| Object::build(&scene.object), |surface| surface.object(&scene.object))?;
+    let object = match surface {
+        Some(surface) => surface.object(&scene.object)?,
+        None => build_object(&scene)?,
+    };
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
     model.with_tangent = scene.uses_tangent();
@@ -270,7 +272,7 @@ fn is_cancelled(error: &(dyn Error + 'static)) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Shape;
+    use crate::{object::Object, scene::Shape};
 
     #[test]
     fn an_adapter_that_does_not_answer_is_told_with_what_to_do() {

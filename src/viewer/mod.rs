@@ -71,7 +71,13 @@ use crate::gpu::{ADAPTER_VARIABLE, FrameError, GpuError};
 pub enum ViewError {
     /// The device that draws.
     #[error(transparent)]
-    Gpu(#[from] GpuError),
+    Gpu(GpuError),
+    /// There is nothing to draw on.
+    #[error(
+        "the window needs a Vulkan, Metal or DX12 adapter to draw on, a software one will do; found: {0}. Install your GPU's \
+         Vulkan driver or Mesa's software Vulkan (package mesa-vulkan-drivers); haptize play and haptize info need neither"
+    )]
+    NoAdapter(String),
     /// It was lost, and no other window can be opened instead.
     #[error(
         "the GPU that draws the window was lost, and the window with it: {0}. Start haptize view again; if this comes back, \
@@ -108,6 +114,15 @@ pub enum ViewError {
         /// Why.
         reason: String,
     },
+}
+
+impl From<GpuError> for ViewError {
+    fn from(error: GpuError) -> Self {
+        match error {
+            GpuError::NoAdapter { found, .. } => Self::NoAdapter(found),
+            error => Self::Gpu(error),
+        }
+    }
 }
 
 /// A number with three digits, as labels show it.

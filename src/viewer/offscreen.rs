@@ -1,12 +1,17 @@
 //! The window's picture without a window: the same panels, laid out and painted by egui into a texture that is read back.
 
 use super::{Pace, Start, ViewError, Viewer, dress, guide::LEAD_IN, pixels, theme};
-use crate::gpu::{AdapterChoice, Context, GpuError};
+use crate::{
+    dataset::replace_file,
+    gpu::{AdapterChoice, Context, GpuError},
+};
 use eframe::{
     egui::{self, Pos2, Rect, Theme, vec2},
     egui_wgpu::{RenderState, Renderer, RendererOptions, ScreenDescriptor},
 };
+use image::ImageEncoder;
 use std::{
+    io,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -94,7 +99,10 @@ pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), V
         output.append(egui.run_ui(input, |ui| viewer.ui(ui)));
     }
     let (size, bytes) = paint(&context, &render, &egui, output, picture)?;
-    let written = image::save_buffer(path, &bytes, size[0], size[1], image::ColorType::Rgba8);
+    let written = replace_file(path, |file| {
+        let encoder = image::codecs::png::PngEncoder::new(file);
+        encoder.write_image(&bytes, size[0], size[1], image::ExtendedColorType::Rgba8).map_err(io::Error::other)
+    });
     written.map_err(|error| ViewError::Write { path: path.to_owned(), reason: error.to_string() })
 }
 

@@ -245,7 +245,7 @@ impl Viewer {
 
     fn save(&mut self) {
         let Some(session) = &self.session else { return };
-        let file = self.files.folder().join(format!("{}.haptize", session.loaded.name.replace([' ', '/'], "-")));
+        let file = self.files.fresh(&session.loaded.name, "haptize");
         match session.loaded.dataset.save(&file) {
             Ok(()) => self.files.remember(&file),
             Err(error) => self.error = Some(error.to_string()),

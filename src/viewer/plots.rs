@@ -2,6 +2,7 @@
 //! zoom, and can be written as CSV and as the figures that `haptize play` draws.
 
 use super::{
+    files::fresh,
     history::History,
     legend,
     loaded::Loaded,
@@ -15,7 +16,7 @@ use crate::{
         timing::{Durations, Percentiles},
         trace::Tick,
     },
-    report::{self, ReportError},
+    report::{self, ReportError, canvas::Canvas},
 };
 use eframe::egui::{self, Button, RichText, Ui, vec2};
 use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};
@@ -261,7 +262,7 @@ impl Plots {
     }
 
     fn write_csv(&self, loaded: &Loaded, history: &History, folder: &Path) -> Result<String, String> {
-        let file = folder.join("viewer-trace.csv");
+        let file = fresh(folder, "viewer-trace", "csv");
         let trace = self.frozen.as_ref().unwrap_or(history).trace(loaded);
         replace_file(&file, |out| trace.write_ticks(out)).map_err(|error| {
             format!("cannot write {}: {error}; free some space or start haptize elsewhere", file.display())
@@ -272,12 +273,16 @@ impl Plots {
     fn write_png(&self, loaded: &Loaded, history: &History, folder: &Path) -> Result<String, ReportError> {
         let history = self.frozen.as_ref().unwrap_or(history);
         let trace = history.trace(loaded);
+        let write = |name: &str, canvas: &Canvas| {
+            let file = fresh(folder, name, "png");
+            report::write_png(folder, &file.file_stem().unwrap_or_default().to_string_lossy(), canvas)
+        };
         let mut files: Vec<PathBuf> = vec![
-            report::write_png(folder, "viewer-press", &report::press::press(&trace))?,
-            report::write_png(folder, "viewer-energy", &report::press::energy(&trace))?,
+            write("viewer-press", &report::press::press(&trace))?,
+            write("viewer-energy", &report::press::energy(&trace))?,
         ];
         if history.jitter().percentiles().count > 0 {
-            files.push(report::write_png(folder, "viewer-jitter", &report::jitter::jitter(&history.timing()))?);
+            files.push(write("viewer-jitter", &report::jitter::jitter(&history.timing()))?);
         }
         let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         Ok(format!("wrote {}", names.join(", ")))

@@ -4,8 +4,14 @@ use super::block::{block, felt, setup};
 use haptize::{
     JointVector,
     device::{Device, Motion, SimulatedHand},
-    render::{flags::Fault, haptic::Inputs, setup::Setup},
-    scene::Waypoint,
+    field::TorqueField,
+    render::{
+        flags::Fault,
+        haptic::Inputs,
+        passivity,
+        setup::{Setup, labels},
+    },
+    scene::{HapticsSpec, Interpolation, Waypoint},
     tolerances::GREATEST_GIVEN_ENERGY,
 };
 
@@ -122,4 +128,30 @@ fn bounds_are_reported_with_the_value_that_would_be_safe() {
     let (_, left) = setup.retuned(&block(spec), &gains).unwrap();
     assert_eq!(left, None);
     assert_eq!(haptize::render::passivity::greatest_stiffness(&gains, 1).round(), 1000.0);
+}
+
+#[test]
+fn a_layer_and_an_object_that_keep_their_bounds_may_break_the_one_of_both_together() {
+    let data = block("");
+    let setup = Setup::new(&data).unwrap();
+    let mut gains =
+        HapticsSpec { interpolation: Interpolation::Linear, passivity_factor: 2.0, ..setup.scene.haptics.clone() };
+    let field = TorqueField::new(&data, gains.threshold, &gains.boundary_slope).unwrap();
+    let value = |gains: &HapticsSpec, what: &str| {
+        let bounds = passivity::bounds(gains, &field, &labels(&data.grid));
+        bounds.into_iter().find(|bound| bound.what.contains(what)).unwrap().value
+    };
+    // Both at 0.95 of what is safe alone.
+    let object = value(&gains, "stiffness of the dataset's torque");
+    gains.proxy_damping.iter_mut().for_each(|damping| *damping *= object / 0.95);
+    for joint in 0..2 {
+        gains.boundary_slope[joint] = 0.95 * passivity::greatest_slope(&gains, joint);
+    }
+    assert!((value(&gains, "stiffness of the dataset's torque") - 0.95).abs() < 1e-9);
+    let both = value(&gains, "layer and object together");
+    assert!((both - 0.95 * 2.0_f64.sqrt()).abs() < 1e-9, "{both}");
+    let exceeded = passivity::exceeded(&gains, &field, &labels(&data.grid));
+    let of_slopes: Vec<&str> =
+        exceeded.iter().map(|bound| bound.what.as_str()).filter(|what| !what.contains("coupling")).collect();
+    assert_eq!(of_slopes, ["stiffness of layer and object together over 2 bv / T"]);
 }

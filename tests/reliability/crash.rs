@@ -131,7 +131,13 @@ fn the_comparison_sees_one_bit() {
 /// Runs a bake on the CPU under a limit of the shell.
 #[cfg(unix)]
 fn limited(folder: &Path, limit: &str) -> Output {
-    let program = command(folder, &bake("cpu"));
+    run_limited(folder, &bake("cpu"), limit)
+}
+
+/// Runs the program under a limit of the shell.
+#[cfg(unix)]
+fn run_limited(folder: &Path, arguments: &[&str], limit: &str) -> Output {
+    let program = command(folder, arguments);
     let arguments = program.get_args().map(|argument| argument.to_str().unwrap());
     let line: Vec<&str> = std::iter::once(program.get_program().to_str().unwrap()).chain(arguments).collect();
     Command::new("sh")
@@ -175,9 +181,38 @@ fn a_bake_without_memory_ends_and_continues_where_there_is_some() {
             std::fs::remove_file(whole.folder.path().join("x.haptize")).unwrap();
         } else {
             failures += 1;
-            assert!(!said.is_empty() && !said.contains("panicked"), "{kilobytes} kB: {said}");
+            assert!(!said.contains("panicked"), "{kilobytes} kB: {said}");
+            // An error of the program, or of the system's loader, which found no room for the program at all.
+            let is_told = output.status.code() == Some(1) && said.contains("memory");
+            assert!(is_told || output.status.code() == Some(127), "{kilobytes} kB: {:?}, {said}", output.status);
         }
         whole.finish("cpu", &format!("{kilobytes} kB of memory"));
     }
     assert!(failures > 3, "the limits are felt");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn other_commands_without_memory_end_with_an_error_of_one_json_object() {
+    let whole = Undisturbed::new("cpu", 4);
+    let folder = whole.folder.path();
+    succeed(folder, &bake("cpu"));
+    // Larger than what is allowed below: known before anything is read.
+    let large = std::fs::File::create(folder.join("large.haptize")).unwrap();
+    large.set_len(1 << 32).unwrap();
+    for (arguments, expected) in [
+        (&["play", "large.haptize"][..], "4295 MB of memory are needed"),
+        (&["info", "large.haptize"], "4295 MB of memory are needed"),
+        (&["play", "x.haptize", "--seconds", "3600"], "ticks"),
+        (&["play", "x.haptize", "--seconds", "0.1"], "memory"),
+    ] {
+        let arguments = [arguments, &["--json"]].concat();
+        let output = run_limited(folder, &arguments, "ulimit -v 150000");
+        let (told, said) = (String::from_utf8_lossy(&output.stdout), message(&output));
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+        let json: serde_json::Value = serde_json::from_str(&told).unwrap();
+        let error = json["error"].as_str().unwrap();
+        assert!(said.contains(expected) && error.contains("memory"), "{arguments:?}: {said} {error}");
+        assert!(said.contains("ulimit -v"), "{arguments:?}: a remedy: {said}");
+    }
 }

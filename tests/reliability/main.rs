@@ -7,4 +7,7 @@
 mod alone;
 mod crash;
 mod fuzz;
+mod outputs;
 mod program;
+mod signals;
+mod telling;

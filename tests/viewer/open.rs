@@ -66,6 +66,21 @@ fn the_chooser_lists_a_folder_and_opens_what_is_clicked_or_typed() {
     assert!(window.shows("This did not work") && window.shows("two.toml"), "{:?}", window.harness.state().error());
 }
 
+/// Another program that cuts the file short must not reach a running loop.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_window_does_not_keep_a_file_mapped() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("cut-me.haptize");
+    std::fs::copy(&SPHERE.1, &file).unwrap();
+    let mut window = Window::open(&Start::File(file.clone()), [1200.0, 800.0], Theme::Light);
+    assert!(!std::fs::read_to_string("/proc/self/maps").unwrap().contains("cut-me.haptize"));
+    std::fs::OpenOptions::new().write(true).open(&file).unwrap().set_len(64).unwrap();
+    window.click("Press");
+    window.pass(2.2);
+    assert!(window.torque() > 0.1);
+}
+
 /// A file that somebody drops on the window.
 #[derive(Debug)]
 struct Dropped(PathBuf);

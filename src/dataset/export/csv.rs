@@ -11,6 +11,11 @@ use std::{
 /// Header of the status column.
 const STATUS: &str = "status (0 free; 1 contact; 2 unconverged; 3 overflow; 4 outside)";
 
+/// Returns the file with the contact forces beside the table at `path`.
+pub(super) fn contacts_file(path: &Path) -> PathBuf {
+    path.with_extension("contacts.csv")
+}
+
 pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut files = vec![path.to_path_buf()];
     let failed = |path: &Path| {
@@ -18,7 +23,7 @@ pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Err
         move |source| Error::Write { path, source }
     };
     if dataset.contacts.is_some() {
-        let contacts = path.with_extension("contacts.csv");
+        let contacts = contacts_file(path);
         replace_file(&contacts, |writer| write_contacts(dataset, writer)).map_err(failed(&contacts))?;
         files.push(contacts);
     }

@@ -24,6 +24,12 @@ impl Format {
             Self::Csv => "csv",
         }
     }
+
+    /// Returns the file that may be written beside the one at `path`.
+    #[must_use]
+    pub fn beside(self, path: &Path) -> Option<PathBuf> {
+        (self == Self::Csv).then(|| csv::contacts_file(path))
+    }
 }
 
 impl Dataset {

@@ -13,7 +13,7 @@ use crate::{
 use std::{
     fmt::Write as _,
     fs::{File, OpenOptions},
-    io::{BufRead, BufReader, BufWriter, Read, Seek, SeekFrom, Write},
+    io::{self, BufRead, BufReader, BufWriter, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 
@@ -110,7 +110,7 @@ pub enum LogError {
         /// The log.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// The log is there already.
     #[error("{}: exists already; continue it with --resume, or name another file", .0.display())]
@@ -149,11 +149,17 @@ impl LogHeader {
         text + ",ticks,status"
     }
 
+    /// The first two lines.
+    fn opening(&self) -> String {
+        format!("{SIGNATURE}\n# kind: {}\n", if self.simulated { "simulated" } else { "real" })
+    }
+
     fn text(&self) -> String {
-        let kind = if self.simulated { "simulated" } else { "real" };
         let plan = if self.guided { GUIDED } else { "the scene's" };
-        let mut text = format!(
-            "{SIGNATURE}\n# kind: {kind}\n# plan: {plan}\n# rig: {}\n\
+        let mut text = self.opening();
+        let _ = write!(
+            text,
+            "# plan: {plan}\n# rig: {}\n\
              # tau: contact torque on the proxy in steady contact, minus control torque, gravity subtracted\n\
              # std: standard deviation of a single tick's torque over the ticks that were averaged\n",
             self.rig
@@ -172,8 +178,8 @@ impl LogWriter {
     /// # Errors
     /// When there is a file already, or it cannot be made.
     pub fn create(path: &Path, header: &LogHeader) -> Result<Self, LogError> {
-        let failed = |source: std::io::Error| match source.kind() {
-            std::io::ErrorKind::AlreadyExists => LogError::Exists(path.to_owned()),
+        let failed = |source: io::Error| match source.kind() {
+            io::ErrorKind::AlreadyExists => LogError::Exists(path.to_owned()),
             _ => LogError::File { path: path.to_owned(), source },
         };
         let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
@@ -190,11 +196,13 @@ impl LogWriter {
         let failed = |source| LogError::File { path: path.to_owned(), source };
         let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(failed)?;
         let whole = whole_lines(&mut file).map_err(failed)?;
-        file.set_len(whole).map_err(failed)?;
-        let log = ScanLog::read(path)?;
+        // Nothing is cut off before it is known that the file is this scan's log.
+        file.rewind().map_err(failed)?;
+        let log = ScanLog::parse(path, (&file).take(whole))?;
         if log.header != *header {
             return Err(LogError::OtherScene(path.to_owned()));
         }
+        file.set_len(whole).map_err(failed)?;
         file.seek(SeekFrom::End(0)).map_err(failed)?;
         Ok((Self { path: path.to_owned(), file: BufWriter::new(file) }, log.rows))
     }
@@ -221,7 +229,7 @@ impl LogWriter {
 }
 
 /// Length of the file up to its last line end [bytes].
-fn whole_lines(file: &mut File) -> std::io::Result<u64> {
+fn whole_lines(file: &mut File) -> io::Result<u64> {
     let length = file.seek(SeekFrom::End(0))?;
     let tail = length.min(LONGEST_LINE);
     file.seek(SeekFrom::Start(length - tail))?;
@@ -239,13 +247,32 @@ impl ScanLog {
         File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == SIGNATURE.as_bytes()
     }
 
+    /// Whether the file at `path` begins like the log of a simulated scan, or is empty as one that was ended before its first line.
+    #[must_use]
+    pub fn is_simulated(path: &Path) -> bool {
+        let opening = LogHeader { simulated: true, ..LogHeader::default() }.opening();
+        let mut start = Vec::new();
+        let read = File::open(path).and_then(|file| file.take(opening.len() as u64).read_to_end(&mut start));
+        read.is_ok() && (start.is_empty() || start == opening.as_bytes())
+    }
+
     /// Reads the log at `path`.
     ///
     /// # Errors
     /// [`LogError`] names the file and the line.
     pub fn read(path: &Path) -> Result<Self, LogError> {
-        let failed = |source| LogError::File { path: path.to_owned(), source };
-        let mut reader = BufReader::new(File::open(path).map_err(failed)?);
+        let file = File::open(path).map_err(|source| LogError::File { path: path.to_owned(), source })?;
+        Self::parse(path, file)
+    }
+
+    /// Reads `file`, which is at `path`, from where it stands.
+    fn parse(path: &Path, file: impl Read) -> Result<Self, LogError> {
+        let failed = |source: io::Error| match source.kind() {
+            // Text that is none.
+            io::ErrorKind::InvalidData => LogError::Foreign(path.to_owned()),
+            _ => LogError::File { path: path.to_owned(), source },
+        };
+        let mut reader = BufReader::new(file);
         let mut log = Self::default();
         let (mut text, mut number, mut has_columns) = (String::new(), 0, false);
         loop {
@@ -399,6 +426,21 @@ mod tests {
         assert_eq!(ScanLog::read(&path).unwrap().rows, [row(0), row(1), row(7)]);
         let other = LogHeader { scene: "name = \"y\"\n".to_owned(), ..header() };
         assert!(matches!(LogWriter::resume(&path, &other), Err(LogError::OtherScene(_))));
+        assert!(ScanLog::is_simulated(&path));
+        std::fs::write(&path, LogHeader { simulated: false, ..header() }.text()).unwrap();
+        assert!(ScanLog::is_one(&path) && !ScanLog::is_simulated(&path));
+    }
+
+    #[test]
+    fn a_file_that_is_not_the_log_to_be_continued_is_left_as_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("notes.csv");
+        let of_another_scene = LogHeader { scene: "name = \"y\"\n".to_owned(), ..header() }.text() + "0,0,1,2,3";
+        for text in ["time,q\n1,2", "a line without an end", &of_another_scene] {
+            std::fs::write(&path, text).unwrap();
+            assert!(LogWriter::resume(&path, &header()).is_err());
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+        }
     }
 
     #[test]

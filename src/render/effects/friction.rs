@@ -182,3 +182,81 @@ fn add_tangential(tangential: &mut JointMatrix, patch: &Patch) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{JointVector, render::npmi::Npmi};
+
+    const INTERVAL: f64 = 1e-3;
+
+    /// So many bristles that hold one joint. Each one's cone is just wide enough to hold until the one before has slipped.
+    fn ladder(friction: &Friction, pending: &Pending<'_>, motion: &Motion, count: usize) -> Vec<Patch> {
+        let mut columns = [DVec3::ZERO; MAX_JOINTS];
+        columns[0] = DVec3::X;
+        let patch = |node| Patch {
+            node,
+            normal: DVec3::Z,
+            pressure: f64::MAX,
+            share: 1.0,
+            columns,
+            bristle: DVec3::ZERO,
+            slipped: false,
+            mode: Mode::Stick,
+        };
+        let mut patches = Vec::new();
+        for node in 0..count {
+            patches.push(patch(node));
+        }
+        let mut before = 0.0;
+        for next in 0..count {
+            let load = friction.loaded(&pending.load, &patches, INTERVAL);
+            let step = pending.npmi.advance(pending.stage, &mut motion.clone(), INTERVAL, &load);
+            let force = friction.holding(&patches[next], patches[next].slide(&step.velocity, INTERVAL), INTERVAL);
+            let size = force.length();
+            assert!(size > before);
+            patches[next].pressure = (before + 0.1 * (size - before)) / friction.kinetic;
+            patches[next].mode = Mode::Slip(force / size);
+            before = size;
+        }
+        patches.iter_mut().for_each(|patch| patch.mode = Mode::Stick);
+        patches
+    }
+
+    #[test]
+    fn nodes_that_would_slip_one_after_another_are_held_once_the_time_of_a_tick_is_used_up() {
+        let friction = Friction { kinetic: 0.5, stiction: 0.5, stiffness: 500.0, damping: 0.0 };
+        let mut inertia = [[0.0; MAX_JOINTS]; MAX_JOINTS];
+        inertia[0][0] = 1e-3;
+        let npmi = Npmi::new(&inertia, &[[-1.0, 1.0]]).unwrap();
+        let motion = Motion::at_rest(&JointVector::zeros(1));
+        let stage = npmi.stage(&motion, INTERVAL);
+        let zeros = JointVector::zeros(1);
+        let load = Load {
+            stiffness: zeros,
+            target: zeros,
+            damping: [[0.0; MAX_JOINTS]; MAX_JOINTS],
+            torque: JointVector::from_slice(&[1.0]),
+            stops: *npmi.limits(),
+        };
+        let pending = Pending { npmi: &npmi, stage: &stage, interval: INTERVAL, load };
+        // Fewer than may change within a tick all find their mode; of more, all are held.
+        for (count, held) in [(MOST_SOLVES - 2, 0), (MOST_SOLVES + 3, MOST_SOLVES + 3)] {
+            let patches = ladder(&friction, &pending, &motion, count);
+            let bristles = vec![Bristle::default(); count];
+            let mut state = EffectState { touches: Vec::new(), patches, bristles };
+            let mut extra = Extra {
+                channels: zeros,
+                friction_work: 0.0,
+                bristles: 0.0,
+                contact_dissipation: 0.0,
+                control_dissipation: 0.0,
+            };
+            let mut motion = motion;
+            friction.step(&pending, &mut state, &mut motion, &mut extra);
+            let found = state.patches.iter().filter(|patch| patch.mode == Mode::Held).count();
+            assert_eq!(found, held, "of {count}");
+            assert!(extra.friction_work < 0.0 && motion.kinetic_energy().is_finite());
+        }
+    }
+}

@@ -18,15 +18,17 @@ mod refinement;
 mod solver;
 
 pub use choice::{Limit, Offer, limits, offers};
-pub use page::{describe, write_all};
+pub use page::{FILES, describe, write_all};
 
 use crate::{
     contact::Model,
     device::MotionError,
     field::FieldError,
     gpu::FrameError,
-    haptize::{BackendChoice, BackendError, BakeError, ReferenceError, reference::Reference, sample, spacing},
-    object::{Object, ObjectError},
+    haptize::{
+        BackendChoice, BackendError, BakeError, ReferenceError, build_object, reference::Reference, sample, spacing,
+    },
+    object::ObjectError,
     proxy::Chain,
     render::{graphics::GraphicsError, session::SessionError, setup::SetupError},
     scene::{JointKind, Scene, SceneError},
@@ -210,7 +212,7 @@ pub enum AccuracyError {
 /// # Errors
 /// Any [`AccuracyError`].
 pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) -> Result<Accuracy, AccuracyError> {
-    let object = Object::build(&scene.object)?;
+    let object = build_object(scene).map_err(BakeError::from)?;
     let chain = Chain::new(&scene.proxy);
     let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
     progress("reference");

@@ -15,6 +15,25 @@ use std::{
     path::{Path, PathBuf},
 };
 
+/// Files that [`write_all`] may write.
+pub const FILES: [&str; 15] = [
+    "accuracy-spacing.svg",
+    "accuracy-spacing.png",
+    "accuracy-loops.svg",
+    "accuracy-loops.png",
+    "accuracy-solver.svg",
+    "accuracy-solver.png",
+    "accuracy-refinement.svg",
+    "accuracy-refinement.png",
+    "accuracy-graphics.svg",
+    "accuracy-graphics.png",
+    "accuracy.csv",
+    "accuracy.html",
+    "effects.svg",
+    "effects.png",
+    "effects.csv",
+];
+
 /// Writes `accuracy-*.{svg,png}`, `accuracy.csv` and `accuracy.html` into `folder`, and returns their paths; where effects
 /// were priced, also `effects.{svg,png,csv}`.
 ///

@@ -26,6 +26,9 @@ const TOP: f64 = 84.0;
 /// Ends of the axis: shares of the bound. Less is drawn at the left end, more at the right.
 const SHARES: [f64; 2] = [1e-6, 10.0];
 
+/// Files that [`write_all`] writes.
+pub const FILES: [&str; 3] = ["stability.svg", "stability.png", "stability.md"];
+
 /// Writes `stability.md` and `stability.{svg,png}` into `folder`: the outcomes, each with its room, as found on `adapter`.
 ///
 /// # Errors

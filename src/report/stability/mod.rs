@@ -11,7 +11,7 @@ mod graphics;
 mod gridization;
 pub mod worlds;
 
-pub use figure::write_all;
+pub use figure::{FILES, write_all};
 
 use crate::gpu::Context;
 use serde::Serialize;

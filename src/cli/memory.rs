@@ -1,0 +1,98 @@
+//! Memory that runs out: an error with the number of bytes and the remedy.
+//!
+//! Rust lets a program answer a failed allocation where it asks first. Any other one ends the process by `abort`, after a line with the
+//! number of bytes. Here the size is remembered, and the signal of `abort` is answered with what to do and exit code 1.
+
+use std::{
+    alloc::{GlobalAlloc, Layout, System},
+    sync::atomic::{AtomicUsize, Ordering},
+};
+
+/// The system's allocator, which remembers the size of an allocation that failed.
+pub struct Remembering;
+
+/// Size of the last allocation that failed [bytes]; 0 before any did.
+static FAILED: AtomicUsize = AtomicUsize::new(0);
+
+impl Remembering {
+    fn checked(pointer: *mut u8, bytes: usize) -> *mut u8 {
+        if pointer.is_null() {
+            FAILED.store(bytes, Ordering::Relaxed);
+        }
+        pointer
+    }
+}
+
+// SAFETY: hands every call on to the system's allocator.
+unsafe impl GlobalAlloc for Remembering {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        Self::checked(unsafe { System.alloc(layout) }, layout.size())
+    }
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        Self::checked(unsafe { System.alloc_zeroed(layout) }, layout.size())
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        Self::checked(unsafe { System.realloc(pointer, layout, size) }, size)
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[cfg(unix)]
+mod answer {
+    use super::{FAILED, Ordering};
+
+    /// What is said around the number of bytes.
+    const SAID: [&str; 2] = [
+        "out of memory: ",
+        " bytes were asked for in vain; close other programs, raise the limit (ulimit -v), or take a coarser grid or surface; what was \
+         written is kept, and --resume continues an unfinished bake or scan",
+    ];
+
+    /// Answers `abort` after a failed allocation. Any other one takes its course.
+    extern "C" fn answer<const JSON: bool>(signal: libc::c_int) {
+        let failed = FAILED.load(Ordering::Relaxed);
+        if failed == 0 {
+            // SAFETY: no memory is involved; `abort` raises the signal again, which now ends the process.
+            unsafe { libc::signal(signal, libc::SIG_DFL) };
+            return;
+        }
+        say(2, ["haptize: ", "\n"], failed);
+        if JSON {
+            say(1, ["{\n  \"error\": \"", "\"\n}\n"], failed);
+        }
+        // SAFETY: ends the process, and may do so in a signal handler.
+        unsafe { libc::_exit(1) }
+    }
+
+    /// Writes what is to be said between `around` to the file descriptor `file`, without allocating.
+    fn say(file: libc::c_int, around: [&str; 2], failed: usize) {
+        let (mut digits, mut first, mut rest) = ([0; 20], 20, failed);
+        while rest > 0 {
+            first -= 1;
+            digits[first] = b'0' + (rest % 10) as u8;
+            rest /= 10;
+        }
+        for part in
+            [around[0].as_bytes(), SAID[0].as_bytes(), &digits[first..], SAID[1].as_bytes(), around[1].as_bytes()]
+        {
+            // SAFETY: the part is valid for reading, and `write` may be called in a signal handler.
+            unsafe { libc::write(file, part.as_ptr().cast(), part.len()) };
+        }
+    }
+
+    pub fn tell_shortage(json: bool) {
+        let answer = if json { answer::<true> } else { answer::<false> } as extern "C" fn(libc::c_int);
+        // SAFETY: the handler calls nothing that may not be called in one.
+        unsafe { libc::signal(libc::SIGABRT, answer as libc::sighandler_t) };
+    }
+}
+
+#[cfg(not(unix))]
+mod answer {
+    pub fn tell_shortage(_: bool) {}
+}
+
+/// Has a failed allocation told with the remedy from now on; with `json` on standard output, too.
+pub use answer::tell_shortage;
