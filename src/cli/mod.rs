@@ -18,6 +18,7 @@ mod doctor;
 mod export;
 mod felt;
 mod gridize;
+mod import;
 mod info;
 mod inspect;
 mod interrupt;
@@ -63,6 +64,8 @@ enum Command {
     Export(export::Arguments),
     /// Make a dataset of scattered measurements: a scan's log, or any tables of joint positions and torques.
     Gridize(gridize::Arguments),
+    /// Make a scene of a robot's file (URDF): its joints, inertias and shapes, before a soft ball.
+    Import(import::Arguments),
     /// Say what a dataset holds, after checking all of it.
     Info(info::Arguments),
     /// Solve one configuration and tell all of it.
@@ -87,6 +90,7 @@ impl Command {
             Self::Doctor(arguments) => doctor::run(arguments),
             Self::Export(arguments) => export::run(arguments),
             Self::Gridize(arguments) => gridize::run(arguments),
+            Self::Import(arguments) => import::run(arguments),
             Self::Info(arguments) => info::run(arguments),
             Self::Inspect(arguments) => inspect::run(arguments),
             Self::Paper(arguments) => paper::run(arguments),

@@ -30,6 +30,8 @@ pub use body::Body;
 pub use compliance::Compliance;
 pub use error::{ObjectError, SurfaceDefect};
 pub use factor::{Factor, FactorError};
+pub(crate) use icosphere::generate as icosphere;
+pub(crate) use import::read as read_surface;
 pub use settled::settled;
 pub use skin::Skin;
 pub use stiffening::Stiffening;

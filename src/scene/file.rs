@@ -111,7 +111,7 @@ pub(super) struct JointTable {
     pub limits: Spanned<[f64; 2]>,
     pub mass: Option<Number>,
     pub centre_of_mass: Option<Vector>,
-    pub inertia: Option<Vector>,
+    pub inertia: Option<Spanned<Vec<f64>>>,
     pub rotor_inertia: Option<Number>,
     #[serde(default)]
     pub nodes: Vec<Spanned<NodesTable>>,

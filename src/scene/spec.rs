@@ -4,7 +4,7 @@
 //! radians and metres: where a doc says [N m/rad], a prismatic joint has [N/m], and so on.
 
 use crate::JointVector;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -144,6 +144,9 @@ pub enum GroundNodes {
     Below(f64),
 }
 
+/// Most contact nodes of a chain: far more than a chain of six links needs, few enough for one per thread on a GPU.
+pub const MAX_CONTACT_NODES: usize = 4096;
+
 /// The multi-link virtual proxy: a serial chain of one to six joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProxySpec {
@@ -168,8 +171,8 @@ pub struct JointSpec {
     pub mass: f64,
     /// Centre of mass in the link's frame [m].
     pub centre_of_mass: DVec3,
-    /// Principal moments of inertia about the centre of mass, along the link frame's axes [kg m^2].
-    pub inertia: DVec3,
+    /// Inertia about the centre of mass, along the link frame's axes, symmetric and positive semidefinite [kg m^2].
+    pub inertia: DMat3,
     /// Reflected inertia of the actuator about the joint, positive, so that the chain's inertia is positive definite in
     /// every configuration [kg m^2 or kg].
     pub rotor_inertia: f64,
