@@ -246,10 +246,17 @@ impl Builder<'_> {
         let name = &joint.name;
         let refuse = |message: String| Err(self.robot.source().error(joint.span.clone(), message));
         if let Some(leader) = &joint.mimic {
-            return refuse(format!(
-                "joint {name:?} follows {leader:?} (mimic), and the joints of a scene move independently: hold it with --lock \
-                 {name}=VALUE, or remove <mimic>"
-            ));
+            let chain = self.way.iter().map(|&number| &self.robot.joints[number]).filter(|other| other.name != *name);
+            if chain.into_iter().any(|other| other.name == *leader || other.mimic.as_ref() == Some(leader)) {
+                return refuse(format!(
+                    "joint {name:?} follows {leader:?} (mimic), as another joint of the chain does or is, and the joints of a scene \
+                     move independently: hold it with --lock {name}=VALUE, or remove <mimic>"
+                ));
+            }
+            let message = format!(
+                "joint {name:?} follows {leader:?} (mimic), which is not in the chain: it moves by itself in the scene"
+            );
+            self.note(&joint.span, message);
         }
         let kind = match joint.kind {
             JointType::Prismatic => JointKind::Prismatic,

@@ -190,3 +190,15 @@ fn what_the_file_lacks_is_noted() {
     assert_eq!(arm.base, ["world", "base"]);
     assert_eq!(JointVector::from_slice(&arm.joints[1].limits), JointVector::from_slice(&[-0.05, 0.1]));
 }
+
+/// One side of a parallelogram follows the other: in a chain through that side it is a joint like any other.
+#[test]
+fn a_joint_that_follows_one_beside_the_chain_moves_by_itself() {
+    let text = std::fs::read_to_string(file("arm.urdf")).unwrap();
+    let limits = "<limit lower=\"-1.2\" upper=\"1.5\" effort=\"5\" velocity=\"3\"/>";
+    let follows = |leader: &str| text.replace(limits, &format!("{limits}<mimic joint=\"{leader}\"/>"));
+    let (_, followed) = arm(&follows("camera_tilt"), "probe", &[]).unwrap();
+    assert_eq!(followed.joints.len(), 4);
+    assert!(followed.notes.iter().any(|note| note.message.contains("follows \"camera_tilt\"")), "{:?}", followed.notes);
+    assert!(arm(&follows("yaw"), "probe", &[]).is_err());
+}

@@ -32,7 +32,7 @@ const CASES: &[(&str, &str, usize, &[&str])] = &[
     ("<limit lower=\"-1\" upper=\"1\"/>", "<limit effort=\"3\"/>", 5, &["no limits", "<limit"]),
     (
         "<limit lower=\"-1\" upper=\"1\"/>",
-        "<limit lower=\"-1\" upper=\"1\"/><mimic joint=\"other\"/>",
+        "<limit lower=\"-1\" upper=\"1\"/><mimic joint=\"grip\"/>",
         5,
         &["mimic", "--lock turn"],
     ),
