@@ -1,6 +1,6 @@
 //! `haptize inspect`: one configuration in full.
 
-use super::{Failure, Report};
+use super::{Failure, Report, info};
 use clap::ValueEnum;
 use glam::DVec3;
 use haptize::{
@@ -48,6 +48,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut json = serde_json::to_value(&inspection)?;
     let mut text = String::new();
     describe(&mut text, &inspection)?;
+    let inclusions = info::inclusions(&scene.object);
+    info::write_inclusions(&mut text, &mut json, &inclusions)?;
     if let Some(skin) = object.skin {
         json["skin"] = serde_json::to_value(skin)?;
         writeln!(text, "  skin         {skin}")?;

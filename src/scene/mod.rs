@@ -19,8 +19,9 @@ pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, Spe
 pub use spec::{
     Algorithm, AxisSpec, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec, FrictionSpec,
     GraphicsEffects, GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects, HapticsSpec,
-    Interpolation, JointKind, JointSpec, MAX_CONTACT_NODES, Material, MotionSpec, ObjectSpec, ProxyInertia,
-    ProxyNodeSpec, ProxySpec, Shape, SkinSpec, SpringKind, SpringSpec, StiffeningSpec, Waypoint,
+    InclusionPlace, InclusionSpec, Interpolation, JointKind, JointSpec, MAX_CONTACT_NODES, Material, MotionSpec,
+    ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec, Shape, SkinSpec, SpringKind, SpringSpec, StiffeningSpec,
+    Waypoint,
 };
 
 pub(crate) use inertia::is_positive_semidefinite;

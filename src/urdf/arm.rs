@@ -99,7 +99,7 @@ impl Arm {
         let mut joints = Vec::new();
         for &number in &way {
             let joint = &robot.joints[number];
-            place = place * joint.origin;
+            place *= joint.origin;
             if let Some(motion) = held.get(&number) {
                 place *= *motion;
                 continue;

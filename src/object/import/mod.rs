@@ -67,6 +67,7 @@ pub(super) fn read_tetrahedra(
     let mesh = msh::read(&mut BufReader::new(open(file)?)).map_err(unreadable)?;
     let nodes: Vec<DVec3> = mesh.nodes.iter().map(|node| scale * *node + centre).collect();
     let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra);
+    let ordered = Body { regions: mesh.regions, ..ordered };
     if turned > 0 {
         let (file, all) = (file.display(), ordered.tetrahedra.len());
         warnings.push(format!("{file}: {turned} of {all} tetrahedra were numbered inside out and were turned"));

@@ -278,7 +278,12 @@ pub const STL: Target = Target {
     seeds: || vec![shipped("datasets/cube.stl"), binary_stl()],
     mutate: PLY.mutate,
     run: |file, input| {
-        mesh(file, input, None, Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.1) }))
+        mesh(
+            file,
+            input,
+            None,
+            Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.1), inclusions: Vec::new() }),
+        )
     },
     kinds: 14,
 };
@@ -301,7 +306,14 @@ pub const MSH: Target = Target {
     extension: "msh",
     seeds: || vec![program::BLOCK.into(), program::BLOCK_4.into()],
     mutate: mutate::text,
-    run: |file, input| mesh(file, input, None, Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: None })),
+    run: |file, input| {
+        mesh(
+            file,
+            input,
+            None,
+            Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: None, inclusions: Vec::new() }),
+        )
+    },
     kinds: 30,
 };
 
