@@ -1,7 +1,7 @@
 //! Configuration-space haptization: contact between a multi-link virtual proxy and a deformable virtual object is
 //! solved beforehand for every joint configuration, and felt at 1 kHz by interpolation.
 //!
-//! A [`scene`] says what is touched with what. An [`object`] deforms, a [`proxy`] moves its joints, and their
+//! A [`scene`] says what is touched with what. An [`object`] deforms, a [`proxy`] moves its joints (it may come from a robot's file, [`urdf`]), and their
 //! equilibrium ([`contact`]) at every point of a grid over the joint angles q gives a [`dataset`] ([`haptize`], on the
 //! CPU or through [`gpu`]): the joint torque tau(q), the stored energy U(q) and the contact forces. [`render`] looks
 //! torques up in it, a thousand times a second, for the hand or log that [`device`] stands for; [`report`] draws what
@@ -66,6 +66,7 @@ pub mod scene;
 
 pub mod object;
 pub mod proxy;
+pub mod urdf;
 
 pub mod contact;
 

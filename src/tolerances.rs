@@ -416,6 +416,12 @@ pub const NEAR_PLANE: f64 = 1e-6;
 /// the depth buffer (single precision) at grazing views, below a twentieth of what a camera frames.
 pub const EDGE_LIFT: f64 = 5e-3;
 
+// --- arms ---
+
+/// Least principal minor of an inertia over its trace, that many factors: scenes and robot files give five digits or more, and
+/// what is below zero by that much stays below the actuators' reflected inertia.
+pub const INERTIA_ROUNDING: f64 = 1e-5;
+
 // --- scanning ---
 
 /// Acceleration of gravity [m/s^2], standard value.

@@ -70,6 +70,7 @@ fn sample() -> Dataset {
             solid: Some(Solid {
                 inner_nodes: vec![0.1, 0.2, 1.0 / 3.0].into(),
                 tetrahedra: vec![0, 1, 2, 4, 0, 2, 3, 4].into(),
+                regions: vec![3, 1].into(),
             }),
         }),
         scene: "name = \"sample\" # Kontakt \u{fc}ber \u{3c0}\n".into(),

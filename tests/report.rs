@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use haptize::{
     JointVector,
     contact::Status,
@@ -59,7 +59,7 @@ fn arm(joints: usize) -> Chain {
         limits: [-3.0, 3.0],
         mass: 0.1,
         centre_of_mass: DVec3::ZERO,
-        inertia: DVec3::splat(1e-4),
+        inertia: DMat3::from_diagonal(DVec3::splat(1e-4)),
         rotor_inertia: 1e-4,
     };
     let node = |link: usize, k: usize| ProxyNode {

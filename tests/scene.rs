@@ -313,6 +313,8 @@ const BROKEN: &[Broken] = &[
     ("limits = [-1, 1]", "limits = [-1, 1]\nmass = -1", "mass", &["zero or positive"]),
     ("limits = [-1, 1]", "limits = [-1, 1]\nrotor_inertia = 0", "rotor_inertia", &["positive"]),
     ("limits = [-1, 1]", "limits = [-1, 1]\ninertia = [1, -1, 1]", "inertia", &["negative"]),
+    ("limits = [-1, 1]", "limits = [-1, 1]\ninertia = [1, 1]", "inertia", &["2 numbers", "products"]),
+    ("limits = [-1, 1]", "limits = [-1, 1]\ninertia = [1, 1, 1, 2, 0, 0]", "inertia", &["eigenvalue"]),
     ("limits = [-1, 1]", "limits = [-1, 1]\nname = \"a,b\"", "name", &["letters"]),
     ("{ at = [0.1, 0, 0] }", "{ at = [0.1, 0, 0], count = 3 }", "nodes", &["either"]),
     ("{ at = [0.1, 0, 0] }", "{ from = [0, 0, 0], to = [0, 0, 1], count = 3, spacing = 0.1 }", "nodes", &["one of"]),

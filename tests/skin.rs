@@ -199,7 +199,7 @@ fn skins_of_isotropic_objects_keep_the_small_compliance() {
 
 #[test]
 fn a_skin_adds_to_springs_and_to_solids_what_it_is_alone() {
-    let solid = Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.4, cell: Some(0.02) });
+    let solid = Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.4, cell: Some(0.02), inclusions: Vec::new() });
     let springs = Material::Springs(SpringSpec { kind: SpringKind::Axial, stiffness: 150.0 });
     let ground = Some(GroundSpec { stiffness: 50.0, nodes: GroundNodes::All });
     let alone = build(&hollow(3, SKIN));

@@ -20,7 +20,7 @@ fn spec(shape: Shape, material: Material, ground: GroundSpec) -> ObjectSpec {
 }
 
 fn elastic(cell: Option<f64>) -> Material {
-    Material::Elastic(ElasticSpec { young: YOUNG, poisson: POISSON, cell })
+    Material::Elastic(ElasticSpec { young: YOUNG, poisson: POISSON, cell, inclusions: Vec::new() })
 }
 
 fn light() -> GroundSpec {
@@ -249,7 +249,10 @@ fn a_scene_names_one_shape_and_one_material() {
     };
     let sphere = "sphere = { radius = 0.05, rings = 5, segments = 5 }";
     let solid = scene(&format!("{sphere}\nelasticity = {{ young = 1e4, poisson = 0.4, cell = 0.02 }}")).unwrap();
-    assert_eq!(solid.material, Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.4, cell: Some(0.02) }));
+    assert_eq!(
+        solid.material,
+        Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.4, cell: Some(0.02), inclusions: Vec::new() })
+    );
     let springs = "springs = { kind = \"axial\", stiffness = 1.0 }";
     for (object, expected) in [
         (sphere.to_owned(), "no material"),

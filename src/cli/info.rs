@@ -6,7 +6,7 @@ use haptize::{
     contact::MeshRipple,
     dataset::{Axis, Dataset, MeasuredError, Summary},
     object::Skin,
-    scene::Rendering,
+    scene::{Material, ObjectSpec, Rendering, SkinSpec},
 };
 use std::{
     fmt::{self, Write},
@@ -44,16 +44,33 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         writeln!(text, "               no command but info and export takes it: bake the scene again")?;
     }
     describe(&mut text, &summary, &dataset.absent())?;
-    if let Some(skin) = skin(&dataset) {
+    let spec = Rendering::parse(&dataset.scene, "scene").ok().and_then(|scene| scene.object);
+    write_inclusions(&mut text, &mut json, &spec.as_ref().map_or_else(Vec::new, inclusions))?;
+    if let Some(skin) = spec.and_then(|spec| skin(&dataset, spec.skin?)) {
         json["skin"] = serde_json::to_value(skin)?;
         writeln!(text, "  skin         {skin}")?;
     }
     Ok(Report { text, json, whole: contradiction.is_none() })
 }
 
-/// The skin of the object, where the dataset's scene has one.
-fn skin(dataset: &Dataset) -> Option<Skin> {
-    let spec = Rendering::parse(&dataset.scene, "scene").ok()?.object?.skin?;
+/// Returns the inclusions of the object, one description each.
+pub fn inclusions(object: &ObjectSpec) -> Vec<String> {
+    match &object.material {
+        Material::Elastic(elastic) => elastic.inclusions.iter().map(ToString::to_string).collect(),
+        Material::Springs(_) | Material::Hollow => Vec::new(),
+    }
+}
+
+/// Writes these, for people and for programs.
+pub fn write_inclusions(text: &mut String, json: &mut serde_json::Value, inclusions: &[String]) -> fmt::Result {
+    if !inclusions.is_empty() {
+        json["inclusions"] = inclusions.into();
+    }
+    inclusions.iter().try_for_each(|inclusion| writeln!(text, "  inclusion    {inclusion}"))
+}
+
+/// The skin `spec` on the dataset's surface.
+fn skin(dataset: &Dataset, spec: SkinSpec) -> Option<Skin> {
     let surface = dataset.surface.as_ref()?;
     let nodes: Vec<DVec3> = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
     let triangles: Vec<[u32; 3]> = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();

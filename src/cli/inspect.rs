@@ -1,6 +1,6 @@
 //! `haptize inspect`: one configuration in full.
 
-use super::{Failure, Report, tell};
+use super::{Failure, Report, info, tell};
 use clap::ValueEnum;
 use glam::DVec3;
 use haptize::{
@@ -59,6 +59,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     describe(&mut text, &inspection, &chain)?;
     object.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
     json["object_warnings"] = object.warnings.clone().into();
+    let inclusions = info::inclusions(&scene.object);
+    info::write_inclusions(&mut text, &mut json, &inclusions)?;
     if let Some(skin) = object.skin {
         json["skin"] = serde_json::to_value(skin)?;
         writeln!(text, "  skin         {skin}")?;

@@ -28,6 +28,7 @@ mod doctor;
 mod export;
 mod felt;
 mod gridize;
+mod import;
 mod info;
 mod inspect;
 mod interrupt;
@@ -86,6 +87,8 @@ enum Command {
     Export(export::Arguments),
     /// Interpolate scattered measurements onto a grid: a scan's log, or tables of joint positions and torques.
     Gridize(gridize::Arguments),
+    /// Turn a robot file (URDF) into a scene: its joints, inertias and shapes, before a soft ball.
+    Import(import::Arguments),
     /// Check a dataset and summarise it.
     Info(info::Arguments),
     /// Solve one configuration and print every detail, beside what a dataset interpolates there.
@@ -115,6 +118,7 @@ impl Command {
             Self::Doctor(arguments) => doctor::run(arguments),
             Self::Export(arguments) => export::run(arguments),
             Self::Gridize(arguments) => gridize::run(arguments),
+            Self::Import(arguments) => import::run(arguments),
             Self::Info(arguments) => info::run(arguments),
             Self::Inspect(arguments) => inspect::run(arguments),
             Self::Man(arguments) => man::run(arguments),

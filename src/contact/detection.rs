@@ -334,7 +334,7 @@ mod tests {
                 limits: [-1.0, 1.0],
                 mass: 1.0,
                 centre_of_mass: DVec3::ZERO,
-                inertia: DVec3::ONE,
+                inertia: glam::DMat3::IDENTITY,
                 rotor_inertia: 0.0,
                 nodes: vec![ProxyNodeSpec { position: DVec3::ZERO, radius, length: 0.0 }; count],
             }],

@@ -60,9 +60,12 @@ fn check_surface(surface: &Surface) -> Result<(), String> {
     }
     finite("surface_nodes", nodes, |x: &f64| x.is_finite())?;
     within("surface_triangles", triangles, nodes.len() / 3)?;
-    let Some(Solid { inner_nodes, tetrahedra }) = solid else { return Ok(()) };
+    let Some(Solid { inner_nodes, tetrahedra, regions }) = solid else { return Ok(()) };
     if !inner_nodes.len().is_multiple_of(3) || !tetrahedra.len().is_multiple_of(4) {
         return Err("the solid has an incomplete node or tetrahedron".into());
+    }
+    if !regions.is_empty() && regions.len() != tetrahedra.len() / 4 {
+        return Err(format!("the solid has {} tetrahedra, but regions of {}", tetrahedra.len() / 4, regions.len()));
     }
     finite("inner_nodes", inner_nodes, |x: &f64| x.is_finite())?;
     within("tetrahedra", tetrahedra, (nodes.len() + inner_nodes.len()) / 3)

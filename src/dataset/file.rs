@@ -20,6 +20,7 @@
 //! | `touch_offsets`, `touch_nodes`, `touch_forces` | u64, u32, f32 | as these | the same on nodes of the proxy, where an effect needs it |
 //! | `surface_nodes`, `surface_triangles` | f64, u32 | S, 3 and T, 3 | at rest [m] |
 //! | `inner_nodes`, `tetrahedra` | f64, u32 | I, 3 and V, 4 | of a mesh of tetrahedra; inner nodes are numbered from S on [m] |
+//! | `regions` | u32 | V | physical volume of each tetrahedron, where the mesh names any |
 //!
 //! In Python: `safetensors.numpy.load_file("sphere.haptize")["torque"]`.
 //!
@@ -167,9 +168,12 @@ pub(crate) fn surface_tensors(surface: &Surface) -> Vec<Tensor<&[u8]>> {
         tensor("surface_nodes", &[nodes.len() / 3, 3], nodes),
         tensor("surface_triangles", &[triangles.len() / 3, 3], triangles),
     ];
-    if let Some(Solid { inner_nodes, tetrahedra }) = solid {
+    if let Some(Solid { inner_nodes, tetrahedra, regions }) = solid {
         tensors.push(tensor("inner_nodes", &[inner_nodes.len() / 3, 3], inner_nodes));
         tensors.push(tensor("tetrahedra", &[tetrahedra.len() / 4, 4], tetrahedra));
+        if !regions.is_empty() {
+            tensors.push(tensor("regions", &[regions.len()], regions));
+        }
     }
     tensors
 }

@@ -92,6 +92,8 @@ pub struct Solid {
     pub inner_nodes: Column<f64>,
     /// Four node numbers a tetrahedron.
     pub tetrahedra: Column<u32>,
+    /// Physical volume of each tetrahedron; empty where the mesh names none.
+    pub regions: Column<u32>,
 }
 
 /// Where a dataset comes from.

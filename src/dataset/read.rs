@@ -164,6 +164,7 @@ impl Windows {
                                 .column(tensors, "inner_nodes", &[None, Some(3)])?
                                 .ok_or_else(|| missing("inner_nodes"))?,
                             tetrahedra,
+                            regions: self.column(tensors, "regions", &[None])?.unwrap_or_else(|| Vec::new().into()),
                         }),
                     },
                 }),

@@ -19,6 +19,7 @@ impl Surface {
             solid: (!object.tetrahedra.is_empty()).then(|| Solid {
                 inner_nodes: numbers(inner),
                 tetrahedra: object.tetrahedra.as_flattened().to_vec().into(),
+                regions: object.regions.clone().into(),
             }),
         }
     }
@@ -28,8 +29,9 @@ impl Surface {
     /// # Errors
     /// As for [`Object::from_body`].
     pub fn object(&self, spec: &ObjectSpec) -> Result<Object, ObjectError> {
-        let (inner, tetrahedra) =
-            self.solid.as_ref().map_or((&[][..], &[][..]), |solid| (&solid.inner_nodes[..], &solid.tetrahedra[..]));
+        let (inner, tetrahedra, regions) = self.solid.as_ref().map_or((&[][..], &[][..], &[][..]), |solid| {
+            (&solid.inner_nodes[..], &solid.tetrahedra[..], &solid.regions[..])
+        });
         let nodes: Vec<DVec3> =
             self.nodes.chunks_exact(3).chain(inner.chunks_exact(3)).map(DVec3::from_slice).collect();
         let body = Body {
@@ -37,6 +39,7 @@ impl Surface {
             surface_nodes: self.nodes.len() / 3,
             triangles: self.triangles.as_chunks().0.to_vec(),
             tetrahedra: tetrahedra.as_chunks().0.to_vec(),
+            regions: regions.to_vec(),
         };
         Object::from_body(spec, body)
     }

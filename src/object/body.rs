@@ -14,19 +14,24 @@ pub struct Body {
     pub triangles: Vec<[u32; 3]>,
     /// Corners of tetrahedra of positive volume; empty for a surface.
     pub tetrahedra: Vec<[u32; 4]>,
+    /// Physical volume of each tetrahedron, 0 outside all; empty if the mesh names none.
+    pub regions: Vec<u32>,
 }
 
 impl Body {
     /// A surface.
     #[must_use]
     pub fn shell((nodes, triangles): (Vec<DVec3>, Vec<[u32; 3]>)) -> Self {
-        Self { surface_nodes: nodes.len(), nodes, triangles, tetrahedra: Vec::new() }
+        Self { surface_nodes: nodes.len(), nodes, triangles, ..Self::default() }
     }
 
     /// Refuses node numbers that are out of range. Those of the triangles are checked with the surface.
     pub(super) fn check(&self) -> Result<(), ObjectError> {
         let count = self.nodes.len();
         let wild = |corners: &&[u32; 4]| corners.iter().any(|&corner| corner as usize >= count);
+        if !self.regions.is_empty() && self.regions.len() != self.tetrahedra.len() {
+            return Err(ObjectError::Regions { regions: self.regions.len(), tetrahedra: self.tetrahedra.len() });
+        }
         match self.tetrahedra.iter().find(wild) {
             Some(corners) => Err(ObjectError::TetrahedronNode { corners: *corners, count }),
             None if self.surface_nodes > count => Err(ObjectError::SurfaceNodes { surface: self.surface_nodes, count }),

@@ -10,7 +10,7 @@
 //! (Hughes, The Finite Element Method, 1987, section 2.8). A uniform strain is met exactly, whatever the mesh. Bending is not:
 //! such elements are too stiff in it by a share that falls with the square of their size, and more so near nu = 1/2.
 
-use super::{ObjectError, Stiffness};
+use super::{ObjectError, Stiffness, inclusion};
 use crate::scene::ElasticSpec;
 use crate::tolerances::MIN_TETRAHEDRON_ASPECT;
 use glam::{DMat3, DVec3};
@@ -22,6 +22,8 @@ pub(super) struct Solid {
     pub tetrahedra: Vec<[u32; 4]>,
     /// Share of each that is filled with material [1].
     pub filled: Vec<f64>,
+    /// Physical volume of each; empty if there are none.
+    pub regions: Vec<u32>,
     /// Surface nodes tied to a point in a tetrahedron: node, corners, barycentric weights.
     pub ties: Vec<(u32, [u32; 4], [f64; 4])>,
     /// Stiffness of each tie, in units of Young's modulus [m].
@@ -52,11 +54,11 @@ impl Solid {
     }
 
     /// Adds Kn to `stiffness`, whose pattern holds [`Solid::edges`].
-    pub fn add(&self, elastic: ElasticSpec, nodes: &[DVec3], stiffness: &mut Stiffness) -> Result<(), ObjectError> {
-        let ElasticSpec { young, poisson, .. } = elastic;
-        let lambda = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
-        let mu = young / (2.0 * (1.0 + poisson));
-        for (number, (corners, filled)) in self.tetrahedra.iter().zip(&self.filled).enumerate() {
+    pub fn add(&self, elastic: &ElasticSpec, nodes: &[DVec3], stiffness: &mut Stiffness) -> Result<(), ObjectError> {
+        let means = inclusion::mean(self, elastic, nodes)?;
+        for (number, ((corners, filled), [lambda, mu])) in
+            self.tetrahedra.iter().zip(&self.filled).zip(means).enumerate()
+        {
             let places = corners.map(|corner| nodes[corner as usize]);
             let volume = volume(places);
             let longest = (0..4).flat_map(|a| (0..a).map(move |b| (a, b)));
@@ -77,7 +79,7 @@ impl Solid {
                 }
             }
         }
-        let tie = young * self.tie_length;
+        let tie = elastic.young * self.tie_length;
         for (node, corners, weights) in &self.ties {
             let all = corners.iter().zip(weights).map(|(&corner, weight)| (corner as usize, -weight));
             let all: Vec<(usize, f64)> = all.chain([(*node as usize, 1.0)]).collect();

@@ -104,6 +104,20 @@ pub enum ObjectError {
         /// The mesh file, or `sphere`.
         surface: String,
     },
+    /// An inclusion holds no part of the solid.
+    #[error("no part of the solid is in the inclusion ({inclusion}): correct its place, or remove it")]
+    EmptyInclusion {
+        /// Its description.
+        inclusion: String,
+    },
+    /// Regions for another number of tetrahedra.
+    #[error("there are {regions} regions for {tetrahedra} tetrahedra: build the object again from its scene")]
+    Regions {
+        /// Number of regions.
+        regions: usize,
+        /// Number of tetrahedra.
+        tetrahedra: usize,
+    },
     /// The ground names a node that is not there.
     #[error("ground names node {node}, but the object has nodes 0 to {}: correct the list", .count - 1)]
     GroundNode {

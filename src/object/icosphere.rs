@@ -34,7 +34,7 @@ const FACES: [[u32; 3]; 20] = [
 ];
 
 /// Returns the nodes and outward triangles of a sphere. `divisions`: parts of each edge of the icosahedron.
-pub(super) fn generate(
+pub(crate) fn generate(
     centre: DVec3,
     radius: f64,
     divisions: usize,

@@ -15,6 +15,7 @@ mod fill;
 mod ground;
 mod icosphere;
 mod import;
+mod inclusion;
 mod ordering;
 mod refine;
 mod settled;
@@ -30,6 +31,8 @@ pub use body::Body;
 pub use compliance::Compliance;
 pub use error::{ObjectError, SurfaceDefect};
 pub use factor::{Factor, FactorError};
+pub(crate) use icosphere::generate as icosphere;
+pub(crate) use import::read as read_surface;
 pub use settled::settled;
 pub use skin::Skin;
 pub use stiffening::Stiffening;
@@ -54,6 +57,8 @@ pub struct Object {
     pub triangles: Vec<[u32; 3]>,
     /// Corners of the tetrahedra of a mesh of such; empty for a surface, whatever fills it.
     pub tetrahedra: Vec<[u32; 4]>,
+    /// Physical volume of each tetrahedron; empty if the mesh names none.
+    pub regions: Vec<u32>,
     /// Neighbours on the surface.
     pub topology: Topology,
     /// The skin of the surface, where it has one.
@@ -127,18 +132,22 @@ impl Object {
     fn assemble(spec: &ObjectSpec, body: Body, mut warnings: Vec<String>) -> Result<Self, ObjectError> {
         check_parameters(spec)?;
         check_count(body.nodes.len())?;
-        let Body { mut nodes, surface_nodes, mut triangles, tetrahedra } = body;
+        let Body { mut nodes, surface_nodes, mut triangles, tetrahedra, regions } = body;
         let surface = topology::close(&nodes[..surface_nodes], &mut triangles)
             .map_err(|defect| ObjectError::Surface { surface: surface_name(spec), defect })?;
         warnings.extend(surface.warnings);
-        let mut solid =
-            Solid { filled: vec![1.0; tetrahedra.len()], tetrahedra: tetrahedra.clone(), ..Solid::default() };
-        if let (Material::Elastic(ElasticSpec { cell, .. }), true) = (spec.material, solid.tetrahedra.is_empty()) {
+        let mut solid = Solid {
+            filled: vec![1.0; tetrahedra.len()],
+            tetrahedra: tetrahedra.clone(),
+            regions: regions.clone(),
+            ..Solid::default()
+        };
+        if let (Material::Elastic(ElasticSpec { cell, .. }), true) = (&spec.material, solid.tetrahedra.is_empty()) {
             let cell = cell.ok_or_else(|| ObjectError::NoCell { surface: surface_name(spec) })?;
             solid = fill::fill(&mut nodes, &triangles, cell)?;
             check_count(nodes.len())?;
         }
-        let edges = match spec.material {
+        let edges = match &spec.material {
             Material::Hollow => Vec::new(),
             _ if solid.tetrahedra.is_empty() => surface.edges,
             _ => solid.edges(),
@@ -158,8 +167,8 @@ impl Object {
                 stiffness.add(node, node, DMat3::from_diagonal(DVec3::splat(ground.stiffness)));
             }
         }
-        match spec.material {
-            Material::Springs(springs) => springs::add(spec, springs, &nodes, &edges, &mut stiffness)?,
+        match &spec.material {
+            Material::Springs(springs) => springs::add(spec, *springs, &nodes, &edges, &mut stiffness)?,
             Material::Elastic(elastic) => solid.add(elastic, &nodes, &mut stiffness)?,
             Material::Hollow => {}
         }
@@ -173,6 +182,7 @@ impl Object {
             rest: nodes,
             triangles,
             tetrahedra,
+            regions,
             topology: surface.topology,
             stiffness,
             factor,
@@ -194,7 +204,7 @@ fn check_count(nodes: usize) -> Result<(), ObjectError> {
 
 /// Numbers that a scene file has had checked already, and a specification made in code has not.
 fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {
-    let material = match spec.material {
+    let material = match &spec.material {
         Material::Springs(springs) => Some(("spring stiffness", springs.stiffness)),
         Material::Elastic(elastic) => Some(("Young's modulus", elastic.young)),
         Material::Hollow => None,
@@ -215,9 +225,20 @@ fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {
             return Err(ObjectError::Parameter { name, value, range: "zero or positive, and finite" });
         }
     }
-    if let Material::Elastic(ElasticSpec { poisson: value, cell, .. }) = spec.material {
-        if !(value > -1.0 && value < 0.5) {
-            return Err(ObjectError::Parameter { name: "Poisson's ratio", value, range: "above -1 and below 0.5" });
+    if let Material::Elastic(ElasticSpec { poisson, cell, inclusions, .. }) = &spec.material {
+        for value in inclusions.iter().map(|inclusion| inclusion.poisson).chain([*poisson]) {
+            if !(value > -1.0 && value < 0.5) {
+                return Err(ObjectError::Parameter { name: "Poisson's ratio", value, range: "above -1 and below 0.5" });
+            }
+        }
+        for value in inclusions.iter().map(|inclusion| inclusion.young) {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(ObjectError::Parameter {
+                    name: "inclusion's Young's modulus",
+                    value,
+                    range: "positive and finite",
+                });
+            }
         }
         if let Some(value) = cell.filter(|cell| !(*cell > 0.0 && cell.is_finite())) {
             return Err(ObjectError::Parameter { name: "cell", value, range: "positive and finite" });

@@ -30,8 +30,8 @@ pub struct Joint {
     pub mass: f64,
     /// In the link's frame [m].
     pub centre_of_mass: DVec3,
-    /// Principal moments about the centre of mass, along the link frame's axes [kg m^2].
-    pub inertia: DVec3,
+    /// Inertia about the centre of mass, along the link frame's axes [kg m^2].
+    pub inertia: DMat3,
     /// Reflected inertia of the actuator [kg m^2 or kg].
     pub rotor_inertia: f64,
 }
@@ -170,7 +170,7 @@ mod tests {
             limits: [-4.0, 4.0],
             mass: 1.0,
             centre_of_mass: DVec3::ZERO,
-            inertia: DVec3::ZERO,
+            inertia: DMat3::ZERO,
             rotor_inertia: 1.0,
         };
         let tip = Node { link: 1, position: DVec3::new(0.3, 0.0, 0.0), radius: 0.0, length: 0.0 };

@@ -132,8 +132,7 @@ impl Chain {
             let about_origin = DMat3::from_diagonal(DVec3::splat(centre.length_squared())) - outer;
             sum.mass += joint.mass;
             sum.first += joint.mass * centre;
-            sum.second +=
-                rotation * DMat3::from_diagonal(joint.inertia) * rotation.transpose() + joint.mass * about_origin;
+            sum.second += rotation * joint.inertia * rotation.transpose() + joint.mass * about_origin;
             composite[index] = sum;
         }
         composite

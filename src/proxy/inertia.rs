@@ -7,7 +7,7 @@
 use super::{Chain, Pose};
 use crate::MAX_JOINTS;
 use crate::scene::JointKind;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 /// A square matrix over the joints: the first d rows and columns count, the others are zero.
 pub type JointMatrix = [[f64; MAX_JOINTS]; MAX_JOINTS];
@@ -22,7 +22,7 @@ impl Chain {
             inertia[link][link] += joint.rotor_inertia;
             let rotation = pose.rotations[link];
             let centre = pose.origins[link] + rotation * joint.centre_of_mass;
-            let moments = rotation * DMat3::from_diagonal(joint.inertia) * rotation.transpose();
+            let moments = rotation * joint.inertia * rotation.transpose();
             for (i, row) in inertia.iter_mut().enumerate().take(link + 1) {
                 let momentum = joint.mass * self.point_velocity(pose, centre, i);
                 let spin = moments * self.spin(pose, i);

@@ -4,6 +4,7 @@ use super::{Chain, Joint, Node};
 use crate::JointVector;
 use crate::random::Random;
 use crate::scene::JointKind;
+use glam::DMat3;
 
 /// Sixty chains, each with a configuration and a rate.
 pub fn chains() -> impl Iterator<Item = (Chain, JointVector, JointVector)> {
@@ -18,7 +19,11 @@ pub fn chains() -> impl Iterator<Item = (Chain, JointVector, JointVector)> {
             limits: [-2.0, 2.0],
             mass: 0.1 + random.between(-1.0, 1.0).abs(),
             centre_of_mass: 0.1 * random.vector(),
-            inertia: 1e-3 * random.vector().abs(),
+            inertia: {
+                // Positive semidefinite, with products of inertia.
+                let root = DMat3::from_cols(random.vector(), random.vector(), random.vector());
+                1e-3 * root * root.transpose()
+            },
             rotor_inertia: 1e-3 * (1.1 + random.between(-1.0, 1.0)),
         });
         let joints: Vec<Joint> = joints.collect();

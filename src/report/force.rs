@@ -141,7 +141,7 @@ mod tests {
             limits: [-3.0, 3.0],
             mass: 0.0,
             centre_of_mass: DVec3::ZERO,
-            inertia: DVec3::ZERO,
+            inertia: DMat3::ZERO,
             rotor_inertia: 1e-3,
             nodes,
         };

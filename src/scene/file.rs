@@ -73,6 +73,25 @@ pub(super) struct ElasticityTable {
     pub young: Number,
     pub poisson: Number,
     pub cell: Option<Number>,
+    #[serde(default)]
+    pub inclusion: Vec<Spanned<InclusionTable>>,
+}
+
+/// A part of the solid, by a sphere or by the number of a physical volume.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct InclusionTable {
+    pub sphere: Option<InclusionSphereTable>,
+    pub region: Option<Spanned<u32>>,
+    pub young: Number,
+    pub poisson: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct InclusionSphereTable {
+    pub centre: Vector,
+    pub radius: Number,
 }
 
 #[derive(Deserialize)]
@@ -111,7 +130,7 @@ pub(super) struct JointTable {
     pub limits: Spanned<[f64; 2]>,
     pub mass: Option<Number>,
     pub centre_of_mass: Option<Vector>,
-    pub inertia: Option<Vector>,
+    pub inertia: Option<Spanned<Vec<f64>>>,
     pub rotor_inertia: Option<Number>,
     #[serde(default)]
     pub nodes: Vec<Spanned<NodesTable>>,

@@ -8,6 +8,7 @@ mod convert;
 mod effects;
 mod error;
 mod file;
+mod inertia;
 mod own_text;
 mod scan;
 mod spec;
@@ -18,9 +19,12 @@ pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, Spe
 pub use spec::{
     Algorithm, AxisSpec, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec, FrictionSpec,
     GraphicsEffects, GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects, HapticsSpec,
-    Interpolation, JointKind, JointSpec, Material, MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec,
-    Shape, SkinSpec, SpringKind, SpringSpec, StiffeningSpec, Waypoint,
+    InclusionPlace, InclusionSpec, Interpolation, JointKind, JointSpec, MAX_CONTACT_NODES, Material, MotionSpec,
+    ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec, Shape, SkinSpec, SpringKind, SpringSpec, StiffeningSpec,
+    Waypoint,
 };
+
+pub(crate) use inertia::is_positive_semidefinite;
 
 use check::Checker;
 use std::io::Read;

@@ -4,7 +4,7 @@
 //! radians and metres: where a doc says [N m/rad], a prismatic joint has [N/m], and so on.
 
 use crate::JointVector;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -73,7 +73,7 @@ pub enum Shape {
 }
 
 /// What resists deformation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Material {
     /// Springs along the edges of the surface, or of the tetrahedra.
     Springs(SpringSpec),
@@ -94,8 +94,8 @@ pub struct SkinSpec {
     pub foundation: f64,
 }
 
-/// A homogeneous, isotropic, linearly elastic solid.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// An isotropic, linearly elastic solid, homogeneous but for its inclusions.
+#[derive(Clone, Debug, PartialEq)]
 pub struct ElasticSpec {
     /// Young's modulus E [Pa].
     pub young: f64,
@@ -103,6 +103,45 @@ pub struct ElasticSpec {
     pub poisson: f64,
     /// Size of the cubes of the lattice that fills a surface; none where the shape is tetrahedra [m].
     pub cell: Option<f64>,
+    /// Parts with another stiffness; where two overlap, the later one counts.
+    pub inclusions: Vec<InclusionSpec>,
+}
+
+/// A part of an elastic solid with a stiffness of its own, bonded to the rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InclusionSpec {
+    /// Which part.
+    pub place: InclusionPlace,
+    /// Young's modulus [Pa].
+    pub young: f64,
+    /// Poisson's ratio [1].
+    pub poisson: f64,
+}
+
+/// Which part of a solid an inclusion is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InclusionPlace {
+    /// What lies in a sphere.
+    Sphere {
+        /// [m]
+        centre: DVec3,
+        /// [m]
+        radius: f64,
+    },
+    /// The tetrahedra of a physical volume of the Gmsh file, by its number.
+    Region(u32),
+}
+
+impl std::fmt::Display for InclusionSpec {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.place {
+            InclusionPlace::Sphere { centre: DVec3 { x, y, z }, radius } => {
+                write!(f, "sphere of {:.1} mm radius at ({x:.4}, {y:.4}, {z:.4}) m", radius * 1e3)?;
+            }
+            InclusionPlace::Region(region) => write!(f, "region {region}")?,
+        }
+        write!(f, ": Young's modulus {:.3e} Pa, Poisson's ratio {}", self.young, self.poisson)
+    }
 }
 
 /// Springs along edges.
@@ -144,6 +183,9 @@ pub enum GroundNodes {
     Below(f64),
 }
 
+/// Most contact nodes of a chain: far more than a chain of six links needs, few enough for one per thread on a GPU.
+pub const MAX_CONTACT_NODES: usize = 4096;
+
 /// The multi-link virtual proxy: a serial chain of one to six joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProxySpec {
@@ -168,8 +210,8 @@ pub struct JointSpec {
     pub mass: f64,
     /// Centre of mass in the link's frame [m].
     pub centre_of_mass: DVec3,
-    /// Principal moments of inertia about the centre of mass, along the link frame's axes [kg m^2].
-    pub inertia: DVec3,
+    /// Inertia about the centre of mass, along the link frame's axes, symmetric and positive semidefinite [kg m^2].
+    pub inertia: DMat3,
     /// Reflected inertia of the actuator about the joint, positive, so that the chain's inertia is positive definite in
     /// every configuration [kg m^2 or kg].
     pub rotor_inertia: f64,

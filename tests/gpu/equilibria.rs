@@ -15,7 +15,8 @@ use haptize::{
 
 /// Springs along their rest direction, and a solid: of both, unlike isotropic springs, the compliance has blocks of nine numbers.
 const AXIAL: Material = Material::Springs(SpringSpec { kind: SpringKind::Axial, stiffness: 300.0 });
-const SOLID: Material = Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.01) });
+const SOLID: Material =
+    Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.01), inclusions: Vec::new() });
 
 /// Every `stride`-th configuration of the scene's grid, from number `first` on.
 fn configurations(scene: &Scene, first: usize, stride: usize) -> Vec<JointVector> {

@@ -43,6 +43,7 @@ pub(super) fn order(nodes: &[DVec3], mut tetrahedra: Vec<[u32; 4]>) -> (Body, us
         surface_nodes: kept.iter().filter(|&&node| kind[node as usize] == 0).count(),
         triangles: faces.into_iter().map(|(face, _)| face.map(|node| numbers[node as usize])).collect(),
         tetrahedra: tetrahedra.into_iter().map(|corners| corners.map(|node| numbers[node as usize])).collect(),
+        regions: Vec::new(),
     };
     (ordered, turned)
 }

@@ -24,7 +24,7 @@ type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
 const MAX_BYTES: u64 = 1 << 28;
 
 /// Reads the surface in `file`; what is merged on the way is told in `warnings`.
-pub(super) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<String>) -> Result<Surface, ObjectError> {
+pub(crate) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<String>) -> Result<Surface, ObjectError> {
     if !(scale > 0.0 && scale.is_finite()) {
         return Err(ObjectError::Parameter { name: "scale", value: scale, range: "positive and finite" });
     }
@@ -67,6 +67,7 @@ pub(super) fn read_tetrahedra(
     let mesh = msh::read(&mut BufReader::new(open(file)?)).map_err(unreadable)?;
     let nodes: Vec<DVec3> = mesh.nodes.iter().map(|node| scale * *node + centre).collect();
     let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra);
+    let ordered = Body { regions: mesh.regions, ..ordered };
     if turned > 0 {
         let (file, all) = (file.display(), ordered.tetrahedra.len());
         warnings.push(format!("{file}: {turned} of {all} tetrahedra were numbered inside out and were turned"));

@@ -1,6 +1,6 @@
 //! Tetrahedra from Gmsh files, ASCII of versions 2.2 and 4.1.
 //!
-//! Read are `$MeshFormat`, `$Nodes` and the elements of type 4 (tetrahedra of four nodes) in `$Elements`; points, lines and
+//! Read are `$MeshFormat`, `$Nodes`, the physical volumes in `$Entities` (4.1) and the elements of type 4 (tetrahedra of four nodes) in `$Elements`; points, lines and
 //! triangles, which Gmsh writes for boundaries, and all other sections are read past. The surface is what it always is: the
 //! faces that belong to one tetrahedron only. Every error names the line. Nothing is reserved for what a file announces
 //! before it is there.
@@ -13,6 +13,17 @@ use std::io::BufRead;
 pub(super) struct Mesh {
     pub nodes: Vec<DVec3>,
     pub tetrahedra: Vec<[u32; 4]>,
+    /// Physical volume of each tetrahedron, 0 outside all; empty if the file names none.
+    pub regions: Vec<u32>,
+}
+
+/// Tetrahedra as they come.
+#[derive(Default)]
+struct Tetrahedra {
+    corners: Vec<[u32; 4]>,
+    regions: Vec<u32>,
+    /// Physical volume of each volume of the geometry (version 4.1), by Gmsh's tags.
+    volumes: HashMap<i64, u32>,
 }
 
 /// Gmsh's number for a tetrahedron of four nodes.
@@ -23,7 +34,7 @@ pub(super) fn read(stream: &mut impl BufRead) -> Result<Mesh, String> {
     let mut lines = Lines { stream, number: 0, text: String::new() };
     let mut version = None;
     let mut nodes = Nodes::default();
-    let mut tetrahedra = Vec::new();
+    let mut tetrahedra = Tetrahedra::default();
     while lines.next()? {
         match lines.text.as_str() {
             "$MeshFormat" => version = Some(format(&mut lines)?),
@@ -35,6 +46,10 @@ pub(super) fn read(stream: &mut impl BufRead) -> Result<Mesh, String> {
                 Version::Two => elements_2(&mut lines, &nodes, &mut tetrahedra)?,
                 Version::Four => elements_4(&mut lines, &nodes, &mut tetrahedra)?,
             },
+            "$Entities" => match version.ok_or_else(|| lines.error("$Entities comes before $MeshFormat"))? {
+                Version::Two => skip(&mut lines)?,
+                Version::Four => entities(&mut lines, &mut tetrahedra.volumes)?,
+            },
             section if section.starts_with('$') => skip(&mut lines)?,
             _ => return Err(lines.error("this is no section of a Gmsh file")),
         }
@@ -42,10 +57,14 @@ pub(super) fn read(stream: &mut impl BufRead) -> Result<Mesh, String> {
     if version.is_none() {
         return Err("it has no $MeshFormat: it is no Gmsh file".to_owned());
     }
+    let Tetrahedra { corners: tetrahedra, mut regions, .. } = tetrahedra;
     if tetrahedra.is_empty() {
         return Err("it has no tetrahedra of four nodes: mesh the volume in first order (gmsh -3 -order 1)".to_owned());
     }
-    Ok(Mesh { nodes: nodes.positions, tetrahedra })
+    if regions.iter().all(|region| *region == 0) {
+        regions.clear();
+    }
+    Ok(Mesh { nodes: nodes.positions, tetrahedra, regions })
 }
 
 #[derive(Clone, Copy)]
@@ -165,6 +184,23 @@ fn skip(lines: &mut Lines<'_, impl BufRead>) -> Result<(), String> {
     }
 }
 
+/// `points curves surfaces volumes`, then one line for each; that of a volume has its tag, six bounds, the number of its physical volumes
+/// and these, of which the first counts.
+fn entities(lines: &mut Lines<'_, impl BufRead>, volumes: &mut HashMap<i64, u32>) -> Result<(), String> {
+    lines.require()?;
+    let ([points, curves, surfaces, count], _) = lines.numbers::<u64, 4>()?;
+    for _ in 0..points.saturating_add(curves).saturating_add(surfaces) {
+        lines.require()?;
+    }
+    for _ in 0..count {
+        lines.require()?;
+        if lines.number_at::<u64>(7)? > 0 {
+            volumes.insert(lines.number_at(0)?, lines.number_at(8)?);
+        }
+    }
+    lines.end("$EndEntities")
+}
+
 fn nodes_2(lines: &mut Lines<'_, impl BufRead>, nodes: &mut Nodes) -> Result<(), String> {
     lines.require()?;
     let ([count], _) = lines.numbers::<u64, 1>()?;
@@ -198,11 +234,7 @@ fn nodes_4(lines: &mut Lines<'_, impl BufRead>, nodes: &mut Nodes) -> Result<(),
     lines.end("$EndNodes")
 }
 
-fn elements_2(
-    lines: &mut Lines<'_, impl BufRead>,
-    nodes: &Nodes,
-    tetrahedra: &mut Vec<[u32; 4]>,
-) -> Result<(), String> {
+fn elements_2(lines: &mut Lines<'_, impl BufRead>, nodes: &Nodes, tetrahedra: &mut Tetrahedra) -> Result<(), String> {
     lines.require()?;
     let ([count], _) = lines.numbers::<u64, 1>()?;
     for _ in 0..count {
@@ -214,27 +246,27 @@ fn elements_2(
             if first.saturating_add(4) != all {
                 return Err(lines.error("a tetrahedron must have four nodes"));
             }
+            // The first label is the physical volume.
+            let region = if labels > 0 { lines.number_at(3)? } else { 0 };
             let mut tags = [0; 4];
             for (k, tag) in tags.iter_mut().enumerate() {
                 *tag = lines.number_at(first + k)?;
             }
-            tetrahedra.push(nodes.corners(lines, tags)?);
+            tetrahedra.corners.push(nodes.corners(lines, tags)?);
+            tetrahedra.regions.push(region);
         }
     }
     lines.end("$EndElements")
 }
 
 /// `blocks elements least greatest`, then blocks: `dimension entity type elements`, and lines of a number and the nodes.
-fn elements_4(
-    lines: &mut Lines<'_, impl BufRead>,
-    nodes: &Nodes,
-    tetrahedra: &mut Vec<[u32; 4]>,
-) -> Result<(), String> {
+fn elements_4(lines: &mut Lines<'_, impl BufRead>, nodes: &Nodes, tetrahedra: &mut Tetrahedra) -> Result<(), String> {
     lines.require()?;
     let ([blocks], _) = lines.numbers::<u64, 1>()?;
     for _ in 0..blocks {
         lines.require()?;
-        let ([_, _, kind, count], _) = lines.numbers::<i64, 4>()?;
+        let ([_, entity, kind, count], _) = lines.numbers::<i64, 4>()?;
+        let region = tetrahedra.volumes.get(&entity).copied().unwrap_or(0);
         for _ in 0..count {
             lines.require()?;
             if kind == TETRAHEDRON as i64 {
@@ -242,7 +274,8 @@ fn elements_4(
                 if all != 5 {
                     return Err(lines.error("a tetrahedron must have four nodes"));
                 }
-                tetrahedra.push(nodes.corners(lines, tags)?);
+                tetrahedra.corners.push(nodes.corners(lines, tags)?);
+                tetrahedra.regions.push(region);
             }
         }
     }

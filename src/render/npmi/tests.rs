@@ -6,7 +6,7 @@ use crate::{
     random::Random,
     scene::JointKind,
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Numbers between -1 and 1, the same every time.
 struct Noise(Random);
@@ -219,7 +219,7 @@ fn arm(count: usize, limits: [f64; 2]) -> Chain {
         limits,
         mass: 0.4,
         centre_of_mass: DVec3::new(0.15, 0.01, 0.02),
-        inertia: DVec3::new(1e-4, 2e-3, 2e-3),
+        inertia: DMat3::from_diagonal(DVec3::new(1e-4, 2e-3, 2e-3)),
         rotor_inertia: 1e-4,
     };
     Chain { joints: (0..count).map(joint).collect(), nodes: Vec::new() }

@@ -2,8 +2,10 @@
 
 use super::super::check::Checker;
 use super::super::error::SceneError;
-use super::super::file::{GroundTable, MeshTable, ObjectTable, SphereTable};
-use super::super::{ElasticSpec, GroundNodes, GroundSpec, Material, ObjectSpec, Shape, SpringSpec};
+use super::super::file::{GroundTable, InclusionTable, MeshTable, ObjectTable, SphereTable};
+use super::super::{
+    ElasticSpec, GroundNodes, GroundSpec, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape, SpringSpec,
+};
 use super::skin;
 use glam::DVec3;
 use std::ops::Range;
@@ -53,7 +55,7 @@ pub(super) fn convert(checker: &Checker<'_>, table: &Spanned<ObjectTable>) -> Re
         }
     };
     let material = material(checker, table, span.clone())?;
-    let skin = table.skin.as_ref().map(|skin| skin::convert(checker, skin, material)).transpose()?;
+    let skin = table.skin.as_ref().map(|skin| skin::convert(checker, skin, &material)).transpose()?;
     let ground = table.ground.as_ref().map(|own| ground(checker, own)).transpose()?;
     if ground.is_none() && skin.is_none_or(|skin| skin.foundation == 0.0) {
         let message = "nothing holds the object: add [object.ground], or a foundation to [object.skin]";
@@ -127,11 +129,11 @@ fn material(checker: &Checker<'_>, table: &ObjectTable, span: Range<usize>) -> R
                 return Err(checker.error(cell.span(), "tetrahedra are solid already: leave cell out"));
             }
             let young = checker.positive("young", &elasticity.young)?;
-            Ok(Material::Elastic(ElasticSpec {
-                young,
-                poisson: checker.between("poisson", &elasticity.poisson, -1.0, 0.5)?,
-                cell,
-            }))
+            let poisson = checker.between("poisson", &elasticity.poisson, -1.0, 0.5)?;
+            let has_regions = table.tetrahedra.is_some();
+            let inclusions: Result<Vec<InclusionSpec>, SceneError> =
+                elasticity.inclusion.iter().map(|own| inclusion(checker, own, poisson, has_regions)).collect();
+            Ok(Material::Elastic(ElasticSpec { young, poisson, cell, inclusions: inclusions? }))
         }
         (None, None) if table.skin.is_some() && table.tetrahedra.is_none() => Ok(Material::Hollow),
         (None, None) => {
@@ -143,6 +145,34 @@ fn material(checker: &Checker<'_>, table: &ObjectTable, span: Range<usize>) -> R
             Err(checker.error(elasticity.span(), message))
         }
     }
+}
+
+/// `poisson`: of the solid around; `has_regions`: whether its shape is a Gmsh file.
+fn inclusion(
+    checker: &Checker<'_>,
+    table: &Spanned<InclusionTable>,
+    poisson: f64,
+    has_regions: bool,
+) -> Result<InclusionSpec, SceneError> {
+    let (span, table) = (table.span(), table.get_ref());
+    let place = match (&table.sphere, &table.region) {
+        (Some(sphere), None) => InclusionPlace::Sphere {
+            centre: checker.vector("centre", Some(&sphere.centre))?,
+            radius: checker.positive("radius", &sphere.radius)?,
+        },
+        (None, Some(region)) if has_regions => InclusionPlace::Region(*region.get_ref()),
+        (None, Some(region)) => {
+            let message = "a region is a physical volume of a Gmsh file, and the object has none: give a sphere, or \
+                           [object.tetrahedra]";
+            return Err(checker.error(region.span(), message));
+        }
+        _ => {
+            let message = "an inclusion needs one of sphere = { centre = [x, y, z], radius = r } and region = n";
+            return Err(checker.error(span, message));
+        }
+    };
+    let own = table.poisson.as_ref().map(|value| checker.between("poisson", value, -1.0, 0.5));
+    Ok(InclusionSpec { place, young: checker.positive("young", &table.young)?, poisson: own.unwrap_or(Ok(poisson))? })
 }
 
 fn ground(checker: &Checker<'_>, table: &GroundTable) -> Result<GroundSpec, SceneError> {

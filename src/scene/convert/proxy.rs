@@ -3,16 +3,16 @@
 use super::super::check::Checker;
 use super::super::error::SceneError;
 use super::super::file::{JointTable, NodesTable, Number, ProxyTable};
-use super::super::{JointKind, JointSpec, ProxyNodeSpec, ProxySpec};
+use super::super::inertia::is_positive_semidefinite;
+use super::super::{JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
 use crate::{MAX_JOINTS, tolerances::GRID_LINE};
+use glam::DMat3;
 use toml::Spanned;
 
 /// Default reflected inertia of the actuator of a revolute joint, that of a desktop device [kg m^2].
 const ROTOR_INERTIA: f64 = 1e-3;
 /// The same of a prismatic joint [kg].
 const ROTOR_MASS: f64 = 0.05;
-/// Most contact nodes of a chain: far more than a chain of six links needs, few enough for one per thread on a GPU.
-const MAX_NODES: usize = 4096;
 /// Longest name, in characters, that still fits a figure's legend.
 const MAX_NAME: usize = 40;
 
@@ -35,8 +35,8 @@ pub(super) fn convert(checker: &Checker<'_>, table: &ProxyTable) -> Result<Proxy
     if nodes == 0 {
         return Err(checker.error(table.joint.span(), "no link has contact nodes: give one of the joints a nodes list"));
     }
-    if nodes > MAX_NODES {
-        let message = format!("the proxy has {nodes} contact nodes: it may have at most {MAX_NODES}");
+    if nodes > MAX_CONTACT_NODES {
+        let message = format!("the proxy has {nodes} contact nodes: it may have at most {MAX_CONTACT_NODES}");
         return Err(checker.error(table.joint.span(), message));
     }
     Ok(ProxySpec { joints })
@@ -58,10 +58,6 @@ fn joint(checker: &Checker<'_>, table: &JointTable, index: usize) -> Result<Join
         JointKind::Revolute => ROTOR_INERTIA,
         JointKind::Prismatic => ROTOR_MASS,
     };
-    let inertia = checker.vector("inertia", table.inertia.as_ref())?;
-    if let Some(table) = table.inertia.as_ref().filter(|_| inertia.min_element() < 0.0) {
-        return Err(checker.error(table.span(), "inertia has a negative moment: moments are zero or positive"));
-    }
     let mut nodes = Vec::new();
     for table in &table.nodes {
         add_nodes(checker, table, &mut nodes)?;
@@ -74,10 +70,39 @@ fn joint(checker: &Checker<'_>, table: &JointTable, index: usize) -> Result<Join
         limits,
         mass: table.mass.as_ref().map_or(Ok(0.0), |value| checker.not_negative("mass", value))?,
         centre_of_mass: checker.vector("centre_of_mass", table.centre_of_mass.as_ref())?,
-        inertia,
+        inertia: table.inertia.as_ref().map_or(Ok(DMat3::ZERO), |value| inertia(checker, value))?,
         rotor_inertia: rotor_inertia.unwrap_or(Ok(default_rotor_inertia))?,
         nodes,
     })
+}
+
+/// Moments, or moments and products, of inertia as a matrix [kg m^2].
+fn inertia(checker: &Checker<'_>, value: &Spanned<Vec<f64>>) -> Result<DMat3, SceneError> {
+    let numbers = value.get_ref();
+    checker.all_finite("inertia", numbers, value.span())?;
+    let (moments, products) = match numbers[..] {
+        [xx, yy, zz] => ([xx, yy, zz], [0.0; 3]),
+        [xx, yy, zz, xy, xz, yz] => ([xx, yy, zz], [xy, xz, yz]),
+        _ => {
+            let message = format!(
+                "inertia has {} numbers: it is a list of three moments [xx, yy, zz], or of moments and products [xx, yy, zz, \
+                 xy, xz, yz]",
+                numbers.len()
+            );
+            return Err(checker.error(value.span(), message));
+        }
+    };
+    if moments.into_iter().any(|moment| moment < 0.0) {
+        return Err(checker.error(value.span(), "inertia has a negative moment: moments are zero or positive"));
+    }
+    let [[xx, yy, zz], [xy, xz, yz]] = [moments, products];
+    let inertia = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
+    if !is_positive_semidefinite(&inertia) {
+        let message =
+            "no body has these products of inertia beside these moments: the matrix must have no negative eigenvalue";
+        return Err(checker.error(value.span(), message));
+    }
+    Ok(inertia)
 }
 
 /// Names become columns of tables and legends of figures.
@@ -107,7 +132,7 @@ fn add_nodes(
         (None, Some(from), Some(to), count, spacing) if count.is_some() != spacing.is_some() => {
             let (from, to) = (checker.vector("from", Some(from))?, checker.vector("to", Some(to))?);
             let intervals = match (count, spacing) {
-                (Some(count), _) => checker.count("count", count, 2, MAX_NODES)? - 1,
+                (Some(count), _) => checker.count("count", count, 2, MAX_CONTACT_NODES)? - 1,
                 (None, Some(spacing)) => intervals(checker, spacing, from.distance(to))?,
                 (None, None) => 1,
             };
@@ -131,8 +156,9 @@ fn add_nodes(
 /// Number of equal parts, each at most `spacing` long, of a line of `length` [m].
 fn intervals(checker: &Checker<'_>, spacing: &Number, length: f64) -> Result<usize, SceneError> {
     let parts = (length / checker.positive("spacing", spacing)? - GRID_LINE).ceil().max(1.0);
-    if parts >= MAX_NODES as f64 {
-        let message = format!("spacing makes {parts:.0} parts of a line: a chain may have at most {MAX_NODES} nodes");
+    if parts >= MAX_CONTACT_NODES as f64 {
+        let message =
+            format!("spacing makes {parts:.0} parts of a line: a chain may have at most {MAX_CONTACT_NODES} nodes");
         return Err(checker.error(spacing.span(), message));
     }
     Ok(parts as usize)

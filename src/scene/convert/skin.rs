@@ -26,7 +26,7 @@ const ABOVE_HALF: f64 = 0.5 + f64::EPSILON;
 pub(super) fn convert(
     checker: &Checker<'_>,
     table: &Spanned<SkinTable>,
-    material: Material,
+    material: &Material,
 ) -> Result<SkinSpec, SceneError> {
     let span = table.span();
     let table = table.get_ref();
@@ -79,13 +79,13 @@ fn bending_by_width(
     width: &Number,
     tension: f64,
     foundation: f64,
-    material: Material,
+    material: &Material,
 ) -> Result<f64, SceneError> {
     let w = checker.positive("width", width)?;
     match material {
         _ if tension > 0.0 => Ok(tension * w.powi(2)),
         Material::Elastic(ElasticSpec { young, poisson, .. }) => {
-            Ok(young / (2.0 * (1.0 - poisson * poisson)) * w.powi(3))
+            Ok(*young / (2.0 * (1.0 - *poisson * *poisson)) * w.powi(3))
         }
         Material::Hollow if foundation > 0.0 => Ok(foundation * w.powi(4)),
         Material::Hollow | Material::Springs(_) => {

@@ -214,6 +214,7 @@ targets! {
     ply_meshes: targets::PLY;
     stl_meshes: targets::STL;
     gmsh_meshes: targets::MSH;
+    robots: targets::ROBOTS;
     scan_logs: targets::LOGS;
     column_mappings_and_tables: targets::MAPPINGS;
     recordings: targets::RECORDINGS;

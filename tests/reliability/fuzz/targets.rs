@@ -23,6 +23,7 @@ use haptize::{
         ElasticSpec, GroundNodes, GroundSpec, Material, ObjectSpec, Rendering, ScanScene, Scene, Shape, SpringKind,
         SpringSpec,
     },
+    urdf::{self, Arm, Robot, UrdfError},
 };
 use std::{
     path::Path,
@@ -51,6 +52,11 @@ fn outcome<T, E: ToString>(result: Result<T, E>) -> String {
 /// A file of this repository.
 fn shipped(path: &str) -> Vec<u8> {
     std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+}
+
+/// Path of a file of this repository.
+fn shipped_path(path: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path).display().to_string()
 }
 
 fn write(file: &Path, input: &[u8]) {
@@ -272,7 +278,12 @@ pub const STL: Target = Target {
     seeds: || vec![shipped("datasets/cube.stl"), binary_stl()],
     mutate: PLY.mutate,
     run: |file, input| {
-        mesh(file, input, None, Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.1) }))
+        mesh(
+            file,
+            input,
+            None,
+            Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.1), inclusions: Vec::new() }),
+        )
     },
     kinds: 14,
 };
@@ -295,9 +306,47 @@ pub const MSH: Target = Target {
     extension: "msh",
     seeds: || vec![program::BLOCK.into(), program::BLOCK_4.into()],
     mutate: mutate::text,
-    run: |file, input| mesh(file, input, None, Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: None })),
+    run: |file, input| {
+        mesh(
+            file,
+            input,
+            None,
+            Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: None, inclusions: Vec::new() }),
+        )
+    },
     kinds: 30,
 };
+
+pub const ROBOTS: Target = Target {
+    name: "urdf",
+    extension: "urdf",
+    seeds: || {
+        let file = |name: &str| shipped(&format!("tests/urdf/robots/{name}"));
+        // The meshes are found from the folder of the input only where their path is whole.
+        let mesh = shipped_path("tests/urdf/robots/meshes/tip.obj");
+        let arm = String::from_utf8(file("arm.urdf")).unwrap();
+        vec![arm.replace("package://robots/meshes/tip.obj", &mesh).into_bytes(), file("finger.urdf")]
+    },
+    mutate: mutate::text,
+    run: |file, input| {
+        write(file, input);
+        match imported(file) {
+            // What is accepted makes a valid scene.
+            Err(UrdfError::Scene(error)) => panic!("{error}"),
+            made => outcome(made),
+        }
+    },
+    kinds: 40,
+};
+
+/// The scene of the chain to the last link, sampled coarsely.
+fn imported(file: &Path) -> Result<String, UrdfError> {
+    let robot = Robot::load(file)?;
+    let tip = robot.links.iter().rev().find(|link| link.name != "camera").map_or("none", |link| &link.name);
+    let arm = Arm::new(&robot, tip, &[])?;
+    let nodes = urdf::sample(&robot, &arm, 0.02, None)?;
+    urdf::write_scene(&robot, &arm, &nodes, "haptize import")
+}
 
 pub const LOGS: Target = Target {
     name: "logs",

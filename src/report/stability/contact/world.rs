@@ -11,7 +11,7 @@ use crate::{
         ProxySpec, Shape, SkinSpec, SpringKind, SpringSpec,
     },
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::f64::consts::{PI, TAU};
 
 /// Radius of the sphere [m].
@@ -136,7 +136,7 @@ pub fn joint(kind: JointKind, origin: DVec3, axis: DVec3, nodes: Vec<ProxyNodeSp
         limits: [-10.0, 10.0],
         mass: 0.1,
         centre_of_mass: DVec3::ZERO,
-        inertia: DVec3::splat(1e-4),
+        inertia: DMat3::from_diagonal(DVec3::splat(1e-4)),
         rotor_inertia: 1e-3,
         nodes,
     }

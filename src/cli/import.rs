@@ -1,0 +1,117 @@
+//! `haptize import`: a robot's file becomes a scene.
+
+use super::{Failure, Report, tell};
+use haptize::urdf::{self, Arm, Lock, Robot};
+use std::{
+    fmt::Write as _,
+    fs::OpenOptions,
+    io::{ErrorKind, Write as _},
+    path::{Path, PathBuf},
+};
+
+/// Which robot, and which part of it.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The robot's file, URDF. Xacro is expanded first: `xacro FILE > ROBOT.urdf`.
+    robot: PathBuf,
+    /// The link at the end of the arm; its chain to the root becomes the arm.
+    #[arg(long, value_name = "LINK")]
+    tip: String,
+    /// Hold a joint at a value [rad or m]; a scene has at most six that move. May be given several times.
+    #[arg(long, value_name = "JOINT=VALUE", value_parser = lock, allow_hyphen_values = true)]
+    lock: Vec<Lock>,
+    /// Least distance between contact nodes on the links' shapes [m].
+    #[arg(long, default_value_t = 0.005, value_name = "METRES", allow_negative_numbers = true)]
+    spacing: f64,
+    /// Folder that holds the ROS packages that `package://` names, if they are in no folder above the robot's file.
+    #[arg(long, value_name = "DIR")]
+    package_path: Option<PathBuf>,
+    /// The scene to write, which must not be there yet; by default the robot's file in the current folder, ending in .toml.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+}
+
+/// Reads JOINT=VALUE.
+fn lock(text: &str) -> Result<Lock, String> {
+    let (joint, value) = text.rsplit_once('=').ok_or("it must be JOINT=VALUE")?;
+    let value: f64 = value.trim().parse().map_err(|_| format!("{value:?} is no number"))?;
+    if !value.is_finite() {
+        return Err(format!("{value} is no place for a joint"));
+    }
+    Ok(Lock { joint: joint.trim().to_owned(), value })
+}
+
+/// Writes the scene, and tells what the robot's file lacks.
+pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    let robot = Robot::load(&arguments.robot)?;
+    let arm = Arm::new(&robot, &arguments.tip, &arguments.lock)?;
+    let nodes = urdf::sample(&robot, &arm, arguments.spacing, arguments.package_path.as_deref())?;
+    let scene = urdf::write_scene(&robot, &arm, &nodes, &command(arguments))?;
+    let output = match &arguments.output {
+        Some(output) => output.clone(),
+        None => PathBuf::from(arguments.robot.file_name().ok_or("the robot's path names no file; give -o")?)
+            .with_extension("toml"),
+    };
+    write(&output, &scene)?;
+    let notes: Vec<String> = (arm.notes.iter())
+        .map(|note| format!("{}:{}: {}", arguments.robot.display(), note.line, note.message))
+        .collect();
+    notes.iter().for_each(|note| tell(format_args!("haptize: {note}")));
+    let mut text = String::new();
+    let counts: Vec<usize> = nodes.of_joints.iter().map(Vec::len).collect();
+    writeln!(
+        text,
+        "{}: {} joints, {} contact nodes",
+        output.display(),
+        arm.joints.len(),
+        counts.iter().sum::<usize>()
+    )?;
+    for (joint, count) in arm.joints.iter().zip(&counts) {
+        let [lower, upper] = joint.limits;
+        writeln!(
+            text,
+            "  {:<24} {:9} {lower:8.3} to {upper:.3}, {count} nodes",
+            joint.name,
+            format!("{:?}", joint.kind).to_lowercase()
+        )?;
+    }
+    writeln!(text, "  next         haptize bake {}", output.display())?;
+    let json = serde_json::json!({
+        "file": output.display().to_string(),
+        "joints": arm.joints.iter().map(|joint| joint.name.as_str()).collect::<Vec<_>>(),
+        "nodes": counts,
+        "notes": notes,
+    });
+    Ok(Report { text, json, whole: true })
+}
+
+/// The command line again, for the head of the scene; files without their folders.
+fn command(arguments: &Arguments) -> String {
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut command = format!("haptize import {} --tip {}", name(&arguments.robot), arguments.tip);
+    arguments.lock.iter().for_each(|Lock { joint, value }| command += &format!(" --lock {joint}={value}"));
+    command + &format!(" --spacing {}", arguments.spacing)
+}
+
+/// Writes a new file. A scene that is there may hold the work of a person, and is left as it is.
+fn write(output: &Path, scene: &str) -> Result<(), Failure> {
+    let failed =
+        |error: std::io::Error| -> Failure { format!("{}: cannot be written: {error}", output.display()).into() };
+    let mut file = match OpenOptions::new().write(true).create_new(true).open(output) {
+        Ok(file) => file,
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+            return Err(format!(
+                "{}: there is a file already; nothing is written: name another file",
+                output.display()
+            )
+            .into());
+        }
+        Err(error) => return Err(failed(error)),
+    };
+    let written = file.write_all(scene.as_bytes()).and_then(|()| file.sync_all());
+    written.map_err(|error| {
+        // Half a scene is worse than none.
+        let _ = std::fs::remove_file(output);
+        failed(error)
+    })
+}

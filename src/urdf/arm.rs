@@ -1,0 +1,318 @@
+//! The chain from the root to a tip link, in the frames that scenes use.
+//!
+//! At q = 0 a scene's link frames are parallel to the world, each with its origin at its joint. So with the pose (R, p) of joint
+//! frame i in the root's frame at q = 0, the scene has origin_i = p_i - p_(i-1), axis_i = R_i axis, and a point x of a link that is
+//! placed at (S, s) is at s + S x - p_i. What fixed and locked joints carry belongs to the last moving joint before them, branches
+//! beside the chain included.
+
+use super::group::Group;
+use super::robot::{Joint, JointType, Robot};
+use super::{Inertial, Placed, UrdfError};
+use crate::MAX_JOINTS;
+use crate::scene::JointKind;
+use glam::{DAffine3, DQuat, DVec3};
+use std::collections::HashMap;
+use std::f64::consts::{PI, TAU};
+
+/// A joint that is held.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lock {
+    /// Its name.
+    pub joint: String,
+    /// Where [rad or m].
+    pub value: f64,
+}
+
+/// The chain from the root to the tip.
+#[derive(Clone, Debug)]
+pub struct Arm {
+    /// Links that do not move.
+    pub base: Vec<String>,
+    /// From the base outwards.
+    pub joints: Vec<ArmJoint>,
+    /// What was left out or assumed.
+    pub notes: Vec<Note>,
+}
+
+/// What was left out of a robot file or assumed beyond it, for the user to read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// Line of the file, from 1.
+    pub line: usize,
+    /// One sentence.
+    pub message: String,
+}
+
+/// A moving joint, and all that moves with it before the next.
+#[derive(Clone, Debug)]
+pub struct ArmJoint {
+    /// As the file calls it.
+    pub name: String,
+    /// Turning or sliding.
+    pub kind: JointKind,
+    /// In the frame of the joint before, parallel to the world at q = 0 [m].
+    pub origin: DVec3,
+    /// Unit vector, parallel to the world at q = 0.
+    pub axis: DVec3,
+    /// Least and greatest coordinate [rad or m].
+    pub limits: [f64; 2],
+    /// Greatest torque, where the file gives it [N m or N].
+    pub effort: Option<f64>,
+    /// Greatest speed, where the file gives it [rad/s or m/s].
+    pub velocity: Option<f64>,
+    /// Links that move with it.
+    pub links: Vec<String>,
+    /// Of all of these together, in the joint's frame.
+    pub inertial: Inertial,
+    /// Their shapes, in the joint's frame.
+    pub shapes: Vec<Placed>,
+}
+
+impl Arm {
+    /// Returns the chain of `robot` to the link `tip`, joints of `locks` held.
+    ///
+    /// # Errors
+    /// [`UrdfError::Request`] if `tip` or a lock names nothing, a lock is outside its limits, or there are more than six joints or none;
+    /// [`UrdfError::Invalid`] if a joint on the way is one that a scene does not have.
+    pub fn new(robot: &Robot, tip: &str, locks: &[Lock]) -> Result<Self, UrdfError> {
+        let held = held(robot, locks)?;
+        let way = way(robot, tip)?;
+        let moving: Vec<&str> = way
+            .iter()
+            .filter(|number| !held.contains_key(*number))
+            .map(|&number| robot.joints[number].name.as_str())
+            .collect();
+        if moving.is_empty() || moving.len() > MAX_JOINTS {
+            let message = match moving.len() {
+                0 => format!("no joint moves link {tip:?}: name a tip farther out"),
+                count => format!(
+                    "the chain to {tip:?} has {count} moving joints, {}: a scene takes {MAX_JOINTS}; hold some with --lock JOINT=VALUE",
+                    moving.join(", ")
+                ),
+            };
+            return Err(UrdfError::Request { path: robot.path.clone(), message });
+        }
+        let mut builder = Builder { robot, held: &held, way: &way, children: children(robot), notes: Vec::new() };
+        let root = way.first().map_or(0, |&number| robot.joints[number].parent);
+        let base = builder.gather(root, DAffine3::IDENTITY);
+        let (mut place, mut before) = (DAffine3::IDENTITY, DVec3::ZERO);
+        let mut joints = Vec::new();
+        for &number in &way {
+            let joint = &robot.joints[number];
+            place *= joint.origin;
+            if let Some(motion) = held.get(&number) {
+                place *= *motion;
+                continue;
+            }
+            let (kind, limits) = builder.movement(joint)?;
+            let group = builder.gather(joint.child, place).about(place.translation);
+            builder.note_gaps(joint, &group);
+            joints.push(ArmJoint {
+                name: joint.name.clone(),
+                kind,
+                origin: place.translation - before,
+                axis: (place.matrix3 * joint.axis).normalize_or(joint.axis),
+                limits,
+                effort: joint.effort.filter(|effort| *effort > 0.0),
+                velocity: joint.velocity.filter(|velocity| *velocity > 0.0),
+                links: group.names(robot),
+                inertial: group.inertial(),
+                shapes: group.shapes,
+            });
+            before = place.translation;
+        }
+        Ok(Self { base: base.names(robot), joints, notes: builder.notes })
+    }
+}
+
+/// Motions of the joints that do not move: identity if fixed, that of its value if locked.
+fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, UrdfError> {
+    let fixed = robot.joints.iter().enumerate().filter(|(_, joint)| joint.kind == JointType::Fixed);
+    let mut held: HashMap<usize, DAffine3> = fixed.map(|(number, _)| (number, DAffine3::IDENTITY)).collect();
+    for Lock { joint: name, value } in locks {
+        let refuse = |message: String| Err(UrdfError::Request { path: robot.path.clone(), message });
+        let Some(number) = robot.joints.iter().position(|joint| joint.name == *name) else {
+            let joints = robot.joints.iter().filter(|joint| joint.kind != JointType::Fixed);
+            return refuse(format!("there is no joint {name:?} to lock: {}", listed(joints.map(|joint| &joint.name))));
+        };
+        let joint = &robot.joints[number];
+        let within = |[lower, upper]: [f64; 2]| *value >= lower && *value <= upper;
+        if let Some([lower, upper]) =
+            joint.limits.filter(|limits| joint.kind != JointType::Continuous && !within(*limits))
+        {
+            return refuse(format!("joint {name:?} cannot be locked at {value}: its limits are {lower} and {upper}"));
+        }
+        let motion = match joint.kind {
+            JointType::Revolute | JointType::Continuous => {
+                DAffine3::from_quat(DQuat::from_axis_angle(joint.axis, *value))
+            }
+            JointType::Prismatic => DAffine3::from_translation(*value * joint.axis),
+            JointType::Fixed => return refuse(format!("joint {name:?} is fixed already: leave out its --lock")),
+            JointType::Floating | JointType::Planar => {
+                return refuse(format!("joint {name:?} has more than one coordinate: make it fixed in the file"));
+            }
+        };
+        if held.insert(number, motion).is_some() {
+            return refuse(format!("joint {name:?} is locked twice: keep one --lock"));
+        }
+    }
+    Ok(held)
+}
+
+/// Joints from the root to the link `tip`.
+fn way(robot: &Robot, tip: &str) -> Result<Vec<usize>, UrdfError> {
+    let Some(mut link) = robot.links.iter().position(|link| link.name == tip) else {
+        let parents: std::collections::HashSet<usize> = robot.joints.iter().map(|joint| joint.parent).collect();
+        let ends = robot.links.iter().enumerate().filter(|(number, _)| !parents.contains(number));
+        let message = format!("there is no link {tip:?}; chains end at {}", listed(ends.map(|(_, link)| &link.name)));
+        return Err(UrdfError::Request { path: robot.path.clone(), message });
+    };
+    let movers: HashMap<usize, usize> =
+        robot.joints.iter().enumerate().map(|(number, joint)| (joint.child, number)).collect();
+    let mut way = Vec::new();
+    while let Some(&number) = movers.get(&link) {
+        let joint = &robot.joints[number];
+        if way.len() == robot.joints.len() {
+            let message =
+                format!("joint {:?} belongs to a circle of joints: a URDF is a tree; remove one of them", joint.name);
+            return Err(robot.source().error(joint.span.clone(), message));
+        }
+        way.push(number);
+        link = joint.parent;
+    }
+    way.reverse();
+    Ok(way)
+}
+
+/// Least range of a joint [rad or m]: ten times the digits with which a scene shows its grid.
+const LEAST_RANGE: f64 = 1e-4;
+
+/// Most names in a message.
+const MOST_LISTED: usize = 20;
+
+/// Returns the names, with commas; those of long lists are left out at the end.
+fn listed<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    let names: Vec<&str> = names.map(String::as_str).collect();
+    let more = if names.len() > MOST_LISTED { ", .." } else { "" };
+    names[..names.len().min(MOST_LISTED)].join(", ") + more
+}
+
+/// Joints that each link carries.
+fn children(robot: &Robot) -> Vec<Vec<usize>> {
+    let mut children = vec![Vec::new(); robot.links.len()];
+    for (number, joint) in robot.joints.iter().enumerate() {
+        children[joint.parent].push(number);
+    }
+    children
+}
+
+struct Builder<'a> {
+    robot: &'a Robot,
+    held: &'a HashMap<usize, DAffine3>,
+    way: &'a [usize],
+    children: Vec<Vec<usize>>,
+    notes: Vec<Note>,
+}
+
+impl Builder<'_> {
+    fn note(&mut self, span: &std::ops::Range<usize>, message: String) {
+        self.notes.push(Note { line: self.robot.source().line(span.start), message });
+    }
+
+    /// Returns all that does not move against `link`, which is at `place` in the root's frame.
+    fn gather(&mut self, link: usize, place: DAffine3) -> Group {
+        let mut group = Group::default();
+        let mut open = vec![(link, place)];
+        while let Some((link, place)) = open.pop() {
+            group.add(link, &self.robot.links[link], place);
+            for number in self.children[link].clone() {
+                let joint = &self.robot.joints[number];
+                if let Some(motion) = self.held.get(&number) {
+                    open.push((joint.child, place * joint.origin * *motion));
+                } else if !self.way.contains(&number) {
+                    let message = format!(
+                        "joint {:?} moves beside the chain: link {:?} and what it carries are left out; --lock {}=VALUE keeps them",
+                        joint.name, self.robot.links[joint.child].name, joint.name
+                    );
+                    self.note(&joint.span, message);
+                }
+            }
+        }
+        group
+    }
+
+    /// Returns kind and limits of a joint of the chain.
+    fn movement(&mut self, joint: &Joint) -> Result<(JointKind, [f64; 2]), UrdfError> {
+        let name = &joint.name;
+        let refuse = |message: String| Err(self.robot.source().error(joint.span.clone(), message));
+        if let Some(leader) = &joint.mimic {
+            let chain = self.way.iter().map(|&number| &self.robot.joints[number]).filter(|other| other.name != *name);
+            if chain.into_iter().any(|other| other.name == *leader || other.mimic.as_ref() == Some(leader)) {
+                return refuse(format!(
+                    "joint {name:?} follows {leader:?} (mimic), as another joint of the chain does or is, and the joints of a scene \
+                     move independently: hold it with --lock {name}=VALUE, or remove <mimic>"
+                ));
+            }
+            let message = format!(
+                "joint {name:?} follows {leader:?} (mimic), which is not in the chain: it moves by itself in the scene"
+            );
+            self.note(&joint.span, message);
+        }
+        let kind = match joint.kind {
+            JointType::Prismatic => JointKind::Prismatic,
+            JointType::Floating | JointType::Planar => {
+                let kind = if joint.kind == JointType::Planar { "planar" } else { "floating" };
+                return refuse(format!(
+                    "joint {name:?} is {kind}, and the joints of a scene turn or slide: make it fixed, or write it as such joints"
+                ));
+            }
+            JointType::Fixed | JointType::Revolute | JointType::Continuous => JointKind::Revolute,
+        };
+        let limits = match joint.limits {
+            _ if joint.kind == JointType::Continuous => [-PI, PI],
+            Some([lower, upper]) if upper - lower >= LEAST_RANGE => [lower, upper],
+            Some([lower, upper]) => {
+                return refuse(format!(
+                    "joint {name:?} moves from {lower} to {upper}: the lower limit must be less than the upper, by {LEAST_RANGE} or more"
+                ));
+            }
+            None => return refuse(format!("joint {name:?} has no limits: add <limit lower=\"..\" upper=\"..\"/>")),
+        };
+        if joint.kind == JointType::Continuous {
+            self.note(&joint.span, format!("joint {name:?} turns without end: its limits in the scene are -pi and pi"));
+        } else if kind == JointKind::Revolute && limits[1] - limits[0] > TAU {
+            let message = format!(
+                "joint {name:?} turns by more than a revolution: angles a revolution apart are different configurations"
+            );
+            self.note(&joint.span, message);
+        }
+        if joint.was_scaled {
+            self.note(&joint.span, format!("the axis of joint {name:?} is no unit vector: its direction is taken"));
+        }
+        Ok((kind, limits))
+    }
+
+    /// Notes what the links that `joint` moves lack.
+    fn note_gaps(&mut self, joint: &Joint, group: &Group) {
+        if group.inertial().mass == 0.0 {
+            let message = format!(
+                "nothing that joint {:?} moves has an <inertial> with a mass: the scene gives it none",
+                joint.name
+            );
+            self.note(&joint.span, message);
+        }
+        if group.shapes.is_empty() {
+            let message = format!("nothing that joint {:?} moves has a shape: it gets no contact nodes", joint.name);
+            self.note(&joint.span, message);
+        }
+        for &link in &group.links {
+            let link = &self.robot.links[link];
+            if link.is_visual && !link.shapes.is_empty() {
+                self.note(&link.span, format!("link {:?} has no <collision>: its <visual> shapes are used", link.name));
+            }
+            if link.inertial.is_none() && !link.shapes.is_empty() && group.inertial().mass > 0.0 {
+                self.note(&link.span, format!("link {:?} has no <inertial>: it counts as massless", link.name));
+            }
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! XML of a robot file: elements, their attributes as numbers, and errors at their place.
+
+use super::UrdfError;
+use crate::scene::Diagnostic;
+use glam::DVec3;
+use roxmltree::{Document, Node, ParsingOptions};
+use std::{io::Read, ops::Range, path::Path};
+
+/// Longest file that is read [B]; the largest robots in public collections have a few hundred kB.
+const MAX_BYTES: u64 = 1 << 24;
+
+/// Most XML nodes of a file: a hundred times as many as those robots have.
+const MAX_NODES: u32 = 1 << 20;
+
+/// Largest size of any number [m, rad, kg, kg m^2, N m]: beyond every robot in SI units.
+const LARGEST: f64 = 1e6;
+
+/// How to get plain URDF from xacro.
+const XACRO: &str =
+    "this is xacro, which is a program, not a robot: run `xacro FILE > ROBOT.urdf` (pip install xacro) and import that";
+
+/// Text of a robot file.
+pub(super) struct Source<'a> {
+    pub path: &'a Path,
+    pub text: &'a str,
+}
+
+/// Reads the file's text.
+pub(super) fn read_text(path: &Path) -> Result<String, UrdfError> {
+    let unreadable = |reason: String| UrdfError::Unreadable { path: path.to_owned(), reason };
+    let stream = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
+    let attributes = stream.metadata().map_err(|error| unreadable(error.to_string()))?;
+    if !attributes.is_file() || attributes.len() > MAX_BYTES {
+        return Err(unreadable(format!("it is not a plain file of at most {MAX_BYTES} bytes")));
+    }
+    let mut text = String::new();
+    stream.take(MAX_BYTES).read_to_string(&mut text).map_err(|error| unreadable(error.to_string()))?;
+    Ok(text)
+}
+
+impl<'a> Source<'a> {
+    /// Returns an error at `span`.
+    pub fn error(&self, span: Range<usize>, message: impl Into<String>) -> UrdfError {
+        UrdfError::Invalid(Box::new(Diagnostic::new(self.path, self.text, span, message)))
+    }
+
+    /// Returns the line of the byte at `offset`, from 1.
+    pub fn line(&self, offset: usize) -> usize {
+        self.text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1
+    }
+
+    /// Parses the text as XML without a document type, in which entities may be defined that grow without bound.
+    pub fn parse(&self) -> Result<Document<'a>, UrdfError> {
+        if self.path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xacro")) {
+            return Err(self.error(0..0, XACRO));
+        }
+        let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+        let document = Document::parse_with_options(self.text, options).map_err(|error| self.xml_error(&error))?;
+        let is_xacro = |node: &Node<'_, '_>| node.tag_name().namespace().is_some_and(|uri| uri.contains("xacro"));
+        match document.descendants().find(is_xacro) {
+            Some(node) => Err(self.error(node.range(), XACRO)),
+            None => Ok(document),
+        }
+    }
+
+    fn xml_error(&self, error: &roxmltree::Error) -> UrdfError {
+        match error {
+            roxmltree::Error::DtdDetected => {
+                let start = self.text.find("<!DOCTYPE").unwrap_or(0);
+                let message = "a robot file has no document type, and none is read, since entities can grow without bound: \
+                               remove <!DOCTYPE ..>";
+                self.error(start..start + "<!DOCTYPE".len(), message)
+            }
+            roxmltree::Error::UnknownNamespace(prefix, place) if prefix == "xacro" => {
+                let offset = self.offset(*place);
+                self.error(offset..offset, XACRO)
+            }
+            _ => {
+                let offset = self.offset(error.pos());
+                self.error(offset..offset, format!("this is not well-formed XML: {error}"))
+            }
+        }
+    }
+
+    fn offset(&self, place: roxmltree::TextPos) -> usize {
+        let before: usize =
+            self.text.split_inclusive('\n').take(place.row.saturating_sub(1) as usize).map(str::len).sum();
+        let line = self.text.get(before..).unwrap_or_default();
+        let column = place.col.saturating_sub(1) as usize;
+        before + line.char_indices().nth(column).map_or(line.trim_end().len(), |(offset, _)| offset)
+    }
+
+    /// Returns the text of an attribute that must be there.
+    pub fn required<'n>(&self, node: Node<'n, '_>, name: &str) -> Result<&'n str, UrdfError> {
+        node.attribute(name).map(str::trim).filter(|text| !text.is_empty()).ok_or_else(|| {
+            let message = format!("<{}> needs the attribute {name}", node.tag_name().name());
+            self.error(node.range(), message)
+        })
+    }
+
+    /// Returns an attribute as N numbers, `None` if it is missing.
+    pub fn numbers<const N: usize>(&self, node: Node<'_, '_>, name: &str) -> Result<Option<[f64; N]>, UrdfError> {
+        let Some(attribute) = node.attribute_node(name) else { return Ok(None) };
+        let text = attribute.value();
+        let bad = |message: String| self.error(attribute.range(), message);
+        if text.contains("${") || text.contains("$(") {
+            return Err(bad(format!("{text:?} is an expression of xacro: {XACRO}")));
+        }
+        let mut numbers = [0.0_f64; N];
+        let mut words = text.split_ascii_whitespace();
+        for number in &mut numbers {
+            let word = words.next().ok_or_else(|| bad(format!("{name} must be {N} numbers separated by blanks")))?;
+            *number = word.parse().map_err(|_| bad(format!("{name} has {word:?}, which is no number")))?;
+            let in_range = number.abs() <= LARGEST;
+            if !in_range {
+                return Err(bad(format!("{name} has {word}: a robot in SI units has no number above {LARGEST:.0e}")));
+            }
+        }
+        if words.next().is_some() {
+            return Err(bad(format!("{name} must be {N} numbers, and there are more")));
+        }
+        Ok(Some(numbers))
+    }
+
+    /// Returns an attribute as a number, `None` if it is missing.
+    pub fn number(&self, node: Node<'_, '_>, name: &str) -> Result<Option<f64>, UrdfError> {
+        Ok(self.numbers::<1>(node, name)?.map(|[number]| number))
+    }
+
+    /// Returns an attribute as a number that must be there and positive.
+    pub fn positive(&self, node: Node<'_, '_>, name: &str) -> Result<f64, UrdfError> {
+        self.required(node, name)?;
+        let number = self.number(node, name)?.unwrap_or(0.0);
+        if number > 0.0 {
+            return Ok(number);
+        }
+        Err(self.error(node.range(), format!("{name} is {number}: it must be positive")))
+    }
+
+    /// Returns an attribute as a vector, `None` if it is missing.
+    pub fn vector(&self, node: Node<'_, '_>, name: &str) -> Result<Option<DVec3>, UrdfError> {
+        Ok(self.numbers::<3>(node, name)?.map(DVec3::from_array))
+    }
+}
+
+/// Returns the first child element of that name.
+pub(super) fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
+    node.children().find(|child| child.is_element() && child.tag_name().name() == name)
+}

@@ -1,0 +1,38 @@
+//! Where a robot file's meshes are.
+//!
+//! A plain path is relative to the robot file. `package://name/path` is a path in the ROS package `name`: a folder of that name that
+//! holds the robot file or lies beside one that does, or is in the folder that the user names. No program is asked for it.
+
+use std::path::{Path, PathBuf};
+
+/// Returns the file that `name` means in the robot file `robot`.
+///
+/// # Errors
+/// The reason and the remedy, if no such file is there.
+pub(super) fn resolve(name: &str, robot: &Path, packages: Option<&Path>) -> Result<PathBuf, String> {
+    let folder = robot.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if let Some(path) = name.strip_prefix("package://").or_else(|| name.strip_prefix("model://")) {
+        let (package, inside) = path.split_once('/').unwrap_or((path, ""));
+        if package.is_empty() || inside.is_empty() || path.split('/').any(|part| part == "..") {
+            return Err(format!("{name:?} names no file of a package: it must be package://PACKAGE/FILE"));
+        }
+        let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        let of_user = packages.into_iter().flat_map(|own| [own.join(package), own.to_owned()]);
+        let above = folder.ancestors().flat_map(|above| {
+            let itself = above.ends_with(package).then(|| above.to_owned());
+            itself.into_iter().chain([above.join(package)])
+        });
+        return of_user.chain(above).map(|place| place.join(inside)).find(|file| file.is_file()).ok_or_else(|| {
+            format!(
+                "the package {package:?} with the file {inside:?} lies in no folder above this file: name the folder that holds the \
+                 package with --package-path DIR"
+            )
+        });
+    }
+    let path = name.strip_prefix("file://").unwrap_or(name);
+    if let Some((scheme, _)) = path.split_once("://") {
+        return Err(format!("{scheme}:// is not opened: copy the mesh beside the robot file and name it by its path"));
+    }
+    let file = folder.join(path);
+    if file.is_file() { Ok(file) } else { Err(format!("there is no file {}: correct the path", file.display())) }
+}

@@ -1,0 +1,314 @@
+//! The scene file of an arm, as a person would have written it.
+
+use super::practice::Practice;
+use super::{Arm, ArmJoint, ContactNodes, Robot, UrdfError};
+use crate::proxy::Chain;
+use crate::scene::{JointKind, JointSpec, ProxyNodeSpec, ProxySpec, Scene};
+use glam::DVec3;
+use std::fmt::Write;
+
+/// Longest name of a joint in a scene, in characters.
+const MAX_NAME: usize = 40;
+
+/// Default reflected inertia of a joint's actuator, written where the robot has none [kg m^2, or kg].
+const ROTOR: [f64; 2] = [1e-3, 0.05];
+
+/// Stiffness of the coupling at the contact node, from which the joints' gains follow [N/m].
+const TIP_STIFFNESS: f64 = 800.0;
+
+/// Greatest force there [N].
+const TIP_FORCE: f64 = 10.0;
+
+/// Returns the text of a scene with the arm and a soft ball within its reach. `command`: what made it, for the head of the file.
+///
+/// # Errors
+/// [`UrdfError::Scene`] if the text is no valid scene, a fault of this program.
+pub fn write_scene(robot: &Robot, arm: &Arm, nodes: &ContactNodes, command: &str) -> Result<String, UrdfError> {
+    let proxy = proxy(arm, nodes);
+    let practice = Practice::new(&Chain::new(&proxy));
+    let mut text = String::new();
+    // Writing to a string fails only where memory does.
+    let _ = write(&mut text, robot, arm, &proxy, nodes, &practice, command);
+    Scene::parse(&text, robot.path.with_extension("toml"))?;
+    Ok(text)
+}
+
+/// The chain as the scene has it: numbers rounded as they are written.
+fn proxy(arm: &Arm, nodes: &ContactNodes) -> ProxySpec {
+    let mut joints: Vec<JointSpec> = Vec::new();
+    for (joint, nodes) in arm.joints.iter().zip(&nodes.of_joints) {
+        let name = name(&joint.name, &joints);
+        let node = |position: &DVec3| ProxyNodeSpec { position: *position, radius: 0.0, length: 0.0 };
+        joints.push(JointSpec {
+            name,
+            kind: joint.kind,
+            origin: joint.origin,
+            axis: joint.axis,
+            limits: joint.limits.map(|limit| (limit * 1e9).round() / 1e9),
+            mass: joint.inertial.mass,
+            centre_of_mass: joint.inertial.centre,
+            inertia: joint.inertial.inertia,
+            rotor_inertia: ROTOR[usize::from(joint.kind == JointKind::Prismatic)],
+            nodes: nodes.iter().map(node).collect(),
+        });
+    }
+    ProxySpec { joints }
+}
+
+/// Returns a joint's name in letters that a scene takes, other than those before.
+fn name(name: &str, before: &[JointSpec]) -> String {
+    let fits = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '_' | '-');
+    let plain: String = name.chars().map(|c| if fits(c) { c } else { '_' }).take(MAX_NAME).collect();
+    let is_taken = |name: &str| before.iter().any(|joint| joint.name == name);
+    let shorter: String = plain.chars().take(MAX_NAME - 3).collect();
+    let mut numbered = (2..).map(|number| format!("{shorter}_{number}"));
+    if is_taken(&plain) { numbered.find(|name| !is_taken(name)).unwrap_or(plain) } else { plain }
+}
+
+fn write(
+    text: &mut String,
+    robot: &Robot,
+    arm: &Arm,
+    proxy: &ProxySpec,
+    nodes: &ContactNodes,
+    practice: &Practice,
+    command: &str,
+) -> std::fmt::Result {
+    let file = robot.path.file_name().unwrap_or_default().to_string_lossy();
+    let count: usize = nodes.of_joints.iter().map(Vec::len).sum();
+    let joints = proxy.joints.len();
+    writeln!(
+        text,
+        "# {}",
+        comment(&format!("Arm of {joints} joints of the robot {:?}, taken from {file} by", robot.name))
+    )?;
+    writeln!(text, "#     {}", comment(command))?;
+    writeln!(text, "# against a soft ball, which is there for a start: put your own object in its place.\n#")?;
+    writeln!(text, "# All quantities are SI: m, rad, N, kg, s. Every key is explained in datasets/README.md.")?;
+    if !arm.notes.is_empty() {
+        writeln!(text, "#\n# Noticed in the robot's file:")?;
+        arm.notes.iter().try_for_each(|note| writeln!(text, "# - line {}: {}", note.line, comment(&note.message)))?;
+    }
+    let title: String = robot.name.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '_' | '-')).collect();
+    writeln!(text, "\nname = \"{}\"", if title.is_empty() { "robot" } else { &title })?;
+
+    heading(text, "The deformable virtual object")?;
+    let Practice { centre, radius, .. } = practice;
+    writeln!(text, "[object]")?;
+    entry(text, "node_mass", "5e-4", "kg")?;
+    entry(text, "node_damping", "0.05", "N s/m, against the ground")?;
+    writeln!(text, "\n[object.sphere]")?;
+    entry(text, "centre", &vector(*centre, 4), "m, in the frame of the robot's root link")?;
+    entry(text, "radius", &number(*radius, 4), "m")?;
+    entry(text, "edge", &number(0.2 * radius, 4), "m, of its triangles")?;
+    writeln!(text, "\n[object.skin]")?;
+    entry(text, "tension", "100.0", "N/m")?;
+    entry(text, "width", &number(0.35 * radius, 5), "m, over which the dent of a point is rounded")?;
+    entry(text, "foundation", "4e4", "N/m^3")?;
+
+    heading(text, "The multi-link virtual proxy")?;
+    writeln!(
+        text,
+        "# Link frames are parallel to the robot's root frame at q = 0. Links that do not move, and are not felt: {}.",
+        comment(&arm.base.join(", "))
+    )?;
+    writeln!(
+        text,
+        "# {count} contact nodes on the shapes of the moving links, {} m apart or more.",
+        number(nodes.spacing, 6)
+    )?;
+    for (joint, spec) in arm.joints.iter().zip(&proxy.joints) {
+        write_joint(text, joint, spec)?;
+    }
+
+    heading(text, "Contact, equation (2)")?;
+    writeln!(text, "[contact]")?;
+    entry(text, "stiffness", "200.0", "N/m, of one contact spring; each node has three")?;
+
+    let points: usize = practice.axes.iter().map(|(_, lines)| lines).product();
+    let lines: Vec<String> = practice.axes.iter().map(|(_, lines)| lines.to_string()).collect();
+    heading(text, &format!("C-space: {} = {points} configurations", lines.join(" x ")))?;
+    writeln!(
+        text,
+        "# Coarse, for a first look: narrow the ranges to those that you use, and raise the counts, or bake with --max-error.\n"
+    )?;
+    writeln!(text, "[grid]\naxes = [")?;
+    for (([start, stop], count), spec) in practice.axes.iter().zip(&proxy.joints) {
+        let unit = unit(spec.kind);
+        writeln!(
+            text,
+            "    {{ start = {}, stop = {}, count = {count} }}, # {unit}: {}",
+            number(*start, 9),
+            number(*stop, 9),
+            spec.name
+        )?;
+    }
+    writeln!(text, "]")?;
+
+    heading(text, "The 1 kHz loop")?;
+    write_haptics(text, arm, proxy, practice)?;
+    writeln!(text, "\n[graphics]")?;
+    entry(text, "rate", "60.0", "Hz")?;
+
+    heading(text, "Motions")?;
+    writeln!(text, "[motion]\n# Into the ball, hold, and off again.\npress = [")?;
+    let [start, end] = practice.motion.map(|q| list(&q, |x| number(*x, 9)));
+    for (time, q) in [(0.0, &start), (0.5, &start), (2.0, &end), (2.6, &end), (4.1, &start), (4.5, &start)] {
+        writeln!(text, "    {{ time = {time:?}, q = {q} }},")?;
+    }
+    writeln!(text, "]")
+}
+
+fn write_joint(text: &mut String, joint: &ArmJoint, spec: &JointSpec) -> std::fmt::Result {
+    let (turns, inertial) = (spec.kind == JointKind::Revolute, joint.inertial);
+    writeln!(text, "\n[[proxy.joint]]")?;
+    entry(text, "name", &format!("\"{}\"", spec.name), &format!("moves {}", joint.links.join(", ")))?;
+    entry(text, "kind", if turns { "\"revolute\"" } else { "\"prismatic\"" }, "")?;
+    entry(text, "origin", &vector(spec.origin, 9), "m")?;
+    entry(text, "axis", &vector(spec.axis, 9), "")?;
+    entry(text, "limits", &list(&spec.limits, |x| number(*x, 9)), unit(spec.kind))?;
+    if inertial.mass > 0.0 {
+        entry(text, "mass", &significant(inertial.mass), "kg")?;
+        entry(text, "centre_of_mass", &vector(inertial.centre, 6), "m")?;
+    }
+    let [x, y, z] = inertial.inertia.to_cols_array_2d();
+    let (moments, products) = ([x[0], y[1], z[2]], [x[1], x[2], y[2]]);
+    // Products that the moments' rounding hides are those of symmetric links that were turned.
+    let is_aligned = products.iter().all(|product| product.abs() < 1e-6 * moments.iter().sum::<f64>());
+    let numbers = if is_aligned { moments.to_vec() } else { [moments, products].concat() };
+    if moments != [0.0; 3] {
+        let meaning = if is_aligned { "kg m^2" } else { "kg m^2: xx, yy, zz, xy, xz, yz" };
+        entry(text, "inertia", &list(&numbers, |x| significant(*x)), meaning)?;
+    }
+    let rotor = if turns {
+        "kg m^2, of the actuator, not in the robot's file"
+    } else {
+        "kg, of the actuator, not in the robot's file"
+    };
+    entry(text, "rotor_inertia", &significant(spec.rotor_inertia), rotor)?;
+    if spec.nodes.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "nodes = [ # m: {} of them", spec.nodes.len())?;
+    for pair in spec.nodes.chunks(3) {
+        let entries: Vec<String> =
+            pair.iter().map(|node| format!("{{ at = {} }},", vector(node.position, 5))).collect();
+        writeln!(text, "    {}", entries.join(" "))?;
+    }
+    writeln!(text, "]")
+}
+
+/// Gains for a stiffness and a force at the contact node, in the proportions of a desktop device.
+fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, practice: &Practice) -> std::fmt::Result {
+    writeln!(
+        text,
+        "# One number per joint: {TIP_STIFFNESS:.0} N/m and at most {TIP_FORCE:.0} N where the arm meets the ball, through each joint's lever.\n"
+    )?;
+    writeln!(text, "[haptics]")?;
+    let stiffness: Vec<f64> = practice.levers.iter().map(|lever| TIP_STIFFNESS * lever * lever).collect();
+    let scaled = |factor: f64| list(&stiffness, |k| coarse(factor * k));
+    entry(text, "boundary_slope", &scaled(0.75), "N m/rad or N/m")?;
+    entry(text, "proxy_damping", &scaled(2.5e-3), "N m s/rad or N s/m")?;
+    entry(text, "coupling_stiffness", &scaled(1.0), "N m/rad or N/m")?;
+    entry(text, "coupling_damping", &scaled(5e-4), "N m s/rad or N s/m")?;
+    entry(text, "device_damping", &scaled(1.5e-3), "N m s/rad or N s/m")?;
+    entry(text, "device_inertia", &scaled(5e-5), "kg m^2 or kg")?;
+    let limits: Vec<f64> = (practice.levers.iter().zip(&arm.joints))
+        .map(|(lever, joint)| (TIP_FORCE * lever).min(joint.effort.unwrap_or(f64::INFINITY)))
+        .collect();
+    entry(text, "torque_limit", &list(&limits, |x| coarse(*x)), "N m or N")?;
+    entry(text, "torque_rate_limit", &list(&limits, |x| coarse(300.0 * x)), "N m/s or N/s")?;
+    for (joint, spec) in arm.joints.iter().zip(&proxy.joints) {
+        let rated = [
+            joint
+                .effort
+                .map(|x| format!("{} {}", coarse(x), if spec.kind == JointKind::Revolute { "N m" } else { "N" })),
+            joint.velocity.map(|x| format!("{} {}/s", coarse(x), unit(spec.kind))),
+        ];
+        let rated: Vec<String> = rated.into_iter().flatten().collect();
+        if !rated.is_empty() {
+            writeln!(text, "# The robot's file allows {} {}.", spec.name, rated.join(" and "))?;
+        }
+    }
+    writeln!(text, "\n[haptics.hand]")?;
+    entry(text, "stiffness", &scaled(1.0), "N m/rad or N/m")?;
+    entry(text, "damping", &scaled(0.02), "N m s/rad or N s/m")?;
+    entry(text, "inertia", &scaled(1e-4), "kg m^2 or kg")
+}
+
+/// Writes a heading as wide as those of the scenes that ship.
+fn heading(text: &mut String, title: &str) -> std::fmt::Result {
+    writeln!(text, "\n# ---- {title} {}\n", "-".repeat(112_usize.saturating_sub(title.len())))
+}
+
+/// Writes a key with its value and a comment.
+fn entry(text: &mut String, key: &str, value: &str, meaning: &str) -> std::fmt::Result {
+    let assignment = format!("{key} = {value}");
+    if meaning.is_empty() {
+        writeln!(text, "{assignment}")
+    } else {
+        writeln!(text, "{assignment:<40}# {}", comment(meaning))
+    }
+}
+
+/// Returns text that stays within a comment.
+fn comment(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+fn unit(kind: JointKind) -> &'static str {
+    match kind {
+        JointKind::Revolute => "rad",
+        JointKind::Prismatic => "m",
+    }
+}
+
+fn list<T>(values: &[T], each: impl FnMut(&T) -> String) -> String {
+    format!("[{}]", values.iter().map(each).collect::<Vec<_>>().join(", "))
+}
+
+fn vector(v: DVec3, decimals: usize) -> String {
+    list(&v.to_array(), |x| number(*x, decimals))
+}
+
+/// Returns `x` with at most `decimals` decimals, and at least one.
+fn number(x: f64, decimals: usize) -> String {
+    let text = format!("{x:.decimals$}");
+    let trimmed = text.trim_end_matches('0');
+    match trimmed.strip_suffix('.').unwrap_or(trimmed) {
+        "-0" | "0" => "0.0".to_owned(),
+        whole if !whole.contains('.') => format!("{whole}.0"),
+        fraction => fraction.to_owned(),
+    }
+}
+
+/// Returns `x` to six significant digits.
+fn significant(x: f64) -> String {
+    plain(&format!("{x:.5e}"))
+}
+
+/// Returns `x` to three significant digits.
+fn coarse(x: f64) -> String {
+    plain(&format!("{x:.2e}"))
+}
+
+/// Returns a number in scientific notation as one reads it more easily.
+fn plain(scientific: &str) -> String {
+    let x: f64 = scientific.parse().unwrap_or_default();
+    if x == 0.0 || (1e-4..1e6).contains(&x.abs()) { format!("{x:?}") } else { format!("{x:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_have_a_point() {
+        assert_eq!(
+            [0.0, -0.0, 1.0, 0.25, -1e-12, 0.392_25].map(|x| number(x, 9)),
+            ["0.0", "0.0", "1.0", "0.25", "0.0", "0.39225"]
+        );
+        assert_eq!([0.0, 1234.56789, 1.2e-7, 0.01].map(significant), ["0.0", "1234.57", "1.2e-7", "0.01"]);
+        assert_eq!([2.345_678, 1e7].map(coarse), ["2.35", "1e7"]);
+    }
+}

@@ -1,0 +1,89 @@
+//! The scenes of public devices: kinematics against published formulas, and each baked and felt by a simulated device in the loop.
+
+// Helpers outside test functions may fail the test too.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use glam::DVec3;
+use haptize::{JointVector, proxy::Chain, scene::Scene};
+use std::{path::Path, process::Command};
+
+fn shipped(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets").join(name)
+}
+
+/// Position of the first contact node at `q`, and the torques of `force` on it.
+fn tip(name: &str, q: &[f64], force: DVec3) -> (DVec3, JointVector) {
+    let chain = Chain::new(&Scene::load(shipped(name)).unwrap().proxy);
+    let mut pose = chain.new_pose();
+    chain.pose(q, &mut pose);
+    let mut torque = JointVector::zeros(q.len());
+    chain.add_torque(&pose, 0, force, &mut torque);
+    (pose.nodes[0], torque)
+}
+
+/// Positions and torques that `kinematics.cpp` of the device's own library computes.
+#[test]
+fn woodenhaptics_moves_as_its_library_says() {
+    let theta = [0.019_635_0, -0.078_539_8, 1.518_436_4];
+    let (position, torque) = tip("woodenhaptics.toml", &[theta[0], theta[1], theta[1] + theta[2]], DVec3::Z);
+    let expected = DVec3::new(0.008_536_06, 0.004_487_87, 0.191_545_74);
+    assert!(position.distance(expected) < 1e-7, "{position}");
+    for (found, expected) in [torque[0], torque[1] + torque[2], torque[2]].iter().zip([0.0, 0.016_084_11, 0.244_664_24])
+    {
+        assert!((found - expected).abs() < 1e-7, "{torque:?}");
+    }
+}
+
+/// The lengths of the robot file: upper arm 0.134 m, lower arm 0.1325 m, shoulder at 0.125 m.
+#[test]
+fn the_touch_reaches_where_trigonometry_says() {
+    let (waist, shoulder, elbow) = (0.3_f64, 0.7_f64, 0.2_f64);
+    let (position, _) = tip("touch.toml", &[waist, shoulder, elbow], DVec3::ZERO);
+    let reach = 0.134 * shoulder.cos() + 0.1325 * (shoulder + elbow).sin();
+    let height = 0.125 + 0.134 * shoulder.sin() - 0.1325 * (shoulder + elbow).cos();
+    assert!(position.distance(DVec3::new(-reach * waist.sin(), reach * waist.cos(), height)) < 1e-12, "{position}");
+}
+
+/// The pantograph of the vendor's package at the joint angles 168.25 and 12.5 degrees, bases 0.038 m apart: its end effector is
+/// where the two distal bars meet.
+#[test]
+fn the_pantographs_end_effector_is_on_its_first_pair_of_bars() {
+    let end = DVec3::new(0.018_794_5, 0.036_023_4, 0.0);
+    let shoulder = 168.25_f64.to_radians();
+    let joint = 0.07 * DVec3::new(shoulder.cos(), shoulder.sin(), 0.0);
+    let bar = end - joint;
+    assert!((bar.length() - 0.09).abs() < 1e-6, "the distal bar is {} m long", bar.length());
+    let (position, _) = tip("two_diy.toml", &[shoulder, bar.y.atan2(bar.x) - shoulder], DVec3::ZERO);
+    assert!(position.distance(end) < 1e-6, "{position}");
+}
+
+#[test]
+fn each_device_feels_its_scene() {
+    for (name, most) in [("woodenhaptics.toml", 1.2), ("touch.toml", 0.35), ("two_diy.toml", 0.123)] {
+        let folder = tempfile::tempdir().unwrap();
+        let run = |arguments: &[&str]| {
+            let output = Command::new(env!("CARGO_BIN_EXE_haptize"))
+                .args(arguments)
+                .current_dir(folder.path())
+                .output()
+                .unwrap();
+            assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+            serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
+        };
+        let scene = shipped(name).display().to_string();
+        let baked = run(&["bake", &scene, "--backend", "cpu", "--measure-error", "0", "-o", "x.haptize", "--json"]);
+        assert_eq!((&baked["unconverged"], &baked["overflowed"]), (&0.into(), &0.into()), "{name}: {baked:#}");
+        for motion in ["press", "scrape"] {
+            let felt = run(&["play", "x.haptize", "--motion", motion, "--json"]);
+            let number = |key: &str| felt[key].as_f64().unwrap();
+            assert!(felt["fault"].is_null() && number("faults") == 0.0, "{name}, {motion}: {felt:#}");
+            assert!(number("contact_share") > 0.2 && number("contact_share") < 0.95, "{name}, {motion}: {felt:#}");
+            assert!(
+                number("max_device_torque") > 0.05 * most && number("max_device_torque") <= most,
+                "{name}, {motion}: {felt:#}"
+            );
+            assert_eq!(number("outside"), 0.0, "{name}, {motion}: {felt:#}");
+            assert!(number("max_relative_account_residual") < 1e-10, "{name}, {motion}: {felt:#}");
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! `haptize import`: scenes that bake and play as they are.
+
+use super::file;
+use haptize::{
+    object::Object,
+    proxy::Chain,
+    scene::{JointKind, Scene},
+};
+use std::{
+    path::Path,
+    process::{Command, Output},
+};
+
+fn haptize(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_haptize")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn succeed(folder: &Path, arguments: &[&str]) -> String {
+    let output = haptize(folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Imports, bakes on the CPU and plays; returns the accounts of the play.
+fn felt(robot: &str, tip: &str, spacing: &str) -> serde_json::Value {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = file(robot).display().to_string();
+    succeed(folder.path(), &["import", &robot, "--tip", tip, "--spacing", spacing, "-o", "scene.toml"]);
+    let baked = succeed(folder.path(), &["bake", "scene.toml", "--backend", "cpu", "--measure-error", "0", "--json"]);
+    let baked: serde_json::Value = serde_json::from_str(&baked).unwrap();
+    assert_eq!((&baked["unconverged"], &baked["overflowed"]), (&0.into(), &0.into()), "{baked}");
+    let (points, contact) = (baked["points"].as_f64().unwrap(), baked["contact_points"].as_f64().unwrap());
+    assert!(contact > 0.2 * points && contact < 0.95 * points, "{contact} of {points} configurations touch");
+    let played = succeed(folder.path(), &["play", "scene.haptize", "--motion", "press", "--json"]);
+    serde_json::from_str(&played).unwrap()
+}
+
+#[test]
+fn imported_arms_bake_and_are_felt_as_they_are() {
+    for (robot, tip, spacing) in [("finger.urdf", "distal", "0.005"), ("arm.urdf", "probe", "0.008")] {
+        let played = felt(robot, tip, spacing);
+        let number = |key: &str| played[key].as_f64().unwrap();
+        assert!(played["fault"].is_null() && number("faults") == 0.0, "{played:#}");
+        assert!(number("contact_share") > 0.2 && number("contact_share") < 0.9, "{played:#}");
+        assert!(number("max_device_torque") > 0.02, "{played:#}");
+        assert!(number("max_account_residual") < 1e-10, "{played:#}");
+    }
+}
+
+#[test]
+fn the_scene_reads_as_if_a_person_had_written_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = file("finger.urdf").display().to_string();
+    let told = haptize(folder.path(), &["import", &robot, "--tip", "distal", "--spacing", "0.006"]);
+    let notes = String::from_utf8_lossy(&told.stderr).into_owned();
+    assert!(told.status.success() && notes.contains("no <collision>") && notes.contains("<inertial>"), "{notes}");
+    let path = folder.path().join("finger.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    for expected in [
+        "#     haptize import finger.urdf --tip distal --spacing 0.006\n",
+        "name = \"knuckle_flex\"                   # moves proximal\n",
+        "limits = [-0.5, 1.2]                    # rad\n",
+        "origin = [0.1, 0.0, 0.0]                # m\n",
+        "axis = [0.0, 1.0, 0.0]\n",
+        "# - line 3: link \"proximal\" has no <collision>",
+        "# The robot's file allows tip 1.0 N m and 5.0 rad/s.\n",
+    ] {
+        assert!(text.contains(expected), "{expected:?} is not in\n{text}");
+    }
+    assert!(text.lines().all(|line| line.chars().count() < 240 && !line.contains('\t')));
+    let scene = Scene::load(&path).unwrap();
+    assert_eq!(scene.proxy.joints.iter().map(|joint| joint.kind).collect::<Vec<_>>(), [JointKind::Revolute; 2]);
+    // The ball is touched by the last link in the motion and is free of the arm before it.
+    let object = Object::build(&scene.object).unwrap();
+    let chain = Chain::new(&scene.proxy);
+    let inside = |q: &[f64]| {
+        let mut pose = chain.new_pose();
+        chain.pose(q, &mut pose);
+        let centre = object.rest.iter().sum::<glam::DVec3>() / object.rest.len() as f64;
+        pose.nodes.iter().filter(|node| node.distance(centre) < 0.99 * object.rest[0].distance(centre)).count()
+    };
+    let press = &scene.motion.press;
+    assert_eq!(inside(&press[0].q), 0);
+    assert!(inside(&press[2].q) > 0);
+    // What is there is not written over.
+    let again = haptize(folder.path(), &["import", &robot, "--tip", "distal", "--spacing", "0.006"]);
+    assert!(!again.status.success() && String::from_utf8_lossy(&again.stderr).contains("there is a file already"));
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+}
+
+#[test]
+fn packages_are_found_above_the_file_or_where_the_user_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = folder.path().join("alone.urdf");
+    std::fs::copy(file("arm.urdf"), &robot).unwrap();
+    let refused = haptize(folder.path(), &["import", "alone.urdf", "--tip", "probe", "-o", "x.toml"]);
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(
+        !refused.status.success() && message.contains("--package-path") && message.contains("alone.urdf:70:"),
+        "{message}"
+    );
+    assert!(!folder.path().join("x.toml").exists());
+    let packages = file("").parent().unwrap().display().to_string();
+    let arguments =
+        ["import", "alone.urdf", "--tip", "probe", "--package-path", &packages, "--spacing", "0.01", "-o", "x.toml"];
+    succeed(folder.path(), &arguments);
+}
