@@ -72,6 +72,8 @@ pub mod contact;
 
 pub mod gpu;
 
+pub mod ros;
+
 pub mod dataset;
 pub mod field;
 pub mod haptize;

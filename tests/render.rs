@@ -12,7 +12,7 @@ use haptize::{
     JointVector,
     contact::{Model, Proximity, Status},
     dataset::{Contacts, Dataset},
-    device::{Device, Motion, Reading, Recorded, SimulatedHand},
+    device::{Applied, Device, Motion, Reading, Recorded, SimulatedHand},
     field::{TorqueField, range::HaptizedRange},
     haptize::{BackendChoice, Bake},
     object::Object,
@@ -95,8 +95,9 @@ impl Device for Scripted {
         reading
     }
 
-    fn apply(&mut self, torque: &JointVector) {
+    fn apply(&mut self, torque: &JointVector) -> Applied {
         self.torque = *torque;
+        Applied::whole(torque)
     }
 }
 

@@ -7,6 +7,7 @@ use haptize::{
     JointVector,
     contact::Status,
     dataset::{Axis, Contacts, Dataset, Grid, Provenance, Surface},
+    device::Applied,
     object::Object,
     proxy::{Chain, Joint, Node as ProxyNode},
     render::{
@@ -159,6 +160,7 @@ fn recording(chain: &Chain, object: &Object, ticks: usize) -> Trace {
             device: q,
             proxy: q,
             device_torque: torque,
+            applied: Applied::whole(&torque),
             contact_torque: torque,
             index: f64::from(u8::from(!forces.is_empty())),
             contact: !forces.is_empty(),

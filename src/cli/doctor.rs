@@ -4,7 +4,10 @@
 //! the 1 kHz loop punctual (`play --realtime`).
 
 use super::{Failure, Report};
-use haptize::gpu::{ADAPTER_VARIABLE, AdapterSummary, adapters};
+use haptize::{
+    device::Kind,
+    gpu::{ADAPTER_VARIABLE, AdapterSummary, adapters},
+};
 use serde::Serialize;
 use std::{fmt::Write, thread};
 
@@ -76,7 +79,18 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
             writeln!(text, "{:<22} -> {}", "", finding.remedy)?;
         }
     }
+    let devices: Vec<(Kind, _)> =
+        Kind::ALL.into_iter().filter(|kind| *kind != Kind::Simulated).map(|kind| (kind, kind.find())).collect();
+    for (rank, (kind, found)) in devices.iter().enumerate() {
+        let head = if rank == 0 { "haptic devices" } else { "" };
+        let seen = if found.places.is_empty() { "not found".into() } else { found.places.join(", ") };
+        writeln!(text, "{head:<22} {}: {seen}", kind.name())?;
+        found.missing.iter().try_for_each(|missing| writeln!(text, "{:<22} -> {missing}", ""))?;
+    }
+    let devices: Vec<_> =
+        devices.iter().map(|(kind, found)| serde_json::json!({ "kind": kind.name(), "found": found })).collect();
     let json = serde_json::json!({
+        "devices": devices,
         "version": env!("CARGO_PKG_VERSION"),
         "system": std::env::consts::OS,
         "architecture": std::env::consts::ARCH,

@@ -6,6 +6,7 @@ use super::{
     output::{self, Folder, Kind},
 };
 use haptize::{
+    MAX_JOINTS,
     dataset::Dataset,
     haptize::{
         gridize::{GridizeOptions, GridizeReport, Interpolation, Samples, gridize},
@@ -18,6 +19,7 @@ use haptize::{
         hysteresis::hysteresis,
         prediction::{Prediction, held_out, predict},
     },
+    ros::{JointStateTable, is_mcap},
     scene::{Rendering, ScanScene},
 };
 use std::{
@@ -32,9 +34,11 @@ use std::{
 Examples:
   haptize gridize sponge.csv --step 0.03
   haptize gridize sponge.csv --step 0.03 --held-out 0.1 --figures out
+  haptize gridize log.mcap --topic /joint_states --step 0.03
   haptize gridize run1.csv run2.csv --columns instrument.toml --step 0.02,0.02,0.01 --scene arm.toml")]
 pub struct Arguments {
-    /// A log written by `haptize scan`, or with --columns any tables of joint positions and torques.
+    /// A log written by `haptize scan`, an MCAP file with joint states of a robot, or with --columns any tables of joint positions and
+    /// torques.
     #[arg(required = true)]
     logs: Vec<PathBuf>,
     /// Grid step [rad or m]: one number, or one a joint, separated by commas.
@@ -46,6 +50,13 @@ pub struct Arguments {
     /// A TOML file that maps columns to quantities (datasets/instrument.toml is an example).
     #[arg(long, value_name = "TOML")]
     columns: Option<PathBuf>,
+    /// The topic of joint states to read of an MCAP file; by default its only one.
+    #[arg(long)]
+    topic: Option<String>,
+    /// What the efforts of an MCAP file are, without --columns: the torque of the motors, or that of the contact on the arm. They must
+    /// hold no weight of the arm.
+    #[arg(long, default_value = "motor", conflicts_with = "columns")]
+    effort: Effort,
     /// A scene with the arm and the gains to feel the dataset with; scan logs bring theirs.
     #[arg(long)]
     scene: Option<PathBuf>,
@@ -73,6 +84,15 @@ pub struct Arguments {
 
 /// Figures beside [`report::FIGURES`].
 const FIGURES: [&str; 4] = ["gridized.svg", "gridized.png", "hysteresis.svg", "hysteresis.png"];
+
+/// What efforts are.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Effort {
+    /// Torque of the motors, which balances that of the contact.
+    Motor,
+    /// Torque of the contact on the arm.
+    Contact,
+}
 
 /// The measurements that were read.
 pub struct Source {
@@ -114,7 +134,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if let Some(folder) = &folder {
         folder.keep_apart(&output)?;
     }
-    let mapping = arguments.columns.as_deref().map(Mapping::load).transpose()?;
+    let mapping = mapping(arguments)?;
     let mut source = read(&arguments.logs, mapping.as_ref())?;
     if let Some(path) = &arguments.scene {
         source.scene = scene(path, source.samples.joints.len())?;
@@ -185,6 +205,35 @@ fn output(arguments: &Arguments) -> Result<PathBuf, Failure> {
     }
     let name = arguments.logs.first().and_then(|log| log.file_name()).ok_or("the log's path names no file; give -o")?;
     Ok(PathBuf::from(name).with_extension("haptize"))
+}
+
+/// The mapping of --columns, or the one that the joint states of an MCAP file need.
+fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
+    let topic = arguments.topic.as_deref();
+    if let Some(columns) = &arguments.columns {
+        let mut mapping = Mapping::load(columns)?;
+        mapping.table.topic = topic.map(str::to_owned).or(mapping.table.topic);
+        return Ok(Some(mapping));
+    }
+    let Some(log) = arguments.logs.first().filter(|log| is_mcap(log)) else {
+        return if topic.is_some() {
+            Err("--topic is of MCAP files, and the first log is none".into())
+        } else {
+            Ok(None)
+        };
+    };
+    let table = JointStateTable::open(log, topic)?;
+    if table.joints().len() > MAX_JOINTS {
+        let names = table.joints().join(", ");
+        let (file, many) = (log.display(), table.joints().len());
+        return Err(format!(
+            "{file}: {} has {many} joints ({names}), more than {MAX_JOINTS}: choose some by a column mapping (--columns)",
+            table.topic()
+        )
+        .into());
+    }
+    let scale = if arguments.effort == Effort::Contact { 1.0 } else { -1.0 };
+    Ok(Some(Mapping::of_joint_states(table.joints(), table.topic(), scale)))
 }
 
 /// Reads `logs`, a scan's or, through `mapping`, any tables.

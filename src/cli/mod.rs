@@ -24,6 +24,7 @@ mod bake;
 mod bar;
 mod completions;
 mod demo;
+mod device;
 mod doctor;
 mod export;
 mod felt;
@@ -32,6 +33,7 @@ mod import;
 mod info;
 mod inspect;
 mod interrupt;
+mod keyboard;
 mod man;
 mod max_error;
 mod memory;
@@ -81,6 +83,8 @@ enum Command {
     Bake(bake::Arguments),
     /// Print the completion script of a shell.
     Completions(completions::Arguments),
+    /// List real haptic devices, and run one carefully for the first time.
+    Device(device::Arguments),
     /// Report what this machine offers: threads, graphics adapters, real-time priority.
     Doctor(doctor::Arguments),
     /// Convert a dataset for other programs.
@@ -99,7 +103,7 @@ enum Command {
     New(new::Arguments),
     /// Remake the figures and numbers of the paper, with a table that compares them.
     Paper(paper::Arguments),
-    /// Feel a dataset with a simulated hand: traces and figures.
+    /// Feel a dataset with a simulated hand or a real device: traces and figures.
     Play(play::Arguments),
     /// Measure a real object by touching it with a rig (the rig that ships is simulated).
     Scan(scan::Arguments),
@@ -115,6 +119,7 @@ impl Command {
             Self::Accuracy(arguments) => accuracy::run(arguments),
             Self::Bake(arguments) => bake::run(arguments),
             Self::Completions(arguments) => completions::run(arguments),
+            Self::Device(arguments) => device::run(arguments),
             Self::Doctor(arguments) => doctor::run(arguments),
             Self::Export(arguments) => export::run(arguments),
             Self::Gridize(arguments) => gridize::run(arguments),

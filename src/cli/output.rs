@@ -29,9 +29,18 @@ pub enum Kind {
     Drawing,
     /// Text for people or programs: Markdown, HTML, JSON.
     Text,
+    /// A log of joint states in MCAP.
+    Mcap,
 }
 
 impl Kind {
+    /// Returns whether a log at `path` is MCAP by its extension, or else a table.
+    #[must_use]
+    pub fn of_log(path: &Path) -> Self {
+        let mcap = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
+        if mcap { Self::Mcap } else { Self::Table }
+    }
+
     /// Kind of the figure or table called `name`, by its extension.
     fn of(name: &Path) -> Self {
         match name.extension().and_then(|extension| extension.to_str()) {
@@ -53,6 +62,7 @@ impl Kind {
             Self::Picture => start.starts_with(b"\x89PNG"),
             Self::Drawing => start.windows(4).any(|word| word == b"<svg"),
             Self::Text => !start.contains(&0),
+            Self::Mcap => start.starts_with(b"\x89MCAP"),
             Self::Table => {
                 let other = ["toml", "obj", "ply", "stl", "msh", "md", "json"];
                 let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
@@ -70,6 +80,7 @@ impl Kind {
             Self::Picture => "a PNG picture",
             Self::Drawing => "an SVG drawing",
             Self::Text => "text",
+            Self::Mcap => "an MCAP file",
         }
     }
 }

@@ -3,14 +3,16 @@
 use super::{
     Failure, Report,
     felt::Felt,
-    output::{self, Folder, Kind},
+    interrupt,
+    keyboard::Keyboard,
+    output::{self, Folder, Kind as FileKind},
     tell,
 };
 use haptize::{
     dataset::{Axis, Dataset, replace_file},
-    device::{Device, Motion, Recorded},
+    device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, Watchdog, attach, open},
     render::{
-        realtime,
+        mcap, realtime,
         recording::Recording,
         session::{self, SessionError},
         setup::{Setup, labels},
@@ -22,8 +24,10 @@ use haptize::{
 };
 use serde_json::{Value, json};
 use std::{
+    collections::BTreeMap,
     fmt::{self, Write},
     path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
 };
 
 /// Arguments of `haptize play`.
@@ -48,10 +52,17 @@ pub struct Arguments {
     /// Move the device exactly as the motion says, whatever the torque, instead of letting a simulated hand hold it.
     #[arg(long)]
     exact: bool,
+    /// A real device instead of a simulated hand, always against the clock: KIND or KIND:PLACE, as `haptize device list` shows it.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["exact", "beside", "replay"])]
+    device: Option<Address>,
+    /// Torque only while the space bar is held (a dead-man key).
+    #[arg(long, requires = "device")]
+    hold_key: bool,
     /// Run against the clock, in a real-time thread where permitted, instead of as fast as possible.
     #[arg(long)]
     realtime: bool,
-    /// Record the session into this file: all inputs of the loop and all its outputs.
+    /// Record the session into this file: all inputs of the loop and all its outputs. A name that ends in .mcap gives joint
+    /// states in MCAP, for other programs; only the table that other names give can be replayed.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replay the session in this file and check that it matches bit for bit.
@@ -81,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let moved = || std::iter::once(Path::new(&arguments.motion));
     let folder = folder(arguments);
     let asked = arguments.record.as_ref();
-    let recorded = asked.map(|file| output::check(file, Kind::Table, inputs().chain(moved()))).transpose()?;
+    let recorded = asked.map(|file| output::check(file, FileKind::of_log(file), inputs().chain(moved()))).transpose()?;
     let filled =
         Folder::check(&folder, FILES.into_iter().chain(report::FIGURES), inputs().chain(moved()).collect::<Vec<_>>())?;
     if let Some(file) = asked {
@@ -101,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     let mut files = Vec::new();
     if let Some(file) = &arguments.record {
-        record(&played, file)?;
+        record(&played, arguments, file)?;
         files.push(file.clone());
     }
     files.extend(write(&setup, &dataset, &played, &folder)?);
@@ -112,6 +123,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
     }
     let summary = played.trace.summary();
+    let mut tally = Tally::default();
+    played.trace.ticks.iter().for_each(|tick| tally.add(tick.applied.clamps, tick.applied.halt));
     let fault = played.trace.ticks.iter().find_map(|tick| Some((tick.time, tick.fault?.to_string())));
     let mut json = serde_json::to_value(summary)?;
     felt.tell(&mut json);
@@ -120,6 +133,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     json["timing"] = serde_json::to_value(&played.timing)?;
     json["fault"] = fault.as_ref().map(|(time, reason)| json!({ "time": time, "reason": reason })).into();
     json["replayed"] = told.is_some().into();
+    json["device"] = device_json(arguments, &tally)?;
     json["files"] = files.iter().map(|file| Value::from(file.display().to_string())).collect();
     let mut text = told.unwrap_or_default();
     describe(&mut text, &summary)?;
@@ -133,6 +147,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if let Some((time, reason)) = &fault {
         writeln!(text, "  fault        at {time:.4} s the torque went to zero: {reason}; play again to clear it")?;
     }
+    if arguments.device.is_some() {
+        describe_tally(&mut text, &tally)?;
+    }
     if let Some(timing) = &played.timing {
         describe_timing(&mut text, timing)?;
     }
@@ -144,7 +161,28 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     writeln!(text, "traces and figures in {}", folder.display())?;
     filled.close(&files, &mut text, &mut json)?;
-    Ok(Report { text, json, whole: fault.is_none() })
+    let whole = fault.is_none() && tally.stopped.is_none();
+    Ok(Report { text, json, whole })
+}
+
+/// What `arguments` drove, and how often it was clamped and stopped; null where no device was named.
+fn device_json(arguments: &Arguments, tally: &Tally) -> Result<Value, Failure> {
+    let Some(address) = &arguments.device else { return Ok(Value::Null) };
+    Ok(json!({ "name": address.to_string(), "tally": serde_json::to_value(tally)? }))
+}
+
+/// Clamps and stops of a device, for people.
+fn describe_tally(text: &mut String, tally: &Tally) -> fmt::Result {
+    for (clamp, ticks) in &tally.clamped {
+        writeln!(text, "  device       torque clamped by {clamp} for {ticks} ticks")?;
+    }
+    for (reason, ticks) in &tally.halted {
+        writeln!(text, "  device       without torque for {ticks} ticks: {reason}")?;
+    }
+    if let Some(reason) = &tally.stopped {
+        writeln!(text, "  device       stopped for good: {reason}; play again to open it anew")?;
+    }
+    Ok(())
 }
 
 /// The session that `arguments` ask for.
@@ -154,9 +192,48 @@ fn perform(setup: &Setup, dataset: &Dataset, arguments: &Arguments) -> Result<Pl
     if !(seconds > 0.0 && seconds <= LONGEST) {
         return Err(format!("cannot play {seconds} s: give --seconds between 0 and {LONGEST}").into());
     }
+    if let Some(address) = &arguments.device {
+        return drive(setup, dataset, address, motion, seconds, arguments.hold_key);
+    }
     let mut device: Box<dyn Device> =
         if arguments.exact { Box::new(Recorded::new(motion)) } else { Box::new(setup.hand(motion)?) };
     play(setup, dataset, device.as_mut(), seconds, arguments.realtime)
+}
+
+/// Feels the dataset with the device at `address`, until Ctrl-C at the latest. The simulated one is led along `motion`.
+fn drive(
+    setup: &Setup,
+    dataset: &Dataset,
+    address: &Address,
+    motion: Motion,
+    seconds: f64,
+    hold_key: bool,
+) -> Result<Played, Failure> {
+    let hand = if address.kind == Kind::Simulated { Some(setup.hand(motion)?) } else { None };
+    let (key, input) = Key::new();
+    let _keyboard = if hold_key { Some(Keyboard::start(input)?) } else { None };
+    let guard =
+        Guard::new(open(address, hand)?, hold_key.then_some(key)).map_err(|halt| format!("{address}: {halt}"))?;
+    tell(format_args!("haptize: {}", guard.description()));
+    if guard.limits().watchdog == Watchdog::None && address.kind != Kind::Simulated {
+        tell(format_args!(
+            "haptize: note: this device has no watchdog: if haptize is killed the last torque stays on; keep its power switch at hand"
+        ));
+    }
+    if hold_key {
+        tell(format_args!("haptize: torque only while the space bar is held"));
+    }
+    let stop = interrupt::stop_flag();
+    let mut graphics = setup.graphics(dataset)?;
+    let plan = setup.plan(dataset, seconds, SNAPSHOTS);
+    // Last of all: the motors go on.
+    let mut device = attach(guard, address, setup.chain.clone(), &setup.scene)?;
+    let played = realtime::run(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, stop);
+    // Motors off before anything is drawn or written.
+    drop(device);
+    interrupt::over();
+    let (trace, timing) = played?;
+    Ok(Played { trace, timing: Some(timing) })
 }
 
 /// Replays the session in `file`. Returns its trace, and a line that says that it matched.
@@ -184,12 +261,24 @@ fn folder(arguments: &Arguments) -> PathBuf {
 }
 
 /// Writes what `played` recorded to `file`.
-fn record(played: &Played, file: &Path) -> Result<(), Failure> {
+fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Failure> {
     let lost = played.timing.as_ref().map_or(0, |timing| timing.unrecorded);
     if lost > 0 {
         return Err(
             format!("{lost} ticks were not recorded, the machine is too busy: nothing is written; try again").into()
         );
+    }
+    if FileKind::of_log(file) == FileKind::Mcap {
+        let mut facts = BTreeMap::from([
+            ("haptize".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+            ("dataset".to_owned(), arguments.dataset.display().to_string()),
+        ]);
+        facts.extend(arguments.device.as_ref().map(|device| ("device".to_owned(), device.to_string())));
+        let mut tally = Tally::default();
+        played.trace.ticks.iter().for_each(|tick| tally.add(tick.applied.clamps, tick.applied.halt));
+        facts.insert("tally".into(), serde_json::to_string(&tally)?);
+        replace_file(file, |out| mcap::write(&played.trace, facts, out)).map_err(|error| unwritten(file, error))?;
+        return Ok(());
     }
     let recording = Recording::of(&played.trace);
     replace_file(file, |out| recording.write(&played.trace.joints, out)).map_err(|error| unwritten(file, error))?;
@@ -219,7 +308,7 @@ pub fn play(
     let mut graphics = setup.graphics(dataset)?;
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
     if against_the_clock {
-        let (trace, timing) = realtime::run(&setup.haptics, device, graphics.as_mut(), &plan)?;
+        let (trace, timing) = realtime::run(&setup.haptics, device, graphics.as_mut(), &plan, &AtomicBool::new(false))?;
         return Ok(Played { trace, timing: Some(timing) });
     }
     let played: Result<Trace, SessionError> = session::run(&setup.haptics, device, graphics.as_mut(), &plan);

@@ -4,13 +4,16 @@ use super::{
     Failure, Report,
     bar::Bar,
     interrupt,
+    keyboard::Keyboard,
     output::{self, Kind},
     tell,
 };
 use haptize::{
     JointVector,
+    dataset::replace_file,
+    device::{Address, DeviceRig, Guard, Key, Kind as DeviceKind, attach_joints, open},
     haptize::scan::{
-        LogHeader, LogWriter, Plan, Rig, ScanProgress, ScanReport, ScanRow, Session, labels,
+        LogHeader, LogWriter, Plan, Rig, ScanProgress, ScanReport, ScanRow, Session, Trajectory, labels,
         simulated::{Hand, SimulatedRig},
     },
     proxy::Chain,
@@ -19,6 +22,8 @@ use haptize::{
 use std::{
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
+    thread,
+    time::{Duration, Instant},
 };
 
 /// Arguments of `haptize scan`.
@@ -37,6 +42,17 @@ pub struct Arguments {
     /// Continue a log that was interrupted.
     #[arg(long)]
     resume: bool,
+    /// Scan with a real device instead of the simulated rig: KIND or KIND:PLACE, as `haptize device list` shows it. It must measure and
+    /// drive its joints. With --guided the space bar says that a hand holds it.
+    #[arg(long, value_name = "NAME", conflicts_with = "plan_out")]
+    device: Option<Address>,
+    /// Only write the plan as a trajectory, as CSV or, where the name ends in .mcap, as joint states in MCAP: for a robot that its own
+    /// controller moves. Its log comes back by `haptize gridize`.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "resume", "guided"])]
+    plan_out: Option<PathBuf>,
+    /// How long the trajectory of --plan-out rests at each point [s]; by default the scan's window and time of averaging.
+    #[arg(long, requires = "plan_out", allow_negative_numbers = true)]
+    dwell: Option<f64>,
     /// Instead of going through the plan, log for so many seconds wherever a hand leads the device to and lets go of it. The
     /// simulated rig is led by a simulated hand, to places of the plan.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
@@ -55,6 +71,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if let Some(seconds) = arguments.guided.filter(|seconds| !(*seconds > 0.0 && *seconds <= LONGEST)) {
         return Err(format!("cannot log for {seconds} s: give --guided between 0 and {LONGEST}").into());
     }
+    if let Some(file) = &arguments.plan_out {
+        return write_plan(&scene, arguments, file);
+    }
     let output = match &arguments.output {
         Some(output) => output.clone(),
         None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file; give -o")?)
@@ -67,7 +86,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         bar.set(progress.done as u64, progress.points as u64, format!("{:.0} s on the rig", progress.time));
     };
     let course = Course { resume: arguments.resume, guided: arguments.guided };
-    let result = measure(&scene, &output, course, stop, &mut progress);
+    let result = match &arguments.device {
+        Some(address) => drive(&scene, &output, course, address, stop, &mut progress),
+        None => measure(&scene, &output, course, stop, &mut progress),
+    };
     bar.finish();
     interrupt::over();
     let report = result?;
@@ -82,6 +104,42 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         );
     }
     Ok(Report { text, json, whole: report.whole })
+}
+
+/// Writes the plan of `scene` to `file`.
+fn write_plan(scene: &ScanScene, arguments: &Arguments, file: &Path) -> Result<Report, Failure> {
+    let kind = Kind::of_log(file);
+    output::check(file, kind, [arguments.scene.as_path()])?;
+    let control = &scene.scan.control;
+    let dwell = arguments.dwell.unwrap_or(control.window + control.average);
+    if !(dwell > 0.0 && dwell <= LONGEST) {
+        return Err(format!("cannot rest for {dwell} s at each point: give --dwell between 0 and {LONGEST}").into());
+    }
+    let chain = Chain::new(&scene.proxy);
+    let plan = Plan::new(&scene.scan.plan, &chain)?;
+    let trajectory = Trajectory::new(&plan, control.speed, dwell);
+    let joints = labels(&chain);
+    let written = replace_file(file, |out| match kind {
+        Kind::Mcap => trajectory.write_mcap(&joints, out),
+        _ => trajectory.write_csv(&joints, out),
+    });
+    written
+        .map_err(|error| format!("cannot write {}: {error}; free some space or give another place", file.display()))?;
+    let (rows, seconds, unreachable) = (trajectory.rows.len(), trajectory.duration(), plan.unreachable.len());
+    let text = format!(
+        "{}: {rows} rows through {} points in {seconds:.0} s, {dwell} s at each; {unreachable} points are not reached by the \
+         joints\n  note         limits of torque and speed are the robot's own: nothing of haptize watches it\n",
+        file.display(),
+        plan.points - unreachable
+    );
+    let json = serde_json::json!({
+        "file": file.display().to_string(),
+        "rows": rows,
+        "points": plan.points,
+        "unreachable": unreachable,
+        "seconds": seconds,
+    });
+    Ok(Report { text, json, whole: true })
 }
 
 /// How a scan goes: by default through the whole plan, into a new log.
@@ -101,30 +159,86 @@ pub fn measure(
     stop: &AtomicBool,
     progress: &mut dyn FnMut(ScanProgress),
 ) -> Result<ScanReport, Failure> {
-    let chain = Chain::new(&scene.proxy);
-    let plan = Plan::new(&scene.scan.plan, &chain)?;
+    let (chain, plan) = planned(scene)?;
     let first = plan.stops.first().map_or_else(|| JointVector::zeros(chain.joints.len()), |stop| stop.q);
     let mut rig = SimulatedRig::new(&scene.proxy, &scene.scan.simulated, first, SEED);
-    let header = LogHeader {
-        rig: rig.description(),
-        simulated: rig.is_simulated(),
-        guided: course.guided.is_some(),
-        joints: labels(&chain),
-        scene: scene.text.clone(),
-    };
-    let (mut log, logged): (LogWriter, Vec<ScanRow>) = if course.resume {
-        LogWriter::resume(output, &header)?
-    } else {
-        (LogWriter::create(output, &header)?, Vec::new())
-    };
+    let (mut log, logged) = open_log(scene, &chain, output, course, &rig)?;
     if let Some(seconds) = course.guided {
         rig = rig.led_by(Hand::new(plan.spread(logged.len(), Hand::visits_within(seconds))));
     }
     tell(format_args!("haptize: {}", rig.description()));
-    let mut session = Session { spec: &scene.scan, chain: &chain, rig: &mut rig, log: &mut log, stop, progress };
+    let session = Session { spec: &scene.scan, chain: &chain, rig: &mut rig, log: &mut log, stop, progress };
+    go(session, course, &plan, &logged)
+}
+
+/// Scans `scene` with the device at `address` into the log `output`, until it is done or `stop` is raised.
+fn drive(
+    scene: &ScanScene,
+    output: &Path,
+    course: Course,
+    address: &Address,
+    stop: &AtomicBool,
+    progress: &mut dyn FnMut(ScanProgress),
+) -> Result<ScanReport, Failure> {
+    let (chain, plan) = planned(scene)?;
+    let (key, input) = Key::new();
+    let _keyboard = if course.guided.is_some() { Some(Keyboard::start(input)?) } else { None };
+    let guard = Guard::new(open(address, None)?, None).map_err(|halt| format!("{address}: {halt}"))?;
+    if guard.scheduler().is_some() {
+        return Err(format!(
+            "{address}: its maker's library drives it in a thread of its own, in which a scan cannot run: use --plan-out and its maker's tools"
+        )
+        .into());
+    }
+    let description = guard.description();
+    let device = attach_joints(guard, address, chain.degrees_of_freedom(), &scene.device)?;
+    let mut last = Instant::now();
+    let wait = |period: f64| {
+        let due = last + Duration::from_secs_f64(period);
+        thread::sleep(due.saturating_duration_since(Instant::now()));
+        let now = Instant::now();
+        (now - std::mem::replace(&mut last, now)).as_secs_f64()
+    };
+    let hand = course.guided.map(|_| key);
+    let mut rig = DeviceRig::new(device, description, address.kind == DeviceKind::Simulated, hand, stop, wait);
+    let (mut log, logged) = open_log(scene, &chain, output, course, &rig)?;
+    tell(format_args!("haptize: {}", rig.description()));
+    let session = Session { spec: &scene.scan, chain: &chain, rig: &mut rig, log: &mut log, stop, progress };
+    go(session, course, &plan, &logged)
+}
+
+/// The arm of `scene`, and where it goes.
+fn planned(scene: &ScanScene) -> Result<(Chain, Plan), Failure> {
+    let chain = Chain::new(&scene.proxy);
+    let plan = Plan::new(&scene.scan.plan, &chain)?;
+    Ok((chain, plan))
+}
+
+/// Begins or continues the log of a scan with `rig`; the rows that it holds.
+fn open_log(
+    scene: &ScanScene,
+    chain: &Chain,
+    output: &Path,
+    course: Course,
+    rig: &dyn Rig,
+) -> Result<(LogWriter, Vec<ScanRow>), Failure> {
+    let header = LogHeader {
+        rig: rig.description(),
+        simulated: rig.is_simulated(),
+        guided: course.guided.is_some(),
+        joints: labels(chain),
+        scene: scene.text.clone(),
+    };
+    if course.resume {
+        return Ok(LogWriter::resume(output, &header)?);
+    }
+    Ok((LogWriter::create(output, &header)?, Vec::new()))
+}
+
+fn go(mut session: Session<'_>, course: Course, plan: &Plan, logged: &[ScanRow]) -> Result<ScanReport, Failure> {
     Ok(match course.guided {
-        Some(seconds) => session.guided(seconds, &logged),
-        None => session.scan(&plan, &logged),
+        Some(seconds) => session.guided(seconds, logged),
+        None => session.scan(plan, logged),
     }?)
 }
 

@@ -5,8 +5,11 @@
 //! held since the last tick. Stepped by the midpoint rule, passive for any step as the proxy is; the torque is constant
 //! over a step, so that its work tau . (y_{k+1} - y_k) is exact.
 
-use super::{Device, Motion, Reading};
-use crate::{JointVector, scene::HapticsSpec};
+use super::{Applied, Device, Motion, Reading};
+use crate::{
+    JointVector,
+    scene::{HandSpec, HapticsSpec},
+};
 
 /// The device in a hand that follows a motion.
 #[derive(Clone, Debug)]
@@ -41,8 +44,28 @@ impl SimulatedHand {
     /// # Errors
     /// When the joints do not fit, or hand and device have no inertia.
     pub fn new(spec: &HapticsSpec, motion: Motion) -> Result<Self, HandError> {
-        let arm = Arm::new(spec, &motion.at(0.0).0)?;
+        Self::holding(&spec.hand, &spec.device_inertia, &spec.device_damping, motion)
+    }
+
+    /// Returns `hand` holding a device of the given `inertia` [kg m^2] and `damping` [N m s/rad] at each joint, at rest at the
+    /// beginning of `motion`.
+    ///
+    /// # Errors
+    /// When the joints do not fit, or hand and device have no inertia.
+    pub fn holding(
+        hand: &HandSpec,
+        inertia: &JointVector,
+        damping: &JointVector,
+        motion: Motion,
+    ) -> Result<Self, HandError> {
+        let arm = Arm::holding(hand, inertia, damping, &motion.at(0.0).0)?;
         Ok(Self { motion, arm, time: 0.0 })
+    }
+
+    /// Returns the number of joints.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        self.arm.position().len()
     }
 }
 
@@ -54,8 +77,9 @@ impl Device for SimulatedHand {
         Reading { position: *self.arm.position(), age: 0.0, hand: self.motion.at(self.time).0 }
     }
 
-    fn apply(&mut self, torque: &JointVector) {
+    fn apply(&mut self, torque: &JointVector) -> Applied {
         self.arm.hold(torque);
+        Applied::whole(torque)
     }
 }
 
@@ -77,11 +101,20 @@ pub(super) struct Arm {
 impl Arm {
     /// The hand and device of `spec`, at rest at `position`.
     pub(super) fn new(spec: &HapticsSpec, position: &JointVector) -> Result<Self, HandError> {
-        let mut inertia = spec.device_inertia;
+        Self::holding(&spec.hand, &spec.device_inertia, &spec.device_damping, position)
+    }
+
+    fn holding(
+        spec: &HandSpec,
+        device_inertia: &JointVector,
+        device_damping: &JointVector,
+        position: &JointVector,
+    ) -> Result<Self, HandError> {
+        let mut inertia = *device_inertia;
         if position.len() != inertia.len() {
             return Err(HandError::Joints { told: position.len(), device: inertia.len() });
         }
-        for (a, (inertia, hand)) in inertia.iter_mut().zip(spec.hand.inertia.iter()).enumerate() {
+        for (a, (inertia, hand)) in inertia.iter_mut().zip(spec.inertia.iter()).enumerate() {
             *inertia += hand;
             if !inertia.is_finite() || *inertia <= 0.0 {
                 return Err(HandError::Inertia(a));
@@ -90,9 +123,9 @@ impl Arm {
         let zero = JointVector::zeros(position.len());
         Ok(Self {
             inertia,
-            stiffness: spec.hand.stiffness,
-            damping: spec.hand.damping,
-            device_damping: spec.device_damping,
+            stiffness: spec.stiffness,
+            damping: spec.damping,
+            device_damping: *device_damping,
             position: *position,
             velocity: zero,
             torque: zero,

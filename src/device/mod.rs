@@ -1,16 +1,64 @@
 //! What drives the haptic loop: a device that reports joint positions and takes joint torques.
+//!
+//! Simulated devices implement [`Device`] themselves. A real one is a [`Hardware`], its protocol in its own
+//! coordinates; a [`Guard`] around it is the safety layer, the same for all; [`JointDevice`] or [`TipDevice`] makes of
+//! it a [`Device`] in the scene's joints.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `hand`, `motion`, `pointer`, `recorded` | simulated devices, and what leads them |
+//! | `hardware` | what a protocol implements |
+//! | `guard`, `halt`, `key`, `tally` | the safety layer, its reasons, the dead-man key, counts |
+//! | `linear_map`, `joints`, `tip` | from a device's coordinates to the scene's joints |
+//! | `rig` | a device as the rig of a scan |
+//! | `catalogue` | kinds of devices, by name |
+//! | `check` | the procedure of `haptize device check` |
+//! | `inverse3` | Haply Inverse3, through the maker's service |
+//! | `serial` | Haply 2DIY and WoodenHaptics |
+//! | `vendor` | Force Dimension and 3D Systems, through their makers' libraries |
+//! | `simulated` | a simulated device that fails as it is told |
 
+mod catalogue;
+mod check;
+mod guard;
+mod halt;
 mod hand;
+mod hardware;
+mod inverse3;
+mod joints;
+mod key;
+mod linear_map;
 mod motion;
 mod pointer;
 mod recorded;
+mod rig;
+pub mod serial;
+mod simulated;
+mod tally;
+mod tip;
+pub mod vendor;
+
+pub use catalogue::{Address, AddressError, Finding, Kind, OpenError, attach, attach_joints, open};
+pub use check::{CheckReport, PUSH_SHARE, Phase, check};
+pub use guard::{Guard, Held, LIMIT_SHARE, RAMP_TIME, RISE_TIME, WARM_TIME};
+pub use halt::{Clamps, Halt, LONGEST_AGE};
+pub use hardware::{Command, Coordinates, Hardware, Limits, Measurement, Scheduler, Watchdog};
+pub use inverse3::{Inverse3, STALE_COMMAND};
+pub use joints::JointDevice;
+pub use key::{Key, KeyInput};
+pub use linear_map::{LinearMap, MapError};
+pub use simulated::{Failure, Script, Simulated};
+pub use tally::Tally;
+pub use tip::TipDevice;
 
 pub use hand::{HandError, SimulatedHand};
 pub use motion::{Motion, MotionError};
 pub use pointer::{Pointer, PointerInput};
 pub use recorded::Recorded;
+pub use rig::DeviceRig;
 
 use crate::JointVector;
+use std::sync::Arc;
 
 /// A haptic device, real or simulated. Both calls come from the real-time thread: they must not allocate, lock or wait.
 pub trait Device: Send {
@@ -18,8 +66,32 @@ pub trait Device: Send {
     /// torque applied last; for real ones time passes by itself.
     fn read(&mut self, elapsed: f64) -> Reading;
 
-    /// Holds `torque` [N m or N] until the next call.
-    fn apply(&mut self, torque: &JointVector);
+    /// Holds `torque` [N m or N] until the next call, or as much of it as the device can. Returns what it holds.
+    fn apply(&mut self, torque: &JointVector) -> Applied;
+
+    /// Returns what calls the loop, if the device owns the thread in which it may be driven.
+    fn scheduler(&self) -> Option<Arc<dyn Scheduler>> {
+        None
+    }
+}
+
+/// What a device made of a torque that it was given.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Applied {
+    /// Torque that it holds until the next tick [N m or N].
+    pub torque: JointVector,
+    /// Why that is less than what was asked for.
+    pub clamps: Clamps,
+    /// Why it is zero, if it was brought there.
+    pub halt: Option<Halt>,
+}
+
+impl Applied {
+    /// Returns `torque`, held as it was given.
+    #[must_use]
+    pub fn whole(torque: &JointVector) -> Self {
+        Self { torque: *torque, clamps: Clamps::empty(), halt: None }
+    }
 }
 
 /// What a device reports.

@@ -4,7 +4,7 @@
 //! a mass on a spring and a damper as in [`super::SimulatedHand`], pulls the device there against the torque that it
 //! feels. Between the pointer's reports the hand holds still. They are exchanged without a lock: the latest counts.
 
-use super::{Device, HandError, Reading, hand::Arm};
+use super::{Applied, Device, HandError, Reading, hand::Arm};
 use crate::{JointVector, scene::HapticsSpec, tolerances::GREATEST_INPUT};
 
 /// The device, for the haptic loop.
@@ -53,8 +53,9 @@ impl Device for Pointer {
         Reading { position: *self.arm.position(), age: 0.0, hand: goal }
     }
 
-    fn apply(&mut self, torque: &JointVector) {
+    fn apply(&mut self, torque: &JointVector) -> Applied {
         self.arm.hold(torque);
+        Applied::whole(torque)
     }
 }
 

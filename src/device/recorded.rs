@@ -1,6 +1,6 @@
 //! A device that moves as recorded, whatever torque it is given.
 
-use super::{Device, Motion, Reading};
+use super::{Applied, Device, Motion, Reading};
 use crate::JointVector;
 
 /// A device that follows a motion exactly.
@@ -25,5 +25,7 @@ impl Device for Recorded {
         Reading { position, age: 0.0, hand: position }
     }
 
-    fn apply(&mut self, _: &JointVector) {}
+    fn apply(&mut self, torque: &JointVector) -> Applied {
+        Applied::whole(torque)
+    }
 }

@@ -5,8 +5,8 @@
 //! positive in a validated scene, so that M is positive definite in every configuration, singular arms included.
 
 use super::{Chain, Pose};
-use crate::MAX_JOINTS;
 use crate::scene::JointKind;
+use crate::{JointVector, MAX_JOINTS};
 use glam::DVec3;
 
 /// A square matrix over the joints: the first d rows and columns count, the others are zero.
@@ -46,6 +46,28 @@ impl Chain {
             JointKind::Revolute => pose.axes[joint],
             JointKind::Prismatic => DVec3::ZERO,
         }
+    }
+}
+
+/// Solves `M x = b` in place by Cholesky's method. M must be positive definite, as every inertia with positive rotor inertias is.
+/// Allocates nothing.
+pub fn solve_positive(matrix: &JointMatrix, b: &mut JointVector) {
+    let mut l = *matrix;
+    let count = b.len();
+    for i in 0..count {
+        for j in 0..=i {
+            let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            let rest = l[i][j] - sum;
+            l[i][j] = if i == j { rest.max(f64::MIN_POSITIVE).sqrt() } else { rest / l[j][j] };
+        }
+    }
+    for i in 0..count {
+        let sum: f64 = (0..i).map(|k| l[i][k] * b[k]).sum();
+        b[i] = (b[i] - sum) / l[i][i];
+    }
+    for i in (0..count).rev() {
+        let sum: f64 = (i + 1..count).map(|k| l[k][i] * b[k]).sum();
+        b[i] = (b[i] - sum) / l[i][i];
     }
 }
 

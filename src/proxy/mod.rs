@@ -15,5 +15,5 @@ mod random;
 
 pub use chain::{Chain, Joint, Node, Pose};
 pub use dynamics::Dynamics;
-pub use inertia::JointMatrix;
+pub use inertia::{JointMatrix, solve_positive};
 pub use links::Links;

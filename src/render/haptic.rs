@@ -273,7 +273,7 @@ impl Haptics {
         }
         state.fault = fault;
         let elapsed = if fault.is_none() { inputs.elapsed } else { self.period };
-        let (torque, limited) = self.limit(&wanted, state.held.now(), elapsed);
+        let (torque, limited) = self.limit(&wanted, state.held.asked(), elapsed);
         state.held.push(&torque);
 
         let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
@@ -363,6 +363,11 @@ impl Haptics {
 }
 
 impl State {
+    /// Takes the torque that the device holds of what the last tick answered [N m or N]: accounts and channels rest on it.
+    pub fn hold(&mut self, torque: &JointVector) {
+        self.held.correct(torque);
+    }
+
     /// Proxy position x at the next tick [rad or m].
     #[must_use]
     pub fn proxy(&self) -> &JointVector {

@@ -6,9 +6,11 @@ use crate::{JointVector, tolerances::GREATEST_POSITION_AGE};
 /// The last torques on the device, in a ring as long as a position may be old.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Held {
-    /// [N m or N]
+    /// On the device [N m or N].
     torques: Vec<JointVector>,
     last: usize,
+    /// Last torque that the loop asked for [N m or N].
+    asked: JointVector,
     /// Nominal T [s].
     period: f64,
 }
@@ -17,12 +19,13 @@ impl Held {
     /// No torque on `joints` joints, with a tick every `period` [s].
     pub fn new(joints: usize, period: f64) -> Self {
         let ticks = (GREATEST_POSITION_AGE / period).ceil() as usize + 1;
-        Self { torques: vec![JointVector::zeros(joints); ticks], last: 0, period }
+        let zero = JointVector::zeros(joints);
+        Self { torques: vec![zero; ticks], last: 0, asked: zero, period }
     }
 
-    /// Since the last tick.
-    pub fn now(&self) -> &JointVector {
-        &self.torques[self.last]
+    /// Returns the last torque that the loop asked for.
+    pub fn asked(&self) -> &JointVector {
+        &self.asked
     }
 
     /// `age` [s] ago, to a tick, or as long ago as is remembered.
@@ -32,9 +35,15 @@ impl Held {
         &self.torques[(self.last + count - ticks) % count]
     }
 
-    /// From now on.
+    /// Takes the torque that the loop asks for from now on.
     pub fn push(&mut self, torque: &JointVector) {
         self.last = (self.last + 1) % self.torques.len();
+        self.torques[self.last] = *torque;
+        self.asked = *torque;
+    }
+
+    /// Takes what the device holds of the last torque that was asked for.
+    pub fn correct(&mut self, torque: &JointVector) {
         self.torques[self.last] = *torque;
     }
 }
@@ -50,9 +59,9 @@ mod tests {
             held.push(&JointVector::from_slice(&[f64::from(k)]));
         }
         let at = |age: f64| held.before(age)[0];
-        assert_eq!(
-            (held.now()[0], at(0.0), at(0.0004), at(0.003), at(0.01), at(1.0)),
-            (49.0, 49.0, 49.0, 46.0, 39.0, 39.0)
-        );
+        let asked = held.asked()[0];
+        assert_eq!((asked, at(0.0), at(0.0004), at(0.003), at(0.01), at(1.0)), (49.0, 49.0, 49.0, 46.0, 39.0, 39.0));
+        held.correct(&JointVector::from_slice(&[7.0]));
+        assert_eq!((held.asked()[0], held.before(0.0)[0], held.before(0.001)[0]), (49.0, 7.0, 48.0));
     }
 }

@@ -10,6 +10,7 @@ pub mod flags;
 pub mod graphics;
 pub mod haptic;
 mod held;
+pub mod mcap;
 pub mod npmi;
 pub mod object_motion;
 mod own_motion;

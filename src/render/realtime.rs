@@ -13,7 +13,7 @@ use super::{
     timing::{Durations, Percentiles, Timing},
     trace::{Frame, Tick, Trace},
 };
-use crate::device::Device;
+use crate::device::{Device, Halt};
 use std::{
     sync::{
         Arc,
@@ -55,6 +55,8 @@ pub struct HapticLoop<'session> {
     missed: u64,
     unrecorded: u64,
     clear: Arc<AtomicBool>,
+    /// Whether the device has stopped for good.
+    stopped: bool,
 }
 
 /// The other ends of a [`HapticLoop`].
@@ -109,6 +111,7 @@ impl<'session> HapticLoop<'session> {
             missed: 0,
             unrecorded: 0,
             clear: Arc::clone(&clear),
+            stopped: false,
         };
         Ok((this, Ends { ticks, latest: reader, late: late_ticks, clear: ClearFault(clear) }))
     }
@@ -125,6 +128,19 @@ impl<'session> HapticLoop<'session> {
     pub fn tick(&mut self) {
         let deadline = self.began + self.period * self.next;
         let now = clock::wait_until(deadline);
+        self.tick_at(now, deadline);
+    }
+
+    /// Does a tick now: for a thread that somebody else paces. The deadline is a period after the last tick, or now, if that was less
+    /// long ago. Allocates, locks and prints nothing.
+    pub fn tick_now(&mut self) {
+        let now = clock::now();
+        let deadline = self.last.map_or(now, |last| (last + self.period).min(now));
+        self.began = deadline.saturating_sub(self.period * self.next);
+        self.tick_at(now, deadline);
+    }
+
+    fn tick_at(&mut self, now: Duration, deadline: Duration) {
         let by = now - deadline;
         self.lateness.record(by);
         if by > self.period / 2 {
@@ -147,18 +163,19 @@ impl<'session> HapticLoop<'session> {
         let (tick, latest) = self.driver.tick(elapsed.as_secs_f64(), interval.as_secs_f64());
         self.cost.record(clock::now() - now);
         self.latest.write(latest);
+        self.stopped |= tick.applied.halt.is_some_and(Halt::is_final);
         if self.recorder.push(tick).is_err() {
             self.unrecorded += 1;
         }
     }
 
-    /// Whether `ticks` deadlines have come.
+    /// Whether `ticks` deadlines have come, or the device has stopped for good.
     fn is_over(&self, ticks: usize) -> bool {
-        self.next as usize >= ticks
+        self.next as usize >= ticks || self.stopped
     }
 }
 
-/// Runs a session against the clock, as long as `plan` says. Graphics, where there is any, runs in a thread of its own.
+/// Runs a session against the clock, as long as `plan` says, until `stop` is raised or the device stops for good. Graphics, where there is any, runs in a thread of its own.
 ///
 /// # Errors
 /// When the device reports no position, or the system gives no threads or memory.
@@ -167,7 +184,9 @@ pub fn run(
     device: &mut dyn Device,
     graphics: Option<&mut Graphics<'_>>,
     plan: &Plan,
+    stop: &AtomicBool,
 ) -> Result<(Trace, Timing), SessionError> {
+    let scheduler = device.scheduler();
     let (mut body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device)?;
     let start = *body.driver.start();
     let frame_cost = Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()))?;
@@ -184,10 +203,23 @@ pub fn run(
         });
         let drawing = drawing.transpose().map_err(resources)?;
         let feeling = thread::Builder::new().name("haptic".into()).spawn_scoped(scope, move || {
-            let refused = body.begin();
-            while !body.is_over(plan.ticks) {
-                body.tick();
-            }
+            let goes_on = |body: &HapticLoop<'_>| !body.is_over(plan.ticks) && !stop.load(Ordering::Relaxed);
+            let refused = match scheduler {
+                None => {
+                    let refused = body.begin();
+                    while goes_on(&body) {
+                        body.tick();
+                    }
+                    refused
+                }
+                Some(scheduler) => {
+                    let run = scheduler.run(&mut || {
+                        body.tick_now();
+                        goes_on(&body)
+                    });
+                    run.err().map(|halt| format!("the device's own thread stopped: {halt}")).into_iter().collect()
+                }
+            };
             (refused, body.lateness, body.cost, body.missed, body.unrecorded)
         });
         let feeling = match feeling {

@@ -4,7 +4,8 @@
 //! CSV: comments (#), one of them with the device's first position and one with the instants of the frames that were kept; a
 //! header; one row a tick. `elapsed`, `interval`, `age` and
 //! position are the tick's inputs as in [`Inputs`]; `restart` is 1 where a fault was cleared; `frames` is how many frames of
-//! the object showed this tick; torque and proxy are the answer. Numbers are printed so that reading gives the same bits. A
+//! the object showed this tick; torque and proxy are the answer, `held` is what the device held of the torque (as
+//! much as was asked for where a file has no such columns). Numbers are printed so that reading gives the same bits. A
 //! position of a wrong number of joints has empty fields.
 
 use super::{
@@ -15,7 +16,7 @@ use super::{
 };
 use crate::{
     JointVector,
-    device::{Device, Reading},
+    device::{Applied, Device, Reading},
 };
 use std::{
     fs::File,
@@ -42,6 +43,7 @@ struct Row {
     hand: JointVector,
     torque: JointVector,
     proxy: JointVector,
+    held: JointVector,
 }
 
 /// A file is not a recording.
@@ -95,6 +97,7 @@ impl Recording {
             hand: tick.hand,
             torque: tick.device_torque,
             proxy: tick.proxy,
+            held: tick.applied.torque,
         };
         let mut rows: Vec<Row> = trace.ticks.iter().map(row).collect();
         for shown in &trace.shown {
@@ -123,11 +126,11 @@ impl Recording {
         write!(out, "\n{KEPT}")?;
         self.kept.iter().try_for_each(|time| write!(out, ",{time}"))?;
         write!(out, "\nelapsed [s],interval [s],age [s],restart,frames")?;
-        for what in ["position", "hand", "torque", "proxy"] {
+        for what in ["position", "hand", "torque", "proxy", "held"] {
             for joint in joints {
                 let unit = match (what, joint.unit.as_str()) {
-                    ("torque", "m") => "N",
-                    ("torque", _) => "N m",
+                    ("torque" | "held", "m") => "N",
+                    ("torque" | "held", _) => "N m",
                     (_, unit) => unit,
                 };
                 write!(out, ",{what} {} [{unit}]", plain(&joint.name))?;
@@ -137,7 +140,7 @@ impl Recording {
         for row in &self.rows {
             let Inputs { position, age, elapsed, interval } = &row.inputs;
             write!(out, "{elapsed},{interval},{age},{},{}", u8::from(row.restart), row.frames)?;
-            for vector in [position, &row.hand, &row.torque, &row.proxy] {
+            for vector in [position, &row.hand, &row.torque, &row.proxy, &row.held] {
                 write_vector(out, vector, joints.len())?;
             }
             writeln!(out)?;
@@ -242,7 +245,12 @@ impl Device for Playback<'_> {
         Reading { position: row.inputs.position, age: row.inputs.age, hand: row.hand }
     }
 
-    fn apply(&mut self, _: &JointVector) {}
+    fn apply(&mut self, torque: &JointVector) -> Applied {
+        // The row that was read last.
+        let row = self.next.and_then(|next| self.recording.rows.get(next.checked_sub(1)?));
+        let held = row.map(|row| row.held).filter(|held| held.len() == torque.len());
+        Applied::whole(&held.unwrap_or(*torque))
+    }
 }
 
 fn write_vector(out: &mut impl Write, vector: &JointVector, joints: usize) -> io::Result<()> {
@@ -254,8 +262,9 @@ fn write_vector(out: &mut impl Write, vector: &JointVector, joints: usize) -> io
 
 fn row(text: &str, joints: usize) -> Result<Row, String> {
     let fields: Vec<&str> = text.split(',').collect();
-    if fields.len() != SCALARS + 4 * joints {
-        return Err(format!("{} fields in the place of {}", fields.len(), SCALARS + 4 * joints));
+    let known = [5, 4].map(|vectors| SCALARS + vectors * joints);
+    if !known.contains(&fields.len()) {
+        return Err(format!("{} fields in the place of {}", fields.len(), known[0]));
     }
     let frames: u32 = number(fields[4])?;
     if frames > MAX_FRAMES {
@@ -274,6 +283,7 @@ fn row(text: &str, joints: usize) -> Result<Row, String> {
         hand: vector(1)?,
         torque: vector(2)?,
         proxy: vector(3)?,
+        held: vector(if fields.len() == known[0] { 4 } else { 2 })?,
     })
 }
 

@@ -122,7 +122,8 @@ impl<'session> Driver<'session> {
             && self.haptics.restart(&mut self.state, &reading.position).is_ok();
         let inputs = Inputs { position: reading.position, age: reading.age, elapsed, interval };
         let output = self.haptics.tick(&mut self.state, &inputs);
-        self.device.apply(&output.torque);
+        let applied = self.device.apply(&output.torque);
+        self.state.hold(&applied.torque);
         let share = if output.sample.contact { output.sample.share } else { 0.0 };
         let latest = Latest { time: self.time, proxy: output.proxy, device: output.device, share };
         let tick = Tick {
@@ -133,6 +134,7 @@ impl<'session> Driver<'session> {
             device: output.device,
             proxy: output.proxy,
             device_torque: output.torque,
+            applied,
             contact_torque: output.sample.torque,
             index: output.sample.index,
             contact: output.sample.contact,

@@ -9,7 +9,7 @@ use super::{
     flags::{Fault, Flags},
     haptic::Inputs,
 };
-use crate::JointVector;
+use crate::{JointVector, device::Applied};
 use glam::DVec3;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -31,6 +31,8 @@ pub struct Tick {
     pub proxy: JointVector,
     /// Torque commanded to the device [N m or N].
     pub device_torque: JointVector,
+    /// What the device held of it, and why not all.
+    pub applied: Applied,
     /// Contact torque tau_bar on the proxy, after the boundary layer [N m or N].
     pub contact_torque: JointVector,
     /// Interpolated contact index, 0 to 1.
@@ -125,6 +127,10 @@ pub struct Summary {
     pub limited: usize,
     /// Ticks with a fault.
     pub faults: usize,
+    /// Ticks at which the device held less than what was asked for.
+    pub clamped: usize,
+    /// Ticks at which the device's safety layer kept it without torque.
+    pub halted: usize,
 }
 
 impl Trace {
@@ -139,6 +145,8 @@ impl Trace {
         s.unconverged = flagged(Flags::UNCONVERGED);
         s.limited = flagged(Flags::SIZE_LIMITED | Flags::RATE_LIMITED);
         s.faults = self.ticks.iter().filter(|tick| tick.fault.is_some()).count();
+        s.clamped = self.ticks.iter().filter(|tick| !tick.applied.clamps.is_empty()).count();
+        s.halted = self.ticks.iter().filter(|tick| tick.applied.halt.is_some()).count();
         for tick in &self.ticks {
             s.max_contact_nodes = s.max_contact_nodes.max(tick.contact_nodes);
             s.max_contact_torque = s.max_contact_torque.max(tick.contact_torque.norm());
@@ -177,9 +185,14 @@ impl Trace {
     /// Those of `out`.
     pub fn write_ticks(&self, out: &mut impl Write) -> io::Result<()> {
         write!(out, "time [s]")?;
-        for (what, torque) in
-            [("hand", false), ("device", false), ("proxy", false), ("device torque", true), ("contact torque", true)]
-        {
+        for (what, torque) in [
+            ("hand", false),
+            ("device", false),
+            ("proxy", false),
+            ("device torque", true),
+            ("held torque", true),
+            ("contact torque", true),
+        ] {
             for joint in &self.joints {
                 let unit = match (torque, joint.unit.as_str()) {
                     (false, unit) => unit,
@@ -189,21 +202,24 @@ impl Trace {
                 write!(out, ",{what} {} [{unit}]", plain(&joint.name))?;
             }
         }
-        write!(out, ",contact index,contact,contact nodes,flags,fault")?;
+        write!(out, ",contact index,contact,contact nodes,flags,fault,clamps,halt")?;
         for (name, _) in Accounts::default().named() {
             write!(out, ",{name} [J]")?;
         }
         writeln!(out)?;
         for tick in &self.ticks {
             write!(out, "{}", tick.time)?;
-            for vector in [&tick.hand, &tick.device, &tick.proxy, &tick.device_torque, &tick.contact_torque] {
+            let torques = [&tick.device_torque, &tick.applied.torque, &tick.contact_torque];
+            for vector in [&tick.hand, &tick.device, &tick.proxy].into_iter().chain(torques) {
                 for value in vector.iter() {
                     write!(out, ",{value}")?;
                 }
             }
             let fault = tick.fault.map(|fault| fault.to_string()).unwrap_or_default();
             let (index, contact, nodes) = (tick.index, u8::from(tick.contact), tick.contact_nodes);
-            write!(out, ",{index},{contact},{nodes},{},{fault}", tick.flags.bits())?;
+            let halt = tick.applied.halt.map(|halt| halt.to_string()).unwrap_or_default();
+            let (flags, clamps) = (tick.flags.bits(), tick.applied.clamps.bits());
+            write!(out, ",{index},{contact},{nodes},{flags},{fault},{clamps},{halt}")?;
             for (_, account) in tick.accounts.named() {
                 write!(out, ",")?;
                 account.map_or(Ok(()), |joules| write!(out, "{joules}"))?;
@@ -252,6 +268,7 @@ mod tests {
             device: one,
             proxy: one,
             device_torque: one,
+            applied: Applied::whole(&one),
             contact_torque: one,
             index: 1.0,
             contact: torque != 0.0,

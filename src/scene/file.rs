@@ -24,6 +24,19 @@ pub(super) struct SceneTable {
     pub graphics: Option<GraphicsEntry>,
     #[serde(default)]
     pub motion: MotionTable,
+    #[serde(default)]
+    pub device: DeviceTable,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DeviceTable {
+    pub map: Option<Spanned<Vec<Vec<f64>>>>,
+    pub offset: Option<Spanned<Vec<f64>>>,
+    pub node: Option<Spanned<usize>>,
+    pub stiffness: Option<Number>,
+    pub damping: Option<Number>,
+    pub effort_limit: Option<Spanned<Vec<f64>>>,
 }
 
 #[derive(Deserialize)]

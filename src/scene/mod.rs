@@ -5,6 +5,7 @@
 
 mod check;
 mod convert;
+mod device;
 mod effects;
 mod error;
 mod file;
@@ -13,6 +14,7 @@ mod own_text;
 mod scan;
 mod spec;
 
+pub use device::DeviceSpec;
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use error::{Diagnostic, SceneError};
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
@@ -67,6 +69,8 @@ pub struct ScanScene {
     pub proxy: ProxySpec,
     /// How it scans.
     pub scan: ScanSpec,
+    /// How a real device stands to the proxy.
+    pub device: DeviceSpec,
 }
 
 /// What rendering needs of a scene, whether its object is virtual, real, or only known from a log.
@@ -88,6 +92,8 @@ pub struct Rendering {
     pub graphics: Option<GraphicsSpec>,
     /// Motions to play.
     pub motion: MotionSpec,
+    /// How a real device stands to the proxy.
+    pub device: DeviceSpec,
 }
 
 /// Longest scene file that is read [B]: a scene is a page or two, and its text goes into every dataset.

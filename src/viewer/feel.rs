@@ -8,7 +8,7 @@
 use super::{background::spawn, gamepad::Gamepad, guide::Guide};
 use crate::{
     JointVector,
-    device::{Device, Pointer, PointerInput, Reading},
+    device::{Applied, Device, Pointer, PointerInput, Reading},
     render::{
         haptic::Haptics,
         realtime::{ClearFault, Ends, HapticLoop},
@@ -245,9 +245,9 @@ impl Device for Timed {
         reading
     }
 
-    fn apply(&mut self, torque: &JointVector) {
+    fn apply(&mut self, torque: &JointVector) -> Applied {
         // Unread costs of the last seconds are as good as newer ones.
         let _ = self.cost.push(self.read.elapsed());
-        self.pointer.apply(torque);
+        self.pointer.apply(torque)
     }
 }

@@ -42,6 +42,9 @@ pub struct Table {
     pub columns: Option<usize>,
     /// What happens to a row with a wrong number of columns, or with a field that is missing or not a finite number.
     pub bad_rows: BadRows,
+    /// The topic of joint states that is read of an MCAP file, whose columns are `time`, and `position`, `velocity` and `effort` with
+    /// each joint's name; absent: its only one. The other keys of the layout are not used then.
+    pub topic: Option<String>,
 }
 
 /// What happens to a row that cannot be used.
@@ -163,7 +166,15 @@ impl Default for Table {
             header: false,
             columns: None,
             bad_rows: BadRows::Refuse,
+            topic: None,
         }
+    }
+}
+
+impl Table {
+    /// The layout of [`crate::ros::JointStateTable`].
+    fn of_joint_states() -> Self {
+        Self { comment: String::new(), header: true, ..Self::default() }
     }
 }
 
@@ -223,6 +234,37 @@ impl Mapping {
             toml::from_str(text).map_err(|error| invalid(error.span().unwrap_or(0..0), error.message()))?;
         check(&mapping).map_err(|refusal| invalid(refusal.place(text), &refusal.message))?;
         Ok(mapping)
+    }
+
+    /// Returns the mapping that takes all `joints` of a topic of joint states, as angles, with `scale` times their efforts as
+    /// contact torques. Messages that leave out a joint are dropped and counted.
+    #[must_use]
+    pub fn of_joint_states(joints: &[String], topic: &str, scale: f64) -> Self {
+        let quantity = |what: &str, joint: &String, scale| Quantity {
+            column: ColumnName::Name(format!("{what} {joint}")),
+            scale,
+            offset: 0.0,
+        };
+        let joint = |name: &String| Joint {
+            name: name.clone(),
+            unit: radians(),
+            position: quantity("position", name, 1.0),
+            torque: quantity("effort", name, scale),
+        };
+        Self {
+            table: Table { bad_rows: BadRows::Drop, topic: Some(topic.to_owned()), ..Table::of_joint_states() },
+            time: Time { column: Some(ColumnName::Name("time".into())), scale: 1.0, period: None, gap: unlimited() },
+            joints: joints.iter().map(joint).collect(),
+            filter: Filter::default(),
+            torque: Torque::default(),
+        }
+    }
+
+    /// Returns the same mapping, for the text that joint states are read as.
+    #[must_use]
+    pub fn for_joint_states(&self) -> Self {
+        let Table { bad_rows, topic, .. } = self.table.clone();
+        Self { table: Table { bad_rows, topic, ..Table::of_joint_states() }, ..self.clone() }
     }
 
     /// Names and units of the joints.

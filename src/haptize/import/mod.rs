@@ -7,6 +7,8 @@
 //! A mechanism with friction has no single torque at a configuration: it depends on the direction of motion. The
 //! mapping says which one is kept (section 2.2 measures at rest; a log of a moving mechanism offers the mean of both
 //! directions, in which dry friction cancels, or either branch), and the report says how far apart they lie.
+//!
+//! A log may also be an MCAP file of a robot: its joint states are read as a table ([`crate::ros`]).
 
 mod cells;
 mod check;
@@ -17,12 +19,17 @@ mod window;
 pub use cells::CellReport;
 pub use mapping::{BadRows, ColumnName, Filter, Joint, Keep, Mapping, MappingError, Quantity, Table, Time, Torque};
 
-use crate::{JointVector, haptize::gridize::Samples, tolerances};
+use crate::{
+    JointVector,
+    haptize::gridize::Samples,
+    ros::{JointStateTable, RosError, is_mcap},
+    tolerances,
+};
 use cells::{Cells, Direction};
 use rows::{Outcome, Row, Rows};
 use std::{
     fs::File,
-    io::{BufRead, BufReader},
+    io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
 };
 use window::{Seen, Window};
@@ -60,6 +67,9 @@ pub enum ImportError {
         /// The limit.
         limit: usize,
     },
+    /// An MCAP file that cannot be read.
+    #[error(transparent)]
+    Ros(#[from] RosError),
     /// Nothing left.
     #[error("no row was kept: {0}")]
     Nothing(String),
@@ -136,11 +146,17 @@ pub fn import(
     files: &[PathBuf],
     progress: &mut dyn FnMut(ImportProgress),
 ) -> Result<Imported, ImportError> {
+    let of_robot = files.iter().any(|file| is_mcap(file));
+    let mapping = &if of_robot { mapping.for_joint_states() } else { mapping.clone() };
     let mut import = Import::new(mapping);
     let mut bytes = 0;
     for path in files {
         let file = path.display().to_string();
-        let opened = File::open(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
+        let opened: Box<dyn Read> = if of_robot {
+            Box::new(JointStateTable::open(path, mapping.table.topic.as_deref())?)
+        } else {
+            Box::new(File::open(path).map_err(|source| ImportError::Read { file: file.clone(), source })?)
+        };
         bytes += import.read(BufReader::with_capacity(1 << 16, opened), &file, &mut |read, rows| {
             progress(ImportProgress { bytes: bytes + read, rows });
         })?;

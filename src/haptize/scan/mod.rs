@@ -13,6 +13,7 @@ pub mod reach;
 mod rig;
 pub mod simulated;
 mod steady;
+mod trajectory;
 
 pub use control::{PdControl, PdOutput};
 pub use log::{LogError, LogHeader, LogWriter, RowStatus, SIGNATURE, ScanLog, ScanRow};
@@ -20,6 +21,7 @@ pub use plan::{Plan, Stop};
 pub use reach::reach;
 pub use rig::{Rig, RigError, RigReading};
 pub use steady::Steadiness;
+pub use trajectory::Trajectory;
 
 use crate::{
     JointVector,

@@ -1,5 +1,6 @@
 //! From the tables of a scene file to a validated [`Scene`]: defaults filled, every number checked, one file per table.
 
+mod device;
 mod graphics;
 mod grid;
 mod haptics;
@@ -51,12 +52,12 @@ pub(super) fn scan_scene(checker: &Checker<'_>, table: &SceneTable) -> Result<Sc
                        haptized by `haptize bake`";
         return Err(checker.error(0..0, message));
     };
-    let Rendering { text, name, proxy, haptics, .. } = rendering(checker, table)?;
+    let Rendering { text, name, proxy, haptics, device, .. } = rendering(checker, table)?;
     if let Some((effect, place)) = haptics.effects.at_contacts() {
         let message = format!("{effect} needs the contact forces, which a real object does not tell: leave it out");
         return Err(checker.error(place.clone(), message));
     }
-    Ok(ScanScene { text, name, scan: scan::convert(checker, scan, &proxy)?, proxy })
+    Ok(ScanScene { text, name, scan: scan::convert(checker, scan, &proxy)?, device, proxy })
 }
 
 /// Validates what rendering needs of `table`.
@@ -82,6 +83,7 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
         haptics: haptics::convert(checker, &table.haptics, joints, interpolation)?,
         graphics,
         motion: motion::convert(checker, &table.motion, joints)?,
+        device: device::convert(checker, &table.device, &proxy)?,
         proxy,
     })
 }

@@ -17,7 +17,7 @@ pub use sponge::{NodeContact, Sponge};
 use super::rig::{Rig, RigError, RigReading};
 use crate::{
     JointVector,
-    proxy::{Chain, JointMatrix, Pose},
+    proxy::{Chain, Pose, solve_positive},
     scene::{Cover, JointKind, ProxySpec, SpecimenSpec},
     tolerances,
 };
@@ -98,7 +98,7 @@ impl SimulatedRig {
             let viscous = VISCOUS * inertia[joint][joint] * self.velocity[joint];
             *rate = torque[joint] + load[joint] - viscous;
         }
-        solve(&inertia, &mut rate);
+        solve_positive(&inertia, &mut rate);
         for joint in 0..rate.len() {
             let free = self.velocity[joint] + time * rate[joint];
             let braked = time * self.spec.joint_friction / inertia[joint][joint];
@@ -164,26 +164,5 @@ impl Rig for SimulatedRig {
 
     fn is_simulated(&self) -> bool {
         true
-    }
-}
-
-/// Solves M x = b in place by Cholesky's method; M is positive definite because every rotor inertia is positive.
-fn solve(matrix: &JointMatrix, b: &mut JointVector) {
-    let mut l = *matrix;
-    let count = b.len();
-    for i in 0..count {
-        for j in 0..=i {
-            let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
-            let rest = l[i][j] - sum;
-            l[i][j] = if i == j { rest.max(f64::MIN_POSITIVE).sqrt() } else { rest / l[j][j] };
-        }
-    }
-    for i in 0..count {
-        let sum: f64 = (0..i).map(|k| l[i][k] * b[k]).sum();
-        b[i] = (b[i] - sum) / l[i][i];
-    }
-    for i in (0..count).rev() {
-        let sum: f64 = (i + 1..count).map(|k| l[k][i] * b[k]).sum();
-        b[i] = (b[i] - sum) / l[i][i];
     }
 }

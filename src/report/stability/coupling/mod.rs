@@ -13,7 +13,7 @@ mod time;
 use super::{Bound, Case, Effort, Failure, Outcome, Setting, worlds::half_space};
 use crate::{
     JointVector,
-    device::{Device, Motion, Reading, SimulatedHand},
+    device::{Applied, Device, Motion, Reading, SimulatedHand},
     render::{
         flags::Fault,
         haptic::{Inputs, Output},
@@ -232,7 +232,7 @@ impl<F: FnMut(usize, Reading) -> Reading + Send> Device for Altered<F> {
         (self.altered)(self.tick, self.device.read(elapsed))
     }
 
-    fn apply(&mut self, torque: &JointVector) {
-        self.device.apply(torque);
+    fn apply(&mut self, torque: &JointVector) -> Applied {
+        self.device.apply(torque)
     }
 }

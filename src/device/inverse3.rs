@@ -1,0 +1,359 @@
+//! Haply Inverse3, through the maker's service: position of its cursor [m] and force on it [N].
+//!
+//! The service (Inverse SDK 3.5) speaks WebSocket, by default on port 10001 of this machine. On connection it sends one
+//! inventory of all devices; then exactly one state for each message that it gets. Commands count once: when messages
+//! stop, the device returns to idle by itself, after a time that the maker does not state.
+//!
+//! A thread of its own keeps that rhythm: it sends the latest command, takes the state that answers it, and passes it
+//! on; neither side waits for the other. A command that the loop has not renewed for [`STALE_COMMAND`] is replaced by a
+//! reading without force, so that a loop that hangs does not leave the last force on. Force is sent only while the
+//! device says that it is calibrated, ready and powered.
+//!
+//! What the service adds to forces (compensation of gravity, a force gate, damping) is the user's own setting and stays
+//! as it is.
+//!
+//! Source: the maker's public documentation, version 3.5, and recorded messages of its client library. Not tried on
+//! hardware.
+
+use super::{Command, Coordinates, Halt, Hardware, Limits, Measurement, Watchdog};
+use crate::JointVector;
+use serde::Deserialize;
+use std::{
+    fmt::Write as _,
+    net::{TcpStream, ToSocketAddrs},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::{self, JoinHandle},
+    time::{Duration, Instant},
+};
+use tungstenite::{Message, WebSocket};
+
+/// Address of the service.
+const ADDRESS: &str = "localhost:10001";
+
+/// Maximum force [N]: well within what the maker states for the device.
+const MOST_FORCE: f64 = 4.0;
+
+/// Time after which a command that is not renewed is dropped.
+pub const STALE_COMMAND: Duration = Duration::from_millis(10);
+
+/// Time between two messages.
+const PERIOD: Duration = Duration::from_millis(1);
+
+/// How long a connection or an answer is waited for.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// Longest message of the service [bytes]: an inventory of many devices has some thousand.
+const LONGEST_MESSAGE: usize = 1 << 20;
+
+/// What is used of a state frame; anything else may be there or not.
+#[derive(Deserialize)]
+struct Frame {
+    #[serde(default)]
+    inverse3: Vec<DeviceFrame>,
+}
+
+#[derive(Deserialize)]
+struct DeviceFrame {
+    device_id: String,
+    state: Option<StateFrame>,
+    status: Option<StatusFrame>,
+}
+
+#[derive(Deserialize)]
+struct StateFrame {
+    cursor_position: Option<Vector>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+struct Vector {
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(default)]
+struct StatusFrame {
+    calibrated: bool,
+    ready: bool,
+    power_supply: bool,
+}
+
+impl StatusFrame {
+    fn is_ready(self) -> bool {
+        self.calibrated && self.ready && self.power_supply
+    }
+}
+
+/// What the thread passes to the loop.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    position: [f64; 3],
+    at: Instant,
+    ready: bool,
+    ended: Option<Halt>,
+}
+
+/// What the loop passes to the thread.
+#[derive(Clone, Copy, Debug)]
+struct Wanted {
+    /// None before motors are enabled.
+    force: Option<[f64; 3]>,
+    at: Instant,
+}
+
+/// A connection to the service, with the thread that keeps it.
+pub struct Inverse3 {
+    id: String,
+    seen: triple_buffer::Output<Seen>,
+    wanted: triple_buffer::Input<Wanted>,
+    enabled: bool,
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Inverse3 {
+    /// Returns the address at which the service is looked for.
+    #[must_use]
+    pub fn address() -> &'static str {
+        ADDRESS
+    }
+
+    /// Returns whether something listens at the service's address.
+    #[must_use]
+    pub fn is_there() -> bool {
+        connect(ADDRESS).is_ok()
+    }
+
+    /// Connects to the service at `place`, `HOST:PORT` or `HOST:PORT/DEVICE`, and takes the device of that number or
+    /// the first.
+    ///
+    /// # Errors
+    /// In words, with the remedy.
+    pub fn open(place: Option<&str>) -> Result<Self, String> {
+        let place = place.unwrap_or(ADDRESS);
+        let (address, wanted_id) = place.split_once('/').map_or((place, None), |(address, id)| (address, Some(id)));
+        let stream = connect(address)?;
+        let config = tungstenite::protocol::WebSocketConfig::default()
+            .max_message_size(Some(LONGEST_MESSAGE))
+            .max_frame_size(Some(LONGEST_MESSAGE));
+        let (mut socket, _) = tungstenite::client::client_with_config(format!("ws://{address}/"), stream, Some(config))
+            .map_err(|error| format!("{address} is no Haply service: {error}"))?;
+        let inventory = receive(&mut socket).map_err(|halt| format!("{address}: no inventory: {halt}"))?;
+        let chosen = inventory.inverse3.iter().find(|device| wanted_id.is_none_or(|id| device.device_id == id));
+        let Some(device) = chosen else {
+            let known: Vec<&str> = inventory.inverse3.iter().map(|device| device.device_id.as_str()).collect();
+            return Err(match wanted_id {
+                Some(id) => format!("the service has no device {id}; it has: {}", known.join(", ")),
+                None => "the service has no Inverse3: plug it in, switch its power on".into(),
+            });
+        };
+        let id = device.device_id.clone();
+        if !id.chars().all(|c| c.is_ascii_alphanumeric()) {
+            return Err(format!("the service names a device {id:?}, which is no number of a device"));
+        }
+        let now = Instant::now();
+        let mut first = Seen { position: [0.0; 3], at: now, ready: false, ended: None };
+        first.take(device);
+        let (publish, seen) = triple_buffer::triple_buffer(&first);
+        let (wanted, commands) = triple_buffer::triple_buffer(&Wanted { force: None, at: now });
+        let over = Arc::new(AtomicBool::new(false));
+        let link = Link { socket, id: id.clone(), seen: first, publish, commands, over: Arc::clone(&over) };
+        let thread = thread::Builder::new().name("inverse3".into()).spawn(move || link.run());
+        let thread = thread.map_err(|error| format!("no thread for the connection: {error}"))?;
+        Ok(Self { id, seen, wanted, enabled: false, over, thread: Some(thread) })
+    }
+}
+
+fn connect(address: &str) -> Result<TcpStream, String> {
+    let absent = || {
+        format!(
+            "no service answers at {address}: install and start the Haply Inverse service, or name it as in inverse3:HOST:PORT"
+        )
+    };
+    let found = address.to_socket_addrs().map_err(|_| absent())?;
+    let stream =
+        found.into_iter().find_map(|address| TcpStream::connect_timeout(&address, PATIENCE).ok()).ok_or_else(absent)?;
+    let set = stream.set_nodelay(true).and_then(|()| stream.set_read_timeout(Some(PATIENCE)));
+    set.map_err(|error| error.to_string())?;
+    Ok(stream)
+}
+
+/// Waits for the next frame.
+fn receive(socket: &mut WebSocket<TcpStream>) -> Result<Frame, Halt> {
+    loop {
+        match socket.read() {
+            Ok(Message::Text(text)) => return serde_json::from_str(&text).map_err(|_| Halt::Garbage),
+            Ok(Message::Ping(_) | Message::Pong(_)) => {}
+            Ok(Message::Binary(_) | Message::Frame(_)) => return Err(Halt::Garbage),
+            Ok(Message::Close(_)) | Err(_) => return Err(Halt::Unplugged),
+        }
+    }
+}
+
+impl Seen {
+    /// Takes in what `device` says.
+    fn take(&mut self, device: &DeviceFrame) {
+        if let Some(status) = device.status {
+            self.ready = status.is_ready();
+        }
+        if let Some(Vector { x, y, z }) = device.state.as_ref().and_then(|state| state.cursor_position) {
+            (self.position, self.at) = ([x, y, z], Instant::now());
+        }
+    }
+}
+
+/// The thread's end.
+struct Link {
+    socket: WebSocket<TcpStream>,
+    id: String,
+    seen: Seen,
+    publish: triple_buffer::Input<Seen>,
+    commands: triple_buffer::Output<Wanted>,
+    over: Arc<AtomicBool>,
+}
+
+impl Link {
+    fn run(mut self) {
+        let mut due = Instant::now();
+        // The first message names the program to the service; later ones must not.
+        let mut session = r#""session":{"configure":{"profile":{"name":"dev.haptize:loop"}}},"#;
+        while !self.over.load(Ordering::Acquire) {
+            let Wanted { force, at } = *self.commands.read();
+            let force = force.filter(|_| at.elapsed() < STALE_COMMAND && self.seen.ready);
+            if let Err(halt) = self.exchange(session, force) {
+                self.seen.ended = Some(halt);
+                self.publish.write(self.seen);
+                return;
+            }
+            session = "";
+            due += PERIOD;
+            thread::sleep(due.saturating_duration_since(Instant::now()));
+            // Time that was lost is not made up for.
+            due = due.max(Instant::now() - PERIOD);
+        }
+        let _ = self.exchange("", Some([0.0; 3]));
+        let _ = self.socket.close(None);
+        let _ = self.socket.flush();
+    }
+
+    /// Sends one message and takes in the state that answers it.
+    fn exchange(&mut self, session: &str, force: Option<[f64; 3]>) -> Result<(), Halt> {
+        let message = message(session, &self.id, force);
+        self.socket.send(Message::text(message)).map_err(|_| Halt::Unplugged)?;
+        let frame = receive(&mut self.socket)?;
+        match frame.inverse3.iter().find(|device| device.device_id == self.id) {
+            Some(device) => self.seen.take(device),
+            None => return Err(Halt::Unplugged),
+        }
+        self.publish.write(self.seen);
+        Ok(())
+    }
+}
+
+/// Returns the message that commands `force`, or that asks for the position.
+fn message(session: &str, id: &str, force: Option<[f64; 3]>) -> String {
+    let mut text = format!(r#"{{{session}"inverse3":[{{"device_id":"{id}","commands":"#);
+    let _ = match force {
+        Some([x, y, z]) => write!(text, r#"{{"set_cursor_force":{{"vector":{{"x":{x:?},"y":{y:?},"z":{z:?}}}}}}}"#),
+        None => write!(text, r#"{{"probe_position":{{}}}}"#),
+    };
+    text.push_str("}]}");
+    text
+}
+
+impl Hardware for Inverse3 {
+    fn description(&self) -> String {
+        format!("Haply Inverse3 {}", self.id)
+    }
+
+    fn coordinates(&self) -> Coordinates {
+        Coordinates::Tip
+    }
+
+    fn limits(&self) -> Limits {
+        Limits { effort: JointVector::from_slice(&[MOST_FORCE; 3]), watchdog: Watchdog::Unstated }
+    }
+
+    fn enable(&mut self) -> Result<(), Halt> {
+        self.enabled = true;
+        Ok(())
+    }
+
+    fn read(&mut self, _: f64) -> Result<Measurement, Halt> {
+        let seen = *self.seen.read();
+        if let Some(halt) = seen.ended {
+            return Err(halt);
+        }
+        let plain = Measurement::plain(JointVector::from_slice(&seen.position), seen.at.elapsed().as_secs_f64());
+        Ok(Measurement { ready: seen.ready, ..plain })
+    }
+
+    fn write(&mut self, effort: &JointVector) -> Result<Command, Halt> {
+        let [x, y, z, ..] = effort.padded();
+        self.wanted.write(Wanted { force: self.enabled.then_some([x, y, z]), at: Instant::now() });
+        Ok(Command::Whole)
+    }
+
+    fn release(&mut self) {
+        self.over.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            // It has no result.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Inverse3 {
+    fn drop(&mut self) {
+        self.release();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_those_of_the_documentation() {
+        let session = r#""session":{"configure":{"profile":{"name":"dev.haptize:loop"}}},"#;
+        assert_eq!(
+            message(session, "049D", Some([0.0, 0.0, 1.5])),
+            r#"{"session":{"configure":{"profile":{"name":"dev.haptize:loop"}}},"inverse3":[{"device_id":"049D","commands":{"set_cursor_force":{"vector":{"x":0.0,"y":0.0,"z":1.5}}}}]}"#
+        );
+        assert_eq!(
+            message("", "049D", None),
+            r#"{"inverse3":[{"device_id":"049D","commands":{"probe_position":{}}}]}"#
+        );
+    }
+
+    #[test]
+    fn frames_are_read_with_whatever_they_hold_or_lack() {
+        let read = |text: &str| serde_json::from_str::<Frame>(text);
+        let full = r#"{"session_id":15,"inverse3":[{"device_id":"04BA","config":{"type":"inverse3"},"state":{"angular_position":
+            {"a0":-69.31704},"cursor_position":{"x":0.0206,"y":-0.0276,"z":0},"mode":"idle","transform":{}},
+            "status":{"calibrated":true,"in_use":false,"power_supply":true,"ready":true,"started":true}}],"verse_grip":[]}"#;
+        let frame = read(full).unwrap();
+        assert!(frame.inverse3[0].status.unwrap().is_ready());
+        assert_eq!(frame.inverse3[0].state.as_ref().unwrap().cursor_position.unwrap().z, 0.0);
+        assert!(read("{}").unwrap().inverse3.is_empty());
+        assert!(read(r#"{"inverse3":[{"device_id":"1"}]}"#).unwrap().inverse3[0].state.is_none());
+        assert!(
+            !read(r#"{"inverse3":[{"device_id":"1","status":{"ready":true}}]}"#).unwrap().inverse3[0]
+                .status
+                .unwrap()
+                .is_ready()
+        );
+        for wrong in [
+            "",
+            "[]x",
+            r#"{"inverse3":7}"#,
+            r#"{"inverse3":[{"device_id":"1","state":{"cursor_position":{"x":"a"}}}]}"#,
+        ] {
+            assert!(read(wrong).is_err(), "{wrong}");
+        }
+    }
+}

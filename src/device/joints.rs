@@ -1,0 +1,39 @@
+//! A device whose joints are those of the scene, through a linear map.
+
+use super::{Applied, Device, Guard, LinearMap, Reading, Scheduler};
+use crate::JointVector;
+use std::sync::Arc;
+
+/// A joint-true device behind its safety layer, in the scene's coordinates.
+pub struct JointDevice {
+    guard: Guard,
+    map: LinearMap,
+}
+
+impl JointDevice {
+    /// Returns the device of `guard`; `map` must have as many coordinates.
+    #[must_use]
+    pub fn new(guard: Guard, map: LinearMap) -> Self {
+        Self { guard, map }
+    }
+}
+
+impl Device for JointDevice {
+    fn read(&mut self, elapsed: f64) -> Reading {
+        let measured = self.guard.read(elapsed);
+        let position = self.map.position(&measured.position);
+        Reading { position, age: measured.age, hand: position }
+    }
+
+    fn apply(&mut self, torque: &JointVector) -> Applied {
+        let held = self.guard.write(&self.map.effort(torque));
+        // What was not reduced is passed on to the last bit.
+        let whole = held.clamps.is_empty() && held.halt.is_none();
+        let torque = if whole { *torque } else { self.map.torque(&held.effort) };
+        Applied { torque, clamps: held.clamps, halt: held.halt }
+    }
+
+    fn scheduler(&self) -> Option<Arc<dyn Scheduler>> {
+        self.guard.scheduler()
+    }
+}

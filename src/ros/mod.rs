@@ -1,0 +1,85 @@
+//! Messages of ROS 2 in MCAP files, read and written without ROS.
+//!
+//! An MCAP file holds messages of many topics; here those of type `sensor_msgs/msg/JointState` count: names, positions,
+//! velocities and efforts of joints at an instant. Files are written without compression, and read if their chunks are
+//! not compressed.
+
+mod cdr;
+mod joint_state;
+mod table;
+mod write;
+
+pub use joint_state::JointState;
+pub use table::{JointStateTable, Topic, is_mcap, topics};
+pub use write::JointStateWriter;
+
+use std::path::PathBuf;
+
+/// Name of the message type.
+const TYPE: &str = "sensor_msgs/msg/JointState";
+
+/// How its schema and its messages are encoded.
+const SCHEMA_ENCODING: &str = "ros2msg";
+const MESSAGE_ENCODING: &str = "cdr";
+
+/// An MCAP file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum RosError {
+    /// The file cannot be opened.
+    #[error("{}: cannot be read: {source}; check the path and its permissions", .file.display())]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is not MCAP, or damaged.
+    #[error("{}: {what}", .file.display())]
+    Mcap {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong, and the remedy.
+        what: String,
+    },
+    /// The topic is not there, or several are.
+    #[error("{}: {what}; its topics of joint states: {topics}", .file.display())]
+    Topic {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong, and the remedy.
+        what: String,
+        /// Topics of joint states, with their numbers of messages.
+        topics: String,
+    },
+    /// A message is not what its type says.
+    #[error("{}: message {number} of {topic} is no {TYPE}: {what}", .file.display())]
+    Message {
+        /// The file.
+        file: PathBuf,
+        /// Its topic.
+        topic: String,
+        /// From 1, among the messages of its topic.
+        number: u64,
+        /// What is wrong.
+        what: String,
+    },
+}
+
+impl RosError {
+    /// Returns the error of a file that is no MCAP, with the remedy.
+    fn mcap(file: &std::path::Path, error: &mcap::McapError) -> Self {
+        let what = match error {
+            mcap::McapError::BadMagic => "not an MCAP file".to_owned(),
+            mcap::McapError::UnsupportedCompression(name) => {
+                format!(
+                    "its chunks are compressed by {name}: write it without by `mcap decompress IN.mcap -o OUT.mcap`"
+                )
+            }
+            mcap::McapError::UnexpectedEof => {
+                "it ends in the middle: what is whole comes back by `mcap recover IN.mcap -o OUT.mcap`".to_owned()
+            }
+            other => other.to_string(),
+        };
+        Self::Mcap { file: file.to_owned(), what }
+    }
+}

@@ -1,0 +1,208 @@
+//! Joint states of an MCAP file as a table of text: what the import of logs reads.
+//!
+//! A header line names the columns: `time`, then `position NAME`, `velocity NAME` and `effort NAME` for each joint that
+//! the topic names anywhere, in the order in which they first appear. Each message is a row; what it does not say is an
+//! empty field, which the import drops or refuses as its mapping says. Time is the message's stamp; if all stamps are
+//! zero, the time at which it was logged.
+
+use super::{JointState, MESSAGE_ENCODING, RosError, TYPE};
+use mcap::{io::MessageReader, sans_io::LinearReaderOptions};
+use std::{
+    collections::BTreeMap,
+    fmt::Write as _,
+    fs::File,
+    io::{self, BufReader, Read},
+    path::{Path, PathBuf},
+};
+
+/// Longest record or chunk that is read [bytes]: a chunk of a recorder's is a few MiB.
+const LONGEST_RECORD: usize = 1 << 28;
+
+/// A topic of joint states.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Topic {
+    /// Its name.
+    pub name: String,
+    /// Its messages.
+    pub messages: u64,
+}
+
+/// Messages of joint states in the file at `path`: topic, log time [ns], bytes.
+struct Messages {
+    path: PathBuf,
+    reader: MessageReader<BufReader<File>>,
+}
+
+impl Messages {
+    fn open(path: &Path) -> Result<Self, RosError> {
+        let file = File::open(path).map_err(|source| RosError::File { file: path.to_owned(), source })?;
+        if !is_mcap(path) {
+            return Err(RosError::mcap(path, &mcap::McapError::BadMagic));
+        }
+        let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
+        let reader = MessageReader::new_with_options(BufReader::with_capacity(1 << 16, file), options);
+        Ok(Self { path: path.to_owned(), reader })
+    }
+}
+
+impl Iterator for Messages {
+    type Item = Result<(String, u64, Vec<u8>), RosError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let message = match self.reader.next()? {
+                Ok(message) => message,
+                Err(error) => return Some(Err(RosError::mcap(&self.path, &error))),
+            };
+            let typed = message.channel.schema.as_ref().is_some_and(|schema| schema.name == TYPE);
+            if typed && message.channel.message_encoding == MESSAGE_ENCODING {
+                return Some(Ok((message.channel.topic.clone(), message.log_time, message.data.into_owned())));
+            }
+        }
+    }
+}
+
+/// Returns whether the file at `path` begins like an MCAP file.
+#[must_use]
+pub fn is_mcap(path: &Path) -> bool {
+    let mut start = [0; mcap::MAGIC.len()];
+    File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *mcap::MAGIC
+}
+
+/// Returns the topics of joint states in the file at `path`, by name.
+///
+/// # Errors
+/// [`RosError`] if the file cannot be read.
+pub fn topics(path: &Path) -> Result<Vec<Topic>, RosError> {
+    let mut counts: BTreeMap<String, u64> = BTreeMap::new();
+    for message in Messages::open(path)? {
+        *counts.entry(message?.0).or_default() += 1;
+    }
+    Ok(counts.into_iter().map(|(name, messages)| Topic { name, messages }).collect())
+}
+
+/// The table of one topic; reading it gives the text.
+pub struct JointStateTable {
+    messages: Messages,
+    topic: String,
+    joints: Vec<String>,
+    stamped: bool,
+    number: u64,
+    text: String,
+    read: usize,
+}
+
+impl JointStateTable {
+    /// Opens the table of `topic` in the file at `path`, or of its only one.
+    ///
+    /// # Errors
+    /// [`RosError`] if the file cannot be read, the topic is not there or not unique, or a message is none.
+    pub fn open(path: &Path, topic: Option<&str>) -> Result<Self, RosError> {
+        let topic = chosen(path, topic)?;
+        let (mut joints, mut stamped, mut number) = (Vec::new(), false, 0);
+        for message in Messages::open(path)? {
+            let (name, _, bytes) = message?;
+            if name == topic {
+                number += 1;
+                let state = decode(path, &topic, number, &bytes)?;
+                stamped |= state.stamp > 0;
+                for joint in state.names {
+                    if !joints.contains(&joint) {
+                        joints.push(joint);
+                    }
+                }
+            }
+        }
+        let mut text = "time".to_owned();
+        for joint in &joints {
+            for what in ["position", "velocity", "effort"] {
+                let _ = write!(text, ",{what} {}", plain(joint));
+            }
+        }
+        text.push('\n');
+        Ok(Self { messages: Messages::open(path)?, topic, joints, stamped, number: 0, text, read: 0 })
+    }
+
+    /// Returns the names of all joints.
+    #[must_use]
+    pub fn joints(&self) -> &[String] {
+        &self.joints
+    }
+
+    /// Returns the topic.
+    #[must_use]
+    pub fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    /// Puts the next message's row into `text`; false at the end.
+    fn next_row(&mut self) -> Result<bool, RosError> {
+        let (logged, bytes) = loop {
+            match self.messages.next().transpose()? {
+                None => return Ok(false),
+                Some((name, logged, bytes)) if name == self.topic => break (logged, bytes),
+                Some(_) => {}
+            }
+        };
+        self.number += 1;
+        let state = decode(&self.messages.path, &self.topic, self.number, &bytes)?;
+        let nanoseconds = if self.stamped { state.stamp } else { logged };
+        (self.read, self.text) = (0, String::new());
+        let _ = write!(self.text, "{}.{:09}", nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
+        for joint in &self.joints {
+            let place = state.names.iter().position(|name| name == joint);
+            for values in [&state.position, &state.velocity, &state.effort] {
+                self.text.push(',');
+                if let Some(value) = place.and_then(|place| values.get(place)) {
+                    let _ = write!(self.text, "{value}");
+                }
+            }
+        }
+        self.text.push('\n');
+        Ok(true)
+    }
+}
+
+impl Read for JointStateTable {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.read == self.text.len() && !self.next_row().map_err(io::Error::other)? {
+            return Ok(0);
+        }
+        let rest = &self.text.as_bytes()[self.read..];
+        let count = rest.len().min(buffer.len());
+        buffer[..count].copy_from_slice(&rest[..count]);
+        self.read += count;
+        Ok(count)
+    }
+}
+
+fn decode(path: &Path, topic: &str, number: u64, bytes: &[u8]) -> Result<JointState, RosError> {
+    JointState::decode(bytes).map_err(|what| RosError::Message {
+        file: path.to_owned(),
+        topic: topic.to_owned(),
+        number,
+        what,
+    })
+}
+
+fn chosen(path: &Path, topic: Option<&str>) -> Result<String, RosError> {
+    let topics = topics(path)?;
+    let wrong = |what: &str| {
+        let listed: Vec<String> =
+            topics.iter().map(|topic| format!("{} ({} messages)", topic.name, topic.messages)).collect();
+        let topics = if listed.is_empty() { "none".to_owned() } else { listed.join(", ") };
+        RosError::Topic { file: path.to_owned(), what: what.to_owned(), topics }
+    };
+    match (topic, topics.as_slice()) {
+        (Some(name), topics) if topics.iter().any(|topic| topic.name == name) => Ok(name.to_owned()),
+        (Some(name), _) => Err(wrong(&format!("there is no topic {name}"))),
+        (None, [only]) => Ok(only.name.clone()),
+        (None, []) => Err(wrong(&format!("no message of it is a {TYPE}"))),
+        (None, _) => Err(wrong("name one of several topics by --topic")),
+    }
+}
+
+/// A joint's name without the characters that structure a table.
+pub(super) fn plain(name: &str) -> String {
+    name.chars().map(|c| if matches!(c, ',' | '"' | '\n' | '\r') { '_' } else { c }).collect()
+}

@@ -1,0 +1,36 @@
+//! `[device]`: how a real haptic device stands to the scene's arm.
+
+use crate::JointVector;
+
+/// How the coordinates of a real device become those of the scene, and how its tip holds the arm. Which device it is,
+/// is said on the command line: any device with such coordinates will do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeviceSpec {
+    /// Rows of A in `q = A m + b`, m the device's coordinates, q the scene's joints or, for a Cartesian device, the
+    /// position of its tip; `None` for the identity.
+    pub map: Option<Vec<JointVector>>,
+    /// b [rad or m]; `None` for zero.
+    pub offset: Option<JointVector>,
+    /// Number of the contact node that the tip of a Cartesian device leads; `None` for the last one.
+    pub node: Option<usize>,
+    /// Of the spring between a Cartesian device's tip and that node [N/m].
+    pub stiffness: f64,
+    /// Of the damper beside it [N s/m].
+    pub damping: f64,
+    /// Maximum size of each of the device's efforts, where that is to be less than the device allows [N m or N].
+    pub effort_limit: Option<JointVector>,
+}
+
+impl Default for DeviceSpec {
+    fn default() -> Self {
+        Self { map: None, offset: None, node: None, stiffness: TIP_STIFFNESS, damping: TIP_DAMPING, effort_limit: None }
+    }
+}
+
+/// Default stiffness between tip and node [N/m]: at 1 kHz a held spring gives no energy to a hand with K T/2 = 0.15 N
+/// s/m of damping, which a hand on a desktop device has ten times over (Kuchenbecker, Park and Niemeyer 2003).
+const TIP_STIFFNESS: f64 = 300.0;
+
+/// Default damping between tip and node [N s/m]: larger than what holding takes, and below what differences of a
+/// position that is measured in steps of 0.05 mm make audible.
+const TIP_DAMPING: f64 = 0.5;
