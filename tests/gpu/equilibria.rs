@@ -129,7 +129,7 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
 
 /// Solves a part of a scene on both sides; asserts agreement and, of the energy form, its laws.
 fn check_scene(name: &str, material: Option<Material>, algorithm: Algorithm, stride: usize) {
-    let (scene, object, chain) = load_of(name, material);
+    let (scene, object, chain) = load_of(name, material.clone());
     let configurations = configurations(&scene, 11, stride);
     let model = Model::new(&object, &chain, haptize::scene::ContactSpec { algorithm, ..scene.contact });
     assert_eq!(model.compliance.rows_per_node, if material.is_some() { 3 } else { 1 });
@@ -176,8 +176,8 @@ fn the_mesh_has_the_same_equilibria_on_gpu_and_cpu() {
 #[test]
 fn objects_that_are_not_isotropic_have_the_same_equilibria_on_gpu_and_cpu() {
     for material in [AXIAL, SOLID] {
-        check_scene("sphere.toml", Some(material), Algorithm::Energy, 131);
-        check_scene("sphere.toml", Some(material), Algorithm::Linearised, 131);
+        check_scene("sphere.toml", Some(material.clone()), Algorithm::Energy, 131);
+        check_scene("sphere.toml", Some(material.clone()), Algorithm::Linearised, 131);
         check_scene("sphere.toml", Some(material), Algorithm::Paper, 37);
     }
 }
