@@ -19,7 +19,7 @@ pub struct Bar {
     bar: ProgressBar,
     /// Name of what is counted.
     unit: &'static str,
-    /// Whether it is drawn; a bar that knows no length is not.
+    /// Whether it has a length: a bar without one is not drawn.
     begun: AtomicBool,
     /// When the last line was printed; absent on a terminal.
     last_line: Option<Mutex<Instant>>,
@@ -62,8 +62,13 @@ impl Bar {
     }
 
     fn show(&self) {
+        let begins = !self.begun.swap(true, Ordering::Relaxed);
+        if begins {
+            // What was done before the first step says nothing of the rest.
+            self.bar.reset_eta();
+        }
         let Some(last_line) = &self.last_line else {
-            if !self.begun.swap(true, Ordering::Relaxed) {
+            if begins {
                 self.bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
             }
             return;
