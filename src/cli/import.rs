@@ -9,8 +9,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Which robot, and which part of it.
+/// Arguments of `haptize import`.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize import panda.urdf --tip panda_hand --lock panda_joint7=0.8
+  haptize import arm.urdf --tip wrist --spacing 0.01 --package-path ~/ros/src -o arm.toml")]
 pub struct Arguments {
     /// The robot's file, URDF. Xacro is expanded first: `xacro FILE > ROBOT.urdf`.
     robot: PathBuf,

@@ -14,6 +14,7 @@ use std::{
 Examples:
   haptize new                            writes sphere.toml
   haptize new --from mesh -o my.toml     writes my.toml, and bean.obj beside it
+  haptize new --from touch               writes a scene for the Touch (Phantom Omni)
 
 Next: edit the file, then `haptize bake` it (`haptize scan` it for sponge and sponge-side).")]
 pub struct Arguments {
@@ -34,6 +35,12 @@ enum Example {
     Paper,
     /// A triangle mesh from a file under an arm of four joints, one of them prismatic.
     Mesh,
+    /// A soft ball within reach of the 3D Systems Touch (Phantom Omni).
+    Touch,
+    /// A soft ball in the workspace of the open device WoodenHaptics.
+    Woodenhaptics,
+    /// A soft ball before the planar Haply 2DIY.
+    TwoDiy,
     /// A spongy block, scanned by a simulated rig and scraped.
     Sponge,
     /// The same block under a fabric.
@@ -52,6 +59,9 @@ impl Example {
             Self::Sphere => ("sphere.toml", include_str!("../../datasets/sphere.toml")),
             Self::Paper => ("paper.toml", include_str!("../../datasets/paper.toml")),
             Self::Mesh => ("mesh.toml", include_str!("../../datasets/mesh.toml")),
+            Self::Touch => ("touch.toml", include_str!("../../datasets/touch.toml")),
+            Self::Woodenhaptics => ("woodenhaptics.toml", include_str!("../../datasets/woodenhaptics.toml")),
+            Self::TwoDiy => ("two_diy.toml", include_str!("../../datasets/two_diy.toml")),
             Self::Sponge => ("sponge.toml", include_str!("../../datasets/sponge.toml")),
             Self::SpongeFabric => ("sponge_fabric.toml", include_str!("../../datasets/sponge_fabric.toml")),
             Self::SpongeSide => ("sponge_side.toml", include_str!("../../datasets/sponge_side.toml")),
