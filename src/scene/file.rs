@@ -243,7 +243,7 @@ pub(super) struct HandTable {
 /// The graphics loop, or `false` for none.
 pub(super) enum GraphicsEntry {
     Off,
-    Loop(GraphicsTable),
+    Loop(Box<GraphicsTable>),
 }
 
 impl<'de> Deserialize<'de> for GraphicsEntry {
@@ -265,7 +265,8 @@ impl<'de> Deserialize<'de> for GraphicsEntry {
             }
 
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<GraphicsEntry, A::Error> {
-                GraphicsTable::deserialize(MapAccessDeserializer::new(map)).map(GraphicsEntry::Loop)
+                GraphicsTable::deserialize(MapAccessDeserializer::new(map))
+                    .map(|table| GraphicsEntry::Loop(Box::new(table)))
             }
         }
 
