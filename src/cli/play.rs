@@ -92,7 +92,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let moved = || std::iter::once(Path::new(&arguments.motion));
     let folder = folder(arguments);
     let asked = arguments.record.as_ref();
-    let recorded = asked.map(|file| output::check(file, FileKind::of_log(file), inputs().chain(moved()))).transpose()?;
+    let recorded =
+        asked.map(|file| output::check(file, FileKind::of_log(file), inputs().chain(moved()))).transpose()?;
     let filled =
         Folder::check(&folder, FILES.into_iter().chain(report::FIGURES), inputs().chain(moved()).collect::<Vec<_>>())?;
     if let Some(file) = asked {

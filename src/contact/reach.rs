@@ -45,7 +45,6 @@ pub(super) fn reached(model: &Model<'_>, configurations: &[JointVector]) -> Vec<
 }
 
 /// Marks the leaves of the surface's tree that matter at `q`.
-
 fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marked: &mut [bool]) {
     let gap = proximity.gap(q);
     if gap >= 0.0 {
