@@ -9,7 +9,7 @@ use super::{
     output::{self, Kind},
     tell,
 };
-use haptize::{
+use crate::{
     haptize::{Aim, BackendChoice, Bake, Bounds, Footprint, Iterations, Lowered, Progress, SweepReport},
     scene::{Algorithm, Scene},
 };

@@ -4,7 +4,7 @@
 //! the 1 kHz loop punctual (`play --realtime`).
 
 use super::{Failure, Report};
-use haptize::gpu::{ADAPTER_VARIABLE, AdapterSummary, adapters};
+use crate::gpu::{ADAPTER_VARIABLE, AdapterSummary, adapters};
 use serde::Serialize;
 use std::{fmt::Write, thread};
 

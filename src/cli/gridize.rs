@@ -5,7 +5,7 @@ use super::{
     bar::bar,
     output::{self, Kind},
 };
-use haptize::{
+use crate::{
     dataset::Dataset,
     haptize::{
         gridize::{GridizeOptions, GridizeReport, Interpolation, Samples, gridize},

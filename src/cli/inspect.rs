@@ -1,9 +1,7 @@
 //! `haptize inspect`: one configuration in full.
 
 use super::{Failure, Report};
-use clap::ValueEnum;
-use glam::DVec3;
-use haptize::{
+use crate::{
     JointVector,
     contact::Model,
     dataset::{self, Dataset},
@@ -12,6 +10,8 @@ use haptize::{
     proxy::Chain,
     scene::{Algorithm, Scene},
 };
+use clap::ValueEnum;
+use glam::DVec3;
 use std::{
     fmt::{self, Write},
     path::{Path, PathBuf},

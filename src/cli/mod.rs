@@ -32,6 +32,7 @@ mod view;
 use clap::{Parser, Subcommand};
 use std::{
     error::Error,
+    ffi::OsString,
     io::{self, ErrorKind, Write},
     process::ExitCode,
 };
@@ -99,21 +100,21 @@ impl Command {
 }
 
 /// Why a subcommand failed: any room's error. Its message names file and line where there is one, and the remedy.
-pub type Failure = Box<dyn Error + Send + Sync>;
+type Failure = Box<dyn Error + Send + Sync>;
 
 /// What a subcommand found out or did, for people and for programs.
-pub struct Report {
+struct Report {
     /// For people: whole lines, the last one ended too.
-    pub text: String,
+    text: String,
     /// For programs: one object.
-    pub json: serde_json::Value,
+    json: serde_json::Value,
     /// False where something is missing from the result (unfinished, or not as it should be): exit code 1.
-    pub whole: bool,
+    whole: bool,
 }
 
-/// Runs what the command line asks for.
-pub fn run() -> ExitCode {
-    let line = CommandLine::parse();
+/// Runs what the command line `arguments`, the program's name first, asks for. Ends the process where they are wrong, or ask for help.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let line = CommandLine::parse_from(arguments);
     let report = start_threads().and_then(|()| line.command.as_ref().map_or_else(demo::run, Command::run));
     match report.and_then(|report| print(&report, line.json).map(|()| report.whole)) {
         Ok(true) => ExitCode::SUCCESS,

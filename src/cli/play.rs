@@ -6,7 +6,7 @@ use super::{
     output::{self, Kind},
     tell,
 };
-use haptize::{
+use crate::{
     dataset::{Dataset, replace_file},
     device::{Device, Motion, Recorded},
     render::{

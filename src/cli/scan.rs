@@ -7,7 +7,7 @@ use super::{
     output::{self, Kind},
     tell,
 };
-use haptize::{
+use crate::{
     JointVector,
     haptize::scan::{
         LogHeader, LogWriter, Plan, Rig, ScanProgress, ScanReport, ScanRow, Session, labels,

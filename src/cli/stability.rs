@@ -1,7 +1,7 @@
 //! `haptize stability`: the hard cases of contact, gridization, loops and graphics, on this machine and its adapter.
 
 use super::{Failure, Report, bar::bar};
-use haptize::{
+use crate::{
     gpu::{AdapterChoice, Context},
     report::stability::{Bound, Case, Effort, Outcome, Setting, cases, table, write_all},
 };

@@ -279,14 +279,7 @@ fn find_at_rest(surface: &RestSurface, x: DVec3, known: &mut RestDistance) -> Cl
 /// The contact (or near miss, with depth <= 0) of proxy node `i` at `x` with the closest point of `facet`, on the side that
 /// `pseudonormal` tells.
 #[inline(always)]
-fn contact_with(
-    model: &Model,
-    i: usize,
-    x: DVec3,
-    closest: &Closest,
-    facet: &Facet,
-    pseudonormal: DVec3,
-) -> Contact {
+fn contact_with(model: &Model, i: usize, x: DVec3, closest: &Closest, facet: &Facet, pseudonormal: DVec3) -> Contact {
     let radius = model.chain.nodes[i].radius;
     let measured = measure(x, radius, facet, &closest.point, pseudonormal);
     let carriers = Carriers::new(model.surface.carriers(closest.triangle), &closest.point);
@@ -313,8 +306,8 @@ mod tests {
     use crate::proxy::Chain;
     use crate::random::sequence;
     use crate::scene::{
-        Algorithm, ContactSpec, ContactSurface, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, ProxyNodeSpec,
-        ProxySpec, Shape, SpringKind, SpringSpec,
+        Algorithm, ContactSpec, ContactSurface, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec,
+        ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
     };
 
     fn ball() -> Object {
@@ -371,9 +364,12 @@ mod tests {
         let object = ball();
         let mut next = sequence(3);
         let (mut compared, mut same) = (0, 0);
-        for (radius, surface) in
-            [(0.0, ContactSurface::Facets), (0.01, ContactSurface::Facets), (0.0, ContactSurface::Smooth), (0.01, ContactSurface::Smooth)]
-        {
+        for (radius, surface) in [
+            (0.0, ContactSurface::Facets),
+            (0.01, ContactSurface::Facets),
+            (0.0, ContactSurface::Smooth),
+            (0.01, ContactSurface::Smooth),
+        ] {
             let chain = nodes(30, radius);
             let contact = ContactSpec {
                 stiffness: 1.0,
@@ -382,7 +378,7 @@ mod tests {
                 tolerance: 1e-8,
                 max_iterations: 1,
                 updates: 0,
-        surface,
+                surface,
             };
             let model = Model::new(&object, &chain, contact);
             let mut detection = Detection::new(&model);

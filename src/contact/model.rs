@@ -103,7 +103,8 @@ impl<'a> Model<'a> {
     /// Takes from the compliance how far the surface moves, and how stiff rigid contact is.
     fn measure_compliance(&mut self) {
         (self.softest, self.mobility) = softest(&self.compliance);
-        self.bulge_mobility = self.surface.smooth.as_ref().map_or(0.0, |smooth| bulge_mobility(smooth, &self.compliance));
+        self.bulge_mobility =
+            self.surface.smooth.as_ref().map_or(0.0, |smooth| bulge_mobility(smooth, &self.compliance));
         self.set_stiffness(self.contact.stiffness);
     }
 
@@ -140,7 +141,10 @@ impl<'a> Model<'a> {
 /// eigenvalue. Nodes that are not covered do not move [m/N].
 fn bulge_mobility(smooth: &SmoothSurface, compliance: &Compliance) -> f64 {
     smooth.bulge_squared(|terms| {
-        let places = terms.iter().filter(|(_, weight)| *weight != 0.0).filter_map(|(node, weight)| Some((compliance.place(*node)?, *weight)));
+        let places = terms
+            .iter()
+            .filter(|(_, weight)| *weight != 0.0)
+            .filter_map(|(node, weight)| Some((compliance.place(*node)?, *weight)));
         let places: Vec<(usize, f64)> = places.collect();
         let mut sum = 0.0;
         for &(i, weight) in &places {

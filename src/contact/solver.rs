@@ -131,7 +131,12 @@ impl<'a> Solver<'a> {
         let model = self.model;
         model.compliance.is_whole()
             || (self.held_by == HeldBy::Energy
-                && reach::covers(model, &self.detection, equilibrium, model.motion_bound(self.energy.state.elastic).moved))
+                && reach::covers(
+                    model,
+                    &self.detection,
+                    equilibrium,
+                    model.motion_bound(self.energy.state.elastic).moved,
+                ))
             || {
                 let moved = self.displacement().chunks_exact(3).map(|u| DVec3::from_slice(u).length());
                 let moved = moved.fold(0.0, f64::max);

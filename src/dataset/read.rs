@@ -16,7 +16,8 @@ use std::{
 };
 
 impl Dataset {
-    /// Maps the file at `path` and checks all of it. The columns are read where they lie in the file.
+    /// Maps the file at `path` and checks all of it. The columns are read where they lie in the file; its pages count as this process's
+    /// memory only once they are looked at after the check.
     ///
     /// # Errors
     /// Missing, foreign, of another version, cut short, or altered in any bit.
@@ -25,7 +26,9 @@ impl Dataset {
         let file = regular_file(path).map_err(read)?;
         // SAFETY: the map is read-only and private to this process; what changing the file meanwhile does is said in `file.rs`.
         let map = unsafe { Mmap::map(&file) }.map_err(read)?;
-        decode(path, map)
+        let dataset = decode(path, map)?;
+        dataset.torque.release();
+        Ok(dataset)
     }
 
     /// Like [`Dataset::open`], but copies the file into memory: nothing that happens to the file can reach the reader.

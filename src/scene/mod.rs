@@ -8,18 +8,20 @@ mod convert;
 mod effects;
 mod error;
 mod file;
+mod gains;
 mod own_text;
 mod scan;
 mod spec;
 
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use error::{Diagnostic, SceneError};
+pub use gains::GainError;
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
 pub use spec::{
-    Algorithm, AxisSpec, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec, FrictionSpec, GraphicsEffects,
-    GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects, HapticsSpec, Interpolation, JointKind,
-    JointSpec, Material, MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec, Shape, SkinSpec, SpringKind,
-    SpringSpec, StiffeningSpec, Waypoint,
+    Algorithm, AxisSpec, BOUNDARY_SLOPE, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec,
+    FrictionSpec, GraphicsEffects, GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects,
+    HapticsSpec, Interpolation, JointKind, JointSpec, Material, MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec,
+    ProxySpec, Shape, SkinSpec, SpringKind, SpringSpec, StiffeningSpec, THRESHOLD, Waypoint,
 };
 
 use check::Checker;

@@ -63,9 +63,8 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
 
 #[test]
 fn torque_converges_at_second_order_as_the_nodes_of_a_link_come_closer() {
-    let [coarse, middle, fine] = ["0.004", "0.002", "0.001"].map(|spacing| {
-        torques(20, &[("spacing = 0.004", &format!("spacing = {spacing}"))])
-    });
+    let [coarse, middle, fine] =
+        ["0.004", "0.002", "0.001"].map(|spacing| torques(20, &[("spacing = 0.004", &format!("spacing = {spacing}"))]));
     let size = rms(fine.iter().copied());
     let (first, second) = (difference(&coarse, &middle), difference(&middle, &fine));
     // Second order divides the change by four. Were the nodes at the ends as stiff as the others, it would be two.

@@ -96,7 +96,8 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
         if (depth - law).abs() > DEPTH_AGREEMENT + INVARIANT_AGREEMENT * depth.abs() {
             return Some(format!("contact law: depth {depth:e} m, force {magnitude:e} N"));
         }
-        let outward = model.object.triangles.iter().find(|t| t.iter().all(|n| touch.carriers.iter().any(|(node, _)| node == n)));
+        let outward =
+            model.object.triangles.iter().find(|t| t.iter().all(|n| touch.carriers.iter().any(|(node, _)| node == n)));
         let corners = outward.map(|t| t.map(|n| model.object.rest[n as usize] + displacement(n)));
         let Some([a, b, c]) = corners else { return Some(format!("no triangle {:?}", touch.carriers)) };
         if (b - a).cross(c - a).dot(normal) < 0.0 {
@@ -108,9 +109,7 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
     for force in &result.forces {
         // The object's nodes carry what the touches press on them.
         let pressed: DVec3 = (result.touches.iter())
-            .flat_map(|touch| {
-                touch.carriers.iter().map(|&(node, weight)| (node, touch.force * -weight))
-            })
+            .flat_map(|touch| touch.carriers.iter().map(|&(node, weight)| (node, touch.force * -weight)))
             .filter_map(|(node, part)| (node == force.node).then_some(part))
             .sum();
         if force.force.distance(pressed) > 1e-5 * pressed.length() {

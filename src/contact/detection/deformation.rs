@@ -127,13 +127,7 @@ impl Deformation {
 
     /// Calls `visit` with each facet of the surface whose flat triangle is nearer to `x` than the squared radius that `visit` returned last;
     /// `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among them.
-    pub fn search(
-        &mut self,
-        model: &Model,
-        x: DVec3,
-        radius_squared: f64,
-        mut visit: impl FnMut(u32, &Facet) -> f64,
-    ) {
+    pub fn search(&mut self, model: &Model, x: DVec3, radius_squared: f64, mut visit: impl FnMut(u32, &Facet) -> f64) {
         let slack = model.surface.bounds.slack(x);
         let moved = self.bound.moved;
         // Of boxes at rest.

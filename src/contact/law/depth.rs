@@ -63,7 +63,8 @@ impl Carriers {
     #[inline]
     #[must_use]
     pub fn new(nodes: &[u32], point: &ClosestPoint) -> Self {
-        let mut carriers = Self { count: nodes.len(), nodes: [0; CARRIERS], weights: [0.0; CARRIERS], slopes: [[0.0; CARRIERS]; 2] };
+        let mut carriers =
+            Self { count: nodes.len(), nodes: [0; CARRIERS], weights: [0.0; CARRIERS], slopes: [[0.0; CARRIERS]; 2] };
         carriers.nodes[..nodes.len()].copy_from_slice(nodes);
         let bent = nodes.len() == CARRIERS;
         if bent {
@@ -164,7 +165,13 @@ pub struct Curvature {
 /// `pseudonormal` decides the side; it is N on a face, and stands in for it where x lies on the edge or vertex itself.
 #[inline]
 #[must_use]
-pub fn measure(x: DVec3, radius: f64, facet: &Facet, point: &ClosestPoint, pseudonormal: DVec3) -> (DVec3, f64, Curvature) {
+pub fn measure(
+    x: DVec3,
+    radius: f64,
+    facet: &Facet,
+    point: &ClosestPoint,
+    pseudonormal: DVec3,
+) -> (DVec3, f64, Curvature) {
     let mut curvature = Curvature::default();
     let normal;
     if point.feature == Feature::Face {
@@ -430,7 +437,10 @@ mod tests {
                 assert!((slope - expected).abs() < 1e-4 * (1.0 + expected.abs()), "{feature:?} {slope} {expected}");
                 let bend = (slope_along(&after, &w) - slope_along(&before, &w)) / (2.0 * h);
                 let expected = hessian(&here, kc, &v, &w);
-                assert!((bend - expected).abs() < 2e-4 * (1.0 + expected.abs()), "{count} {feature:?} {bend} {expected}");
+                assert!(
+                    (bend - expected).abs() < 2e-4 * (1.0 + expected.abs()),
+                    "{count} {feature:?} {bend} {expected}"
+                );
                 // The reaction at the nodes is the same as on the variation.
                 let reaction = here.second_variation(&here.variation(|j| v[j]));
                 let at_nodes: f64 = (0..count).map(|j| here.at_node(&reaction, j).dot(w[j])).sum();
