@@ -5,5 +5,5 @@ fn main() -> std::process::ExitCode {
     // display. This is the layer's own switch.
     // SAFETY: no other thread runs yet.
     unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
-    haptize::cli::run(std::env::args_os())
+    haptize::cli::run(std::env::args_os()).into()
 }

@@ -34,7 +34,6 @@ use std::{
     error::Error,
     ffi::OsString,
     io::{self, ErrorKind, Write},
-    process::ExitCode,
 };
 
 /// Which adapter draws and computes, for the commands that use one.
@@ -112,13 +111,14 @@ struct Report {
     whole: bool,
 }
 
-/// Runs what the command line `arguments`, the program's name first, asks for. Ends the process where they are wrong, or ask for help.
-pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+/// Runs what the command line `arguments`, the program's name first, asks for; returns the exit code. Ends the process where they are
+/// wrong, or ask for help.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let line = CommandLine::parse_from(arguments);
     let report = start_threads().and_then(|()| line.command.as_ref().map_or_else(demo::run, Command::run));
     match report.and_then(|report| print(&report, line.json).map(|()| report.whole)) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
+        Ok(true) => 0,
+        Ok(false) => 1,
         Err(failure) => {
             let message = explain(failure.as_ref());
             tell(format_args!("haptize: {message}"));
@@ -128,7 +128,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
                 // Where standard output is what failed there is nobody left to tell.
                 let _ = print(&report, true);
             }
-            ExitCode::FAILURE
+            1
         }
     }
 }
