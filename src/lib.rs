@@ -86,6 +86,8 @@ pub mod report;
 #[cfg(feature = "viewer")]
 pub mod viewer;
 
+pub mod cli;
+
 pub mod tolerances;
 
 mod joint_matrix;

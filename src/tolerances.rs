@@ -488,3 +488,8 @@ pub const SOLVER_SHARE: f64 = 0.05;
 /// How much finer than the finest measured grid the measured order is trusted [1]: two octaves, as many as it was measured
 /// over. What takes more is not offered.
 pub const FARTHEST_EXTRAPOLATION: f64 = 4.0;
+
+/// Step of the differences that give the slope of an interpolated torque, over the grid's own step [1]: the cube root of the rounding of
+/// f64, where what is rounded and what is left out are alike. Rounding costs 1e-11 of the torque for each grid step, and along a polynomial
+/// piece of degree three what is left out is as little.
+pub const GRADIENT_STEP: f64 = 1e-5;

@@ -78,9 +78,11 @@ VK_DRIVER_FILES=$(lavapipe)
 export VK_DRIVER_FILES VK_ICD_FILENAMES=$VK_DRIVER_FILES
 
 step 'formatting' cargo fmt --all --check
-step 'lints' cargo clippy --locked --all-targets --quiet -- -D warnings
-step 'tests' cargo test --locked --quiet --no-fail-fast
-step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --no-deps --quiet
+step 'lints' cargo clippy --locked --workspace --all-targets --quiet -- -D warnings
+# The bindings are tested in the same build, so that what they share is compiled once.
+step 'tests' cargo test --locked --workspace --quiet --no-fail-fast
+step 'Python package' bash python/tests/run.sh
+step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --no-deps --quiet
 step 'demo' demo
 
 printf '\n== summary (%d s)\n' "$SECONDS"

@@ -1,7 +1,7 @@
 //! `haptize accuracy`: what accuracy costs in time, for one scene.
 
 use super::{Failure, Report, output::Folder, tell};
-use haptize::{
+use crate::{
     report::accuracy::{self, Extent},
     scene::Scene,
 };

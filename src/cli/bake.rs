@@ -7,7 +7,7 @@ use super::{
     output::{self, Kind},
     tell,
 };
-use haptize::{
+use crate::{
     haptize::{
         Aim, BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, Sweep, SweepReport,
     },

@@ -1,7 +1,7 @@
 //! `haptize device`: which real devices this machine has, and a careful first run of one.
 
 use super::{Failure, Report, interrupt, keyboard::Keyboard, tell};
-use haptize::device::{Address, CheckReport, Guard, Key, Kind, LIMIT_SHARE, PUSH_SHARE, Phase, Watchdog, check, open};
+use crate::device::{Address, CheckReport, Guard, Key, Kind, LIMIT_SHARE, PUSH_SHARE, Phase, Watchdog, check, open};
 use serde_json::json;
 use std::{
     fmt::{self, Write},

@@ -4,7 +4,7 @@
 //! the 1 kHz loop punctual (`play --realtime`).
 
 use super::{Failure, Report};
-use haptize::{
+use crate::{
     device::Kind,
     gpu::{ADAPTER_VARIABLE, AdapterSummary, adapters},
 };

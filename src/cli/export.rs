@@ -4,7 +4,7 @@ use super::{
     Failure, Report,
     output::{self, Kind},
 };
-use haptize::dataset::{Dataset, Format};
+use crate::dataset::{Dataset, Format};
 use std::path::PathBuf;
 
 /// Arguments of `haptize export`.

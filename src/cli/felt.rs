@@ -2,7 +2,7 @@
 //! felt by the same motion, where the torque came from, and what the dataset does not hold.
 
 use super::{Failure, play};
-use haptize::{
+use crate::{
     dataset::{Dataset, Provenance},
     device::Motion,
     render::{setup::Setup, trace::Trace},

@@ -5,7 +5,7 @@ use super::{
     bar::Bar,
     output::{self, Folder, Kind},
 };
-use haptize::{
+use crate::{
     MAX_JOINTS,
     dataset::Dataset,
     haptize::{

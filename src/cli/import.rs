@@ -1,7 +1,7 @@
 //! `haptize import`: a robot's file becomes a scene.
 
 use super::{Failure, Report, tell};
-use haptize::urdf::{self, Arm, Lock, Robot};
+use crate::urdf::{self, Arm, Lock, Robot};
 use std::{
     fmt::Write as _,
     fs::OpenOptions,

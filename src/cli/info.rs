@@ -1,13 +1,13 @@
 //! `haptize info`: what a dataset holds. The whole file is checked first.
 
 use super::{Failure, Report};
-use glam::DVec3;
-use haptize::{
+use crate::{
     contact::MeshRipple,
     dataset::{Axis, Dataset, MeasuredError, Summary},
     object::Skin,
     scene::{Material, ObjectSpec, Rendering, SkinSpec},
 };
+use glam::DVec3;
 use std::{
     fmt::{self, Write},
     path::PathBuf,

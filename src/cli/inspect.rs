@@ -1,9 +1,7 @@
 //! `haptize inspect`: one configuration in full.
 
 use super::{Failure, Report, info, tell};
-use clap::ValueEnum;
-use glam::DVec3;
-use haptize::{
+use crate::{
     JointVector,
     contact::Model,
     dataset::{self, Dataset},
@@ -14,6 +12,8 @@ use haptize::{
     scene::{Algorithm, GridSpec, JointKind, Scene},
     tolerances::GRID_STEP_SLACK,
 };
+use clap::ValueEnum;
+use glam::DVec3;
 use std::{
     fmt::{self, Write},
     path::{Path, PathBuf},

@@ -5,7 +5,7 @@
 //! and so does everything at a second signal. A signal that the program was started to ignore (`nohup`) stays ignored.
 
 use super::{Failure, last_words};
-use haptize::dataset::discard_unfinished;
+use crate::dataset::discard_unfinished;
 use std::{
     sync::{
         atomic::{AtomicBool, Ordering},

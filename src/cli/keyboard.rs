@@ -3,7 +3,7 @@
 //! The terminal hands characters over at once and does not show them; it is as before when this is dropped.
 
 use super::Failure;
-use haptize::device::KeyInput;
+use crate::device::KeyInput;
 
 /// A terminal that presses a key.
 #[cfg(unix)]

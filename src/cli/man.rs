@@ -4,8 +4,8 @@ use super::{
     Failure, Report,
     output::{self, Kind},
 };
+use crate::dataset::replace_file;
 use clap_mangen::Man;
-use haptize::dataset::replace_file;
 use std::path::PathBuf;
 
 /// Where the pages go.

@@ -1,7 +1,7 @@
 //! `haptize bake --max-error`: a grid chosen for an error, and baked.
 
 use super::{Failure, Report, bake, tell};
-use haptize::{
+use crate::{
     haptize::{Aim, BackendChoice, Bake, Choice, Pilot, PilotError},
     scene::Scene,
 };

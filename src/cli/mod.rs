@@ -50,8 +50,8 @@ pub use memory::Remembering;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::{
     error::Error,
+    ffi::OsString,
     io::{self, ErrorKind, Write},
-    process::ExitCode,
 };
 
 /// Precomputed contact between an arm and a deformable object, rendered at 1 kHz.
@@ -143,21 +143,21 @@ fn command_line() -> clap::Command {
 }
 
 /// Why a subcommand failed: any module's error. Its message names file and line if there is one, and the remedy.
-pub type Failure = Box<dyn Error + Send + Sync>;
+type Failure = Box<dyn Error + Send + Sync>;
 
 /// The result of a subcommand, for people and for programs.
-pub struct Report {
+struct Report {
     /// For people: whole lines, the last one ended too.
-    pub text: String,
+    text: String,
     /// For programs: one object.
-    pub json: serde_json::Value,
+    json: serde_json::Value,
     /// False where something is missing from the result (unfinished, or not as it should be): exit code 1.
-    pub whole: bool,
+    whole: bool,
 }
 
-/// Runs what the command line asks for.
-pub fn run() -> ExitCode {
-    let line = match CommandLine::try_parse() {
+/// Runs what the command line `arguments`, the program's name first, asks for; returns the exit code.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let line = match CommandLine::try_parse_from(arguments) {
         Ok(line) => line,
         Err(error) => return usage(&error),
     };
@@ -165,11 +165,11 @@ pub fn run() -> ExitCode {
     let begun = interrupt::listen(line.json).and_then(|()| start_threads());
     let report = begun.and_then(|()| line.command.as_ref().map_or_else(demo::run, Command::run));
     match report.and_then(|report| print(&report, line.json).map(|()| report.whole)) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
+        Ok(true) => 0,
+        Ok(false) => 1,
         Err(failure) => {
             last_words(&explain(failure.as_ref()), line.json);
-            ExitCode::FAILURE
+            1
         }
     }
 }
@@ -182,7 +182,7 @@ fn fraction(text: &str) -> Result<f64, String> {
 }
 
 /// Answers a command line that is wrong, or asks for help.
-fn usage(error: &clap::Error) -> ExitCode {
+fn usage(error: &clap::Error) -> u8 {
     let text = error.render().to_string();
     if printable(&text) == text {
         // In colour on a terminal. Where nobody listens there is nobody to tell.
@@ -194,7 +194,7 @@ fn usage(error: &clap::Error) -> ExitCode {
     if error.use_stderr() && std::env::args_os().any(|word| word == "--json") {
         print_error(&text);
     }
-    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(1))
+    u8::try_from(error.exit_code()).unwrap_or(1)
 }
 
 /// Tells why the program ends: on standard error, and with `json` in one object on standard output.

@@ -1,8 +1,8 @@
 //! `haptize new`: a commented scene to begin with, one of those that are part of the program.
 
 use super::{Failure, Report};
+use crate::dataset::replace_file;
 use clap::ValueEnum;
-use haptize::dataset::replace_file;
 use std::{
     io::Write as _,
     path::{Path, PathBuf},
@@ -110,7 +110,7 @@ fn taken(path: &Path) -> Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use haptize::scene::{ScanScene, Scene};
+    use crate::scene::{ScanScene, Scene};
 
     #[test]
     fn every_example_is_a_valid_scene_of_the_kind_that_its_next_step_reads() {

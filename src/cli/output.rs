@@ -2,7 +2,7 @@
 //! replaced is told.
 
 use super::Failure;
-use haptize::dataset::resolved;
+use crate::dataset::resolved;
 use serde_json::{Value, json};
 use std::{
     fmt::Write,

@@ -10,7 +10,7 @@ use super::{
     scan::{self, Course},
     tell,
 };
-use haptize::{
+use crate::{
     dataset::{Dataset, replace_file},
     haptize::{
         BackendChoice,

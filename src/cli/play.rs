@@ -8,7 +8,7 @@ use super::{
     output::{self, Folder, Kind as FileKind},
     tell,
 };
-use haptize::{
+use crate::{
     dataset::{Axis, Dataset, replace_file},
     device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, Watchdog, attach, open},
     render::{

@@ -8,7 +8,7 @@ use super::{
     output::{self, Kind},
     tell,
 };
-use haptize::{
+use crate::{
     JointVector,
     dataset::replace_file,
     device::{Address, DeviceRig, Guard, Key, Kind as DeviceKind, attach_joints, open},

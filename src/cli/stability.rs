@@ -1,7 +1,7 @@
 //! `haptize stability`: the hard cases of contact, gridization, loops and graphics, on this machine and its adapter.
 
 use super::{Failure, Report, bar::Bar, output::Folder};
-use haptize::{
+use crate::{
     gpu::{AdapterChoice, Context},
     report::stability::{Bound, Case, Effort, FILES, Outcome, Setting, cases, table, write_all},
 };

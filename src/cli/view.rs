@@ -46,7 +46,7 @@ fn size(text: &str) -> Result<[f32; 2], String> {
 #[cfg(feature = "viewer")]
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     use super::output::{self, Kind};
-    use haptize::viewer::{self, Picture, Start};
+    use crate::viewer::{self, Picture, Start};
     let start = arguments.file.clone().map_or(Start::Sphere, Start::File);
     let Some(file) = &arguments.screenshot else {
         viewer::open(start)?;

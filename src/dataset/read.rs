@@ -19,7 +19,8 @@ use std::{
 };
 
 impl Dataset {
-    /// Maps the file at `path` and checks all of it. The columns are read where they lie in the file.
+    /// Maps the file at `path` and checks all of it. The columns are read where they lie in the file; its pages count as this process's
+    /// memory only once they are looked at after the check.
     ///
     /// # Errors
     /// Missing, foreign, of another version, cut short, or altered in any bit.
@@ -31,7 +32,9 @@ impl Dataset {
             io::ErrorKind::OutOfMemory => no_room(path, &file),
             _ => read(source),
         })?;
-        decode(path, map)
+        let dataset = decode(path, map)?;
+        dataset.torque.release();
+        Ok(dataset)
     }
 
     /// Like [`Dataset::open`], but copies the file into memory: nothing that happens to the file can reach the reader.

@@ -9,6 +9,7 @@
 //! A field owns a copy of what it needs, interleaved point by point. The real-time thread thus never touches a mapped file,
 //! which would end the process when somebody else truncates it.
 
+mod batch;
 pub mod boundary;
 mod error;
 mod flags;
@@ -17,13 +18,15 @@ mod layered;
 mod points;
 mod potential;
 pub mod range;
+mod slope;
 pub mod stencil;
 mod work;
 
+pub use batch::{BatchError, check_rows, fill_rows};
 pub use error::FieldError;
 pub use flags::Flags;
 
-use crate::{JointVector, MAX_JOINTS, dataset::Dataset, scene::Interpolation};
+use crate::{JointVector, MAX_JOINTS, contact::Status, dataset::Dataset, scene::Interpolation};
 use layered::Layered;
 use points::{Checked, Point};
 use potential::Potential;
@@ -61,6 +64,23 @@ pub struct Sample {
     pub share: f64,
     /// [`Flags::OUTSIDE`], [`Flags::ABSENT`], [`Flags::UNCONVERGED`], [`Flags::LAYER`].
     pub flags: Flags,
+}
+
+impl Sample {
+    /// What is known of the configuration: [`Status::Outside`] outside the grid or beside a grid point that was not computed,
+    /// [`Status::Unconverged`] beside one that did not converge; else whether there is contact.
+    #[must_use]
+    pub fn status(&self) -> Status {
+        if self.flags.intersects(Flags::OUTSIDE | Flags::ABSENT) {
+            Status::Outside
+        } else if self.flags.contains(Flags::UNCONVERGED) {
+            Status::Unconverged
+        } else if self.contact {
+            Status::Contact
+        } else {
+            Status::Free
+        }
+    }
 }
 
 /// Flags and contact of a cell's corners, whatever is interpolated.

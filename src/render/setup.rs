@@ -18,7 +18,8 @@ use crate::{
     field::{FieldError, TorqueField, range::HaptizedRange},
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{HapticsSpec, ProxyInertia, Rendering, SceneError},
+    scene::{BOUNDARY_SLOPE, HapticsSpec, Interpolation, ProxyInertia, Rendering, SceneError, THRESHOLD},
+    tolerances::LEVER_ARM,
 };
 use std::sync::Arc;
 
@@ -158,6 +159,26 @@ impl Setup {
     }
 }
 
+/// Returns the torque field of `dataset` as its scene has it felt, or interpolated as `interpolation` says. A dataset without a scene, of
+/// measurements, has the defaults of one: linear, [`THRESHOLD`], [`BOUNDARY_SLOPE`].
+///
+/// # Errors
+/// When its scene is not valid, or the dataset lacks what the interpolation needs.
+pub fn field(dataset: &Dataset, interpolation: Option<Interpolation>) -> Result<TorqueField, SetupError> {
+    let (scene, threshold, slope);
+    if dataset.scene.trim().is_empty() {
+        let mut slopes = JointVector::zeros(dataset.grid.joints());
+        let lever = |unit: &str| if unit == "m" { LEVER_ARM } else { 1.0 };
+        let axes = slopes.iter_mut().zip(&dataset.grid.axes);
+        axes.for_each(|(slope, axis)| *slope = BOUNDARY_SLOPE / lever(&axis.unit).powi(2));
+        (scene, threshold, slope) = (Interpolation::Linear, THRESHOLD, slopes);
+    } else {
+        let haptics = Rendering::parse(&dataset.scene, "scene")?.haptics;
+        (scene, threshold, slope) = (haptics.interpolation, haptics.threshold, haptics.boundary_slope);
+    }
+    Ok(TorqueField::interpolated(dataset, interpolation.unwrap_or(scene), threshold, &slope)?)
+}
+
 /// A haptic loop and what is known of its gains.
 struct Loop {
     haptics: Haptics,
@@ -200,4 +221,23 @@ fn centre(grid: &Grid) -> JointVector {
         *q = 0.5 * (axis.coordinate(0) + axis.coordinate(axis.count.saturating_sub(1)));
     }
     q
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::synthetic::{grid, half_space};
+
+    #[test]
+    fn a_dataset_without_a_scene_is_felt_with_the_defaults() {
+        let mut data = half_space(grid(&[(-0.6, 0.1, 13), (-0.06, 0.01, 13)]), 5.0);
+        data.grid.axes[1].unit = "m".into();
+        let slopes = JointVector::from_slice(&[BOUNDARY_SLOPE, 100.0 * BOUNDARY_SLOPE]);
+        let (found, expected) = (field(&data, None).unwrap(), TorqueField::new(&data, THRESHOLD, &slopes).unwrap());
+        assert_eq!(found.sample(&[0.33, 0.033]), expected.sample(&[0.33, 0.033]));
+        assert!(found.sample(&[0.33, 0.033]).contact);
+        assert!(field(&data, Some(Interpolation::Potential)).unwrap().is_potential());
+        data.scene = "not a scene".into();
+        assert!(matches!(field(&data, None), Err(SetupError::Scene(_))));
+    }
 }

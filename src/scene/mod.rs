@@ -9,6 +9,7 @@ mod device;
 mod effects;
 mod error;
 mod file;
+mod gains;
 mod inertia;
 mod own_text;
 mod scan;
@@ -17,13 +18,14 @@ mod spec;
 pub use device::DeviceSpec;
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use error::{Diagnostic, SceneError};
+pub use gains::GainError;
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
 pub use spec::{
-    Algorithm, AxisSpec, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec, FrictionSpec,
-    GraphicsEffects, GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects, HapticsSpec,
-    InclusionPlace, InclusionSpec, Interpolation, JointKind, JointSpec, MAX_CONTACT_NODES, Material, MotionSpec,
-    ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec, Shape, SkinSpec, SpringKind, SpringSpec, StiffeningSpec,
-    Waypoint,
+    Algorithm, AxisSpec, BOUNDARY_SLOPE, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec,
+    FrictionSpec, GraphicsEffects, GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects,
+    HapticsSpec, InclusionPlace, InclusionSpec, Interpolation, JointKind, JointSpec, MAX_CONTACT_NODES, Material,
+    MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec, Shape, SkinSpec, SpringKind, SpringSpec,
+    StiffeningSpec, THRESHOLD, Waypoint,
 };
 
 pub(crate) use inertia::is_positive_semidefinite;

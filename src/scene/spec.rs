@@ -327,6 +327,12 @@ pub struct AxisSpec {
     pub count: usize,
 }
 
+/// Threshold Ith of the contact index unless the scene names one [1]: the paper's.
+pub const THRESHOLD: f64 = 0.5;
+
+/// Slope Ks of the boundary layer at a revolute joint unless the scene names one [N m/rad].
+pub const BOUNDARY_SLOPE: f64 = 15.0;
+
 /// The 1 kHz loop (section 3.1).
 #[derive(Clone, Debug, PartialEq)]
 pub struct HapticsSpec {

@@ -2,10 +2,16 @@
 
 use crate::{
     equilibria::relative_error,
-    fixture::{Folder, SCENE, scene},
+    fixture::{Folder, POINTS, SCENE, scene, sweep},
 };
 use glam::DVec3;
-use haptize::{contact::Model, haptize::Inspection, object::Object, proxy::Chain};
+use haptize::{
+    contact::Model,
+    haptize::{CpuBackend, Direct, Inspection, Run},
+    object::Object,
+    proxy::Chain,
+};
+use std::sync::atomic::AtomicBool;
 
 #[test]
 fn an_inspection_tells_the_same_from_scene_and_dataset() {
@@ -51,4 +57,29 @@ fn an_inspection_is_complete_enough_to_recompute_the_torque() {
     let pushing: DVec3 =
         inspection.proxy_nodes.iter().flat_map(|node| &node.contacts).map(|contact| contact.force).sum();
     assert!((pushed + pushing).length() < 1e-12 * pushed.length());
+}
+
+#[test]
+fn a_scene_solved_directly_gives_what_its_inspection_and_its_dataset_tell() {
+    let scene = scene();
+    let direct = Direct::new(&scene).unwrap();
+    let run = Run { chunk: 10, stop: &AtomicBool::new(false), progress: &mut |_| () };
+    let (dataset, _) = sweep().run(&mut CpuBackend::new(direct.model(), 1).unwrap(), run).unwrap();
+    let q: Vec<f64> = (0..POINTS).flat_map(|point| dataset.grid.configuration(point).to_vec()).collect();
+    let (torques, statuses) = direct.torques(&q).unwrap();
+    assert_eq!(torques, *dataset.torque);
+    assert!(statuses.iter().zip(dataset.status.iter()).all(|(solved, stored)| *solved as u8 == *stored));
+    let inspection = direct.inspect(&[0.05, 0.045]).unwrap();
+    assert_eq!(inspection.torque, direct.torques(&[0.05, 0.045]).unwrap().0);
+    assert_eq!(inspection.status, "contact");
+}
+
+#[test]
+fn what_is_no_configuration_is_not_solved() {
+    let direct = Direct::new(&scene()).unwrap();
+    let refused = |q: &[f64]| direct.inspect(q).unwrap_err().to_string();
+    assert!(refused(&[0.0]).contains("1 coordinates were given for a proxy of 2 joints"));
+    assert!(refused(&[0.0, f64::NAN]).contains("coordinate 1 of configuration 0 is not a finite number"));
+    assert!(direct.torques(&[0.0; 3]).is_err());
+    assert!(direct.torques(&[f64::INFINITY, 0.0]).is_err());
 }

@@ -1,9 +1,10 @@
 //! NumPy archive: every tensor of the file under its own name, and what the file has in its header as arrays.
 //!
 //! `q` (n1, .., nd, d) are the configurations, `q1` .. `qd` the grid lines of each axis, `joint_names` and `joint_units`
-//! their names, `scene` and `provenance` texts. Arrays are streamed, not compressed: numbers of a smooth field hardly are.
+//! their names, `scene` and `provenance` texts. `units` and `axes` have a row for each array of numbers, its name and then its unit, or what
+//! its axes are: `dict(archive["units"])["energy"]` is `J`. Arrays are streamed, not compressed: numbers of a smooth field hardly are.
 
-use super::super::{Dataset, Error, file, replace_file};
+use super::super::{Axis, Dataset, Error, file, replace_file};
 use npyz::{AutoSerialize, DType, TypeStr, WriterBuilder};
 use safetensors::Dtype;
 use std::{
@@ -45,10 +46,47 @@ fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Resul
     let joints = [grid.joints()];
     texts(&mut zip, "joint_names", &joints, grid.axes.iter().map(|axis| axis.name.clone()).collect())?;
     texts(&mut zip, "joint_units", &joints, grid.axes.iter().map(|axis| axis.unit.clone()).collect())?;
+    let (units, axes) = meanings(dataset);
+    texts(&mut zip, "units", &[units.len(), 2], units.into_iter().flatten().collect())?;
+    texts(&mut zip, "axes", &[axes.len(), 2], axes.into_iter().flatten().collect())?;
     texts(&mut zip, "scene", &[], vec![dataset.scene.clone()])?;
     texts(&mut zip, "provenance", &[], vec![serde_json::to_string(&dataset.provenance)?])?;
     zip.finish()?;
     Ok(())
+}
+
+/// Each array of numbers with its unit, and with its axes.
+fn meanings(dataset: &Dataset) -> (Vec<[String; 2]>, Vec<[String; 2]>) {
+    let axes = &dataset.grid.axes;
+    // Where joints are of both kinds: `N m, N`.
+    let each = |unit: &dyn Fn(&Axis) -> String| {
+        let mut units: Vec<String> = axes.iter().map(unit).collect();
+        units.dedup();
+        units.join(", ")
+    };
+    let effort = each(&|axis| axis.effort_unit().into());
+    let slope = each(&|axis| format!("{}/{}", axis.effort_unit(), axis.unit));
+    let coordinate = each(&|axis| axis.unit.clone());
+    let grid = axes.iter().map(|axis| axis.name.as_str()).collect::<Vec<_>>().join(", ");
+    let meaning = |name: &str| match name {
+        "torque" => (effort.clone(), format!("{grid}, joint")),
+        "tangent" => (slope.clone(), format!("{grid}, lower triangle")),
+        "energy" => ("J".into(), grid.clone()),
+        "gap" => ("m".into(), grid.clone()),
+        "contact_forces" | "touch_forces" => ("N".into(), "contact, xyz".into()),
+        "contact_nodes" | "touch_nodes" => ("1".into(), "contact".into()),
+        "contact_offsets" | "touch_offsets" => ("1".into(), "point".into()),
+        "surface_nodes" | "inner_nodes" => ("m".into(), "node, xyz".into()),
+        "surface_triangles" => ("1".into(), "triangle, corner".into()),
+        "tetrahedra" => ("1".into(), "tetrahedron, corner".into()),
+        // Status, residual, iterations.
+        _ => ("1".into(), grid.clone()),
+    };
+    let tensors = file::tensors(dataset).into_iter().map(|tensor| (tensor.name.to_owned(), meaning(tensor.name)));
+    let all = ("q".to_owned(), (coordinate.clone(), format!("{grid}, joint")));
+    let lines =
+        axes.iter().enumerate().map(|(k, axis)| (format!("q{}", k + 1), (axis.unit.clone(), axis.name.clone())));
+    tensors.chain([all]).chain(lines).map(|(name, (unit, axes))| ([name.clone(), unit], [name, axes])).unzip()
 }
 
 fn array<W: Write + Seek, T: AutoSerialize + Copy>(

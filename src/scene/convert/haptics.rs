@@ -7,8 +7,8 @@ use super::super::check::Checker;
 use super::super::error::SceneError;
 use super::super::file::{FourChannelTable, FrictionTable, HapticsTable, PerJoint};
 use super::super::{
-    ContactDampingSpec, FourChannelSpec, FrictionSpec, HandSpec, HapticEffects, HapticsSpec, Interpolation, JointKind,
-    JointSpec, ProxyInertia,
+    BOUNDARY_SLOPE, ContactDampingSpec, FourChannelSpec, FrictionSpec, HandSpec, HapticEffects, HapticsSpec,
+    Interpolation, JointKind, JointSpec, ProxyInertia, THRESHOLD,
 };
 use crate::{
     JointVector,
@@ -53,7 +53,8 @@ pub(super) fn convert(
         .rate
         .as_ref()
         .map_or(Ok(1000.0), |value| checker.within("rate", value, 1.0 / GREATEST_INTERVAL, HIGHEST_RATE));
-    let threshold = table.threshold.as_ref().map_or(Ok(0.5), |value| checker.between("threshold", value, 0.0, 1.0));
+    let threshold =
+        table.threshold.as_ref().map_or(Ok(THRESHOLD), |value| checker.between("threshold", value, 0.0, 1.0));
     let factor = table.passivity_factor.as_ref().map_or(Ok(1.0), |value| checker.positive("passivity_factor", value));
     let hand = &table.hand;
     Ok(HapticsSpec {
@@ -61,7 +62,7 @@ pub(super) fn convert(
         threshold: threshold?,
         interpolation: table.interpolation.unwrap_or(interpolation),
         passivity_factor: factor?,
-        boundary_slope: vector("boundary_slope", &table.boundary_slope, true, Gain(15.0))?,
+        boundary_slope: vector("boundary_slope", &table.boundary_slope, true, Gain(BOUNDARY_SLOPE))?,
         proxy_damping: vector("proxy_damping", &table.proxy_damping, false, Gain(0.02))?,
         proxy_damping_is_free: table.proxy_damping.is_none(),
         proxy_inertia: table.proxy_inertia.unwrap_or(ProxyInertia::Constant),

@@ -1,0 +1,26 @@
+#!/bin/sh
+# Installs the C interface under PREFIX: libraries, header, pkg-config file and CMake find module.
+#
+#   cargo build -p haptize-capi --profile dist && sh capi/install.sh PREFIX
+#
+# HAPTIZE_BUILT names the folder of the built libraries where that is not target/dist.
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+prefix=${1:?usage: install.sh PREFIX}
+built=${HAPTIZE_BUILT:-$here/../target/dist}
+version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$here/Cargo.toml" | head -n 1)
+abi=$(sed -n 's/^#define HZ_ABI \([0-9]*\).*/\1/p' "$here/include/haptize.h")
+
+mkdir -p "$prefix/include" "$prefix/lib/pkgconfig" "$prefix/share/haptize/cmake"
+prefix=$(cd "$prefix" && pwd)
+cp "$here/include/haptize.h" "$prefix/include/"
+cp "$here/cmake/FindHaptize.cmake" "$prefix/share/haptize/cmake/"
+cp "$built/libhaptize_capi.a" "$prefix/lib/libhaptize.a"
+if [ -e "$built/libhaptize_capi.dylib" ]; then
+    cp "$built/libhaptize_capi.dylib" "$prefix/lib/libhaptize.dylib"
+    install_name_tool -id "$prefix/lib/libhaptize.dylib" "$prefix/lib/libhaptize.dylib"
+else
+    cp "$built/libhaptize_capi.so" "$prefix/lib/libhaptize.so.$abi"
+    ln -sf "libhaptize.so.$abi" "$prefix/lib/libhaptize.so"
+fi
+sed -e "s|@PREFIX@|$prefix|" -e "s|@VERSION@|$version|" "$here/haptize.pc.in" > "$prefix/lib/pkgconfig/haptize.pc"

@@ -1,0 +1,188 @@
+//! How a call ended: a code, and where there is more to say a message in the caller's buffer.
+
+use haptize::{dataset, haptize::BakeError, render::setup::SetupError, scene::SceneError};
+use std::{
+    ffi::{CStr, c_char},
+    io::{Cursor, Write},
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::Path,
+};
+
+/// How a call ended. Below zero it failed, and nothing but zeros was written to its results.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum hz_code {
+    /// Everything is as it should be.
+    HZ_OK = 0,
+    /// The configuration is outside the grid, or beside a grid point that was not computed.
+    HZ_OUTSIDE = 1,
+    /// Beside a grid point that did not converge: the torque is not to be trusted.
+    HZ_UNCONVERGED = 2,
+    /// The loop has let go: the torque is being brought to zero, or has been. hz_loop_fault tells why.
+    HZ_LET_GO = 3,
+    /// An argument is NULL, not a finite number, of a wrong size, or out of its range.
+    HZ_ARGUMENT = -1,
+    /// A file cannot be read.
+    HZ_FILE = -2,
+    /// A file is not a dataset, of another version, or damaged.
+    HZ_FORMAT = -3,
+    /// A scene or its object is not valid; the message names file and line.
+    HZ_SCENE = -4,
+    /// A defect of the library; please report it.
+    HZ_DEFECT = -99,
+}
+
+/// Why a call failed.
+pub struct Failure {
+    pub code: hz_code,
+    pub message: String,
+}
+
+/// An argument that cannot be taken.
+pub fn argument(message: impl Into<String>) -> Failure {
+    Failure { code: hz_code::HZ_ARGUMENT, message: message.into() }
+}
+
+impl From<dataset::Error> for Failure {
+    fn from(error: dataset::Error) -> Self {
+        let code = match error {
+            dataset::Error::Read { .. } | dataset::Error::Write { .. } => hz_code::HZ_FILE,
+            _ => hz_code::HZ_FORMAT,
+        };
+        Self { code, message: error.to_string() }
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        let code = match error {
+            SceneError::Unreadable { .. } => hz_code::HZ_FILE,
+            SceneError::Invalid(_) => hz_code::HZ_SCENE,
+        };
+        Self { code, message: error.to_string() }
+    }
+}
+
+impl From<SetupError> for Failure {
+    fn from(error: SetupError) -> Self {
+        let code = if matches!(error, SetupError::Field(_)) { hz_code::HZ_FORMAT } else { hz_code::HZ_SCENE };
+        Self { code, message: error.to_string() }
+    }
+}
+
+impl From<BakeError> for Failure {
+    fn from(error: BakeError) -> Self {
+        Self { code: hz_code::HZ_SCENE, message: error.to_string() }
+    }
+}
+
+/// Runs `work`; a panic becomes a code. Allocates nothing where `work` does not.
+pub fn guarded(work: impl FnOnce() -> hz_code) -> hz_code {
+    // What a panic has left half done is not looked at again: the caller is told of a defect.
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or(hz_code::HZ_DEFECT)
+}
+
+/// Runs `work` and writes its message, remarks or the reason of its failure, into the `size` bytes at `text`.
+///
+/// # Safety
+/// `text` is NULL or points to `size` bytes that may be written.
+pub unsafe fn told(text: *mut c_char, size: usize, work: impl FnOnce() -> Result<String, Failure>) -> hz_code {
+    let mut code = hz_code::HZ_DEFECT;
+    let message = match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(Ok(remarks)) => {
+            code = hz_code::HZ_OK;
+            remarks
+        }
+        Ok(Err(failure)) => {
+            code = failure.code;
+            failure.message
+        }
+        Err(_) => "the library panicked: please report this as a defect".into(),
+    };
+    // SAFETY: as the caller promises.
+    unsafe { write_text(text, size, &message) };
+    code
+}
+
+/// Writes `message` into the `size` bytes at `text`, cut where it does not fit, and ended by a zero. Allocates nothing.
+///
+/// # Safety
+/// As for [`told`].
+pub unsafe fn write_text(text: *mut c_char, size: usize, message: &dyn std::fmt::Display) {
+    if text.is_null() || size == 0 {
+        return;
+    }
+    // SAFETY: as the caller promises.
+    let buffer = unsafe { std::slice::from_raw_parts_mut(text.cast::<u8>(), size) };
+    let mut cursor = Cursor::new(&mut buffer[..size - 1]);
+    // A message that does not fit is cut.
+    let _ = write!(cursor, "{message}");
+    let mut end = cursor.position() as usize;
+    // Not within a character: bytes 10xxxxxx go on with one.
+    if end == size - 1 {
+        let text = &buffer[..end];
+        end = text.utf8_chunks().next().map_or(0, |chunk| chunk.valid().len());
+    }
+    buffer[end] = 0;
+}
+
+/// The path that a C string names, in UTF-8.
+///
+/// # Safety
+/// `path` is NULL or points to a text that ends in a zero and outlives the result.
+pub unsafe fn path<'a>(path: *const c_char) -> Result<&'a Path, Failure> {
+    if path.is_null() {
+        return Err(argument("the path is NULL"));
+    }
+    // SAFETY: as the caller promises.
+    let text = unsafe { CStr::from_ptr(path) };
+    text.to_str().map(Path::new).map_err(|_| argument("the path is not UTF-8"))
+}
+
+/// The `count` numbers at `numbers`; `None` where it is NULL or they cannot be in memory.
+///
+/// # Safety
+/// `numbers` is NULL or points to `count` numbers that nobody writes while the result lives.
+pub unsafe fn slice<'a, T>(numbers: *const T, count: usize) -> Option<&'a [T]> {
+    if !is_buffer(numbers, count) {
+        return None;
+    }
+    // SAFETY: as the caller promises; the length was checked.
+    Some(unsafe { std::slice::from_raw_parts(numbers, count) })
+}
+
+/// As [`slice`], to be written.
+///
+/// # Safety
+/// `numbers` is NULL or points to `count` numbers that nobody else reads or writes while the result lives.
+pub unsafe fn slice_mut<'a, T>(numbers: *mut T, count: usize) -> Option<&'a mut [T]> {
+    if !is_buffer(numbers, count) {
+        return None;
+    }
+    // SAFETY: as the caller promises; the length was checked.
+    Some(unsafe { std::slice::from_raw_parts_mut(numbers, count) })
+}
+
+fn is_buffer<T>(numbers: *const T, count: usize) -> bool {
+    !numbers.is_null() && numbers.is_aligned() && count <= isize::MAX as usize / size_of::<T>()
+}
+
+/// A structure whose first entry is its own size, by which a program compiled with a later header is known: such a one is only longer.
+///
+/// # Safety
+/// The structure begins with a `usize`.
+pub unsafe trait Extensible: Sized {}
+
+/// The structure at `structure`; `None` where it is NULL or its size is not told or too small.
+///
+/// # Safety
+/// `structure` is NULL or points to a structure of the size that it tells, which nobody else writes while the result lives.
+pub unsafe fn structure<'a, T: Extensible>(structure: *mut T) -> Option<&'a mut T> {
+    if structure.is_null() || !structure.is_aligned() {
+        return None;
+    }
+    // SAFETY: the structure begins with its size.
+    let size = unsafe { structure.cast::<usize>().read() };
+    // SAFETY: as the caller promises; the size was checked.
+    (size >= size_of::<T>()).then(|| unsafe { &mut *structure })
+}

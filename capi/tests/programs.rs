@@ -1,0 +1,130 @@
+//! The example programs, installed, compiled and run as a user would, under the address sanitiser where the compiler has it.
+
+#![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
+#![cfg(target_os = "linux")]
+
+mod common;
+
+use common::{Files, PRESSED};
+use haptize::{dataset::Dataset, haptize::Direct, render::setup, scene::Scene};
+use std::{
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+const HERE: &str = env!("CARGO_MANIFEST_DIR");
+
+/// Programs that watch their memory and every undefined operation, and end at the first fault.
+const SANITISED: [&str; 2] = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+
+/// Runs `command`, which must be there and succeed.
+fn run(command: &mut Command) -> String {
+    let Output { status, stdout, stderr } = command.output().unwrap();
+    let [stdout, stderr] = [stdout, stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(status.success(), "{command:?}: {status}\n{stdout}{stderr}");
+    stdout
+}
+
+fn is_there(program: &str) -> bool {
+    Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
+}
+
+/// Installs the libraries that this test was built with; returns the prefix.
+fn install(files: &Files) -> PathBuf {
+    let built = std::env::current_exe().unwrap();
+    let prefix = files.path("prefix");
+    run(Command::new("sh")
+        .arg(Path::new(HERE).join("install.sh"))
+        .arg(&prefix)
+        .env("HAPTIZE_BUILT", built.parent().unwrap()));
+    prefix
+}
+
+/// Whether `compiler` can make programs that watch their memory.
+fn has_sanitiser(files: &Files, compiler: &str) -> bool {
+    let source = files.path("empty.c");
+    std::fs::write(&source, "int main(void) { return 0; }\n").unwrap();
+    let mut command = Command::new(compiler);
+    command.args(SANITISED).arg(&source).arg("-o").arg(files.path("empty"));
+    command.output().is_ok_and(|output| output.status.success())
+        && Command::new(files.path("empty")).output().is_ok_and(|output| output.status.success())
+}
+
+/// Compiles `source` with every warning an error against what is installed, and runs it with `arguments`.
+fn compile_and_run(files: &Files, prefix: &Path, compiler: [&str; 2], source: &str, arguments: &[String]) -> String {
+    let program = files.path(&source.replace('.', "_"));
+    let mut command = Command::new(compiler[0]);
+    command.args([compiler[1], "-Wall", "-Wextra", "-Werror", "-pedantic", "-g"]);
+    if has_sanitiser(files, compiler[0]) {
+        command.args(SANITISED);
+    } else {
+        eprintln!("{source} runs without the address sanitiser, which {} does not have", compiler[0]);
+    }
+    let flags = if is_there("pkg-config") {
+        let mut flags = Command::new("pkg-config");
+        run(flags.args(["--cflags", "--libs", "haptize"]).env("PKG_CONFIG_PATH", prefix.join("lib/pkgconfig")))
+    } else {
+        format!("-I{0}/include -L{0}/lib -lhaptize", prefix.display())
+    };
+    command.arg(Path::new(HERE).join("examples").join(source)).args(flags.split_whitespace()).arg("-o").arg(&program);
+    run(&mut command);
+    run(Command::new(&program).args(arguments).env("LD_LIBRARY_PATH", prefix.join("lib")))
+}
+
+fn numbers(line: &str) -> Vec<f64> {
+    line.split_whitespace().filter_map(|word| word.parse().ok()).collect()
+}
+
+#[test]
+fn the_examples_compile_without_a_warning_and_tell_what_the_library_tells() {
+    if !is_there("cc") || !is_there("c++") {
+        eprintln!("skipped: there is no C or C++ compiler (cc, c++)");
+        return;
+    }
+    let files = Files::new();
+    let prefix = install(&files);
+    let [scene, dataset] = ["small.toml", "small.haptize"].map(|name| files.path(name).display().to_string());
+    let q = PRESSED.map(|q| q.to_string());
+    let looked_up = setup::field(&Dataset::open(&files.path("small.haptize")).unwrap(), None).unwrap().sample(&PRESSED);
+    let [first, second] = [looked_up.torque[0], looked_up.torque[1]];
+
+    let pressed =
+        compile_and_run(&files, &prefix, ["cc", "-std=c99"], "press.c", &[&[dataset.clone()][..], &q].concat());
+    let lines: Vec<&str> = pressed.lines().collect();
+    assert_eq!(numbers(lines[0]), [0.0, first, second], "{pressed}");
+    assert_eq!(numbers(lines[1]), [0.0, 1.0, looked_up.energy], "{pressed}");
+    let felt = numbers(lines[2]);
+    assert!(felt[..2] == [0.0, 1.0] && felt[3] < 0.0, "{pressed}");
+
+    let solved =
+        compile_and_run(&files, &prefix, ["c++", "-std=c++14"], "solve.cc", &[&[scene, dataset][..], &q].concat());
+    let lines: Vec<&str> = solved.lines().collect();
+    let direct = Direct::new(&Scene::load(files.path("small.toml")).unwrap()).unwrap().inspect(&PRESSED).unwrap();
+    assert_eq!(numbers(lines[0])[3..], direct.torque, "{solved}");
+    assert_eq!(numbers(lines[1])[1..], [1.0, first, second], "{solved}");
+}
+
+#[test]
+fn cmake_finds_what_is_installed() {
+    if !is_there("cmake") || !is_there("cc") {
+        eprintln!("skipped: there is no CMake or no C compiler");
+        return;
+    }
+    let files = Files::new();
+    let prefix = install(&files);
+    let project = files.path("project");
+    std::fs::create_dir(&project).unwrap();
+    let text = format!(
+        "cmake_minimum_required(VERSION 3.15)\nproject(press C)\n\
+         list(APPEND CMAKE_MODULE_PATH {0}/share/haptize/cmake)\nfind_package(Haptize REQUIRED)\n\
+         add_executable(press {HERE}/examples/press.c)\ntarget_link_libraries(press Haptize::Haptize)\n",
+        prefix.display()
+    );
+    std::fs::write(project.join("CMakeLists.txt"), text).unwrap();
+    let build = project.join("build");
+    let root = format!("-DCMAKE_PREFIX_PATH={}", prefix.display());
+    run(Command::new("cmake").args([&root, "-S"]).arg(&project).arg("-B").arg(&build));
+    run(Command::new("cmake").arg("--build").arg(&build));
+    let q = PRESSED.map(|q| q.to_string());
+    run(Command::new(build.join("press")).arg(files.path("small.haptize")).args(q));
+}

@@ -1,0 +1,155 @@
+"""Bakes, files, and views into them."""
+
+import gc
+import signal
+import threading
+
+import haptize
+import numpy as np
+import pytest
+
+
+def test_views_are_the_dataset(dataset, file):
+    opened = haptize.Dataset.open(file)
+    for data in (dataset, opened, haptize.Dataset.load(file)):
+        assert data.shape == (7, 9)
+        assert data.torque.shape == (7, 9, 2) and data.torque.dtype == np.float64
+        assert data.status.shape == data.energy.shape == data.gap.shape == (7, 9)
+        assert np.array_equal(data.torque, dataset.torque)
+        assert not data.torque.flags.writeable and not data.torque.flags.owndata
+    assert {0, 1} == set(np.unique(dataset.status))
+    assert [axis["name"] for axis in dataset.axes] == ["turn", "slide"]
+    assert [axis["unit"] for axis in dataset.axes] == ["rad", "m"]
+    assert np.allclose(dataset.lines[0], -0.3 + 0.1 * np.arange(7))
+    offsets, nodes, forces = dataset.contacts
+    assert offsets.shape == (64,) and nodes.shape == (offsets[-1],) and forces.shape == (offsets[-1], 3)
+    nodes, triangles = dataset.surface
+    assert nodes.shape[1] == triangles.shape[1] == 3 and triangles.max() < len(nodes)
+    assert dataset.provenance["backend"] == "cpu"
+    assert dataset.report["points"] == 63 and opened.report is None
+    assert dataset.summary()["points"] == 63
+
+
+def test_a_view_is_read_only_and_outlives_its_dataset(file):
+    torque = haptize.Dataset.open(file).torque
+    with pytest.raises(ValueError):
+        torque[0, 0, 0] = 1.0
+    with pytest.raises(ValueError):
+        torque.flags.writeable = True
+    copy = np.array(haptize.Dataset.load(file).torque)
+    gc.collect()
+    assert np.array_equal(torque, copy)
+
+
+def test_an_opened_file_takes_the_memory_of_what_is_looked_at(tmp_path):
+    """A dataset of 100 MB: its check reads all of it, and gives it back."""
+
+    def resident():
+        with open("/proc/self/statm") as statm:
+            return 4096 * int(statm.read().split()[1])
+
+    try:
+        resident()
+    except OSError:
+        pytest.skip("this system does not tell the memory of a process")
+    q = np.array([[a, b] for a in (0.0, 1.0) for b in (0.0, 1.0)] + [[0.5, 0.5]])
+    haptize.gridize(q, q - 0.5, 1 / 2000).save(tmp_path / "large.haptize")
+    gc.collect()
+    before = resident()
+    large = haptize.Dataset.open(tmp_path / "large.haptize")
+    size = (tmp_path / "large.haptize").stat().st_size
+    opened = resident() - before
+    assert size > 60e6 and opened < 0.1 * size, (size, opened)
+    large.torque[:20].sum()
+    assert resident() - before < 0.2 * size
+    large.torque.sum()
+    assert resident() - before > 0.8 * size
+
+
+@pytest.mark.parametrize(
+    "contents, words", [(None, "cannot be read"), (b"", "not a haptize dataset"), (b"x" * 9999, "not a haptize dataset")]
+)
+def test_a_file_that_is_no_dataset_is_refused(tmp_path, contents, words):
+    path = tmp_path / "wrong.haptize"
+    if contents is not None:
+        path.write_bytes(contents)
+    for open in (haptize.Dataset.open, haptize.Dataset.load, haptize.Field.open):
+        with pytest.raises(haptize.DatasetError, match=words) as raised:
+            open(path)
+        assert str(raised.value.path) == str(path)
+
+
+def test_a_damaged_file_is_refused(file, tmp_path):
+    data = bytearray(file.read_bytes())
+    data[-10] ^= 1
+    (tmp_path / "damaged.haptize").write_bytes(data)
+    with pytest.raises(haptize.DatasetError, match="damaged"):
+        haptize.Dataset.open(tmp_path / "damaged.haptize")
+
+
+def test_progress_is_told_and_may_stop_a_bake(scene, tmp_path):
+    told = []
+    haptize.bake(scene, backend="cpu", measure_error=0, progress=lambda done, points: told.append((done, points)))
+    assert told and all(points == 63 and 0 <= done <= 63 for done, points in told)
+
+    def stop(done, points):
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        haptize.bake(scene, tmp_path / "stopped.haptize", backend="cpu", progress=stop)
+    # What was solved is kept; nothing is written over it by mistake.
+    if list(tmp_path.iterdir()):
+        baked = haptize.bake(scene, tmp_path / "stopped.haptize", backend="cpu", resume=True)
+        assert baked.report["points"] == 63
+
+
+def test_ctrl_c_stops_a_bake(scene):
+    def interrupt(done, points):
+        signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        haptize.bake(scene, backend="cpu", progress=interrupt)
+
+
+def test_other_threads_run_while_a_scene_is_baked(scene):
+    baked = []
+    thread = threading.Thread(target=lambda: baked.append(haptize.bake(scene, backend="cpu")))
+    thread.start()
+    turns = 0
+    while thread.is_alive():
+        turns += 1
+    thread.join()
+    assert turns > 0 and len(baked) == 1
+
+
+def test_what_cannot_be_baked_says_why(scene, tmp_path):
+    with pytest.raises(ValueError, match="no backend"):
+        haptize.bake(scene, backend="abacus")
+    with pytest.raises(haptize.BakeError, match="none"):
+        haptize.bake(scene, tmp_path / "none" / "a.haptize", backend="cpu")
+    with pytest.raises(TypeError):
+        haptize.bake("scene.toml")
+
+
+def test_exports_are_read_by_numpy(dataset, tmp_path):
+    (path,) = dataset.export(tmp_path / "small.npz", "npz")
+    with np.load(path) as archive:
+        assert np.array_equal(archive["torque"], dataset.torque)
+        units, axes = dict(archive["units"]), dict(archive["axes"])
+        assert (units["torque"], units["energy"], units["q2"], units["contact_forces"]) == ("N m, N", "J", "m", "N")
+        assert (axes["torque"], axes["status"], axes["q1"]) == ("turn, slide, joint", "turn, slide", "turn")
+        numbers = {name for name in archive if archive[name].dtype.kind != "U"}
+        assert numbers == set(units) == set(axes)
+    with pytest.raises(ValueError):
+        dataset.export(tmp_path / "small.xls", "xls")
+
+
+def test_figures_are_written(dataset, tmp_path):
+    files = dataset.figures(tmp_path)
+    assert files and all(file.stat().st_size > 1000 for file in map(type(tmp_path), files))
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("agg")
+    ax = haptize.plot(dataset, joint=1)
+    assert ax.get_xlabel() == "turn [rad]" and ax.get_ylabel() == "slide [m]"
+    with pytest.raises(ValueError):
+        haptize.plot(dataset, "colour")

@@ -1,0 +1,178 @@
+//! Many look-ups at once, on all cores: row k of an output is made from row k of the configurations.
+
+use super::TorqueField;
+use rayon::prelude::*;
+
+/// Rows that one thread takes at a time: some tens of microseconds of work, beside which sharing them out costs nothing.
+const SHARE: usize = 256;
+
+/// A batch of look-ups was refused; nothing was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BatchError {
+    /// A buffer's length does not fit the others.
+    #[error("the {buffer} hold {found} numbers where {expected} are needed: {rows} configurations of {joints} joints")]
+    Length {
+        /// Which buffer.
+        buffer: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length that it should have.
+        expected: usize,
+        /// Whole configurations.
+        rows: usize,
+        /// Joints of the field.
+        joints: usize,
+    },
+    /// A coordinate is no number.
+    #[error("coordinate {joint} of configuration {row} is not a finite number (both counted from 0)")]
+    NotFinite {
+        /// The configuration.
+        row: usize,
+        /// The joint.
+        joint: usize,
+    },
+}
+
+/// Checks `configurations`, `joints` coordinates each, and returns their number.
+///
+/// # Errors
+/// When they are not whole rows of finite numbers.
+pub fn check_rows(configurations: &[f64], joints: usize) -> Result<usize, BatchError> {
+    let (found, rows) = (configurations.len(), configurations.len() / joints);
+    if rows * joints != found {
+        let (buffer, expected) = ("configurations", (rows + 1) * joints);
+        return Err(BatchError::Length { buffer, found, expected, rows, joints });
+    }
+    match configurations.iter().position(|coordinate| !coordinate.is_finite()) {
+        Some(entry) => Err(BatchError::NotFinite { row: entry / joints, joint: entry % joints }),
+        None => Ok(rows),
+    }
+}
+
+/// Fills the rows of `out` on all cores: `write` makes each of a configuration, a row of `joints` coordinates [rad or m]. Few rows are
+/// filled on the calling thread.
+///
+/// # Errors
+/// When `configurations` are not whole rows of finite numbers, or `out` is not as many whole rows.
+pub fn fill_rows<T: Send>(
+    configurations: &[f64],
+    joints: usize,
+    out: &mut [T],
+    write: impl Fn(&[f64], &mut [T]) + Sync,
+) -> Result<(), BatchError> {
+    let rows = check_rows(configurations, joints)?;
+    let width = out.len().checked_div(rows).unwrap_or(0);
+    if width * rows != out.len() {
+        let (found, expected) = (out.len(), (width + 1) * rows);
+        return Err(BatchError::Length { buffer: "results", found, expected, rows, joints });
+    }
+    if width > 0 {
+        fill((configurations, joints), (out, width), &write);
+    }
+    Ok(())
+}
+
+/// Fills whole rows.
+fn fill<T: Send>(
+    (configurations, joints): (&[f64], usize),
+    (out, width): (&mut [T], usize),
+    write: &(impl Fn(&[f64], &mut [T]) + Sync),
+) {
+    let share = |(q, out): (&[f64], &mut [T])| {
+        q.chunks_exact(joints).zip(out.chunks_exact_mut(width)).for_each(|(q, out)| write(q, out));
+    };
+    if configurations.len() <= SHARE * joints {
+        share((configurations, out));
+    } else {
+        configurations.par_chunks(SHARE * joints).zip(out.par_chunks_mut(SHARE * width)).for_each(share);
+    }
+}
+
+impl TorqueField {
+    /// Torques at `configurations`, one entry per joint in each row of both [rad or m; N m or N], on all cores; and where it is asked for
+    /// the number of the status of each, as [`Sample::status`] tells it. The same numbers as [`TorqueField::sample`] gives.
+    ///
+    /// # Errors
+    /// When the lengths do not fit, or a coordinate is not finite.
+    pub fn torques(
+        &self,
+        configurations: &[f64],
+        torques: &mut [f64],
+        statuses: Option<&mut [u8]>,
+    ) -> Result<(), BatchError> {
+        let joints = self.joints();
+        let rows = check_rows(configurations, joints)?;
+        let lengths = [("torques", torques.len(), rows * joints)];
+        let optional = statuses.as_ref().map(|statuses| ("statuses", statuses.len(), rows));
+        for (buffer, found, expected) in lengths.into_iter().chain(optional) {
+            if found != expected {
+                return Err(BatchError::Length { buffer, found, expected, rows, joints });
+            }
+        }
+        let Some(statuses) = statuses else {
+            return fill_rows(configurations, joints, torques, |q, torque| {
+                torque.copy_from_slice(&self.sample(q).torque)
+            });
+        };
+        let rows = configurations.par_chunks_exact(joints).zip(torques.par_chunks_exact_mut(joints)).zip(statuses);
+        rows.with_min_len(SHARE).for_each(|((q, torque), status)| {
+            let sample = self.sample(q);
+            torque.copy_from_slice(&sample.torque);
+            *status = sample.status() as u8;
+        });
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        JointVector,
+        field::Sample,
+        field::synthetic::{grid, half_space},
+    };
+
+    fn field(joints: usize) -> TorqueField {
+        let data = half_space(grid(&vec![(-0.6, 0.3, 5); joints]), 5.0);
+        TorqueField::new(&data, 0.5, &JointVector::from_slice(&vec![15.0; joints])).unwrap()
+    }
+
+    #[test]
+    fn a_batch_gives_the_same_bits_as_its_look_ups_one_by_one() {
+        for joints in 1..=3 {
+            let field = field(joints);
+            for rows in [0, 1, SHARE, SHARE + 1, 5 * SHARE + 7] {
+                let q: Vec<f64> = (0..rows * joints).map(|k| (k as f64 * 0.7).sin()).collect();
+                let mut torques = vec![f64::NAN; q.len()];
+                let mut statuses = vec![u8::MAX; rows];
+                field.torques(&q, &mut torques, Some(&mut statuses)).unwrap();
+                let samples: Vec<Sample> = q.chunks_exact(joints).map(|q| field.sample(q)).collect();
+                let one_by_one: Vec<f64> = samples.iter().flat_map(|sample| sample.torque.to_vec()).collect();
+                assert_eq!(torques, one_by_one, "{rows} rows of {joints}");
+                assert!(samples.iter().zip(&statuses).all(|(sample, status)| sample.status() as u8 == *status));
+                torques.fill(f64::NAN);
+                field.torques(&q, &mut torques, None).unwrap();
+                assert_eq!(torques, one_by_one, "{rows} rows of {joints}");
+                assert!(rows < SHARE || torques.iter().any(|tau| *tau != 0.0));
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_batch_is_refused_and_nothing_written() {
+        let field = field(2);
+        let mut out = [7.0; 4];
+        let length = |buffer, found, expected, rows| BatchError::Length { buffer, found, expected, rows, joints: 2 };
+        assert_eq!(field.torques(&[0.0; 3], &mut out, None), Err(length("configurations", 3, 4, 1)));
+        assert_eq!(field.torques(&[0.0; 6], &mut out, None), Err(length("torques", 4, 6, 3)));
+        let refused = field.torques(&[0.0; 4], &mut out, Some(&mut [0; 3]));
+        assert_eq!(refused, Err(length("statuses", 3, 2, 2)));
+        assert_eq!(fill_rows(&[0.0; 6], 2, &mut out, |_, _| ()), Err(length("results", 4, 6, 3)));
+        for bad in [f64::NAN, f64::INFINITY] {
+            let refused = field.torques(&[0.3, 0.3, 0.3, bad], &mut out, None);
+            assert_eq!(refused, Err(BatchError::NotFinite { row: 1, joint: 1 }));
+        }
+        assert_eq!(out, [7.0; 4]);
+    }
+}

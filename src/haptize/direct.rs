@@ -1,0 +1,101 @@
+//! Equilibria solved directly, wherever they are asked for: what a program calls that has no dataset, or wants to check one.
+
+use super::{BakeError, Inspection, sample};
+use crate::{
+    contact::{Model, Solvers, Status},
+    field::{BatchError, check_rows},
+    object::Object,
+    proxy::Chain,
+    scene::Scene,
+};
+
+/// The object and the proxy of a scene, which a model borrows.
+struct Parts {
+    object: Object,
+    chain: Chain,
+}
+
+self_cell::self_cell!(
+    struct Prepared {
+        owner: Parts,
+        #[covariant]
+        dependent: Model,
+    }
+);
+
+/// A scene, ready to be solved at any configuration. Threads can share it.
+pub struct Direct(Prepared);
+
+/// A configuration is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DirectError {
+    /// Not as many coordinates as the proxy has joints.
+    #[error("{found} coordinates were given for a proxy of {joints} joints")]
+    Joints {
+        /// Coordinates given.
+        found: usize,
+        /// Joints of the proxy.
+        joints: usize,
+    },
+    /// A batch of them is none.
+    #[error(transparent)]
+    Batch(#[from] BatchError),
+}
+
+impl Direct {
+    /// Builds object and proxy of `scene`. Of an object with more than [`Model::WHOLE`] surface nodes only those are prepared that the proxy
+    /// reaches within the scene's grid; a configuration that reaches farther is [`Status::Overflow`].
+    ///
+    /// # Errors
+    /// When the object cannot be built.
+    pub fn new(scene: &Scene) -> Result<Self, BakeError> {
+        let parts = Parts { object: Object::build(&scene.object)?, chain: Chain::new(&scene.proxy) };
+        let prepared = Prepared::try_new(parts, |Parts { object, chain }| {
+            Model::reaching(object, chain, scene.contact, &sample(scene))
+        })?;
+        Ok(Self(prepared))
+    }
+
+    /// The object and the proxy, prepared.
+    #[must_use]
+    pub fn model(&self) -> &Model<'_> {
+        self.0.borrow_dependent()
+    }
+
+    /// Number of joints d.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        self.0.borrow_owner().chain.joints.len()
+    }
+
+    /// The equilibrium at `q` in full, one coordinate a joint [rad or m].
+    ///
+    /// # Errors
+    /// When `q` is no configuration.
+    pub fn inspect(&self, q: &[f64]) -> Result<Inspection, DirectError> {
+        let (found, joints) = (q.len(), self.joints());
+        if found != joints {
+            return Err(DirectError::Joints { found, joints });
+        }
+        check_rows(q, joints)?;
+        Ok(Inspection::new(self.model(), q))
+    }
+
+    /// Torques and statuses of many configurations, joint fastest as they are, on all cores [N m or N]. Each is solved from rest; where
+    /// there are several equilibria, a bake may have found a lower one from neighbouring grid points.
+    ///
+    /// # Errors
+    /// When `configurations` are not whole rows of finite numbers.
+    pub fn torques(&self, configurations: &[f64]) -> Result<(Vec<f64>, Vec<Status>), DirectError> {
+        let joints = self.joints();
+        check_rows(configurations, joints)?;
+        let rows: Vec<&[f64]> = configurations.chunks_exact(joints).collect();
+        let solvers = Solvers::new(self.model(), rayon::current_num_threads());
+        let solved = solvers.map(&rows, |solver, q| {
+            let equilibrium = solver.solve(q);
+            (equilibrium.torque, equilibrium.status)
+        });
+        let torques = solved.iter().flat_map(|(torque, _)| torque.iter().copied()).collect();
+        Ok((torques, solved.into_iter().map(|(_, status)| status).collect()))
+    }
+}
