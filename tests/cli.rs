@@ -309,8 +309,10 @@ fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
     std::fs::write(path("nan.csv"), "# by hand\ntime,q1\n0,0\n0.1,nan\n").unwrap();
     std::fs::write(path("point.csv"), "0,0\n").unwrap();
     let recorded = std::fs::read_to_string(path("r.csv")).unwrap();
-    let last = recorded.trim_end().rfind(',').unwrap();
-    std::fs::write(path("altered.csv"), format!("{}0.1\n", &recorded[..=last])).unwrap();
+    // The proxy's position; the last column is what the device held.
+    let (rest, held) = recorded.trim_end().rsplit_once(',').unwrap();
+    let (before, _) = rest.rsplit_once(',').unwrap();
+    std::fs::write(path("altered.csv"), format!("{before},0.1,{held}\n")).unwrap();
     for (arguments, expected) in [
         (&["none.haptize"][..], "none.haptize"),
         (&["finger.haptize", "--motion", "none.csv"], "none.csv: cannot be read"),

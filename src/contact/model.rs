@@ -18,7 +18,7 @@ pub struct Model<'a> {
     pub object: &'a Object,
     /// The proxy.
     pub chain: &'a Chain,
-    /// C = K^-1 on the surface nodes that can be reached.
+    /// C = K^-1 on the surface nodes that can be reached; changed by [`Model::take_compliance`] alone.
     pub compliance: Arc<Compliance>,
     /// How equation (2) is solved; its stiffness is finite.
     pub contact: ContactSpec,
@@ -103,8 +103,8 @@ impl<'a> Model<'a> {
         model
     }
 
-    /// Takes `compliance` instead of what there is.
-    pub(super) fn take_compliance(&mut self, compliance: Compliance) {
+    /// Takes `compliance` instead of what there is, with all that follows from it.
+    pub fn take_compliance(&mut self, compliance: Compliance) {
         self.compliance = Arc::new(compliance);
         self.measure_compliance();
     }

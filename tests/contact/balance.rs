@@ -125,6 +125,43 @@ fn hard_configurations_are_balanced_or_flagged() {
 
 /// A ball on a mirror plane of the object may balance on a saddle of E, from which it slides off to either side: what is returned is the
 /// minimum that a hair's breadth beside the plane has, too.
+/// Between rigid contact forces c and the forces K u that hold the displacement, in the energy norm: recomputed from u by the stiffness itself.
+#[test]
+fn the_residual_of_rigid_contact_is_the_imbalance_of_forces() {
+    let object = sphere(SpringKind::Isotropic);
+    let chain = Chain::new(&arm(0.0));
+    let model = Model::new(&object, &chain, contact(Algorithm::Energy, f64::INFINITY));
+    let mut solver = Solver::new(&model);
+    let mut compared = 0;
+    for q in random_configurations(3, 60) {
+        let found = solver.solve(&q);
+        if found.status != Status::Contact {
+            continue;
+        }
+        let u: Vec<DVec3> = solver.displacement().chunks_exact(3).map(DVec3::from_slice).collect();
+        let mut held_by = vec![DVec3::ZERO; u.len()];
+        object.stiffness.apply(&u, &mut held_by);
+        let mut pushed = vec![DVec3::ZERO; u.len()];
+        found.forces.iter().for_each(|force| pushed[force.node as usize] = force.force);
+        let respond = |j: usize| -> DVec3 {
+            (0..u.len()).filter(|&i| pushed[i] != DVec3::ZERO).map(|i| model.compliance.block(j, i) * pushed[i]).sum()
+        };
+        let response: Vec<DVec3> = (0..u.len()).map(respond).collect();
+        let norm = |forces: &dyn Fn(usize) -> DVec3, moves: &dyn Fn(usize) -> DVec3| -> f64 {
+            (0..u.len()).map(|j| forces(j).dot(moves(j))).sum::<f64>().sqrt()
+        };
+        let imbalance =
+            norm(&|j| pushed[j] - held_by[j], &|j| response[j] - u[j]) / norm(&|j| pushed[j], &|j| response[j]);
+        assert!(
+            (found.residual - imbalance).abs() < 0.01 * imbalance + 1e-10,
+            "{} {imbalance} at {q:?}",
+            found.residual
+        );
+        compared += usize::from(found.residual > 1e-9);
+    }
+    assert!(compared > 2, "{compared}");
+}
+
 #[test]
 fn saddles_are_left() {
     let object = world::sphere(world::PAPER).unwrap();

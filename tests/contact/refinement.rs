@@ -54,7 +54,7 @@ fn torques(count: u32, replacements: &[(&str, &str)]) -> Vec<f64> {
 
 fn rms(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value * value, count + 1.0));
-    (sum / count as f64).sqrt()
+    (sum / count).sqrt()
 }
 
 fn difference(a: &[f64], b: &[f64]) -> f64 {

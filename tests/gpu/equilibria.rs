@@ -187,8 +187,8 @@ fn part<'a>((scene, object, chain): &'a (Scene, Object, Chain), algorithm: Algor
     let contact = haptize::scene::ContactSpec { algorithm, ..scene.contact };
     let mut model = Model::new(object, chain, contact);
     let reached = |node: &u32| model.surface.positions[*node as usize].dot(DVec3::new(-0.3, 0.0, 1.0)) > 0.015;
-    model.compliance =
-        Compliance::on(object, (0..object.surface_nodes as u32).filter(reached).collect()).unwrap().into();
+    let nodes = (0..object.surface_nodes as u32).filter(reached).collect();
+    model.take_compliance(Compliance::on(object, nodes).unwrap());
     model
 }
 
@@ -400,12 +400,12 @@ fn updates_are_refused() {
 }
 
 /// Every hard case of contact that the CPU keeps: stiffness, exact places and awkward ones, slivers, units, a kilometre from the
-/// origin, torque along paths and against the energy, singular arms.
+/// origin, torque along paths and against the energy, singular arms; not the search for lower equilibria, which is the CPU's alone.
 #[test]
 fn the_gpu_keeps_the_bounds_of_its_hard_cases() {
     use haptize::report::stability::{Effort, Outcome, Setting, cases, table};
     let setting = Setting { effort: Effort::Sample, gpu: Some(context()) };
-    for case in cases().into_iter().filter(|case| case.room == "contact") {
+    for case in cases().into_iter().filter(|case| case.room == "contact" && case.name != "lowest equilibrium") {
         let outcomes = (case.run)(&setting).unwrap();
         let on_gpu: Vec<Outcome> = outcomes.into_iter().filter(|outcome| outcome.varied.contains("GPU")).collect();
         assert!(!on_gpu.is_empty(), "{}", case.name);

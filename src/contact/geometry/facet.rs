@@ -30,7 +30,7 @@ const FACE: [Direction; 2] = [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]];
 /// The direction in which a point moves along each edge.
 const EDGES: [[Direction; 1]; 3] = [[[-1.0, 1.0, 0.0]], [[0.0, -1.0, 1.0]], [[1.0, 0.0, -1.0]]];
 
-/// The directions in which a point that lies on `feature` may move on it: two on a face, one on an edge, none on a vertex.
+/// Returns the directions in which a point that lies on `feature` may move on it: two on a face, one on an edge, none on a vertex.
 #[must_use]
 pub fn directions(feature: Feature) -> &'static [Direction] {
     match feature {
@@ -40,14 +40,14 @@ pub fn directions(feature: Feature) -> &'static [Direction] {
     }
 }
 
-/// The factors 4 w_k w_{k+1} of the sagittas at weights `w` [1].
+/// Returns the factors 4 w_k w_{k+1} of the sagittas at weights `w` [1].
 #[inline]
 #[must_use]
 pub fn bubbles(w: [f64; 3]) -> [f64; 3] {
     [4.0 * w[0] * w[1], 4.0 * w[1] * w[2], 4.0 * w[2] * w[0]]
 }
 
-/// Their derivative at `w` along `d`.
+/// Returns their derivative at `w` along `d`.
 #[inline]
 #[must_use]
 pub fn bubble_slopes(w: [f64; 3], d: Direction) -> [f64; 3] {
@@ -55,20 +55,20 @@ pub fn bubble_slopes(w: [f64; 3], d: Direction) -> [f64; 3] {
 }
 
 impl Facet {
-    /// A flat triangle.
+    /// Returns a flat triangle.
     #[must_use]
     pub fn flat(corners: [DVec3; 3]) -> Self {
         Self { corners, sagittas: None }
     }
 
-    /// Its point at barycentric weights `w` [m].
+    /// Returns its point at barycentric weights `w` [m].
     #[inline]
     #[must_use]
     pub fn point(&self, w: [f64; 3]) -> DVec3 {
         combine(&self.corners, w) + self.sagittas.map_or(DVec3::ZERO, |sagittas| combine(&sagittas, bubbles(w)))
     }
 
-    /// The derivative of its point at `w` along `d` [m].
+    /// Returns the derivative of its point at `w` along `d` [m].
     #[inline]
     #[must_use]
     pub fn tangent(&self, w: [f64; 3], d: Direction) -> DVec3 {
@@ -76,14 +76,14 @@ impl Facet {
         combine(&self.corners, d) + self.sagittas.map_or(DVec3::ZERO, bent)
     }
 
-    /// The second derivative of its point along `d` and `e`, the same everywhere [m].
+    /// Returns the second derivative of its point along `d` and `e`, which is the same everywhere [m].
     #[inline]
     #[must_use]
     pub fn bend(&self, d: Direction, e: Direction) -> DVec3 {
         self.sagittas.map_or(DVec3::ZERO, |sagittas| combine(&sagittas, bubble_slopes(e, d)))
     }
 
-    /// Its outward unit normal at `w`; zero where it has none.
+    /// Returns its outward unit normal at `w`; zero where it has none.
     #[must_use]
     pub fn normal(&self, w: [f64; 3]) -> DVec3 {
         unit_or_zero(match self.sagittas {
@@ -92,7 +92,7 @@ impl Facet {
         })
     }
 
-    /// The angle between its two edges at corner k [rad].
+    /// Returns the angle between its two edges at corner k [rad].
     #[must_use]
     pub fn angle(&self, k: usize) -> f64 {
         let mut at = [0.0; 3];
@@ -101,7 +101,7 @@ impl Facet {
         left.cross(right).length().atan2(left.dot(right))
     }
 
-    /// The point of it that is closest to `x`; none where a bent facet is farther than `within` [m].
+    /// Finds the point of it that is closest to `x`; none where a bent facet is farther than `within` [m].
     #[inline]
     #[must_use]
     pub fn closest(&self, x: DVec3, within: f64) -> Option<ClosestPoint> {
@@ -113,7 +113,7 @@ impl Facet {
         (least <= within || within.is_nan()).then(|| self.closest_bent(x, flat.weights))
     }
 
-    /// The same on a bent facet, searched from `start`.
+    /// Finds the same on a bent facet, searching from `start`.
     fn closest_bent(&self, x: DVec3, start: [f64; 3]) -> ClosestPoint {
         let unbounded = self.stationary(x, start);
         if unbounded.into_iter().all(|weight| weight >= 0.0) {
@@ -131,8 +131,8 @@ impl Facet {
         best.map_or(ClosestPoint { weights: start, feature: Feature::Face }, |(_, point)| point)
     }
 
-    /// Weights where the distance to `x` is least, those of the facet continued beyond its edges; far outside, whence Newton's method will not
-    /// come back, where it has got to.
+    /// Finds the weights at which the distance to `x` is least, on the facet continued beyond its edges. Far outside it stops, since Newton's
+    /// method would not come back.
     fn stationary(&self, x: DVec3, start: [f64; 3]) -> [f64; 3] {
         let bends = [self.bend(FACE[0], FACE[0]), self.bend(FACE[0], FACE[1]), self.bend(FACE[1], FACE[1])];
         let mut w = start;
@@ -157,7 +157,7 @@ impl Facet {
         w
     }
 
-    /// The point of edge k that is closest to `x`, searched from the point of the edge that is next to `start`.
+    /// Finds the point of edge k that is closest to `x`, from the point of the edge that is next to `start`.
     fn closest_on_edge(&self, x: DVec3, k: usize, start: [f64; 3]) -> ClosestPoint {
         let (direction, next) = (EDGES[k][0], (k + 1) % 3);
         let bend = self.bend(direction, direction);
@@ -189,7 +189,7 @@ impl Facet {
     }
 }
 
-/// sum_k factor_k vector_k.
+/// Returns sum_k factor_k vector_k.
 #[inline]
 fn combine(vectors: &[DVec3; 3], factors: [f64; 3]) -> DVec3 {
     vectors[0] * factors[0] + vectors[1] * factors[1] + vectors[2] * factors[2]

@@ -27,7 +27,7 @@ pub struct SmoothSurface {
 }
 
 impl SmoothSurface {
-    /// The smooth surface through the nodes of a closed mesh.
+    /// Prepares the smooth surface through the nodes of a closed mesh.
     #[must_use]
     pub fn new(triangles: &[[u32; 3]], topology: &Topology) -> Self {
         let nodes = |t: usize| {
@@ -46,7 +46,7 @@ impl SmoothSurface {
         Self { nodes: (0..triangles.len()).map(nodes).collect() }
     }
 
-    /// Facet `t` with nodes at `positions` [m].
+    /// Returns facet `t` with nodes at `positions` [m].
     #[inline]
     #[must_use]
     pub fn facet(&self, positions: &[DVec3], t: u32) -> Facet {
@@ -62,7 +62,7 @@ impl SmoothSurface {
         Facet { corners, sagittas: Some(sagittas) }
     }
 
-    /// By how much the facets stand off the flat triangles at most, with nodes at `positions` [m].
+    /// Returns by how much the facets stand off the flat triangles at most, with nodes at `positions` [m].
     #[must_use]
     pub fn bulge(&self, positions: &[DVec3]) -> f64 {
         let longest = |t: usize| {
@@ -72,8 +72,8 @@ impl SmoothSurface {
         MOST_BUBBLES * (0..self.nodes.len()).map(longest).fold(0.0, f64::max)
     }
 
-    /// The greatest of `square` over the sagittas of all edges, each given as its nodes and their weights: where that is the square of a
-    /// sagitta, by how much the facets stand off the flat triangles at most, squared.
+    /// Returns a bound of the square of what the facets stand off the flat triangles by, where `square` bounds that of a sagitta, given as the
+    /// nodes that it depends on and their weights.
     pub fn bulge_squared(&self, square: impl Fn(&[(u32, f64)]) -> f64) -> f64 {
         let mut most = 0.0_f64;
         for nodes in &self.nodes {
@@ -89,14 +89,14 @@ impl SmoothSurface {
     }
 }
 
-/// The triangle across edge `k` of triangle `t`, and which of its edges that is.
+/// Returns the triangle across edge `k` of triangle `t`, and which of its edges that is.
 pub fn across(triangles: &[[u32; 3]], topology: &Topology, t: usize, k: usize) -> (usize, usize) {
     let across = topology.across[t][k] as usize;
     let end = triangles[t][(k + 1) % 3];
     (across, triangles[across].iter().position(|&corner| corner == end).unwrap_or(0))
 }
 
-/// Weights of a facet's nodes in a sum of its corners and of its sagittas with these factors.
+/// Returns the weights of a facet's nodes in a sum of its corners and of its sagittas with these factors.
 #[inline]
 fn weights(corners: [f64; 3], sagittas: [f64; 3]) -> [f64; CARRIERS] {
     let mut weights = [0.0; CARRIERS];
@@ -110,14 +110,14 @@ fn weights(corners: [f64; 3], sagittas: [f64; 3]) -> [f64; CARRIERS] {
     weights
 }
 
-/// Weights of a facet's nodes in its point at barycentric weights `w` [1].
+/// Returns the weights of a facet's nodes in its point at barycentric weights `w` [1].
 #[inline]
 #[must_use]
 pub fn point_weights(w: [f64; 3]) -> [f64; CARRIERS] {
     weights(w, bubbles(w))
 }
 
-/// Their derivative at `w` along `d`.
+/// Returns their derivative at `w` along `d`.
 #[inline]
 #[must_use]
 pub fn point_slopes(w: [f64; 3], d: Direction) -> [f64; CARRIERS] {

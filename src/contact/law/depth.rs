@@ -59,7 +59,7 @@ pub struct Carriers {
 }
 
 impl Carriers {
-    /// How `point` of the facet with these `nodes` hangs on them: three of a flat facet, or all of a bent one.
+    /// Notes how `point` of the facet with these `nodes` hangs on them: three of a flat facet, or all of a bent one.
     #[inline]
     #[must_use]
     pub fn new(nodes: &[u32], point: &ClosestPoint) -> Self {
@@ -277,7 +277,7 @@ impl Contact {
         self.share * self.push
     }
 
-    /// By how much displacements `v` of its nodes, by their place, move its closest point [m].
+    /// Returns by how much displacements `v` of its nodes, by their place, move its closest point [m].
     #[inline]
     #[must_use]
     pub fn moved(&self, v: impl Fn(usize) -> DVec3) -> DVec3 {
@@ -288,7 +288,7 @@ impl Contact {
         sum
     }
 
-    /// How displacements `v` of its nodes move its closest point, and turn the surface there, where that matters.
+    /// Returns how displacements `v` of its nodes move its closest point, and turn the surface there, where that matters.
     #[inline]
     #[must_use]
     pub fn variation(&self, v: impl Fn(usize) -> DVec3) -> Variation {
@@ -310,14 +310,14 @@ impl Contact {
         self.normal.dot(variation.point)
     }
 
-    /// What a force `push` along the depth gives to the closest point: push N [N].
+    /// Returns the reaction of a force `push` along the depth on the closest point: push N [N].
     #[inline]
     #[must_use]
     pub fn spread(&self, push: f64) -> Variation {
         Variation::translation(self.normal * push)
     }
 
-    /// What node j, by its place, has of a reaction.
+    /// Returns the part of a reaction that node j, by its place, carries.
     #[inline]
     #[must_use]
     pub fn at_node(&self, reaction: &Variation, j: usize) -> DVec3 {
@@ -325,7 +325,7 @@ impl Contact {
         reaction.point * weights[j] + reaction.tangents[0] * first[j] + reaction.tangents[1] * second[j]
     }
 
-    /// Second variation of the depth along `variation`: the reaction whose work along another variation is d2s of both.
+    /// Returns the second variation of the depth along `variation`: the reaction whose work along another variation is d2s of both.
     #[inline]
     #[must_use]
     pub fn second_variation(&self, variation: &Variation) -> Variation {

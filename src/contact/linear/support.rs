@@ -113,8 +113,8 @@ impl Support {
         }
     }
 
-    /// What a force of one newton along `direction`, shared among slots by their weights, displaces the support by [m]. Of an isotropic object,
-    /// for which it returns true, all moves along the direction, by the `scalars` [m].
+    /// Sets `displacement` to that of the support under a force of one newton along `direction`, shared among slots by their weights [m]. An
+    /// isotropic object, for which it returns true, moves along the direction everywhere, by the `scalars` [m].
     pub fn respond_along(
         &self,
         direction: DVec3,

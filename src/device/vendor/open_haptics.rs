@@ -349,7 +349,7 @@ unsafe extern "C" fn called(session: *mut c_void) -> c_uint {
         (*session).calls.fetch_add(1, Ordering::Relaxed);
         IN_CALLBACK.set(true);
         let tick = &mut *(*session).tick;
-        let goes_on = catch_unwind(AssertUnwindSafe(|| tick()));
+        let goes_on = catch_unwind(AssertUnwindSafe(tick));
         IN_CALLBACK.set(false);
         match goes_on {
             Ok(true) => return CALLBACK_CONTINUE,
