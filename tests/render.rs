@@ -243,7 +243,7 @@ fn a_recorded_session_replays_bit_for_bit_with_its_faults() {
 
 #[test]
 fn files_that_are_no_recording_are_refused_with_their_line() {
-    let good = "# start,0,0\nelapsed [s],...\n0.001,0.001,0,0,0,1,1,1,1,1,1,1,1\n";
+    let good = "# start,0,0\nelapsed [s],...\n0.001,0.001,0,0,0,1,1,1,1,1,1,1,1,1,1\n";
     let file = tempfile::NamedTempFile::new().unwrap();
     let read = |text: &str| {
         std::fs::write(file.path(), text).unwrap();
@@ -251,13 +251,13 @@ fn files_that_are_no_recording_are_refused_with_their_line() {
     };
     assert_eq!(read(good).unwrap().ticks(), 1);
     for (old, new, expected) in [
-        ("0.001,0.001,0,0,0,1", "0.001,0.001,0,0,0,1,1", ":3: 14 fields in the place of 13"),
+        ("0.001,0.001,0,0,0,1", "0.001,0.001,0,0,0,1,1", ":3: 16 fields in the place of 15"),
         ("0.001,0.001,0,0,0,1", "0.001,x,0,0,0,1", ":3: \"x\" is not such a number"),
         ("0.001,0.001,0,0,0,1", "0.001,0.001,0,-1,0,1", ":3: \"-1\" is not such a number"),
         ("0.001,0.001,0,0,0,1", "0.001,0.001,0,0,0,", ":3: \"\" is not such a number"),
         ("# start,0,0\n", "", ":2: 1 ticks and a first position of 0 joints"),
         ("# start,0,0\n", "# start,0\n", ":1: 1 coordinates"),
-        ("0.001,0.001,0,0,0,1,1,1,1,1,1,1,1\n", "", ":2: 0 ticks"),
+        ("0.001,0.001,0,0,0,1,1,1,1,1,1,1,1,1,1\n", "", ":2: 0 ticks"),
     ] {
         assert_eq!(good.matches(old).count(), 1);
         let message = read(&good.replace(old, new)).unwrap_err();

@@ -11,6 +11,11 @@ use std::{
 
 /// What to do with devices.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize device list                           kinds of devices, and what each is missing here
+  haptize device check 2diy                     reads it, then holds zero torque
+  haptize device check woodenhaptics --push     drives each coordinate with little torque while the space bar is held")]
 pub struct Arguments {
     #[command(subcommand)]
     what: What,

@@ -42,6 +42,11 @@ pub fn listen(json: bool) -> Result<(), Failure> {
             }
         }
         end(json);
+    })
+    .map_err(|error| {
+        format!(
+            "cannot listen for signals: {error}; close other programs, or raise the limits on processes and memory (ulimit -u, ulimit -v)"
+        )
     })?;
     ignore(&ignored);
     Ok(())
