@@ -1,6 +1,6 @@
 //! Devices on a serial line: the line itself, and the rhythm of request and reply that such devices share.
 //!
-//! A device answers each command with what it measured. A new request waits for the reply to the last, for [`PATIENCE`]
+//! A device answers each command with what it measured. A new request waits for the reply to the last, for `PATIENCE`
 //! ticks at most; the first command of zero never waits. Replies come in the order of requests and carry no number:
 //! each is taken for that to the oldest request without one. A measurement's age counts from that request, so that a
 //! line that loses replies looks older than it is, never younger; after some losses it is stale for good. Positions
