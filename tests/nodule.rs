@@ -231,7 +231,7 @@ fn a_finger_finds_the_nodule() {
     // The nodule lies at x = 12 mm, which a finger of 120 mm reaches at 0.1 rad.
     assert!((yaw - 0.1).abs() < 0.03, "most torque, {most}, at {yaw} rad");
     // As far from the middle on the other side.
-    assert!(*most > 1.12 * torques[5], "{most} over the nodule, {} beside: {torques:?}", torques[5]);
+    assert!(*most > 1.15 * torques[5], "{most} over the nodule, {} beside: {torques:?}", torques[5]);
 }
 
 #[test]
