@@ -45,6 +45,8 @@ pub struct Line {
     /// The host's end, kept open so that the line is there before and after the driver.
     slave: File,
     pub path: String,
+    /// Whether the host reads only after `send` has returned, as it does when one thread plays both.
+    in_step: bool,
 }
 
 impl Line {
@@ -57,7 +59,7 @@ impl Line {
         let mut settings = tcgetattr(&slave).unwrap();
         settings.make_raw();
         tcsetattr(&slave, OptionalActions::Now, &settings).unwrap();
-        Self { master: File::from(master), slave, path }
+        Self { master: File::from(master), slave, path, in_step: true }
     }
 
     /// What the host has sent, waiting a little for it.
@@ -70,10 +72,14 @@ impl Line {
         self.master.read(&mut bytes).map_or(Vec::new(), |count| bytes[..count].to_vec())
     }
 
-    /// Sends `bytes`, and waits until they have arrived at the host's end.
+    /// Sends `bytes`, and waits until they have arrived at the host's end. A host in another thread may have taken them
+    /// before they can be counted there: then nothing waits, or the next request would be answered late.
     pub fn send(&mut self, bytes: &[u8]) {
         let before = rustix::io::ioctl_fionread(&self.slave).unwrap();
         self.master.write_all(bytes).unwrap();
+        if !self.in_step {
+            return;
+        }
         let since = Instant::now();
         while rustix::io::ioctl_fionread(&self.slave).unwrap() < before + bytes.len() as u64
             && since.elapsed() < Duration::from_millis(20)
@@ -149,9 +155,11 @@ impl<F: Firmware + 'static> Emulator<F> {
         let over = Arc::new(AtomicBool::new(false));
         let (ends, path) = (Arc::clone(&over), self.line.path.clone());
         let body = thread::spawn(move || {
+            self.line.in_step = false;
             while !ends.load(Ordering::Relaxed) {
                 self.step(0.0);
             }
+            self.line.in_step = true;
             self
         });
         let opened = open(&path);
