@@ -104,7 +104,7 @@ pub const FACET_ITERATIONS: usize = 16;
 
 /// Step of barycentric weights at which the search for that point ends [1]: the next step would be about its square, far below the rounding of a
 /// weight.
-pub const FACET_STEP: f64 = 1e-10;
+pub const FACET_STEP: f64 = 1e-8;
 
 /// Least convexity of the distance to a bent facet, over that to a flat one, at which its second derivative is used [1]: beyond, the point is within
 /// a hundredth of the surface's radius of curvature from where the closest point leaps, and a step by it would be a hundred times as far.

@@ -209,7 +209,7 @@ impl Detection {
         let likely = if moved == 0.0 { known.closest } else { known.last };
         // None was closest where the pass before was not a number.
         if (likely as usize) < model.object.triangles.len() {
-            closest.consider(x, &deformation.facet(model, likely), likely, f64::MAX);
+            closest.consider(x, deformation.facet(model, likely), likely, f64::MAX);
         }
         // Distance within which facets are looked for, and its square for their triangles.
         let near = |closest: &Closest| {
@@ -235,9 +235,9 @@ impl Detection {
 
     /// The contact (or near miss, with depth <= 0) of proxy node `i` with the closest feature of the deformed surface.
     fn contact_at(&mut self, model: &Model, i: usize, closest: Closest) -> Contact {
-        let facet = self.deformation.facet(model, closest.triangle);
         let pseudonormal = self.deformation.pseudonormal(model, closest.triangle, &closest.point);
-        contact_with(model, i, self.nodes[i], &closest, &facet, pseudonormal)
+        let facet = self.deformation.facet(model, closest.triangle);
+        contact_with(model, i, self.nodes[i], &closest, facet, pseudonormal)
     }
 
     /// Rows of the problem with geometry frozen at rest: every proxy node within `reach` of the surface, with its depth at
@@ -255,7 +255,7 @@ impl Detection {
             if closest.triangle == u32::MAX {
                 continue;
             }
-            let facet = model.surface.facet(&model.surface.positions, closest.triangle);
+            let facet = model.surface.facet_at_rest(closest.triangle);
             let direction = model.surface.pseudonormal_at_rest(closest.triangle, &closest.point);
             let mut row = contact_with(model, i, x, &closest, &facet, direction);
             if row.depth >= -reach {
@@ -297,7 +297,7 @@ fn facing(model: &Model, i: usize, x: DVec3, deformation: &mut Deformation, clos
         Feature::Face => normal,
         _ => towards,
     };
-    contact_with(model, i, x, closest, &facet, direction)
+    contact_with(model, i, x, closest, facet, direction)
 }
 
 #[cfg(test)]

@@ -68,12 +68,12 @@ impl fmt::Display for MeshRipple {
 
 /// The ripple over one facet; none where the compliance does not cover it.
 fn facet(model: &Model<'_>, triangle: usize) -> Option<f64> {
-    let nodes = model.surface.carriers(triangle as u32);
-    let places: Vec<usize> = nodes.iter().map(|&node| model.compliance.place(node)).collect::<Option<_>>()?;
+    let carried = model.surface.carriers(triangle as u32);
+    let places: Vec<usize> = carried.0.iter().map(|&node| model.compliance.place(node)).collect::<Option<_>>()?;
     let normal = model.surface.normals[triangle];
     let between = |i: usize, j: usize| normal.dot(model.compliance.block(places[i], places[j]) * normal);
     let compliance = |weights: [f64; 3]| -> f64 {
-        let carriers = Carriers::new(nodes, &ClosestPoint { weights, feature: Feature::Face });
+        let carriers = Carriers::new(carried, &ClosestPoint { weights, feature: Feature::Face });
         let w = carriers.weights();
         let row = |i: usize| (0..w.len()).map(|j| w[i] * w[j] * between(i, j)).sum::<f64>();
         (0..w.len()).map(row).sum::<f64>() + 1.0 / model.kc

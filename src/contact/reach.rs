@@ -38,7 +38,7 @@ pub(super) fn reached(model: &Model<'_>, configurations: &[JointVector]) -> Vec<
         );
     let mut reached = vec![false; model.surface.positions.len()];
     for (leaf, _) in model.surface.bounds.leaves.iter().zip(marked).filter(|(_, marked)| *marked) {
-        let carriers = leaf.triangles.iter().flat_map(|&t| model.surface.carriers(t));
+        let carriers = leaf.triangles.iter().flat_map(|&t| model.surface.carriers(t).0);
         carriers.for_each(|&node| reached[node as usize] = true);
     }
     (0..).zip(reached).filter(|(_, reached)| *reached).map(|(node, _)| node).collect()
@@ -67,7 +67,7 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
 
 /// Of each leaf of the tree of `surface`, whether `compliance` covers all nodes of its facets.
 pub(super) fn covered_leaves(surface: &RestSurface<'_>, compliance: &Compliance) -> Vec<bool> {
-    let covered = |t: &u32| surface.carriers(*t).iter().all(|&node| compliance.place(node).is_some());
+    let covered = |t: &u32| surface.carriers(*t).0.iter().all(|&node| compliance.place(node).is_some());
     surface.bounds.leaves.iter().map(|leaf| leaf.triangles.iter().all(covered)).collect()
 }
 
@@ -83,7 +83,7 @@ pub(super) fn covers(model: &Model<'_>, detection: &Detection, equilibrium: &Equ
             model.surface.bounds.walk(x, squared, |leaf| {
                 if !model.covered_leaves[leaf] {
                     let near = model.surface.bounds.leaves[leaf].near(x, squared);
-                    within &= near.flat_map(|t| model.surface.carriers(t)).all(|&node| covered(node));
+                    within &= near.flat_map(|t| model.surface.carriers(t).0).all(|&node| covered(node));
                 }
                 // Nothing more can change.
                 if within { squared } else { -1.0 }

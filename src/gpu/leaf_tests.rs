@@ -187,7 +187,7 @@ fn depth_and_its_derivatives_are_the_twins() {
         assert!((depth - f64::from(answer.depth)).abs() < 4.0 * DISTANCE_ROUNDING);
         // Directions: rounding over the shortest length that is divided by.
         assert!(normal.distance(vector(&answer.normal)) < 1e-4, "{normal} {:?}", answer.normal);
-        let carriers = Carriers::new(&[0, 1, 2], &point);
+        let carriers = Carriers::new((&[0, 1, 2], None), &point);
         let contact = Contact { multiplier: 1.0, ..Contact::new(0, carriers, measured) };
         let moves = question.moves.map(|v| vector(&v));
         let reaction = contact.second_variation(&contact.variation(|j| moves[j]));

@@ -30,6 +30,12 @@ impl Topology {
     pub fn triangles_around(&self, node: usize) -> &[u32] {
         &self.around[self.around_offsets[node] as usize..self.around_offsets[node + 1] as usize]
     }
+
+    /// Returns that of the closed surfaces that `triangles` form, and turns them outward.
+    #[cfg(test)]
+    pub(crate) fn of(nodes: &[DVec3], triangles: &mut [[u32; 3]]) -> Self {
+        close(nodes, triangles).unwrap().topology
+    }
 }
 
 /// What [`close`] finds.

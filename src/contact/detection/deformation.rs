@@ -34,7 +34,21 @@ pub struct Deformation {
     /// Their positions [m].
     pub positions: Vec<DVec3>,
     places: Vec<Place>,
+    /// Facets that were formed last: neighbouring proxy nodes look at the same few.
+    formed: Vec<Formed>,
 }
+
+/// A facet where it is now.
+#[derive(Clone)]
+struct Formed {
+    /// The surface's number when it was formed, and the facet's.
+    surface: u64,
+    triangle: u32,
+    facet: Facet,
+}
+
+/// Facets that are kept: more than the forearm of any scene that ships looks at.
+const KEPT: usize = 256;
 
 impl Deformation {
     /// For the surface of `model`.
@@ -49,6 +63,7 @@ impl Deformation {
             displacement: vec![DVec3::ZERO; model.surface.positions.len()],
             positions: model.surface.positions.clone(),
             places: model.surface.bounds.leaves.iter().map(place).collect(),
+            formed: vec![Formed { surface: 0, triangle: 0, facet: Facet::flat([DVec3::ZERO; 3]) }; KEPT],
         }
     }
 
@@ -102,7 +117,7 @@ impl Deformation {
     pub fn pseudonormal(&mut self, model: &Model, t: u32, point: &ClosestPoint) -> DVec3 {
         let (triangles, topology) = (&model.object.triangles, &model.object.topology);
         match point.feature {
-            Feature::Face => self.displace_facet(model, t),
+            Feature::Face => return self.facet(model, t).normal(point.weights),
             Feature::Edge(k) => {
                 self.displace_facet(model, t);
                 self.displace_facet(model, topology.across[t as usize][k]);
@@ -116,13 +131,18 @@ impl Deformation {
     }
 
     fn displace_facet(&mut self, model: &Model, t: u32) {
-        model.surface.carriers(t).iter().for_each(|&node| self.displace(model, node));
+        model.surface.carriers(t).0.iter().for_each(|&node| self.displace(model, node));
     }
 
     /// Facet `t` [m].
-    pub fn facet(&mut self, model: &Model, t: u32) -> Facet {
-        self.displace_facet(model, t);
-        model.surface.facet(&self.positions, t)
+    pub fn facet(&mut self, model: &Model, t: u32) -> &Facet {
+        let at = t as usize % KEPT;
+        if self.formed[at].surface != self.surface || self.formed[at].triangle != t {
+            self.displace_facet(model, t);
+            let facet = model.surface.facet(&self.positions, t);
+            self.formed[at] = Formed { surface: self.surface, triangle: t, facet };
+        }
+        &self.formed[at].facet
     }
 
     /// Calls `visit` with each facet of the surface whose flat triangle is nearer to `x` than the squared radius that `visit` returned last;
@@ -141,7 +161,7 @@ impl Deformation {
                 let squares = self.places[leaf].packet.distances_squared(x);
                 for (&triangle, square) in model.surface.bounds.leaves[leaf].triangles.iter().zip(squares) {
                     if square <= bound {
-                        bound = visit(triangle, &self.facet(model, triangle)) + slack;
+                        bound = visit(triangle, self.facet(model, triangle)) + slack;
                         nearer = true;
                     }
                 }

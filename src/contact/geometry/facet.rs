@@ -1,24 +1,21 @@
-//! One facet of the contact surface: a flat triangle, or one that is bent to join its neighbours smoothly.
+//! One facet of the contact surface: a flat triangle, or a triangle of degree four that joins its neighbours smoothly.
 //!
-//! With barycentric weights w_k of the corners c_k and edge k joining corners k and k + 1, a point of it is
-//! `p(w) = sum_k w_k c_k + 4 sum_k w_k w_{k+1} s_k`, s_k being the sagitta of edge k: by how much the middle of the edge stands off the
-//! chord. Flat facets have none. A point closest to x is found by Newton's method from the closest point of the flat triangle.
+//! Its points belong to barycentric weights. A point closest to x is found by Newton's method from the closest point of the flat triangle
+//! between the corners.
 
 use super::closest_point::{ClosestPoint, Feature, closest_point};
 use super::normals::{area_vector, unit_or_zero};
+use super::quartic::{CONTROLS, Jet, place};
 use crate::tolerances::{FACET_ITERATIONS, FACET_STEP, MINIMUM_SQUARE};
 use glam::DVec3;
-
-/// The greatest sum of [`bubbles`]: no point of a facet stands off the flat triangle by more than this times its longest sagitta [1].
-pub const MOST_BUBBLES: f64 = 4.0 / 3.0;
 
 /// A triangle of the contact surface [m].
 #[derive(Clone, Copy, Debug)]
 pub struct Facet {
     /// Its corners, anticlockwise seen from outside.
     pub corners: [DVec3; 3],
-    /// The sagittas of its edges; none where it is flat.
-    pub sagittas: Option<[DVec3; 3]>,
+    /// Its control points; none where it is flat.
+    pub net: Option<[DVec3; CONTROLS]>,
 }
 
 /// A direction in which barycentric weights change; the changes sum to zero.
@@ -40,55 +37,46 @@ pub fn directions(feature: Feature) -> &'static [Direction] {
     }
 }
 
-/// Returns the factors 4 w_k w_{k+1} of the sagittas at weights `w` [1].
-#[inline]
-#[must_use]
-pub fn bubbles(w: [f64; 3]) -> [f64; 3] {
-    [4.0 * w[0] * w[1], 4.0 * w[1] * w[2], 4.0 * w[2] * w[0]]
-}
-
-/// Returns their derivative at `w` along `d`.
-#[inline]
-#[must_use]
-pub fn bubble_slopes(w: [f64; 3], d: Direction) -> [f64; 3] {
-    [4.0 * (d[0] * w[1] + w[0] * d[1]), 4.0 * (d[1] * w[2] + w[1] * d[2]), 4.0 * (d[2] * w[0] + w[2] * d[0])]
-}
-
 impl Facet {
     /// Returns a flat triangle.
     #[must_use]
     pub fn flat(corners: [DVec3; 3]) -> Self {
-        Self { corners, sagittas: None }
+        Self { corners, net: None }
+    }
+
+    /// Returns a triangle of degree four.
+    #[must_use]
+    pub fn bent(net: [DVec3; CONTROLS]) -> Self {
+        const CORNERS: [usize; 3] = [place([4, 0, 0]), place([0, 4, 0]), place([0, 0, 4])];
+        Self { corners: CORNERS.map(|corner| net[corner]), net: Some(net) }
+    }
+
+    /// Returns its point at barycentric weights `w`, with the derivatives there.
+    #[inline]
+    #[must_use]
+    pub fn jet(&self, w: [f64; 3]) -> Jet {
+        match &self.net {
+            None => Jet::flat(&self.corners, w),
+            Some(net) => Jet::new(net, w),
+        }
     }
 
     /// Returns its point at barycentric weights `w` [m].
     #[inline]
     #[must_use]
     pub fn point(&self, w: [f64; 3]) -> DVec3 {
-        combine(&self.corners, w) + self.sagittas.map_or(DVec3::ZERO, |sagittas| combine(&sagittas, bubbles(w)))
-    }
-
-    /// Returns the derivative of its point at `w` along `d` [m].
-    #[inline]
-    #[must_use]
-    pub fn tangent(&self, w: [f64; 3], d: Direction) -> DVec3 {
-        let bent = |sagittas| combine(&sagittas, bubble_slopes(w, d));
-        combine(&self.corners, d) + self.sagittas.map_or(DVec3::ZERO, bent)
-    }
-
-    /// Returns the second derivative of its point along `d` and `e`, which is the same everywhere [m].
-    #[inline]
-    #[must_use]
-    pub fn bend(&self, d: Direction, e: Direction) -> DVec3 {
-        self.sagittas.map_or(DVec3::ZERO, |sagittas| combine(&sagittas, bubble_slopes(e, d)))
+        self.jet(w).point
     }
 
     /// Returns its outward unit normal at `w`; zero where it has none.
     #[must_use]
     pub fn normal(&self, w: [f64; 3]) -> DVec3 {
-        unit_or_zero(match self.sagittas {
+        unit_or_zero(match self.net {
             None => area_vector(self.corners),
-            Some(_) => self.tangent(w, FACE[0]).cross(self.tangent(w, FACE[1])),
+            Some(_) => {
+                let jet = self.jet(w);
+                jet.tangent(FACE[0]).cross(jet.tangent(FACE[1]))
+            }
         })
     }
 
@@ -97,7 +85,8 @@ impl Facet {
     pub fn angle(&self, k: usize) -> f64 {
         let mut at = [0.0; 3];
         at[k] = 1.0;
-        let (left, right) = (self.tangent(at, EDGES[k][0]), -self.tangent(at, EDGES[(k + 2) % 3][0]));
+        let jet = self.jet(at);
+        let (left, right) = (jet.tangent(EDGES[k][0]), -jet.tangent(EDGES[(k + 2) % 3][0]));
         left.cross(right).length().atan2(left.dot(right))
     }
 
@@ -106,10 +95,11 @@ impl Facet {
     #[must_use]
     pub fn closest(&self, x: DVec3, within: f64) -> Option<ClosestPoint> {
         let flat = closest_point(x, self.corners);
-        let Some(sagittas) = self.sagittas else { return Some(flat) };
-        let [a, b, c] = &sagittas;
-        let longest = a.length_squared().max(b.length_squared()).max(c.length_squared()).sqrt();
-        let least = x.distance(combine(&self.corners, flat.weights)) - MOST_BUBBLES * longest;
+        let Some(net) = &self.net else { return Some(flat) };
+        // All of it lies between its control points, so no point of it is nearer than the nearest of these along any direction.
+        let towards = (x - Jet::flat(&self.corners, flat.weights).point).normalize_or_zero();
+        let farthest = net.iter().map(|control| towards.dot(*control)).fold(f64::MIN, f64::max);
+        let least = towards.dot(x) - farthest;
         (least <= within || within.is_nan()).then(|| self.closest_bent(x, flat.weights))
     }
 
@@ -134,11 +124,12 @@ impl Facet {
     /// Finds the weights at which the distance to `x` is least, on the facet continued beyond its edges. Far outside it stops, since Newton's
     /// method would not come back.
     fn stationary(&self, x: DVec3, start: [f64; 3]) -> [f64; 3] {
-        let bends = [self.bend(FACE[0], FACE[0]), self.bend(FACE[0], FACE[1]), self.bend(FACE[1], FACE[1])];
         let mut w = start;
         for _ in 0..FACET_ITERATIONS {
-            let offset = self.point(w) - x;
-            let (a, b) = (self.tangent(w, FACE[0]), self.tangent(w, FACE[1]));
+            let jet = self.jet(w);
+            let offset = jet.point - x;
+            let (a, b) = (jet.tangent(FACE[0]), jet.tangent(FACE[1]));
+            let bends = [jet.bend(FACE[0], FACE[0]), jet.bend(FACE[0], FACE[1]), jet.bend(FACE[1], FACE[1])];
             let slope = [offset.dot(a), offset.dot(b)];
             let metric = [a.dot(a), a.dot(b), b.dot(b)];
             let full =
@@ -160,7 +151,6 @@ impl Facet {
     /// Finds the point of edge k that is closest to `x`, from the point of the edge that is next to `start`.
     fn closest_on_edge(&self, x: DVec3, k: usize, start: [f64; 3]) -> ClosestPoint {
         let (direction, next) = (EDGES[k][0], (k + 1) % 3);
-        let bend = self.bend(direction, direction);
         let at = |t: f64| {
             let mut weights = [0.0; 3];
             (weights[k], weights[next]) = (1.0 - t, t);
@@ -169,10 +159,10 @@ impl Facet {
         let sum = start[k] + start[next];
         let mut t = if sum > 0.0 { start[next] / sum } else { 0.5 };
         for _ in 0..FACET_ITERATIONS {
-            let offset = self.point(at(t)) - x;
-            let tangent = self.tangent(at(t), direction);
+            let jet = self.jet(at(t));
+            let (offset, tangent) = (jet.point - x, jet.tangent(direction));
             let metric = tangent.dot(tangent);
-            let full = metric + offset.dot(bend);
+            let full = metric + offset.dot(jet.bend(direction, direction));
             let before = t;
             t -= offset.dot(tangent) / (if full > 0.0 { full } else { metric }).max(MINIMUM_SQUARE);
             t = t.clamp(0.0, 1.0);
@@ -187,10 +177,4 @@ impl Facet {
         };
         ClosestPoint { weights: at(t), feature }
     }
-}
-
-/// Returns sum_k factor_k vector_k.
-#[inline]
-fn combine(vectors: &[DVec3; 3], factors: [f64; 3]) -> DVec3 {
-    vectors[0] * factors[0] + vectors[1] * factors[1] + vectors[2] * factors[2]
 }

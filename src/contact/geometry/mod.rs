@@ -6,6 +6,7 @@ mod distance_bounds;
 pub mod facet;
 pub mod normals;
 pub mod packet;
+pub mod quartic;
 mod rest;
 pub mod smooth;
 

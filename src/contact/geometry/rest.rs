@@ -5,7 +5,7 @@ use super::closest_point::{Closest, ClosestPoint, Feature};
 use super::distance_bounds::DistanceBounds;
 use super::facet::Facet;
 use super::normals;
-use super::smooth::{SmoothSurface, across};
+use super::smooth::{Shape, SmoothSurface, across};
 use crate::object::{Object, Topology};
 use crate::scene::ContactSurface;
 use glam::DVec3;
@@ -75,7 +75,7 @@ impl<'a> RestSurface<'a> {
         };
         surface.distance_bounds = DistanceBounds::new(&surface);
         if felt == ContactSurface::Smooth {
-            let smooth = SmoothSurface::new(triangles, topology);
+            let smooth = SmoothSurface::new(&surface.positions, triangles, topology);
             surface.bulge = smooth.bulge(&surface.positions);
             surface.smooth = Some(smooth);
         }
@@ -94,13 +94,13 @@ impl<'a> RestSurface<'a> {
         (bound - self.bulge, near)
     }
 
-    /// The nodes on which facet `t` depends: its corners first.
+    /// The nodes on which facet `t` depends, its corners first, and where it is smooth how it hangs on them.
     #[inline]
     #[must_use]
-    pub fn carriers(&self, t: u32) -> &[u32] {
+    pub fn carriers(&self, t: u32) -> (&[u32], Option<&Shape>) {
         match &self.smooth {
-            None => &self.triangles[t as usize],
-            Some(smooth) => &smooth.nodes[t as usize],
+            None => (&self.triangles[t as usize], None),
+            Some(smooth) => (smooth.nodes(t), Some(smooth.shape(t))),
         }
     }
 
@@ -111,6 +111,16 @@ impl<'a> RestSurface<'a> {
         match &self.smooth {
             None => Facet::flat(normals::corners(positions, self.triangles[t as usize])),
             Some(smooth) => smooth.facet(positions, t),
+        }
+    }
+
+    /// Facet `t` at rest [m].
+    #[inline]
+    #[must_use]
+    pub fn facet_at_rest(&self, t: u32) -> Facet {
+        match &self.smooth {
+            None => Facet::flat(normals::corners(&self.positions, self.triangles[t as usize])),
+            Some(smooth) => smooth.at_rest[t as usize],
         }
     }
 
@@ -164,12 +174,12 @@ impl<'a> RestSurface<'a> {
     pub fn closest(&self, x: DVec3, near: u32) -> Closest {
         let mut closest = Closest::none();
         if (near as usize) < self.triangles.len() {
-            closest.consider(x, &self.facet(&self.positions, near), near, f64::MAX);
+            closest.consider(x, &self.facet_at_rest(near), near, f64::MAX);
         }
         self.bounds.search(x, closest.within(self.bulge), |t| {
             if t != near {
                 let least = closest.distance_squared.sqrt();
-                closest.consider(x, &self.facet(&self.positions, t), t, least);
+                closest.consider(x, &self.facet_at_rest(t), t, least);
             }
             closest.within(self.bulge)
         });
@@ -182,7 +192,7 @@ impl<'a> RestSurface<'a> {
         if closest.triangle == u32::MAX {
             return false;
         }
-        let facet = self.facet(&self.positions, closest.triangle);
+        let facet = self.facet_at_rest(closest.triangle);
         let offset = facet.point(closest.point.weights) - x;
         offset.dot(self.pseudonormal_at_rest(closest.triangle, &closest.point)) > 0.0
     }
@@ -240,6 +250,7 @@ mod tests {
     fn a_smooth_surface_is_nearer_to_what_the_mesh_samples() {
         let [coarse, fine] = [2, 3].map(|divisions| errors(divisions, ContactSurface::Smooth));
         let flat = errors(3, ContactSurface::Facets);
+        println!("{coarse:?} {fine:?} {flat:?}");
         assert!(fine.0 < 0.1 * flat.0 && fine.1 < 0.1 * flat.1, "{fine:?} {flat:?}");
         assert!(coarse.0 > 6.0 * fine.0 && coarse.1 > 2.2 * fine.1, "{coarse:?} {fine:?}");
     }

@@ -18,7 +18,7 @@
 use crate::contact::geometry::closest_point::ClosestPoint;
 use crate::contact::geometry::closest_point::Feature;
 use crate::contact::geometry::facet::{Facet, directions};
-use crate::contact::geometry::smooth::{CARRIERS, point_slopes, point_weights};
+use crate::contact::geometry::smooth::{CARRIERS, Shape};
 use crate::tolerances::{LEAST_CONVEXITY, MINIMUM_CURVATURE_RADIUS, MINIMUM_SQUARE};
 use glam::DVec3;
 use std::ops::Neg;
@@ -49,7 +49,7 @@ pub struct Contact {
 /// The nodes of a facet, and how its closest point hangs on them.
 #[derive(Clone, Copy, Debug)]
 pub struct Carriers {
-    /// Three on a flat facet, twelve on a bent one.
+    /// Three on a flat facet, on a smooth one the corners and all their neighbours.
     count: usize,
     nodes: [u32; CARRIERS],
     /// w_j; exactly zero for nodes that the feature does not touch.
@@ -59,24 +59,21 @@ pub struct Carriers {
 }
 
 impl Carriers {
-    /// Notes how `point` of the facet with these `nodes` hangs on them: three of a flat facet, or all of a bent one.
+    /// Notes how `point` hangs on these nodes: the corners of a flat facet, or all nodes of a smooth one with their shape.
     #[inline]
     #[must_use]
-    pub fn new(nodes: &[u32], point: &ClosestPoint) -> Self {
+    pub fn new((nodes, shape): (&[u32], Option<&Shape>), point: &ClosestPoint) -> Self {
         let mut carriers =
             Self { count: nodes.len(), nodes: [0; CARRIERS], weights: [0.0; CARRIERS], slopes: [[0.0; CARRIERS]; 2] };
         carriers.nodes[..nodes.len()].copy_from_slice(nodes);
-        let bent = nodes.len() == CARRIERS;
-        if bent {
-            carriers.weights = point_weights(point.weights);
-        } else {
-            carriers.weights[..3].copy_from_slice(&point.weights);
+        match shape {
+            None => carriers.weights[..3].copy_from_slice(&point.weights),
+            Some(shape) => carriers.weights = shape.point_weights(point.weights),
         }
         for (slopes, &direction) in carriers.slopes.iter_mut().zip(directions(point.feature)) {
-            if bent {
-                *slopes = point_slopes(point.weights, direction);
-            } else {
-                slopes[..3].copy_from_slice(&direction);
+            match shape {
+                None => slopes[..3].copy_from_slice(&direction),
+                Some(shape) => *slopes = shape.point_slopes(point.weights, direction),
             }
         }
         carriers
@@ -176,7 +173,7 @@ pub fn measure(
     let normal;
     if point.feature == Feature::Face {
         normal = pseudonormal;
-        let foot = if facet.sagittas.is_none() { facet.corners[0] } else { facet.point(point.weights) };
+        let foot = if facet.net.is_none() { facet.corners[0] } else { facet.point(point.weights) };
         curvature.distance = normal.dot(foot - x);
     } else {
         let offset = facet.point(point.weights) - x;
@@ -200,17 +197,18 @@ impl Curvature {
     #[inline]
     fn bend(&mut self, facet: &Facet, point: &ClosestPoint, normal: DVec3) {
         let s = self.distance;
+        let jet = facet.jet(point.weights);
         match *directions(point.feature) {
             [d, e] => {
-                let (a, b) = (facet.tangent(point.weights, d), facet.tangent(point.weights, e));
+                let (a, b) = (jet.tangent(d), jet.tangent(e));
                 self.tangents = [a, b];
                 let metric = [a.dot(a), a.dot(b), b.dot(b)];
                 let inverse = inverse(metric, MINIMUM_SQUARE);
                 self.turning = inverse;
-                if facet.sagittas.is_none() {
+                if facet.net.is_none() {
                     return;
                 }
-                let bends = [normal.dot(facet.bend(d, d)), normal.dot(facet.bend(d, e)), normal.dot(facet.bend(e, e))];
+                let bends = [normal.dot(jet.bend(d, d)), normal.dot(jet.bend(d, e)), normal.dot(jet.bend(e, e))];
                 let full = [metric[0] + s * bends[0], metric[1] + s * bends[1], metric[2] + s * bends[2]];
                 // Where the distance is hardly convex the closest point is about to leave, and no derivative holds for long.
                 let area = metric[0] * metric[2] - metric[1] * metric[1];
@@ -220,12 +218,12 @@ impl Curvature {
                 }
             }
             [d] => {
-                let tangent = facet.tangent(point.weights, d);
+                let tangent = jet.tangent(d);
                 let metric = tangent.length_squared().max(MINIMUM_SQUARE);
                 self.tangents[0] = tangent;
                 self.along = tangent / metric.sqrt();
                 self.turning[0] = metric.recip();
-                let bend = normal.dot(facet.bend(d, d));
+                let bend = normal.dot(jet.bend(d, d));
                 let full = metric + s * bend;
                 if full > LEAST_CONVEXITY * metric {
                     self.turning[0] = full.recip();
@@ -358,22 +356,19 @@ impl Contact {
 mod tests {
     use super::*;
     use crate::contact::geometry::facet::Direction;
-    use crate::contact::geometry::smooth::SmoothSurface;
     use crate::random::sequence;
 
     /// A facet on its own nodes, flat or bent, and where they are.
     struct Sample {
         nodes: Vec<u32>,
+        shape: Option<Shape>,
         positions: Vec<DVec3>,
     }
 
     impl Sample {
         fn facet(&self, shift: impl Fn(usize) -> DVec3) -> Facet {
             let at: Vec<DVec3> = self.positions.iter().enumerate().map(|(j, position)| *position + shift(j)).collect();
-            if self.nodes.len() == 3 {
-                return Facet::flat([at[0], at[1], at[2]]);
-            }
-            SmoothSurface { nodes: vec![std::array::from_fn(|j| j as u32)] }.facet(&at, 0)
+            self.shape.as_ref().map_or(Facet::flat([at[0], at[1], at[2]]), |shape| shape.facet(|j| at[j]))
         }
 
         /// The contact of `x`; `outward` decides the side at edges and vertices.
@@ -381,7 +376,7 @@ mod tests {
             let point = facet.closest(x, f64::MAX).unwrap();
             let pseudonormal = if point.feature == Feature::Face { facet.normal(point.weights) } else { outward };
             let measured = measure(x, radius, facet, &point, pseudonormal);
-            let contact = Contact::new(0, Carriers::new(&self.nodes, &point), measured);
+            let contact = Contact::new(0, Carriers::new((&self.nodes, self.shape.as_ref()), &point), measured);
             (point.feature, Contact { multiplier: 3.0 * measured.1, ..contact })
         }
     }
@@ -399,13 +394,15 @@ mod tests {
     fn derivatives_agree_with_finite_differences() {
         let mut next = sequence(7);
         let h = 1e-5;
-        for count in [3, CARRIERS] {
+        for (count, neighbours) in [(3, None), (12, Some([6, 6, 6])), (13, Some([4, 7, 8])), (6, Some([0, 3, 0]))] {
             let mut seen = [0usize; 6];
             for _ in 0..6000 {
                 let mut point = || DVec3::new(next(), next(), next());
-                let mut sample = Sample { nodes: (0..count as u32).collect(), positions: Vec::new() };
-                // Nodes beyond the corners bend the facet by about a third of its size.
-                sample.positions.extend((0..count).map(|_| point()));
+                let shape = neighbours.map(Shape::new);
+                let mut sample = Sample { nodes: (0..count as u32).collect(), shape, positions: Vec::new() };
+                // A smooth facet is half as large as the nodes lie apart, and bent by about a third of that.
+                let size = if neighbours.is_some() { 2.0 } else { 1.0 };
+                sample.positions.extend((0..count).map(|_| point() * size));
                 let x = point();
                 let v: Vec<DVec3> = (0..count).map(|_| point()).collect();
                 let w: Vec<DVec3> = (0..count).map(|_| point()).collect();
@@ -419,9 +416,9 @@ mod tests {
                 let (feature_before, before) = sample.contact(x, radius, &at(-h), outward);
                 let (feature_after, after) = sample.contact(x, radius, &at(h), outward);
                 // Where a bent facet is about to let the closest point go, there is no derivative to speak of.
-                let bent = count == CARRIERS && !matches!(feature, Feature::Vertex(_));
+                let bent = neighbours.is_some() && !matches!(feature, Feature::Vertex(_));
                 let foot = facet.closest(x, f64::MAX).unwrap().weights;
-                let off = |d: &Direction| (facet.point(foot) - x).dot(facet.tangent(foot, *d)).abs();
+                let off = |d: &Direction| (facet.point(foot) - x).dot(facet.jet(foot).tangent(*d)).abs();
                 if directions(feature).iter().any(|d| off(d) > 1e-9) {
                     continue;
                 }
@@ -460,7 +457,7 @@ mod tests {
 
     /// A flat facet at rest under one corner.
     fn corner() -> Sample {
-        Sample { nodes: vec![0, 1, 2], positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y] }
+        Sample { nodes: vec![0, 1, 2], shape: None, positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y] }
     }
 
     /// The second derivative in the direction along which the closest point slides is what frozen geometry leaves out.

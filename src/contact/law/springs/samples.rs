@@ -39,7 +39,7 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
         let facet = Facet::flat(corners(t));
         let point = facet.closest(x, f64::MAX).unwrap();
         let measured = measure(x, 0.0, &facet, &point, middle.normalize());
-        contacts.push(Contact::new(i, Carriers::new(&object.triangles[t], &point), measured));
+        contacts.push(Contact::new(i, Carriers::new((&object.triangles[t], None), &point), measured));
     }
     contacts[5].depth = -1e-3;
     for i in 6..8 {
@@ -52,7 +52,7 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
             let point = facet.closest(x, f64::MAX).unwrap();
             let outward = x - facet.point(point.weights);
             let measured = measure(x, 0.008, &facet, &point, outward.normalize());
-            contacts.push(Contact::new(i, Carriers::new(&object.triangles[near], &point), measured));
+            contacts.push(Contact::new(i, Carriers::new((&object.triangles[near], None), &point), measured));
         }
     }
     distribute_all(&mut contacts, &mut Vec::new());
