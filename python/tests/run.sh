@@ -52,5 +52,5 @@ tested() {
 
 tested "$oldest" 'numpy<2'
 rm -rf "$place/test"
-tested "$newest" 'numpy>=2' mypy matplotlib
+tested "$newest" 'numpy>=2' mypy matplotlib h5py
 cd "$place" && test/bin/stubtest haptize._haptize
