@@ -11,6 +11,7 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 def test_the_cells_of_the_notebook_run(monkeypatch):
     pyplot = pytest.importorskip("matplotlib.pyplot")
     pyplot.switch_backend("agg")
+    pyplot.close("all")
     monkeypatch.chdir(EXAMPLES)
     cells = [cell for cell in json.loads((EXAMPLES / "bean.ipynb").read_text())["cells"] if cell["cell_type"] == "code"]
     names: dict = {}
