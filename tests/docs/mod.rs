@@ -73,9 +73,12 @@ fn commands(text: &str) -> (Vec<Shown>, Vec<String>) {
     (commands, left_out)
 }
 
-/// `line` without what changes from run to run and from machine to machine: numbers, and how far apart words are.
+/// `line` without what changes from run to run and from machine to machine: numbers, what solved, and how far apart words are.
 fn masked(line: &str) -> String {
-    let line = line.replace(std::env::consts::ARCH, "ARCH").replace("x86_64", "ARCH");
+    let solver = [" on cpu (", " on gpu ("].iter().find_map(|solver| line.find(solver));
+    let line = &line[..solver.unwrap_or(line.len())];
+    let machine = [std::env::consts::ARCH, "x86_64", std::env::consts::OS, "linux"];
+    let line = machine.iter().fold(line.to_owned(), |line, name| line.replace(name, "#"));
     let of_number = |character: &char| character.is_ascii_digit() || "+-.eE".contains(*character);
     let characters: Vec<char> = line.chars().collect();
     let runs = characters.chunk_by(|a, b| of_number(a) == of_number(b));
