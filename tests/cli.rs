@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod docs;
+
 use serde_json::Value;
 use std::{
     path::Path,

@@ -501,6 +501,25 @@ fn the_numpy_archive_holds_the_same_numbers() {
     assert_eq!(array::<f64>(&path, "energy"), None);
 }
 
+/// What h5py finds in such files is tested with the Python package.
+#[test]
+fn the_hdf5_file_is_one_and_holds_the_bytes_of_every_column() {
+    let folder = Folder::new();
+    let path = folder.file("a.h5");
+    let dataset = sample();
+    assert_eq!(Format::named("hdf5"), Some(Format::Hdf5));
+    assert_eq!(dataset.export(&path, Format::Hdf5).unwrap(), std::slice::from_ref(&path));
+    let file = std::fs::read(&path).unwrap();
+    assert!(file.starts_with(b"\x89HDF\r\n\x1a\n"));
+    let holds = |bytes: &[u8]| file.windows(bytes.len()).any(|window| window == bytes);
+    assert!(holds(bytemuck::cast_slice(&dataset.torque)));
+    assert!(holds(bytemuck::cast_slice(&dataset.contacts.as_ref().unwrap().forces)));
+    assert!(holds(dataset.scene.as_bytes()) && holds(b"\"s\", lide") && !holds(&[0x5a; 16]));
+    let whole = file.len();
+    bare().export(&path, Format::Hdf5).unwrap();
+    assert!(std::fs::read(&path).unwrap().len() < whole);
+}
+
 #[test]
 fn the_text_files_hold_the_same_numbers() {
     let folder = Folder::new();

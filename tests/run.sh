@@ -83,6 +83,7 @@ step 'lints' cargo clippy --locked --workspace --all-targets --quiet -- -D warni
 step 'tests' cargo test --locked --workspace --quiet --no-fail-fast
 step 'Python package' bash python/tests/run.sh
 step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --no-deps --quiet
+step 'documentation as a site' bash docs/site/build.sh
 step 'demo' demo
 
 printf '\n== summary (%d s)\n' "$SECONDS"

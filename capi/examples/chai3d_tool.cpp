@@ -1,5 +1,5 @@
-// A CHAI3D tool that feels a baked object: the joint torque of a haptize field becomes the tool's force. Needs CHAI3D 3; not compiled by the
-// tests.
+// A CHAI3D tool that feels a baked object: the joint torque of a haptize field becomes the tool's force. Needs CHAI3D 3, and is compiled where
+// CMakeLists.txt finds it; it was compiled with the headers of CHAI3D 3.3.0, and not run.
 //
 // The arm's joints must be those of the device: here the first three, and J, whose columns are the tip's velocity for a unit rate of each joint,
 // comes from the device's kinematics. At the tip F = J^-T tau.
@@ -33,8 +33,10 @@ public:
         else
             hz_loop_tick(loop_, angles, 0.0, dt, torque, nullptr); // zero torque once it has let go
         chai3d::cMatrix3d inverse;
-        jacobian.transr().invertr(inverse); // J^T is singular where the arm is stretched: then no force
-        const chai3d::cVector3d force = inverse * chai3d::cVector3d(torque[0], torque[1], torque[2]);
+        jacobian.transr(inverse);
+        chai3d::cVector3d force(0.0, 0.0, 0.0);
+        if (inverse.invert()) // not where the arm is stretched: then no force
+            force = inverse * chai3d::cVector3d(torque[0], torque[1], torque[2]);
         device->setForce(force.length() < 20.0 ? force : chai3d::cVector3d(0.0, 0.0, 0.0));
     }
 

@@ -2,7 +2,7 @@
 
 use crate::{
     HZ_MAX_JOINTS,
-    outcome::{self, Extensible, argument, guarded, hz_code, told},
+    outcome::{self, Extensible, guarded, hz_code},
 };
 use haptize::{JointVector, contact::Status, dataset::Dataset, field::TorqueField, render::setup};
 use std::ffi::c_char;
@@ -50,10 +50,7 @@ pub unsafe extern "C" fn hz_field_open(
     message: *mut c_char,
     message_size: usize,
 ) -> hz_code {
-    let work = || {
-        // SAFETY: as the caller promises.
-        let out = unsafe { field.as_mut() }.ok_or_else(|| argument("the pointer to the field is NULL"))?;
-        *out = std::ptr::null_mut();
+    let make = || {
         // SAFETY: as the caller promises.
         let dataset = Dataset::open(unsafe { outcome::path(path)? })?;
         let field = setup::field(&dataset, None)?;
@@ -62,11 +59,10 @@ pub unsafe extern "C" fn hz_field_open(
         for (a, axis) in dataset.grid.axes.iter().enumerate() {
             (least[a], greatest[a]) = (axis.coordinate(0), axis.coordinate(axis.count - 1));
         }
-        *out = Box::into_raw(Box::new(hz_field { field, least, greatest }));
-        Ok(String::new())
+        Ok((hz_field { field, least, greatest }, String::new()))
     };
     // SAFETY: as the caller promises.
-    unsafe { told(message, message_size, work) }
+    unsafe { outcome::open(field, message, message_size, make) }
 }
 
 /// Closes a field; NULL is left alone. No other call may be using it.
@@ -75,14 +71,8 @@ pub unsafe extern "C" fn hz_field_open(
 /// `field` is NULL or one that was opened and not yet closed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hz_field_close(field: *mut hz_field) {
-    if !field.is_null() {
-        // SAFETY: as the caller promises.
-        let field = unsafe { Box::from_raw(field) };
-        guarded(|| {
-            drop(field);
-            hz_code::HZ_OK
-        });
-    }
+    // SAFETY: as the caller promises.
+    unsafe { outcome::close(field) }
 }
 
 /// Returns the number of joints, 1 to HZ_MAX_JOINTS; 0 for NULL.

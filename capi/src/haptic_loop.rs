@@ -3,7 +3,7 @@
 use crate::{
     HZ_MAX_JOINTS,
     field::configuration,
-    outcome::{self, Extensible, Failure, argument, guarded, hz_code, told, write_text},
+    outcome::{self, Extensible, Failure, argument, guarded, hz_code, write_text},
 };
 use haptize::{
     JointVector,
@@ -79,10 +79,7 @@ pub unsafe extern "C" fn hz_loop_open(
     message: *mut c_char,
     message_size: usize,
 ) -> hz_code {
-    let work = || {
-        // SAFETY: as the caller promises.
-        let out = unsafe { r#loop.as_mut() }.ok_or_else(|| argument("the pointer to the loop is NULL"))?;
-        *out = std::ptr::null_mut();
+    let make = || {
         // SAFETY: as the caller promises.
         let dataset = Dataset::open(unsafe { outcome::path(path)? })?;
         let setup = Setup::new(&dataset)?;
@@ -99,11 +96,10 @@ pub unsafe extern "C" fn hz_loop_open(
         };
         let begin = JointVector::zeros(haptics.joints());
         let state = haptics.start(&begin).map_err(|fault| argument(fault.to_string()))?;
-        *out = Box::into_raw(Box::new(hz_loop { haptics, state, started: false }));
-        Ok(advice.unwrap_or_default())
+        Ok((hz_loop { haptics, state, started: false }, advice.unwrap_or_default()))
     };
     // SAFETY: as the caller promises.
-    unsafe { told(message, message_size, work) }
+    unsafe { outcome::open(r#loop, message, message_size, make) }
 }
 
 /// Puts what `gains` tell into `spec`.
@@ -128,14 +124,8 @@ fn take(gains: &hz_gains, spec: &mut HapticsSpec) -> Result<(), Failure> {
 /// `loop` is NULL or one that was opened and not yet closed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hz_loop_close(r#loop: *mut hz_loop) {
-    if !r#loop.is_null() {
-        // SAFETY: as the caller promises.
-        let closed = unsafe { Box::from_raw(r#loop) };
-        guarded(|| {
-            drop(closed);
-            hz_code::HZ_OK
-        });
-    }
+    // SAFETY: as the caller promises.
+    unsafe { outcome::close(r#loop) }
 }
 
 /// Returns the number of joints, 1 to HZ_MAX_JOINTS; 0 for NULL.

@@ -104,6 +104,43 @@ pub unsafe fn told(text: *mut c_char, size: usize, work: impl FnOnce() -> Result
     code
 }
 
+/// Puts what `make` makes, with its remarks, behind a new handle at `handle`, NULL where it fails, and writes the message as [`told`] does.
+///
+/// # Safety
+/// `handle` is NULL or a place for a pointer; `text` as for [`told`].
+pub unsafe fn open<T>(
+    handle: *mut *mut T,
+    text: *mut c_char,
+    size: usize,
+    make: impl FnOnce() -> Result<(T, String), Failure>,
+) -> hz_code {
+    let work = || {
+        // SAFETY: as the caller promises.
+        let out = unsafe { handle.as_mut() }.ok_or_else(|| argument("the pointer to the handle is NULL"))?;
+        *out = std::ptr::null_mut();
+        let (made, remarks) = make()?;
+        *out = Box::into_raw(Box::new(made));
+        Ok(remarks)
+    };
+    // SAFETY: as the caller promises.
+    unsafe { told(text, size, work) }
+}
+
+/// Ends what [`open`] began; NULL is left alone.
+///
+/// # Safety
+/// `handle` is NULL or was opened and not yet closed.
+pub unsafe fn close<T>(handle: *mut T) {
+    if !handle.is_null() {
+        // SAFETY: as the caller promises.
+        let opened = unsafe { Box::from_raw(handle) };
+        guarded(|| {
+            drop(opened);
+            hz_code::HZ_OK
+        });
+    }
+}
+
 /// Writes `message` into the `size` bytes at `text`, cut where it does not fit, and ended by a zero. Allocates nothing.
 ///
 /// # Safety

@@ -3,7 +3,7 @@
 use crate::{
     HZ_MAX_JOINTS,
     field::configuration,
-    outcome::{self, Extensible, argument, guarded, hz_code, told},
+    outcome::{self, Extensible, guarded, hz_code},
 };
 use haptize::{
     JointVector,
@@ -67,17 +67,13 @@ pub unsafe extern "C" fn hz_solver_open(
     message: *mut c_char,
     message_size: usize,
 ) -> hz_code {
-    let work = || {
-        // SAFETY: as the caller promises.
-        let out = unsafe { solver.as_mut() }.ok_or_else(|| argument("the pointer to the solver is NULL"))?;
-        *out = std::ptr::null_mut();
+    let make = || {
         // SAFETY: as the caller promises.
         let scene = Scene::load(unsafe { outcome::path(path)? })?;
-        *out = Box::into_raw(Box::new(hz_solver { direct: Direct::new(&scene)? }));
-        Ok(String::new())
+        Ok((hz_solver { direct: Direct::new(&scene)? }, String::new()))
     };
     // SAFETY: as the caller promises.
-    unsafe { told(message, message_size, work) }
+    unsafe { outcome::open(solver, message, message_size, make) }
 }
 
 /// Closes a solver; NULL is left alone. No other call may be using it.
@@ -86,14 +82,8 @@ pub unsafe extern "C" fn hz_solver_open(
 /// `solver` is NULL or one that was opened and not yet closed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hz_solver_close(solver: *mut hz_solver) {
-    if !solver.is_null() {
-        // SAFETY: as the caller promises.
-        let solver = unsafe { Box::from_raw(solver) };
-        guarded(|| {
-            drop(solver);
-            hz_code::HZ_OK
-        });
-    }
+    // SAFETY: as the caller promises.
+    unsafe { outcome::close(solver) }
 }
 
 /// Returns the number of joints, 1 to HZ_MAX_JOINTS; 0 for NULL.

@@ -132,7 +132,7 @@ fn files_that_cannot_be_opened_say_why_in_the_callers_buffer() {
         assert!(found == code && handle.is_null() && message.contains(words), "{found:?}: {message}");
     }
     let (code, handle, message) = scene(broken.as_ptr());
-    assert!(code == hz_code::HZ_SCENE && handle.is_null() && message.contains("broken.toml:4:"), "{code:?}: {message}");
+    assert!(code == hz_code::HZ_SCENE && handle.is_null() && message.contains("broken.toml:5:"), "{code:?}: {message}");
     let (code, ..) = scene(missing.as_ptr());
     assert_eq!(code, hz_code::HZ_FILE);
 

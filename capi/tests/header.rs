@@ -8,10 +8,8 @@ use std::path::Path;
 fn the_header_is_what_the_sources_make() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(here.join("cbindgen.toml")).unwrap();
-    let mut builder = cbindgen::Builder::new().with_config(config);
-    for source in ["lib.rs", "outcome.rs", "field.rs", "haptic_loop.rs", "solver.rs"] {
-        builder = builder.with_src(here.join("src").join(source));
-    }
+    // The other files are modules of this one.
+    let builder = cbindgen::Builder::new().with_config(config).with_src(here.join("src/lib.rs"));
     let mut made = Vec::new();
     builder.generate().unwrap().write(&mut made);
     // Rust's heading for what an unsafe function asks of its caller.
@@ -26,4 +24,21 @@ fn the_header_is_what_the_sources_make() {
         "{}: not what the sources make; write it anew with HAPTIZE_WRITE_HEADER=1 cargo test -p haptize-capi --test header",
         header.display()
     );
+}
+
+#[test]
+fn every_function_has_its_place_in_the_documentation() {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let header = std::fs::read_to_string(here.join("include/haptize.h")).unwrap();
+    let page = std::fs::read_to_string(here.join("../docs/c.md")).unwrap();
+    let declared = header.lines().filter(|line| !line.trim_start().starts_with("//")).flat_map(|line| {
+        let words = line.split(|character: char| !character.is_alphanumeric() && character != '_');
+        words.filter(|word| word.starts_with("hz_") && line.contains(&format!("{word}("))).map(str::to_owned)
+    });
+    let declared: Vec<String> = declared.collect();
+    assert!(declared.len() > 15, "{declared:?}");
+    for (k, function) in declared.iter().enumerate() {
+        assert!(page.contains(&format!("`{function}`")), "docs/c.md does not name {function}");
+        assert!(!declared[..k].contains(function), "{function} is declared twice");
+    }
 }

@@ -106,25 +106,19 @@ fn the_examples_compile_without_a_warning_and_tell_what_the_library_tells() {
 
 #[test]
 fn cmake_finds_what_is_installed() {
-    if !is_there("cmake") || !is_there("cc") {
-        eprintln!("skipped: there is no CMake or no C compiler");
+    if !is_there("cmake") || !is_there("cc") || !is_there("c++") {
+        eprintln!("skipped: there is no CMake, or no C or C++ compiler");
         return;
     }
     let files = Files::new();
     let prefix = install(&files);
-    let project = files.path("project");
-    std::fs::create_dir(&project).unwrap();
-    let text = format!(
-        "cmake_minimum_required(VERSION 3.15)\nproject(press C)\n\
-         list(APPEND CMAKE_MODULE_PATH {0}/share/haptize/cmake)\nfind_package(Haptize REQUIRED)\n\
-         add_executable(press {HERE}/examples/press.c)\ntarget_link_libraries(press Haptize::Haptize)\n",
-        prefix.display()
-    );
-    std::fs::write(project.join("CMakeLists.txt"), text).unwrap();
-    let build = project.join("build");
+    let (project, build) = (Path::new(HERE).join("examples"), files.path("build"));
     let root = format!("-DCMAKE_PREFIX_PATH={}", prefix.display());
-    run(Command::new("cmake").args([&root, "-S"]).arg(&project).arg("-B").arg(&build));
+    run(Command::new("cmake").args([&root, "-S"]).arg(project).arg("-B").arg(&build));
     run(Command::new("cmake").arg("--build").arg(&build));
-    let q = PRESSED.map(|q| q.to_string());
-    run(Command::new(build.join("press")).arg(files.path("small.haptize")).args(q));
+    let (scene, dataset, q) = (files.path("small.toml"), files.path("small.haptize"), PRESSED.map(|q| q.to_string()));
+    let pressed = run(Command::new(build.join("press")).arg(&dataset).args(&q));
+    let solved = run(Command::new(build.join("solve")).args([&scene, &dataset]).args(&q));
+    // Both look the same torque up, behind one code and two.
+    assert_eq!(numbers(pressed.lines().next().unwrap())[1..], numbers(solved.lines().nth(1).unwrap())[2..]);
 }

@@ -1,4 +1,4 @@
-"""The cost of one look-up and of many from Python: see benches/bindings.sh.
+"""The cost of one look-up and of many from Python, and the memory of an opened dataset: see benches/bindings.sh.
 
     python time_look_up.py DATASET
 """
@@ -6,6 +6,7 @@
 import statistics
 import sys
 import time
+from pathlib import Path
 
 import haptize
 import numpy as np
@@ -29,3 +30,16 @@ begin = time.perf_counter()
 field.torque(q, many)
 rate = MANY / (time.perf_counter() - begin) / 1e6
 print(f"Python  {statistics.median(blocks):6.0f} ns a look-up, {rate:6.2f} million a second in a batch")
+
+# Memory of this process [MB], where the system tells it. A field copies what it looks up; a dataset does not.
+if Path("/proc/self/statm").exists():
+
+    def resident() -> float:
+        return 4096e-6 * int(Path("/proc/self/statm").read_text().split()[1])
+
+    before = resident()
+    dataset = haptize.Dataset.open(sys.argv[1])
+    opened = resident() - before
+    dataset.torque[0].sum()
+    print(f"Python  {Path(sys.argv[1]).stat().st_size / 1e6:.0f} MB opened and checked: {opened:.1f} MB of memory, "
+          f"{resident() - before:.1f} MB after a look at the torque along the first grid line")

@@ -1,8 +1,10 @@
 //! Arrays in and out: configurations from whatever NumPy takes for numbers, results into the caller's array or a new one.
 
+use haptize::JointVector;
 use numpy::{
-    Element, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
-    ndarray::Dimension,
+    Element, PyArray, PyArray1, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+    npyffi::{NPY_ARRAY_ALIGNED, NPY_ARRAY_C_CONTIGUOUS, NPY_ARRAY_WRITEABLE, NPY_TYPES},
 };
 use pyo3::{exceptions::PyValueError, intern, prelude::*, types::PyDict};
 
@@ -60,10 +62,7 @@ impl<'py> Configurations<'py> {
             Some(out) => {
                 let out = out.cast::<PyArrayDyn<T>>()?;
                 if out.shape() != shape || !is_plain(out) {
-                    return Err(PyValueError::new_err(format!(
-                        "out has shape {:?}: it must be a contiguous, aligned array of shape {shape:?}",
-                        out.shape()
-                    )));
+                    return Err(wrong_output(out.shape(), &shape));
                 }
                 out.clone()
             }
@@ -81,8 +80,14 @@ impl<'py> Configurations<'py> {
 }
 
 /// Whether `array` lies in C order at aligned addresses, and so is a slice.
-pub fn is_plain<T: Element, D: Dimension>(array: &Bound<'_, PyArray<T, D>>) -> bool {
+fn is_plain<T: Element>(array: &Bound<'_, PyArrayDyn<T>>) -> bool {
     array.is_c_contiguous() && array.data().is_aligned()
+}
+
+fn wrong_output(shape: &[usize], expected: &[usize]) -> PyErr {
+    PyValueError::new_err(format!(
+        "out has shape {shape:?}: it must be a contiguous, aligned array of shape {expected:?}"
+    ))
 }
 
 /// `values` as an array of f64 in C order, copied where they are not one.
@@ -112,20 +117,75 @@ pub fn numbers(values: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
 }
 
 /// One vector of `joints` numbers.
-pub fn vector(name: &str, values: &Bound<'_, PyAny>, joints: usize) -> PyResult<haptize::JointVector> {
-    let (numbers, shape) = match values.cast::<PyArray1<f64>>() {
-        // Without a copy for what a loop is called with.
-        Ok(array) if is_plain(array) && array.len() == joints => {
-            let read = array.try_readonly().map_err(|error| PyValueError::new_err(error.to_string()))?;
-            return Ok(haptize::JointVector::from_slice(read.as_slice()?));
-        }
-        _ => numbers(values)?,
-    };
+pub fn vector(name: &str, values: &Bound<'_, PyAny>, joints: usize) -> PyResult<JointVector> {
+    if let Some(vector) = plain_vector(values, joints) {
+        return Ok(vector.read());
+    }
+    let (numbers, shape) = numbers(values)?;
     if shape != [joints] {
         let message = format!("{name} has shape {shape:?}: it must have one entry per joint, {joints}");
         return Err(PyValueError::new_err(message));
     }
-    Ok(haptize::JointVector::from_slice(&numbers))
+    Ok(JointVector::from_slice(&numbers))
+}
+
+/// A NumPy vector of one f64 per joint, contiguous and aligned: what a loop is called with a thousand times a second. It is told by its
+/// flags, which takes a few nanoseconds, where NumPy's own comparison of types and the ledger of borrows take some hundred.
+pub struct PlainVector<'a, 'py> {
+    array: &'a Bound<'py, PyUntypedArray>,
+    joints: usize,
+}
+
+/// `values` as a plain vector of `joints` numbers; `None` where it is anything else.
+pub fn plain_vector<'a, 'py>(values: &'a Bound<'py, PyAny>, joints: usize) -> Option<PlainVector<'a, 'py>> {
+    let array = values.cast::<PyUntypedArray>().ok()?;
+    let (vector, kind) = (PlainVector { array, joints }, array.dtype());
+    let numbers = kind.num() == NPY_TYPES::NPY_DOUBLE as i32 && kind.is_native_byteorder() == Some(true);
+    let plain = numbers && array.shape() == [joints] && vector.has(NPY_ARRAY_C_CONTIGUOUS | NPY_ARRAY_ALIGNED);
+    plain.then_some(vector)
+}
+
+impl<'py> PlainVector<'_, 'py> {
+    fn has(&self, flags: i32) -> bool {
+        // SAFETY: the array is alive, and nothing else writes its flags while this thread holds the interpreter.
+        unsafe { (*self.array.as_array_ptr()).fields.flags & flags == flags }
+    }
+
+    fn place(&self) -> *mut f64 {
+        // SAFETY: as above; the type was checked.
+        unsafe { (*self.array.as_array_ptr()).fields.data.cast() }
+    }
+
+    /// Copies the numbers.
+    pub fn read(&self) -> JointVector {
+        // SAFETY: there are as many numbers, aligned and side by side; they are copied while this thread holds the interpreter.
+        JointVector::from_slice(unsafe { std::slice::from_raw_parts(self.place(), self.joints) })
+    }
+}
+
+/// Where one vector of results goes: the caller's array, which may be the one that the question came in, or a new one.
+pub struct Output<'a, 'py>(Option<PlainVector<'a, 'py>>);
+
+impl<'a, 'py> Output<'a, 'py> {
+    /// Takes `out`, if there is one, for `joints` numbers.
+    pub fn new(out: Option<&'a Bound<'py, PyAny>>, joints: usize) -> PyResult<Self> {
+        let Some(out) = out else { return Ok(Self(None)) };
+        match plain_vector(out, joints) {
+            Some(vector) if vector.has(NPY_ARRAY_WRITEABLE) => Ok(Self(Some(vector))),
+            Some(_) => Err(PyValueError::new_err("out: the array is read-only")),
+            None => Err(wrong_output(out.cast::<PyArrayDyn<f64>>()?.shape(), &[joints])),
+        }
+    }
+
+    /// Writes `values`, one per joint, and returns the array.
+    pub fn write(self, py: Python<'py>, values: &JointVector) -> Bound<'py, PyAny> {
+        let Some(vector) = self.0 else { return PyArray1::from_slice(py, values).into_any() };
+        let numbers = &values[..vector.joints];
+        // SAFETY: there is room for as many numbers, aligned and side by side, which NumPy lets be written. No reference to them lives: those
+        // that calls hold end with them, or while other threads run belong to a batch, whose array nobody is to write meanwhile.
+        unsafe { vector.place().copy_from_nonoverlapping(numbers.as_ptr(), numbers.len()) };
+        vector.array.as_any().clone()
+    }
 }
 
 /// An array of `shape` that holds `values`.

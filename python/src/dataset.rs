@@ -68,12 +68,10 @@ impl Dataset {
         py.detach(|| self.dataset.save(&path)).map_err(|error| errors::dataset(py, &error))
     }
 
-    /// Write the dataset for other programs, format "npz" or "csv". Returns the files written.
+    /// Write the dataset for other programs, format "npz", "hdf5" or "csv". Returns the files written.
     fn export(&self, py: Python<'_>, path: PathBuf, format: &str) -> PyResult<Vec<PathBuf>> {
-        let format = match format {
-            "npz" => Format::Npz,
-            "csv" => Format::Csv,
-            other => return Err(PyValueError::new_err(format!("no format {other:?}: take \"npz\" or \"csv\""))),
+        let Some(format) = Format::named(format) else {
+            return Err(PyValueError::new_err(format!("no format {format:?}: take \"npz\", \"hdf5\" or \"csv\"")));
         };
         py.detach(|| self.dataset.export(&path, format)).map_err(|error| errors::dataset(py, &error))
     }

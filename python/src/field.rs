@@ -1,8 +1,12 @@
 //! Torque fields: look-ups of one configuration or a million.
 
-use crate::{arrays::Configurations, dataset::Dataset, errors};
+use crate::{
+    arrays::{Configurations, Output, plain_vector},
+    dataset::Dataset,
+    errors,
+};
 use haptize::{
-    dataset,
+    JointVector, dataset,
     field::{TorqueField, fill_rows},
     render::setup,
     scene::Interpolation,
@@ -72,10 +76,15 @@ impl Field {
 
     /// Torque on the arm [N m; N at prismatic joints], of the shape of q; into `out`, an array of float64, where that is given.
     #[pyo3(signature = (q, out = None))]
-    fn torque<'py>(&self, q: &Bound<'py, PyAny>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Array<'py, f64>> {
-        let configurations = Configurations::new(q, self.field.joints())?;
+    fn torque<'py>(&self, q: &Bound<'py, PyAny>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        let joints = self.field.joints();
+        if let Some(one) = plain_vector(q, joints).map(|q| q.read()).filter(JointVector::is_finite) {
+            let out = Output::new(out, joints)?;
+            return Ok(out.write(q.py(), &self.field.sample(&one).torque));
+        }
+        let configurations = Configurations::new(q, joints)?;
         let look_up = |q: &[f64], out: &mut [f64]| self.field.torques(q, out, None).map_err(errors::batch);
-        configurations.fill(&[self.field.joints()], out, look_up)
+        Ok(configurations.fill(&[joints], out, look_up)?.into_any())
     }
 
     /// Energy that the object stores [J], one number for each configuration; zero where the dataset does not hold it.

@@ -8,7 +8,7 @@ use haptize::{
         setup::Setup,
     },
 };
-use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::PyArray1;
 use pyo3::{
     exceptions::{PyRuntimeError, PyValueError},
     prelude::*,
@@ -95,26 +95,15 @@ impl Loop {
         y: &Bound<'py, PyAny>,
         dt: f64,
         age: f64,
-        out: Option<Bound<'py, PyArray1<f64>>>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let joints = self.haptics.joints();
         let position = arrays::vector("y", y, joints)?;
         let state = self.state.as_mut().ok_or_else(|| PyRuntimeError::new_err("call start before the first tick"))?;
-        let out = match out {
-            Some(out) if out.len() == joints && arrays::is_plain(&out) => out,
-            Some(_) => {
-                return Err(PyValueError::new_err(format!(
-                    "out must be contiguous and aligned, with {joints} entries"
-                )));
-            }
-            None => PyArray1::zeros(py, joints, false),
-        };
-        let mut writer = out.try_readwrite().map_err(|error| PyValueError::new_err(format!("out: {error}")))?;
+        let out = arrays::Output::new(out, joints)?;
         let output = self.haptics.tick(state, &Inputs { position, age, elapsed: dt, interval: dt });
-        writer.as_slice_mut()?.copy_from_slice(&output.torque);
-        drop(writer);
         self.last = Some(output);
-        Ok(out)
+        Ok(out.write(py, &output.torque))
     }
 
     /// Why the loop has let go and what to do about it; None where it has not.

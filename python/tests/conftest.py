@@ -1,33 +1,14 @@
 """A small scene, baked once, in a folder of its own."""
 
+from pathlib import Path
+
 import haptize
 import pytest
 
-SCENE = """
-name = "small sphere"
-[object]
-sphere = { radius = 0.05, rings = 8, segments = 8 }
-springs = { kind = "isotropic", stiffness = 300.0 }
-ground = { stiffness = 100.0 }
-[contact]
-stiffness = 1000.0
-[grid]
-axes = [{ start = -0.3, step = 0.1, count = 7 }, { start = 0.01, step = 0.004, count = 9 }]
-[[proxy.joint]]
-name = "turn"
-kind = "revolute"
-axis = [0, 0, 1]
-limits = [-1, 1]
-[[proxy.joint]]
-name = "slide"
-kind = "prismatic"
-axis = [-1, 0, 0]
-limits = [0, 0.1]
-nodes = [{ from = [0.08, -0.01, 0.002], to = [0.08, 0.01, 0.002], count = 3 }]
-[graphics]
-"""
+SCENE = (Path(__file__).resolve().parents[2] / "tests/scenes/small.toml").read_text()
 
-PRESSED = (0.05, 0.0405)
+# In contact.
+PRESSED = (-0.18, 0.0415)
 
 
 @pytest.fixture(scope="session")

@@ -37,6 +37,13 @@ if ! environment build "$newest" 'maturin>=1.9,<2'; then
     exit 0
 fi
 
+# Features that the tests ask of the package's dependencies, and the package does not: each has the engine compiled once more.
+features() {
+    cargo tree --locked --prefix none -f '{p} [{f}]' "$@" | sed 's/ (\*)$//' | sort -u
+}
+comm -13 <(features --workspace -e all) <(features -p haptize-python -e normal,build) |
+    sed 's/^/compiled twice, for want of features in python\/Cargo.toml: /'
+
 # The profile of the tests, so that what they have compiled is used.
 "$place/build/bin/maturin" build --quiet --locked --profile dev --compatibility linux --auditwheel skip --compression-method stored --out "$place"
 wheel=$(ls "$place"/haptize-*.whl)
@@ -52,5 +59,5 @@ tested() {
 
 tested "$oldest" 'numpy<2'
 rm -rf "$place/test"
-tested "$newest" 'numpy>=2' mypy matplotlib
+tested "$newest" 'numpy>=2' mypy matplotlib h5py
 cd "$place" && test/bin/stubtest haptize._haptize

@@ -144,6 +144,30 @@ def test_exports_are_read_by_numpy(dataset, tmp_path):
         dataset.export(tmp_path / "small.xls", "xls")
 
 
+def test_hdf5_is_read_by_h5py_with_units_and_axes(dataset, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    (path,) = dataset.export(tmp_path / "small.h5", "hdf5")
+    with h5py.File(path) as file:
+        for name in ("torque", "energy", "gap", "status", "residual", "iterations"):
+            column = getattr(dataset, name)
+            assert np.array_equal(file[name], column) and file[name].dtype == column.dtype, name
+            assert [file[name].dims[axis].label for axis in (0, 1)] == ["turn", "slide"]
+            for axis, line in enumerate(dataset.lines):
+                assert np.array_equal(file[name].dims[axis][0], line)
+        for name, column in zip(("contact_offsets", "contact_nodes", "contact_forces"), dataset.contacts):
+            assert np.array_equal(file[name], column)
+        units = {name: file[name].attrs["units"] for name in file if "units" in file[name].attrs}
+        assert {np.bytes_(b"N m, N"), np.bytes_(b"J"), np.bytes_(b"m"), np.bytes_(b"rad")} <= set(map(np.bytes_, units.values()))
+        assert file["torque"].dims[2].label == "joint" and len(file["torque"].dims[2]) == 0
+        assert file["scene"].asstr()[()] == dataset.scene
+        assert list(file["joint_names"].asstr()) == ["turn", "slide"]
+        assert file["q2"].is_scale and file["q2"].attrs["NAME"] in ("slide", b"slide")
+    q = np.random.default_rng(3).uniform(-1, 1, (50, 2))
+    (path,) = haptize.gridize(q, q, 0.1).export(tmp_path / "measured.h5", "hdf5")
+    with h5py.File(path) as file:
+        assert "energy" not in file and file["torque"].ndim == 3
+
+
 def test_figures_are_written(dataset, tmp_path):
     files = dataset.figures(tmp_path)
     assert files and all(file.stat().st_size > 1000 for file in map(type(tmp_path), files))

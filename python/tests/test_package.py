@@ -1,6 +1,7 @@
 """What the wheel brings beside the module: the command, types, documentation."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -25,8 +26,11 @@ def test_the_command_is_installed(tmp_path):
 
 
 def test_every_name_is_documented():
+    page = (Path(__file__).resolve().parents[2] / "docs/python.md").read_text()
     for name in haptize.__all__:
         thing = getattr(haptize, name)
         assert name == "__version__" or (thing.__doc__ and thing.__doc__.strip()), name
         for method in (vars(thing) if isinstance(thing, type) else ()):
             assert method.startswith("_") or getattr(thing, method).__doc__, f"{name}.{method}"
+            assert method.startswith("_") or re.search(rf"[`.]{method}\b", page), f"docs/python.md does not name {name}.{method}"
+        assert name == "__version__" or f"`{name}" in page, f"docs/python.md does not name {name}"

@@ -43,8 +43,8 @@ def test_an_error_names_file_and_line(tmp_path):
     with pytest.raises(haptize.SceneError) as raised:
         haptize.Scene.load(path)
     assert str(raised.value.path) == str(path)
-    assert raised.value.line == 4 and raised.value.column > 1
-    assert "wrong.toml:4:" in str(raised.value)
+    assert raised.value.line == 5 and raised.value.column > 1
+    assert "wrong.toml:5:" in str(raised.value)
     with pytest.raises(haptize.SceneError) as raised:
         haptize.Scene.load(tmp_path / "none.toml")
     assert raised.value.line is None

@@ -12,6 +12,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   haptize export sphere.haptize --format npz
+  haptize export sphere.haptize --format hdf5
   haptize export sphere.haptize --format csv -o tables/sphere.csv")]
 pub struct Arguments {
     /// The dataset's file.
@@ -31,6 +32,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let output = arguments.output.clone().unwrap_or_else(beside);
     let kind = match arguments.format {
         Format::Npz => Kind::Archive,
+        Format::Hdf5 => Kind::Hdf5,
         Format::Csv => Kind::Table,
     };
     let inputs = [arguments.dataset.as_path()];

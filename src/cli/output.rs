@@ -21,6 +21,8 @@ pub enum Kind {
     Table,
     /// NumPy's archive.
     Archive,
+    /// HDF5.
+    Hdf5,
     /// A manual page.
     Page,
     /// A picture, in PNG.
@@ -58,6 +60,7 @@ impl Kind {
             // Safetensors: the length of the header, which is a JSON object.
             Self::Dataset => start.len() > 8 && start[8] == b'{' && start[..8].ends_with(&[0, 0, 0]),
             Self::Archive => start.starts_with(b"PK"),
+            Self::Hdf5 => start.starts_with(b"\x89HDF\r\n\x1a\n"),
             Self::Page => start.starts_with(b"."),
             Self::Picture => start.starts_with(b"\x89PNG"),
             Self::Drawing => start.windows(4).any(|word| word == b"<svg"),
@@ -76,6 +79,7 @@ impl Kind {
             Self::Dataset => "a dataset",
             Self::Table => "a table",
             Self::Archive => "an archive",
+            Self::Hdf5 => "an HDF5 file",
             Self::Page => "a manual page",
             Self::Picture => "a PNG picture",
             Self::Drawing => "an SVG drawing",

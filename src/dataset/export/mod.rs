@@ -1,6 +1,8 @@
-//! Datasets for other programs: NumPy archives and comma-separated text.
+//! Datasets for other programs: NumPy archives, HDF5 and comma-separated text.
 
 mod csv;
+mod hdf5;
+mod meaning;
 mod npz;
 
 use super::{Dataset, Error};
@@ -11,16 +13,25 @@ use std::path::{Path, PathBuf};
 pub enum Format {
     /// NumPy archive, uncompressed: `numpy.load(FILE)["torque"]`.
     Npz,
+    /// HDF5, with units and axes: `h5py.File(FILE)["torque"]`, in MATLAB `h5read(FILE, "/torque")`.
+    Hdf5,
     /// Comma-separated text, one row a grid point, and a second file with one row a contact force.
     Csv,
 }
 
 impl Format {
+    /// Returns the format that the command line calls `name`.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        clap::ValueEnum::from_str(name, false).ok()
+    }
+
     /// The usual extension of such files.
     #[must_use]
     pub fn extension(self) -> &'static str {
         match self {
             Self::Npz => "npz",
+            Self::Hdf5 => "h5",
             Self::Csv => "csv",
         }
     }
@@ -40,6 +51,7 @@ impl Dataset {
     pub fn export(&self, path: &Path, format: Format) -> Result<Vec<PathBuf>, Error> {
         match format {
             Format::Npz => npz::export(self, path),
+            Format::Hdf5 => hdf5::export(self, path),
             Format::Csv => csv::export(self, path),
         }
     }

@@ -4,7 +4,10 @@
 //! their names, `scene` and `provenance` texts. `units` and `axes` have a row for each array of numbers, its name and then its unit, or what
 //! its axes are: `dict(archive["units"])["energy"]` is `J`. Arrays are streamed, not compressed: numbers of a smooth field hardly are.
 
-use super::super::{Axis, Dataset, Error, file, replace_file};
+use super::{
+    super::{Dataset, Error, file, replace_file},
+    meaning::{Meaning, lines, lines_name, meaning},
+};
 use npyz::{AutoSerialize, DType, TypeStr, WriterBuilder};
 use safetensors::Dtype;
 use std::{
@@ -40,8 +43,7 @@ fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Resul
     let coordinates = configurations.flat_map(|q| (0..q.len()).map(move |joint| q[joint]));
     stream(&mut zip, "q", &shape, f64::default_dtype(), coordinates)?;
     for (k, axis) in grid.axes.iter().enumerate() {
-        let lines = (0..axis.count).map(|line| axis.coordinate(line));
-        stream(&mut zip, &format!("q{}", k + 1), &[axis.count], f64::default_dtype(), lines)?;
+        stream(&mut zip, &lines_name(k), &[axis.count], f64::default_dtype(), lines(axis))?;
     }
     let joints = [grid.joints()];
     texts(&mut zip, "joint_names", &joints, grid.axes.iter().map(|axis| axis.name.clone()).collect())?;
@@ -57,36 +59,13 @@ fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Resul
 
 /// Each array of numbers with its unit, and with its axes.
 fn meanings(dataset: &Dataset) -> (Vec<[String; 2]>, Vec<[String; 2]>) {
-    let axes = &dataset.grid.axes;
-    // Where joints are of both kinds: `N m, N`.
-    let each = |unit: &dyn Fn(&Axis) -> String| {
-        let mut units: Vec<String> = axes.iter().map(unit).collect();
-        units.dedup();
-        units.join(", ")
-    };
-    let effort = each(&|axis| axis.effort_unit().into());
-    let slope = each(&|axis| format!("{}/{}", axis.effort_unit(), axis.unit));
-    let coordinate = each(&|axis| axis.unit.clone());
-    let grid = axes.iter().map(|axis| axis.name.as_str()).collect::<Vec<_>>().join(", ");
-    let meaning = |name: &str| match name {
-        "torque" => (effort.clone(), format!("{grid}, joint")),
-        "tangent" => (slope.clone(), format!("{grid}, lower triangle")),
-        "energy" => ("J".into(), grid.clone()),
-        "gap" => ("m".into(), grid.clone()),
-        "contact_forces" | "touch_forces" => ("N".into(), "contact, xyz".into()),
-        "contact_nodes" | "touch_nodes" => ("1".into(), "contact".into()),
-        "contact_offsets" | "touch_offsets" => ("1".into(), "point".into()),
-        "surface_nodes" | "inner_nodes" => ("m".into(), "node, xyz".into()),
-        "surface_triangles" => ("1".into(), "triangle, corner".into()),
-        "tetrahedra" => ("1".into(), "tetrahedron, corner".into()),
-        // Status, residual, iterations.
-        _ => ("1".into(), grid.clone()),
-    };
-    let tensors = file::tensors(dataset).into_iter().map(|tensor| (tensor.name.to_owned(), meaning(tensor.name)));
-    let all = ("q".to_owned(), (coordinate.clone(), format!("{grid}, joint")));
-    let lines =
-        axes.iter().enumerate().map(|(k, axis)| (format!("q{}", k + 1), (axis.unit.clone(), axis.name.clone())));
-    tensors.chain([all]).chain(lines).map(|(name, (unit, axes))| ([name.clone(), unit], [name, axes])).unzip()
+    let grid = &dataset.grid;
+    let arrays = file::tensors(dataset).into_iter().map(|tensor| tensor.name).chain(["q"]).map(|name| {
+        let Meaning { unit, axes, .. } = meaning(grid, name);
+        (name.to_owned(), unit, axes.join(", "))
+    });
+    let lines = grid.axes.iter().enumerate().map(|(k, axis)| (lines_name(k), axis.unit.clone(), axis.name.clone()));
+    arrays.chain(lines).map(|(name, unit, axes)| ([name.clone(), unit], [name, axes])).unzip()
 }
 
 fn array<W: Write + Seek, T: AutoSerialize + Copy>(

@@ -1,0 +1,89 @@
+//! HDF5: every tensor of the file under its own name, with its unit as the attribute `units` and its axes as dimension labels.
+//!
+//! `q1` .. `qd` are the grid lines of each axis; they are dimension scales, attached to every array over the grid, so that h5py, xarray and
+//! MATLAB know the coordinates. `joint_names` and `joint_units` are texts, and so are `scene` and `provenance`, datasets of their own because
+//! an attribute holds 64 KiB at most. Nothing is compressed: numbers of a smooth field hardly are.
+//!
+//! The writer puts the file together in memory, which takes three times the size of the dataset; [`super::npz`] streams.
+
+use super::{
+    super::{Dataset, Error, Grid, file, replace_file},
+    meaning::{Meaning, lines, lines_name, meaning},
+};
+use hdf5_writer::{AttributeBuilder, ByteOrder, DatasetBuilder, Datatype, Hdf5Builder, Hdf5WritePlan, WriteOptions};
+use safetensors::Dtype;
+use std::{
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
+    let written = plan(dataset)
+        .and_then(|plan| plan.encode(WriteOptions { byte_order: ByteOrder::LittleEndian, ..WriteOptions::default() }))
+        .map_err(io::Error::other)
+        .and_then(|bytes| replace_file(path, |writer| writer.write_all(&bytes)));
+    written.map_err(|source| Error::Write { path: path.into(), source })?;
+    Ok(vec![path.into()])
+}
+
+fn plan(dataset: &Dataset) -> hdf5_writer::Result<Hdf5WritePlan> {
+    let grid = &dataset.grid;
+    let tensors = file::tensors(dataset);
+    let over_grid: Vec<&str> =
+        tensors.iter().map(|tensor| tensor.name).filter(|name| meaning(grid, name).of_grid > 0).collect();
+    let mut builder = Hdf5Builder::new();
+    for tensor in &tensors {
+        let shape: Vec<u64> = tensor.shape.iter().map(|&count| count as u64).collect();
+        let array = DatasetBuilder::new(tensor.name, datatype(tensor.dtype)?, shape).raw_data(tensor.contents);
+        builder = builder.dataset(described(array, &meaning(grid, tensor.name))?);
+    }
+    for k in 0..grid.joints() {
+        builder = builder.dataset(scale(grid, k, &over_grid)?);
+    }
+    let texts = |name, texts: Vec<&str>| DatasetBuilder::vlen_string_data(name, vec![texts.len() as u64], &texts);
+    let text = |name, text: &str| DatasetBuilder::vlen_string_data(name, vec![], &[text]);
+    let provenance = serde_json::to_string(&dataset.provenance).map_err(io::Error::other)?;
+    builder
+        .dataset(texts("joint_names", grid.axes.iter().map(|axis| axis.name.as_str()).collect())?)
+        .dataset(texts("joint_units", grid.axes.iter().map(|axis| axis.unit.as_str()).collect())?)
+        .dataset(text("scene", &dataset.scene)?)
+        .dataset(text("provenance", &provenance)?)
+        .into_plan()
+}
+
+/// `array` with its unit, the names of its axes, and the scales of those that are the grid's.
+fn described(array: DatasetBuilder, meaning: &Meaning) -> hdf5_writer::Result<DatasetBuilder> {
+    let array = array
+        .attribute(AttributeBuilder::fixed_string("units", &meaning.unit))
+        .attribute(AttributeBuilder::vlen_strings("DIMENSION_LABELS", &meaning.axes)?);
+    if meaning.of_grid == 0 {
+        return Ok(array);
+    }
+    let scales = (0..meaning.axes.len()).map(|k| if k < meaning.of_grid { vec![lines_name(k)] } else { vec![] });
+    Ok(array.attribute(AttributeBuilder::vlen_object_references("DIMENSION_LIST", scales.collect())))
+}
+
+/// The grid lines of axis `k` as a scale of the arrays `over_grid`.
+fn scale(grid: &Grid, k: usize, over_grid: &[&str]) -> hdf5_writer::Result<DatasetBuilder> {
+    let axis = &grid.axes[k];
+    let coordinates: Vec<f64> = lines(axis).collect();
+    let attached = over_grid.iter().map(|name| ((*name).to_owned(), k as u32)).collect();
+    Ok(DatasetBuilder::typed_data(lines_name(k), vec![axis.count as u64], &coordinates)?
+        .attribute(AttributeBuilder::fixed_string("CLASS", "DIMENSION_SCALE"))
+        .attribute(AttributeBuilder::fixed_string("NAME", &axis.name))
+        .attribute(AttributeBuilder::fixed_string("units", &axis.unit))
+        .attribute(AttributeBuilder::object_reference_list("REFERENCE_LIST", attached)))
+}
+
+fn datatype(dtype: Dtype) -> hdf5_writer::Result<Datatype> {
+    let byte_order = ByteOrder::LittleEndian;
+    let unsigned = |size| Datatype::FixedPoint { size, signed: false, byte_order };
+    match dtype {
+        Dtype::F64 => Ok(Datatype::FloatingPoint { size: 8, byte_order }),
+        Dtype::F32 => Ok(Datatype::FloatingPoint { size: 4, byte_order }),
+        Dtype::U64 => Ok(unsigned(8)),
+        Dtype::U32 => Ok(unsigned(4)),
+        Dtype::U8 => Ok(unsigned(1)),
+        other => Err(hdf5_writer::Error::UnsupportedFeature(format!("numbers of the type {other:?}"))),
+    }
+}
