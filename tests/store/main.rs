@@ -9,3 +9,4 @@ mod fixture;
 mod interleavings;
 mod interpolation;
 mod publication;
+mod refine;
