@@ -77,6 +77,7 @@ pub mod ros;
 pub mod dataset;
 pub mod field;
 pub mod haptize;
+pub mod store;
 
 pub mod device;
 pub mod render;

@@ -78,6 +78,9 @@ struct Metadata {
     /// [`super::Provenance`] as JSON.
     provenance: String,
     scene: String,
+    /// Levels and order of a store ([`crate::store`]), as JSON; absent in a dataset.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    store: Option<String>,
 }
 
 /// Tensors of the contact forces on the object.
@@ -204,16 +207,35 @@ pub(crate) struct Heading<'a> {
     pub(crate) scene: &'a str,
 }
 
+/// Kind of a file.
+#[derive(Clone, Copy)]
+pub(crate) struct Kind<'a> {
+    /// Its name and version.
+    pub(crate) format: &'static str,
+    /// See [`Metadata::store`].
+    pub(crate) store: Option<&'a str>,
+}
+
 /// Writes a dataset's file, replacing the one that is `target` whole or not at all. The tensors are as in the table above, in any order.
 pub(crate) fn write_file<C: Contents>(
     target: Target<'_>,
+    heading: Heading<'_>,
+    tensors: Vec<Tensor<C>>,
+) -> Result<(), Error> {
+    write_container(target, Kind { format: FORMAT, store: None }, heading, tensors)
+}
+
+/// Writes a file of any kind in the dataset's container, as [`write_file`] does.
+pub(crate) fn write_container<C: Contents>(
+    target: Target<'_>,
+    kind: Kind<'_>,
     heading: Heading<'_>,
     mut tensors: Vec<Tensor<C>>,
 ) -> Result<(), Error> {
     let path = target.path();
     let inconsistent = |reason| Error::Inconsistent { path: path.into(), reason };
     tensors.sort_by_key(|tensor| std::cmp::Reverse(tensor.dtype.bitsize()));
-    let mut text = header(heading, &tensors).map_err(|error| inconsistent(error.to_string()))?;
+    let mut text = header(kind, heading, &tensors).map_err(|error| inconsistent(error.to_string()))?;
     text.resize((LENGTH + text.len()).next_multiple_of(PAGE) - LENGTH, b' ');
     if text.len() > MAX_HEADER {
         return Err(inconsistent(format!("its header, scene included, is longer than {MAX_HEADER} bytes")));
@@ -256,7 +278,7 @@ impl<W: Write> Write for Hashed<W> {
     }
 }
 
-fn header<C>(heading: Heading<'_>, tensors: &[Tensor<C>]) -> serde_json::Result<Vec<u8>> {
+fn header<C>(kind: Kind<'_>, heading: Heading<'_>, tensors: &[Tensor<C>]) -> serde_json::Result<Vec<u8>> {
     let mut end = 0;
     let infos = tensors.iter().map(|tensor| {
         let start = end;
@@ -266,10 +288,11 @@ fn header<C>(heading: Heading<'_>, tensors: &[Tensor<C>]) -> serde_json::Result<
     serde_json::to_vec(&Header {
         metadata: Metadata {
             checksum: NO_CHECKSUM.into(),
-            format: FORMAT.into(),
+            format: kind.format.into(),
             grid: serde_json::to_string(heading.grid)?,
             provenance: serde_json::to_string(heading.provenance)?,
             scene: heading.scene.into(),
+            store: kind.store.map(str::to_owned),
         },
         tensors: infos.collect(),
     })

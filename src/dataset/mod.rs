@@ -25,8 +25,11 @@ pub use atomic::{Target, discard_unfinished, replace_file, resolved};
 pub use column::Column;
 pub use error::Error;
 pub use export::Format;
-pub(crate) use file::{CONTACTS, Contents as TensorContents, Heading, TOUCHES, Tensor, surface_tensors, write_file};
+pub(crate) use file::{
+    CONTACTS, Contents as TensorContents, Heading, Kind, TOUCHES, Tensor, surface_tensors, write_container, write_file,
+};
 pub use grid::{Axis, Grid};
+pub(crate) use read::open_container;
 pub use summary::{StatusCounts, Summary};
 
 use crate::contact::{MeshRipple, NodeForce, Status};

@@ -11,7 +11,7 @@ use crate::{
 use memmap2::{Mmap, MmapMut};
 use safetensors::tensor::{Metadata as Tensors, TensorInfo};
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, HashMap},
     fs::File,
     io::{self, Read},
     path::Path,
@@ -68,61 +68,106 @@ fn regular_file(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
+/// Maps the file at `path`, and checks header and checksum; `format` is that of its kind.
+pub(crate) fn open_container(path: &Path, format: &'static str) -> Result<Container, Error> {
+    let read = |source| Error::Read { path: path.into(), source };
+    let file = regular_file(path).map_err(read)?;
+    // SAFETY: as in [`Dataset::open`].
+    let map = unsafe { Mmap::map(&file) }.map_err(read)?;
+    Container::check(path, map, format)
+}
+
 /// Checks a whole file and makes a dataset of windows into it.
 fn decode(path: &Path, map: Mmap) -> Result<Dataset, Error> {
-    let foreign = |reason: &str| Error::Foreign { path: path.into(), reason: reason.into() };
     let damaged = |reason: String| Error::Damaged { path: path.into(), reason };
-
-    if map.get(LENGTH..CHECKSUM) != Some(OPENING) {
-        return Err(foreign("it begins otherwise"));
-    }
-    let length = map.first_chunk::<LENGTH>().map_or(0, |bytes| u64::from_le_bytes(*bytes));
-    let header = usize::try_from(length).unwrap_or(usize::MAX);
-    let start = header.saturating_add(LENGTH);
-    if header > MAX_HEADER || start > map.len() || !start.is_multiple_of(PAGE) {
-        return Err(damaged(format!("its header would be {length} bytes long, in a file of {}", map.len())));
-    }
-    let metadata: Tensors =
-        serde_json::from_slice(&map[LENGTH..start]).map_err(|error| damaged(format!("header: {error}")))?;
-    if metadata.data_len() != map.len() - start {
-        let (found, expected) = (map.len() - start, metadata.data_len());
-        return Err(damaged(format!("it holds {found} bytes of data where its header promises {expected}")));
-    }
-
-    // The digits are compared as text: a hexadecimal number would read the same in capitals.
-    let written = &map[CHECKSUM..CHECKSUM + NO_CHECKSUM.len()];
-    let mut hasher = crc32fast::Hasher::new();
-    hasher.update(&map[..CHECKSUM]);
-    hasher.update(NO_CHECKSUM.as_bytes());
-    hasher.update(&map[CHECKSUM + NO_CHECKSUM.len()..]);
-    let found = digits(hasher);
-    if written != found.as_bytes() {
-        let written = String::from_utf8_lossy(written);
-        return Err(damaged(format!("its contents have checksum {found}, its header says {written}")));
-    }
-
-    let texts: BTreeMap<_, _> = metadata.metadata().iter().flatten().collect();
-    let text = |key: &str| {
-        texts.get(&key.to_string()).map(|text| text.as_str()).ok_or_else(|| damaged(format!("{key} is missing")))
-    };
-    let format = text("format")?;
-    if format != FORMAT {
-        return Err(Error::Version { path: path.into(), found: format.into(), expected: FORMAT });
-    }
-    let grid: Grid = serde_json::from_str(text("grid")?).map_err(|error| damaged(format!("grid: {error}")))?;
-    let provenance: Provenance =
-        serde_json::from_str(text("provenance")?).map_err(|error| damaged(format!("provenance: {error}")))?;
-    let scene = text("scene")?.to_string();
-    grid.check().map_err(damaged)?;
-
-    let mut tensors: BTreeMap<_, _> = metadata.tensors().into_iter().map(|(name, info)| (name, info.clone())).collect();
-    let windows = Windows { map: Arc::new(map), start };
-    let dataset = windows.dataset(&mut tensors, grid, scene, provenance).map_err(damaged)?;
-    if let Some((name, _)) = tensors.first_key_value() {
-        return Err(damaged(format!("tensor {name} does not belong here")));
-    }
+    let mut container = Container::check(path, map, FORMAT)?;
+    let (grid, provenance) = container.heading().map_err(damaged)?;
+    let scene = container.text("scene").map_err(damaged)?.to_string();
+    let Container { windows, tensors, .. } = &mut container;
+    let dataset = windows.dataset(tensors, grid, scene, provenance).map_err(damaged)?;
+    container.finish().map_err(damaged)?;
     check::check(&dataset).map_err(damaged)?;
     Ok(dataset)
+}
+
+/// A file whose header and checksum are sound.
+pub(crate) struct Container {
+    texts: HashMap<String, String>,
+    /// Those that have not been taken.
+    tensors: BTreeMap<String, TensorInfo>,
+    windows: Windows,
+}
+
+impl Container {
+    /// Checks the whole file.
+    fn check(path: &Path, map: Mmap, format: &'static str) -> Result<Self, Error> {
+        let foreign = |reason: &str| Error::Foreign { path: path.into(), reason: reason.into() };
+        let damaged = |reason: String| Error::Damaged { path: path.into(), reason };
+
+        if map.get(LENGTH..CHECKSUM) != Some(OPENING) {
+            return Err(foreign("it begins otherwise"));
+        }
+        let length = map.first_chunk::<LENGTH>().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+        let header = usize::try_from(length).unwrap_or(usize::MAX);
+        let start = header.saturating_add(LENGTH);
+        if header > MAX_HEADER || start > map.len() || !start.is_multiple_of(PAGE) {
+            return Err(damaged(format!("its header would be {length} bytes long, in a file of {}", map.len())));
+        }
+        let metadata: Tensors =
+            serde_json::from_slice(&map[LENGTH..start]).map_err(|error| damaged(format!("header: {error}")))?;
+        if metadata.data_len() != map.len() - start {
+            let (found, expected) = (map.len() - start, metadata.data_len());
+            return Err(damaged(format!("it holds {found} bytes of data where its header promises {expected}")));
+        }
+
+        // The digits are compared as text: a hexadecimal number would read the same in capitals.
+        let written = &map[CHECKSUM..CHECKSUM + NO_CHECKSUM.len()];
+        let mut hasher = crc32fast::Hasher::new();
+        hasher.update(&map[..CHECKSUM]);
+        hasher.update(NO_CHECKSUM.as_bytes());
+        hasher.update(&map[CHECKSUM + NO_CHECKSUM.len()..]);
+        let found = digits(hasher);
+        if written != found.as_bytes() {
+            let written = String::from_utf8_lossy(written);
+            return Err(damaged(format!("its contents have checksum {found}, its header says {written}")));
+        }
+
+        let container = Self {
+            texts: metadata.metadata().clone().unwrap_or_default(),
+            tensors: metadata.tensors().into_iter().map(|(name, info)| (name, info.clone())).collect(),
+            windows: Windows { map: Arc::new(map), start },
+        };
+        let found = container.text("format").map_err(damaged)?;
+        if found != format {
+            return Err(Error::Version { path: path.into(), found: found.into(), expected: format });
+        }
+        Ok(container)
+    }
+
+    /// A text of the header; `Err` says that it is missing.
+    pub(crate) fn text(&self, key: &str) -> Result<&str, String> {
+        self.texts.get(key).map(String::as_str).ok_or_else(|| format!("{key} is missing"))
+    }
+
+    /// Grid and provenance; `Err` says what is wrong.
+    pub(crate) fn heading(&self) -> Result<(Grid, Provenance), String> {
+        let grid: Grid = serde_json::from_str(self.text("grid")?).map_err(|error| format!("grid: {error}"))?;
+        let provenance: Provenance =
+            serde_json::from_str(self.text("provenance")?).map_err(|error| format!("provenance: {error}"))?;
+        grid.check()?;
+        Ok((grid, provenance))
+    }
+
+    /// Takes the tensor `name`; `shape` leaves free lengths as `None`. `Err` says what is wrong, or that it is missing.
+    pub(crate) fn take<T: Element>(&mut self, name: &str, shape: &[Option<usize>]) -> Result<Column<T>, String> {
+        self.windows.column(&mut self.tensors, name, shape)?.ok_or_else(|| missing(name))
+    }
+
+    /// `Err` names a tensor that has not been taken.
+    pub(crate) fn finish(&self) -> Result<(), String> {
+        let extra = self.tensors.first_key_value();
+        extra.map_or(Ok(()), |(name, _)| Err(format!("tensor {name} does not belong here")))
+    }
 }
 
 /// Cuts a mapped file into columns.

@@ -20,6 +20,7 @@ mod measured;
 mod part;
 mod pilot;
 pub(crate) mod reference;
+pub mod refine;
 mod report;
 pub mod scan;
 pub(crate) mod spacing;

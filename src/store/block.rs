@@ -1,0 +1,93 @@
+//! What a block holds: the nodes that were solved, and what they add to the interpolation of the levels below.
+
+use super::{record::width, space::Place};
+use crate::{MAX_JOINTS, contact::Status};
+
+/// Solved nodes of a block, ascending by their place in it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Nodes {
+    /// Bit p tells that the node at place p was solved.
+    pub present: u64,
+    /// w, its gradient and mixed derivatives at each [sqrt(J), by rad or m]; see [`super::record`].
+    pub records: Vec<f32>,
+    /// Smallest signed distance between proxy and object at rest [m].
+    pub gap: Vec<f32>,
+    /// [`Status`] as its number.
+    pub status: Vec<u8>,
+}
+
+impl Nodes {
+    /// Adds the node at `place`, which is behind those that are there.
+    pub fn push(&mut self, place: usize, record: &[f32], gap: f32, status: Status) {
+        self.present |= 1 << place;
+        self.records.extend_from_slice(record);
+        self.gap.push(gap);
+        self.status.push(status as u8);
+    }
+
+    /// Number of nodes.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.present.count_ones() as usize
+    }
+
+    /// Places of the nodes, ascending.
+    pub fn places(&self) -> impl Iterator<Item = usize> + use<> {
+        let present = self.present;
+        (0..u64::BITS as usize).filter(move |place| present >> place & 1 == 1)
+    }
+
+    /// Whether the columns belong together, hold numbers, and the nodes are among `allowed`.
+    pub(super) fn is_sound(&self, joints: usize, allowed: u64) -> bool {
+        let count = self.count();
+        self.present & !allowed == 0
+            && self.records.len() == count * width(joints)
+            && (self.gap.len(), self.status.len()) == (count, count)
+            && self.records.iter().chain(&self.gap).all(|number| number.is_finite())
+            && self.status.iter().all(|&number| Status::from_number(number).is_some())
+    }
+}
+
+/// A published block.
+pub struct Block {
+    pub(super) nodes: Nodes,
+    /// Places of nodes whose torque is not to be trusted.
+    pub(super) failed: u64,
+    /// Numbers of the interpolation at each node less those that the levels below give there, lengths in steps of the level (`linear`: of
+    /// the base).
+    pub(super) surplus: Box<[f32]>,
+}
+
+impl Block {
+    /// What was solved.
+    #[must_use]
+    pub fn nodes(&self) -> &Nodes {
+        &self.nodes
+    }
+
+    pub(super) fn new(nodes: Nodes, surplus: Box<[f32]>) -> Self {
+        let is_failed = |number: &u8| Status::from_number(*number).is_some_and(Status::is_failed);
+        let failed = nodes.places().zip(&nodes.status).filter(|(_, status)| is_failed(status));
+        Self { failed: failed.map(|(place, _)| 1 << place).sum(), nodes, surplus }
+    }
+
+    /// The surplus of the node at `place`, `kinds` numbers; `None` if it was not solved.
+    #[inline]
+    pub(super) fn surplus_at(&self, place: usize, kinds: usize) -> Option<&[f32]> {
+        let present = self.nodes.present;
+        let rank = (present & ((1 << place) - 1)).count_ones() as usize;
+        if present >> place & 1 == 1 { self.surplus.get(rank * kinds..(rank + 1) * kinds) } else { None }
+    }
+
+    /// Memory of the block [bytes].
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let Nodes { records, gap, status, .. } = &self.nodes;
+        size_of::<Self>() + 4 * (self.surplus.len() + records.len() + gap.len()) + status.len()
+    }
+}
+
+/// The block above, along the axes in `set`, of the one with `place`.
+pub(super) fn beyond(place: &Place, set: usize) -> Place {
+    std::array::from_fn::<_, MAX_JOINTS, _>(|a| place[a] + (set >> a & 1) as u32)
+}

@@ -1,0 +1,395 @@
+//! A sparse store of C-space: nodes at several levels, solved where they carry information.
+//!
+//! | file | subject |
+//! |---|---|
+//! | `space` | where nodes and blocks of each level lie, and their keys |
+//! | `directory` | from keys to blocks, for readers that never wait |
+//! | `block` | what a block holds |
+//! | `record` | the numbers of a node |
+//! | `kernel` | the interpolants of one cell |
+//! | `file` | a store on disk |
+//!
+//! *Hierarchy.* The interpolated function is a sum over the levels, each the interpolant of what the level's nodes have more than
+//! the levels below give there (their *surplus*): `w(q) = sum_l sum_n B_n(q) s_n`. The basis functions B of a node are
+//! tensor products with support in the cells around it: C1 cubic Hermite polynomials of value, slopes and mixed second derivatives
+//! ([`Order::Potential`]), or hats ([`Order::Linear`]). A node that was not solved has no surplus: there the function is what the
+//! coarser levels say. So w is C1, or continuous, whichever nodes there are, and exact at all of them, value, gradient and mixed
+//! derivatives. (Bungartz and Griebel 2004, Sparse grids, section 3, for hats; here with Hermite data and without the sparse grid's
+//! choice of levels.)
+//!
+//! *Order of publication.* A surplus is final only if nothing below it can change: a block is published after the blocks of the level
+//! below that hold the corners of its cells. Within a published block a node that was not solved stays so. Then the same nodes give
+//! the same store, to the bit, in whatever order they came.
+//!
+//! Design, bounds and figures: docs/store.md.
+
+mod block;
+mod directory;
+mod file;
+mod kernel;
+pub mod record;
+pub mod space;
+mod sync;
+
+pub use block::{Block, Nodes};
+pub use file::StoreFile;
+pub use space::{Place, Space, SpaceError};
+
+use crate::{JointVector, MAX_JOINTS};
+use block::beyond;
+use directory::{Directory, Refusal};
+use record::{MAX_WIDTH, mixed, sets, slope, width};
+
+/// How a store interpolates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Order {
+    /// w and its gradient, each multilinear: continuous.
+    Linear,
+    /// w by cubic Hermite polynomials: C1, and the gradient is that of w.
+    Potential,
+}
+
+/// Blocks of C-space at several levels. Any number of threads may read and publish at once.
+pub struct Store {
+    space: Space,
+    order: Order,
+    blocks: Directory<Block>,
+}
+
+/// A block was not published; the store is as before.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PublishError {
+    /// The block lies outside the space, or its columns do not belong together.
+    #[error("block {key:#x} of the store is not sound")]
+    Unsound {
+        /// Its key.
+        key: u64,
+    },
+    /// A block of the level below is missing.
+    #[error("block {key:#x} of the store comes before block {missing:#x}, on which it rests")]
+    Order {
+        /// Its key.
+        key: u64,
+        /// That of the other.
+        missing: u64,
+    },
+    /// It is there.
+    #[error("block {key:#x} of the store is there twice")]
+    Taken {
+        /// Its key.
+        key: u64,
+    },
+    /// There is no room.
+    #[error("the store is full with {0} blocks")]
+    Full(usize),
+}
+
+/// The interpolated function at one configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Root {
+    /// w [sqrt(J)].
+    pub value: f64,
+    /// Its gradient [sqrt(J)/rad or /m].
+    pub slopes: JointVector,
+    /// Levels with a block around the configuration; 0 if there is none.
+    pub levels: u32,
+    /// Whether a node around the configuration did not converge.
+    pub failed: bool,
+}
+
+impl Root {
+    /// Energy of contact, `U = max(0, w)^2 / 2` [J].
+    #[must_use]
+    pub fn energy(&self) -> f64 {
+        0.5 * self.value.max(0.0).powi(2)
+    }
+
+    /// Contact torque, `-dU/dq` where the slopes are the gradient of w: zero at w = 0, without a jump [N m or N].
+    #[must_use]
+    pub fn torque(&self) -> JointVector {
+        let mut torque = self.slopes;
+        torque.iter_mut().for_each(|slope| *slope *= -self.value.max(0.0));
+        torque
+    }
+}
+
+impl Store {
+    /// An empty store over `space` with room for `most` blocks.
+    #[must_use]
+    pub fn new(space: Space, order: Order, most: usize) -> Self {
+        Self { space, order, blocks: Directory::new(most) }
+    }
+
+    /// Where its nodes lie.
+    #[must_use]
+    pub fn space(&self) -> &Space {
+        &self.space
+    }
+
+    /// How it interpolates.
+    #[must_use]
+    pub fn order(&self) -> Order {
+        self.order
+    }
+
+    /// Makes room for `most` blocks.
+    pub fn reserve(&mut self, most: usize) {
+        if most > self.blocks.capacity() {
+            self.blocks.resize(most);
+        }
+    }
+
+    /// A published block.
+    #[must_use]
+    pub fn get(&self, level: u32, block: &Place) -> Option<&Block> {
+        self.blocks.get(self.space.key(level, block))
+    }
+
+    /// All blocks, ascending by key: those of the base first.
+    #[must_use]
+    pub fn blocks(&self) -> Vec<(u64, &Block)> {
+        let mut blocks: Vec<_> = self.blocks.iter().collect();
+        blocks.sort_unstable_by_key(|(key, _)| *key);
+        blocks
+    }
+
+    /// The blocks on which a block of `level` rests: those of the level below that hold the corners of its cells.
+    pub fn foundation(&self, level: u32, block: &Place) -> impl Iterator<Item = Place> + use<> {
+        let joints = self.space.joints();
+        let (below, block) = (level.checked_sub(1), *block);
+        let last = below.map_or([0; MAX_JOINTS], |below| self.space.last(below));
+        // Node `block` of the level below, and those one farther; twice as many blocks are listed as there are, at most.
+        let corners = (0..1_usize << joints).filter(move |_| below.is_some()).map(move |set| beyond(&block, set));
+        let inside = corners.filter(move |node| (0..joints).all(|a| node[a] <= last[a]));
+        inside.map(|node| node.map(|i| i >> 1))
+    }
+
+    /// Publishes a block: its nodes, of those that [`Space::nodes`] names.
+    ///
+    /// # Errors
+    /// [`PublishError`].
+    pub fn publish(&self, level: u32, place: &Place, nodes: Nodes) -> Result<(), PublishError> {
+        let key = self.space.key(level, place);
+        if self.space.block(key) != Some((level, *place)) {
+            return Err(PublishError::Unsound { key });
+        }
+        let all: Vec<(usize, Place)> = self.space.nodes(level, place).collect();
+        let allowed = all.iter().fold(0, |set, (place, _)| set | 1 << place);
+        if !nodes.is_sound(self.space.joints(), allowed) {
+            return Err(PublishError::Unsound { key });
+        }
+        for below in self.foundation(level, place) {
+            if self.get(level - 1, &below).is_none() {
+                return Err(PublishError::Order { key, missing: self.space.key(level - 1, &below) });
+            }
+        }
+        let surplus = self.surplus(level, &all, &nodes);
+        match self.blocks.publish(key, Block::new(nodes, surplus)) {
+            Ok(_) => Ok(()),
+            Err(Refusal::Taken) => Err(PublishError::Taken { key }),
+            Err(Refusal::Full) => Err(PublishError::Full(self.blocks.capacity())),
+        }
+    }
+
+    /// Numbers of a node's surplus.
+    fn kinds(&self) -> usize {
+        match self.order {
+            Order::Linear => 1 + self.space.joints(),
+            Order::Potential => width(self.space.joints()),
+        }
+    }
+
+    /// Surplus of the `nodes` of a block of `level`, all of whose nodes are `all`.
+    fn surplus(&self, level: u32, all: &[(usize, Place)], nodes: &Nodes) -> Box<[f32]> {
+        let joints = self.space.joints();
+        let kinds = self.kinds();
+        let mut surplus = vec![0.0; kinds * nodes.count()].into_boxed_slice();
+        let solved =
+            all.iter().filter(|(place, _)| nodes.present >> place & 1 == 1).zip(surplus.chunks_exact_mut(kinds));
+        for (((_, node), surplus), record) in solved.zip(nodes.records.chunks_exact(width(joints))) {
+            let below = self.record(level, node);
+            for (kind, set) in sets(joints).enumerate() {
+                let position = match self.order {
+                    Order::Potential => kind,
+                    Order::Linear if set.count_ones() <= 1 => (set << 1).checked_ilog2().unwrap_or(0) as usize,
+                    Order::Linear => continue,
+                };
+                let derivatives = (0..joints).filter(|a| set >> a & 1 == 1);
+                let step: f64 = derivatives.map(|a| self.space.step(0, a)).product();
+                let scale = match self.order {
+                    Order::Linear => 1.0,
+                    Order::Potential => 0.5_f64.powi((level * set.count_ones()) as i32),
+                };
+                surplus[position] = ((f64::from(record[kind]) * step - below[kind]) * scale) as f32;
+            }
+        }
+        surplus
+    }
+
+    /// What the levels below `level` give at one of its nodes, lengths in steps of the base.
+    fn record(&self, level: u32, node: &Place) -> [f64; MAX_WIDTH] {
+        let joints = self.space.joints();
+        let (corners, wide) = (1_usize << joints, width(joints));
+        let mut sum = [0.0; MAX_WIDTH];
+        let mut cell = self.space.around(level, node);
+        for below in 0..level {
+            if below > 0 {
+                cell.halve();
+            }
+            for side in 0..corners {
+                let corner = beyond(&cell.low, side);
+                let Some(block) = self.get(below, &corner.map(|i| i >> 1)) else { continue };
+                let place = (0..joints).map(|a| ((corner[a] & 1) as usize) << a).sum::<usize>();
+                let Some(surplus) = block.surplus_at(place, self.kinds()) else { continue };
+                let at = |kind: usize| f64::from(surplus[kind]);
+                match self.order {
+                    Order::Linear => {
+                        let weight: f64 = (0..joints)
+                            .map(|a| if side >> a & 1 == 1 { cell.fractions[a] } else { 1.0 - cell.fractions[a] })
+                            .product();
+                        sum[0] += weight * at(0);
+                        (0..joints).for_each(|a| sum[slope(a)] += weight * at(1 + a));
+                    }
+                    Order::Potential => {
+                        let Some(weights) = kernel::transfer(joints, side, &cell.fractions) else { continue };
+                        for ((sum, weights), set) in sum.iter_mut().zip(&weights).zip(sets(joints)) {
+                            let scale = f64::from(1_u32 << below).powi(set.count_ones() as i32);
+                            *sum += scale * (0..wide).map(|kind| weights[kind] * at(kind)).sum::<f64>();
+                        }
+                    }
+                }
+            }
+        }
+        sum
+    }
+
+    /// The function at `q`, one entry per joint; beyond the grid that at its border. Never allocates, locks or waits.
+    #[must_use]
+    pub fn sample(&self, q: &[f64]) -> Root {
+        use kernel::rates;
+        match (self.order, self.space.joints()) {
+            (Order::Linear, 1) => self.linear::<1, 2, 2>(q),
+            (Order::Linear, 2) => self.linear::<2, 4, 3>(q),
+            (Order::Linear, 3) => self.linear::<3, 8, 4>(q),
+            (Order::Linear, 4) => self.linear::<4, 16, 5>(q),
+            (Order::Linear, 5) => self.linear::<5, 32, 6>(q),
+            (Order::Linear, _) => self.linear::<MAX_JOINTS, 64, 7>(q),
+            (Order::Potential, 1) => self.potential::<1, 2, { width(1) }, { rates(1) }>(q),
+            (Order::Potential, 2) => self.potential::<2, 4, { width(2) }, { rates(2) }>(q),
+            (Order::Potential, 3) => self.potential::<3, 8, { width(3) }, { rates(3) }>(q),
+            (Order::Potential, 4) => self.potential::<4, 16, { width(4) }, { rates(4) }>(q),
+            (Order::Potential, 5) => self.potential::<5, 32, { width(5) }, { rates(5) }>(q),
+            (Order::Potential, _) => self.potential::<MAX_JOINTS, 64, MAX_WIDTH, { rates(MAX_JOINTS) }>(q),
+        }
+    }
+
+    /// `C = 2^D`, `N = 1 + D`.
+    fn linear<const D: usize, const C: usize, const N: usize>(&self, q: &[f64]) -> Root {
+        self.sum::<D, C, N>(q, |_, numbers, fractions, root| {
+            kernel::multilinear::<D, C>(numbers, fractions);
+            root.value += numbers[0][0];
+            root.slopes.iter_mut().zip(&numbers[1..]).for_each(|(sum, slope)| *sum += slope[0]);
+        })
+    }
+
+    /// `C = 2^D`, `W = width(D)`, `R = rates(D)`.
+    fn potential<const D: usize, const C: usize, const W: usize, const R: usize>(&self, q: &[f64]) -> Root {
+        self.sum::<D, C, W>(q, |level, numbers, fractions, root| {
+            let (value, slopes) = kernel::hermite::<D, C, W, R>(numbers, fractions);
+            let rise = f64::from(1_u32 << level);
+            root.value += value;
+            root.slopes.iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += rise * slope);
+        })
+    }
+
+    /// Adds up the levels: `add` adds one, from the `N` numbers at the `C` corners of the cell of that level and the fractions of it.
+    #[inline]
+    fn sum<const D: usize, const C: usize, const N: usize>(
+        &self,
+        q: &[f64],
+        mut add: impl FnMut(u32, &mut [[f64; C]; N], &[f64; MAX_JOINTS], &mut Root),
+    ) -> Root {
+        let mut root = Root { value: 0.0, slopes: JointVector::zeros(self.space.joints()), levels: 0, failed: false };
+        let mut numbers = [[0.0; C]; N];
+        let mut cell = self.space.locate(q);
+        for level in 0..self.space.levels() {
+            if level > 0 {
+                cell.halve();
+            }
+            let Some(any) = self.gather::<D, C, N>(level, &cell.low, &mut numbers, &mut root.failed) else { break };
+            root.levels = level + 1;
+            if any {
+                add(level, &mut numbers, &cell.fractions, &mut root);
+            }
+        }
+        root.slopes.iter_mut().enumerate().for_each(|(a, slope)| *slope /= self.space.step(0, a));
+        root
+    }
+
+    /// Copies the surplus at the corners of the cell with first corner `low`, zeros where there is no node; `None` if there is no block,
+    /// else whether there is a node.
+    fn gather<const D: usize, const C: usize, const N: usize>(
+        &self,
+        level: u32,
+        low: &Place,
+        numbers: &mut [[f64; C]; N],
+        failed: &mut bool,
+    ) -> Option<bool> {
+        // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to the other.
+        let odd = (0..D).map(|a| ((low[a] & 1) as usize) << a).sum::<usize>();
+        let even = (C - 1) ^ odd;
+        let first = self.space.key(level, &low.map(|i| i >> 1));
+        let (mut found, mut any, mut beside, mut inside) = (false, false, 0_usize, 0_usize);
+        loop {
+            let beyond: u64 = (0..D).map(|a| self.space.stride(a) & (beside as u64 >> a & 1).wrapping_neg()).sum();
+            let block = self.blocks.get(first + beyond);
+            found |= block.is_some();
+            loop {
+                let corner = beside | inside;
+                match block.and_then(|block| block.surplus_at(corner ^ odd, N)) {
+                    Some(surplus) => {
+                        any = true;
+                        numbers.iter_mut().zip(surplus).for_each(|(number, &surplus)| number[corner] = surplus.into());
+                        *failed |= block.is_some_and(|block| block.failed >> (corner ^ odd) & 1 == 1);
+                    }
+                    None => numbers.iter_mut().for_each(|number| number[corner] = 0.0),
+                }
+                inside = inside.wrapping_sub(even) & even;
+                if inside == 0 {
+                    break;
+                }
+            }
+            beside = beside.wrapping_sub(odd) & odd;
+            if beside == 0 {
+                break;
+            }
+        }
+        found.then_some(any)
+    }
+
+    /// Memory of all blocks [bytes].
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.blocks.iter().map(|(_, block)| block.bytes() + 2 * size_of::<usize>()).sum()
+    }
+}
+
+/// The numbers of a node from its energy U [J], torque [N m] and tangent d tau/d q, lower triangle [N m/rad]: `w = sqrt(2 U)`,
+/// `w_a = -tau_a / w`, `w_ab = -(d tau_a/d q_b + w_a w_b) / w`. Without a tangent the mixed derivatives are zero.
+#[must_use]
+pub fn root_of(energy: f64, torque: &[f64], tangent: Option<&[f64]>) -> Vec<f64> {
+    let joints = torque.len();
+    let mut record = vec![0.0; width(joints)];
+    let w = (2.0 * energy).sqrt();
+    record[0] = w;
+    torque.iter().enumerate().for_each(|(a, tau)| record[slope(a)] = -tau / w);
+    for a in 0..joints {
+        for b in 0..a {
+            let tangent = tangent.map(|tangent| tangent[a * (a + 1) / 2 + b]);
+            let product = record[slope(a)] * record[slope(b)];
+            record[mixed(a, b)] = tangent.map_or(0.0, |tangent| -(tangent + product) / w);
+        }
+    }
+    record
+}

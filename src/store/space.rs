@@ -1,0 +1,206 @@
+//! Where nodes and blocks lie: a base grid, and levels above it whose spacing halves from one to the next.
+//!
+//! Node `i` of level l is at `start + i step / 2^l` along each axis, so that node 2 i of level l + 1 is node i of level l. Block `k` of a
+//! level holds the nodes `2 k` and `2 k + 1` along each axis, 2^d in all: bit a of a node's place in its block is its parity along axis a.
+//! A key packs a level and the coordinates of a block into 64 bits, ascending with the level.
+
+use crate::{MAX_JOINTS, dataset::Grid};
+
+/// Coordinates of a node or a block, one for each joint; the others are zero.
+pub type Place = [u32; MAX_JOINTS];
+
+/// Bits of a key for the level.
+const LEVEL_BITS: u32 = 4;
+
+/// Most levels.
+pub const MAX_LEVELS: u32 = 1 << LEVEL_BITS;
+
+/// The lattice of all levels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Space {
+    joints: usize,
+    levels: u32,
+    /// First coordinate of each axis [rad or m].
+    start: [f64; MAX_JOINTS],
+    /// Spacing of the base [rad or m].
+    step: [f64; MAX_JOINTS],
+    /// Cells of the base along each axis.
+    cells: [u32; MAX_JOINTS],
+    /// Bits of a key for each coordinate.
+    bits: u32,
+}
+
+/// A grid cannot be refined so often.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SpaceError {
+    /// The base is no grid.
+    #[error("{0}")]
+    Grid(String),
+    /// Nothing can be halved.
+    #[error("axis {axis} has one grid line: refinement needs two or more along each axis")]
+    Flat {
+        /// Its name.
+        axis: String,
+    },
+    /// Coordinates do not fit into a key.
+    #[error("{levels} levels above axis {axis} are more than can be numbered: at most {most} are possible")]
+    Levels {
+        /// Its name.
+        axis: String,
+        /// Levels asked for, the base included.
+        levels: u32,
+        /// Levels that fit, the base included.
+        most: u32,
+    },
+}
+
+/// The cell around a configuration at one level.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cell {
+    /// Its first corner.
+    pub low: Place,
+    /// Fractions of the cell along each axis, 0 to 1.
+    pub fractions: [f64; MAX_JOINTS],
+}
+
+impl Space {
+    /// The space over `base` with `levels` levels, the base included.
+    ///
+    /// # Errors
+    /// [`SpaceError`].
+    pub fn new(base: &Grid, levels: u32) -> Result<Self, SpaceError> {
+        base.check().map_err(SpaceError::Grid)?;
+        let joints = base.joints();
+        let bits = (u64::BITS - LEVEL_BITS) / joints as u32;
+        let mut space = Self {
+            joints,
+            levels: levels.max(1),
+            start: [0.0; MAX_JOINTS],
+            step: [0.0; MAX_JOINTS],
+            cells: [0; MAX_JOINTS],
+            bits,
+        };
+        for (j, axis) in base.axes.iter().enumerate() {
+            if axis.count < 2 {
+                return Err(SpaceError::Flat { axis: axis.name.clone() });
+            }
+            (space.start[j], space.step[j]) = (axis.start, axis.step);
+            // Coordinates of nodes are below 2^31 and below twice those of blocks.
+            let limit = 1_u64 << bits.saturating_add(1).min(31);
+            let fits = |levels: &u32| (axis.count as u64 - 1) < limit >> (levels - 1);
+            let most = (1..=MAX_LEVELS).take_while(fits).last().unwrap_or(0);
+            if levels > most {
+                return Err(SpaceError::Levels { axis: axis.name.clone(), levels, most });
+            }
+            space.cells[j] = (axis.count - 1) as u32;
+        }
+        Ok(space)
+    }
+
+    /// Number of joints d.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        self.joints
+    }
+
+    /// Number of levels, the base included.
+    #[must_use]
+    pub fn levels(&self) -> u32 {
+        self.levels
+    }
+
+    /// Spacing of `level` along `axis` [rad or m].
+    #[must_use]
+    pub fn step(&self, level: u32, axis: usize) -> f64 {
+        self.step[axis] / f64::from(1_u32 << level)
+    }
+
+    /// Last node of `level` along each axis.
+    #[must_use]
+    pub fn last(&self, level: u32) -> Place {
+        self.cells.map(|cells| cells << level)
+    }
+
+    /// Configuration of a node [rad or m].
+    #[must_use]
+    pub fn configuration(&self, level: u32, node: &Place) -> crate::JointVector {
+        let mut q = crate::JointVector::zeros(self.joints);
+        for (a, q) in q.iter_mut().enumerate() {
+            // Steps of the base, which are exact: the same node has the same configuration at every level.
+            *q = self.start[a] + f64::from(node[a]) / f64::from(1_u32 << level) * self.step[a];
+        }
+        q
+    }
+
+    /// Key of a block.
+    #[must_use]
+    pub fn key(&self, level: u32, block: &Place) -> u64 {
+        block[..self.joints].iter().fold(u64::from(level), |key, &k| key << self.bits | u64::from(k))
+    }
+
+    /// What the key of a block's neighbour along `axis` has more.
+    #[inline]
+    pub(super) fn stride(&self, axis: usize) -> u64 {
+        1 << (self.bits * (self.joints - 1 - axis) as u32)
+    }
+
+    /// Level and block of a key; `None` if no block of this space has it.
+    #[must_use]
+    pub fn block(&self, key: u64) -> Option<(u32, Place)> {
+        let (mut rest, mut block) = (key, [0; MAX_JOINTS]);
+        for k in block[..self.joints].iter_mut().rev() {
+            *k = u32::try_from(rest & ((1 << self.bits) - 1)).ok()?;
+            rest >>= self.bits;
+        }
+        let level = u32::try_from(rest).ok().filter(|level| *level < self.levels)?;
+        let last = self.last(level);
+        (0..self.joints).all(|a| 2 * u64::from(block[a]) <= u64::from(last[a])).then_some((level, block))
+    }
+
+    /// The nodes of a block that lie in the grid and belong to its level, those of the base or not all even: place and node.
+    pub fn nodes(&self, level: u32, block: &Place) -> impl Iterator<Item = (usize, Place)> + use<> {
+        let (joints, last, block) = (self.joints, self.last(level), *block);
+        (usize::from(level > 0)..1 << joints).filter_map(move |place| {
+            let mut node = [0; MAX_JOINTS];
+            for a in 0..joints {
+                node[a] = 2 * block[a] + (place >> a & 1) as u32;
+            }
+            (0..joints).all(|a| node[a] <= last[a]).then_some((place, node))
+        })
+    }
+
+    /// The cell of the base around `q`, which has one entry per joint, at the grid's border beyond it.
+    pub(super) fn locate(&self, q: &[f64]) -> Cell {
+        let mut cell = Cell { low: [0; MAX_JOINTS], fractions: [0.0; MAX_JOINTS] };
+        for (a, &q) in q.iter().enumerate().take(self.joints) {
+            let cells = f64::from(self.cells[a]);
+            // What is not a number becomes 0.
+            let steps = ((q - self.start[a]) / self.step[a]).max(0.0).min(cells);
+            let low = steps.min(cells - 1.0) as u32;
+            (cell.low[a], cell.fractions[a]) = (low, steps - f64::from(low));
+        }
+        cell
+    }
+
+    /// The cell of the base around a node of `level`.
+    pub(super) fn around(&self, level: u32, node: &Place) -> Cell {
+        let mut cell = Cell { low: [0; MAX_JOINTS], fractions: [0.0; MAX_JOINTS] };
+        for (a, i) in node.iter().enumerate().take(self.joints) {
+            cell.low[a] = (i >> level).min(self.cells[a] - 1);
+            cell.fractions[a] = f64::from(i - (cell.low[a] << level)) / f64::from(1_u32 << level);
+        }
+        cell
+    }
+}
+
+impl Cell {
+    /// The cell of the level above, finer by half, around the same configuration. Halving is exact.
+    pub fn halve(&mut self) {
+        for (low, fraction) in self.low.iter_mut().zip(&mut self.fractions) {
+            let twice = 2.0 * *fraction;
+            let upper = twice >= 1.0;
+            *low = 2 * *low + u32::from(upper);
+            *fraction = twice - f64::from(u8::from(upper));
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! The file: what comes back, and what is refused.
+
+use crate::fixture::{noise, space, step, store};
+use haptize::{
+    MAX_JOINTS,
+    dataset::{Axis, Error, Grid, Provenance},
+    store::{Order, StoreFile},
+};
+use std::{fs, path::Path};
+
+fn file(joints: usize) -> StoreFile {
+    let count = space(joints, 1).last(0)[0] as usize + 1;
+    let axis = |a: usize| Axis { name: format!("joint {a}"), unit: "rad".into(), start: -0.2, step: step(a), count };
+    StoreFile {
+        store: store(joints, 2, Order::Potential, 0.6, 4, noise(joints, 2)),
+        grid: Grid { axes: (0..joints).map(axis).collect() },
+        scene: "name = \"made\"".into(),
+        provenance: Provenance { version: "1".into(), ..Provenance::default() },
+    }
+}
+
+#[test]
+fn a_store_comes_back_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    for joints in [1, 3, MAX_JOINTS] {
+        let path = folder.path().join(format!("{joints}.store"));
+        let written = file(joints);
+        written.save(path.as_path()).unwrap();
+        let read = StoreFile::open(&path, 0).unwrap();
+        assert_eq!((&read.grid, &read.scene, &read.provenance), (&written.grid, &written.scene, &written.provenance));
+        assert_eq!(read.store.order(), written.store.order());
+        let blocks = |file: &StoreFile| -> Vec<_> {
+            file.store.blocks().into_iter().map(|(key, block)| (key, block.nodes().clone())).collect()
+        };
+        assert_eq!(blocks(&read), blocks(&written));
+        for k in 0..50 {
+            let q: Vec<f64> = (0..joints).map(|a| 0.1 + 0.2 * (f64::from(k) + a as f64).sin()).collect();
+            assert_eq!(read.store.sample(&q), written.store.sample(&q));
+        }
+        // And to the bit on disk.
+        let again = folder.path().join("again.store");
+        read.save(again.as_path()).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), fs::read(&again).unwrap());
+    }
+}
+
+#[test]
+fn a_file_that_is_cut_short_altered_or_of_another_kind_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("whole.store");
+    file(2).save(path.as_path()).unwrap();
+    let whole = fs::read(&path).unwrap();
+    let bad = folder.path().join("bad.store");
+    let refused = |bytes: &[u8]| {
+        fs::write(&bad, bytes).unwrap();
+        StoreFile::open(&bad, 0).map(|_| ()).unwrap_err()
+    };
+    for length in [0, 7, 100, whole.len() / 2, whole.len() - 1] {
+        refused(&whole[..length]);
+    }
+    for at in (0..whole.len()).step_by(whole.len() / 97) {
+        let mut altered = whole.clone();
+        altered[at] ^= 4;
+        refused(&altered);
+    }
+    assert!(matches!(haptize::dataset::Dataset::open(&path).map(|_| ()), Err(Error::Version { .. })));
+    assert!(matches!(StoreFile::open(Path::new("/nowhere"), 0).map(|_| ()), Err(Error::Read { .. })));
+}

@@ -1,0 +1,105 @@
+//! Stores with random nodes at random places.
+
+use haptize::{
+    MAX_JOINTS,
+    contact::Status,
+    dataset::{Axis, Grid},
+    store::{Nodes, Order, Place, Space, Store, record::width},
+};
+
+/// Numbers in -1..1, the same every time.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        2.0 * (self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 1.0
+    }
+
+    /// True with probability `share`.
+    pub fn is(&mut self, share: f64) -> bool {
+        0.5 * (self.next() + 1.0) < share
+    }
+}
+
+/// Spacing of the base along `axis` [rad]: none is a power of two.
+pub fn step(axis: usize) -> f64 {
+    0.1 + 0.03 * axis as f64
+}
+
+/// Three cells of the base along each axis, two with five joints or more.
+pub fn space(joints: usize, levels: u32) -> Space {
+    let count = if joints < 5 { 4 } else { 3 };
+    let axis = |a: usize| Axis { name: format!("joint {a}"), unit: "rad".into(), start: -0.2, step: step(a), count };
+    Space::new(&Grid { axes: (0..joints).map(axis).collect() }, levels).unwrap()
+}
+
+/// All blocks of `level`.
+pub fn blocks(space: &Space, level: u32) -> Vec<Place> {
+    let joints = space.joints();
+    let mut places = vec![[0; MAX_JOINTS]];
+    for a in 0..joints {
+        let along = 0..=space.last(level)[a] / 2;
+        places = places
+            .iter()
+            .flat_map(|place| along.clone().map(|k| (*place, k)))
+            .map(|(mut place, k)| {
+                place[a] = k;
+                place
+            })
+            .collect();
+    }
+    places
+}
+
+/// The nodes of a block, each there with probability `share`, with the numbers that `record` gives for its configuration.
+pub fn nodes(
+    space: &Space,
+    level: u32,
+    block: &Place,
+    mut is_there: impl FnMut(&Place) -> bool,
+    mut record: impl FnMut(&[f64]) -> Vec<f64>,
+) -> Nodes {
+    let mut nodes = Nodes::default();
+    for (place, node) in space.nodes(level, block) {
+        if is_there(&node) {
+            let numbers: Vec<f32> = record(&space.configuration(level, &node)).iter().map(|&x| x as f32).collect();
+            assert_eq!(numbers.len(), width(space.joints()));
+            nodes.push(place, &numbers, 0.25, Status::Contact);
+        }
+    }
+    nodes
+}
+
+/// A store in which blocks are there with probability `share`, as far as their foundations allow, and nodes in them, too.
+pub fn store(
+    joints: usize,
+    levels: u32,
+    order: Order,
+    share: f64,
+    seed: u64,
+    mut record: impl FnMut(&[f64]) -> Vec<f64>,
+) -> Store {
+    let mut random = Random(seed);
+    let space = space(joints, levels);
+    let most = (0..levels).map(|level| blocks(&space, level).len()).sum();
+    let store = Store::new(space.clone(), order, most);
+    for level in 0..levels {
+        for block in blocks(&space, level) {
+            let rests =
+                level == 0 || store.foundation(level, &block).all(|below| store.get(level - 1, &below).is_some());
+            if rests && (level == 0 || random.is(share)) {
+                let is_there = |_: &Place| level == 0 || random.is(0.8);
+                let nodes = nodes(&space, level, &block, is_there, &mut record);
+                store.publish(level, &block, nodes).unwrap();
+            }
+        }
+    }
+    store
+}
+
+/// Random numbers for a node.
+pub fn noise(joints: usize, seed: u64) -> impl FnMut(&[f64]) -> Vec<f64> {
+    let mut random = Random(seed);
+    move |_| (0..width(joints)).map(|_| random.next()).collect()
+}

@@ -1,0 +1,106 @@
+//! What may be published, in what order, and that order does not matter.
+
+use crate::fixture::{blocks, nodes, noise, space, store};
+use haptize::{
+    MAX_JOINTS,
+    contact::Status,
+    dataset::{Axis, Grid},
+    store::{Nodes, Order, Place, PublishError, Space, SpaceError, Store, record::width},
+};
+
+#[test]
+fn the_same_blocks_in_another_order_make_the_same_store_to_the_bit() {
+    for joints in [1, 3, 5] {
+        let one = store(joints, 2, Order::Potential, 0.7, 3, noise(joints, 5));
+        let mut all = one.blocks();
+        // Level by level, backwards.
+        all.reverse();
+        all.sort_by_key(|(key, _)| one.space().block(*key).unwrap().0);
+        let other = Store::new(one.space().clone(), Order::Potential, all.len());
+        for (key, block) in all {
+            let (level, place) = one.space().block(key).unwrap();
+            other.publish(level, &place, block.nodes().clone()).unwrap();
+        }
+        let mut q = one.space().configuration(0, &[0; MAX_JOINTS]);
+        for k in 0..100 {
+            q.iter_mut().enumerate().for_each(|(a, q)| *q = 0.1 + 0.25 * (0.3 * f64::from(k) + a as f64).sin());
+            assert_eq!(one.sample(&q), other.sample(&q));
+        }
+    }
+}
+
+#[test]
+fn a_block_without_its_foundation_or_twice_is_refused() {
+    let space = space(2, 3);
+    let store = Store::new(space.clone(), Order::Linear, 64);
+    let make = |level, block: &Place| nodes(&space, level, block, |_| true, noise(2, 1));
+    let place = [1, 1, 0, 0, 0, 0];
+    assert!(matches!(store.publish(1, &place, make(1, &place)), Err(PublishError::Order { .. })));
+    blocks(&space, 0).iter().for_each(|block| store.publish(0, block, make(0, block)).unwrap());
+    store.publish(1, &place, make(1, &place)).unwrap();
+    assert!(matches!(store.publish(1, &place, make(1, &place)), Err(PublishError::Taken { .. })));
+    // Of the four blocks below only one is there.
+    let above = [3, 3, 0, 0, 0, 0];
+    assert!(matches!(store.publish(2, &above, make(2, &above)), Err(PublishError::Order { .. })));
+}
+
+#[test]
+fn what_is_not_sound_is_refused() {
+    let space = space(2, 2);
+    let store = Store::new(space.clone(), Order::Linear, 64);
+    let block = [0; MAX_JOINTS];
+    let sound = nodes(&space, 0, &block, |_| true, noise(2, 1));
+    let mut bad = vec![sound.clone(), sound.clone(), sound.clone(), sound.clone(), sound.clone()];
+    bad[0].records[3] = f32::NAN;
+    bad[1].records.pop();
+    bad[2].gap[0] = f32::INFINITY;
+    bad[3].status[1] = 9;
+    bad[4].present |= 1 << 63;
+    for nodes in bad {
+        assert!(matches!(store.publish(0, &block, nodes), Err(PublishError::Unsound { .. })));
+    }
+    // Outside the grid, beyond the levels, and nodes of the level below.
+    for (level, place) in [(0, [9, 0, 0, 0, 0, 0]), (2, block), (0, [u32::MAX; MAX_JOINTS])] {
+        assert!(matches!(store.publish(level, &place, Nodes::default()), Err(PublishError::Unsound { .. })));
+    }
+    store.publish(0, &block, sound).unwrap();
+    let mut even = Nodes::default();
+    even.push(0, &vec![0.0; width(2)], 0.0, Status::Free);
+    assert!(matches!(store.publish(1, &block, even), Err(PublishError::Unsound { .. })));
+}
+
+#[test]
+fn a_full_store_says_so_and_room_can_be_made() {
+    let space = space(1, 4);
+    let mut store = Store::new(space.clone(), Order::Linear, 1);
+    let all: Vec<_> = (0..4).flat_map(|level| blocks(&space, level).into_iter().map(move |b| (level, b))).collect();
+    let mut refused = 0;
+    for (level, block) in &all {
+        let nodes = || nodes(&space, *level, block, |_| true, noise(1, 1));
+        if let Err(error) = store.publish(*level, block, nodes()) {
+            assert!(matches!(error, PublishError::Full(_)), "{error}");
+            refused += 1;
+            store.reserve(all.len());
+            store.publish(*level, block, nodes()).unwrap();
+        }
+    }
+    assert_eq!((refused, store.blocks().len()), (1, all.len()));
+}
+
+#[test]
+fn keys_come_back_and_what_cannot_be_numbered_is_refused() {
+    for joints in 1..=MAX_JOINTS {
+        let space = space(joints, 2);
+        for level in 0..2 {
+            for block in blocks(&space, level) {
+                assert_eq!(space.block(space.key(level, &block)), Some((level, block)));
+            }
+        }
+        assert_eq!(space.block(u64::MAX), None);
+    }
+    let axis = |count| Axis { name: "a".into(), unit: "rad".into(), start: 0.0, step: 0.1, count };
+    let grid = |count| Grid { axes: vec![axis(count); 6] };
+    assert!(matches!(Space::new(&grid(1), 2), Err(SpaceError::Flat { .. })));
+    assert!(matches!(Space::new(&grid(1000), 3), Err(SpaceError::Levels { most: 2, .. })));
+    assert!(Space::new(&grid(1000), 2).is_ok());
+}
