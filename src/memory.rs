@@ -13,6 +13,9 @@ pub struct Shortage {
     pub left: usize,
 }
 
+/// Memory below which it is not worth to ask beforehand [bytes]: asking takes as long as to take it.
+pub const SMALL: usize = 1 << 24;
+
 /// Checks that `needed` bytes are left; passes where the system does not tell.
 ///
 /// # Errors
@@ -33,6 +36,21 @@ pub fn left() -> Option<usize> {
     let space = address_space(&read("/proc/self/limits"), &read("/proc/self/status"));
     let group = control_group(&read("/sys/fs/cgroup/memory.max"), &read("/sys/fs/cgroup/memory.current"));
     [system, space, group].into_iter().flatten().min()
+}
+
+/// Memory below which drivers and libraries have been seen to fail without saying why [bytes].
+const SCARCE: usize = 1 << 29;
+
+/// Returns that little memory is left, for messages of what fails without saying why: empty where there is enough.
+#[must_use]
+pub fn scarcity() -> String {
+    match left() {
+        Some(left) if left < SCARCE => format!(
+            " (only {} MB of memory are left, in which a driver may find no room: close other programs, or raise the limit, ulimit -v)",
+            left / 1_000_000
+        ),
+        _ => String::new(),
+    }
 }
 
 /// Number behind `key` in a text of lines such as `MemFree:  123 kB` [bytes].

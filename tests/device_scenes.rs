@@ -4,7 +4,16 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use glam::DVec3;
-use haptize::{JointVector, proxy::Chain, scene::Scene};
+use haptize::{
+    JointVector,
+    contact::{Model, Proximity},
+    dataset::Dataset,
+    device::{Motion, Recorded},
+    object::Object,
+    proxy::Chain,
+    render::{flags::Flags, session, setup::Setup},
+    scene::{Scene, Waypoint},
+};
 use std::{path::Path, process::Command};
 
 fn shipped(name: &str) -> std::path::PathBuf {
@@ -85,5 +94,56 @@ fn each_device_feels_its_scene() {
             assert_eq!(number("outside"), 0.0, "{name}, {motion}: {felt:#}");
             assert!(number("max_relative_account_residual") < 1e-10, "{name}, {motion}: {felt:#}");
         }
+        anywhere_within_the_limits(name, &folder.path().join("x.haptize"));
     }
+}
+
+/// The hand goes anywhere within the device's limits, far beyond what is haptized: the proxy enters the object nowhere that was not
+/// solved, and a hand in the object is pushed back wherever it is.
+fn anywhere_within_the_limits(name: &str, file: &Path) {
+    /// Depth from which a hand must feel something [m]: well beyond a cell's error of where contact begins.
+    const DEEP: f64 = 0.004;
+    let dataset = Dataset::load(file).unwrap();
+    let setup = Setup::new(&dataset).unwrap();
+    let scene = Scene::load(shipped(name)).unwrap();
+    let object = Object::build(&scene.object).unwrap();
+    let model = Model::new(&object, &setup.chain, scene.contact);
+    let mut proximity = Proximity::new(&model);
+    let mut gap = |q: &JointVector| {
+        proximity.place(q);
+        proximity.gap(q)
+    };
+    let mut seed = 22_u64;
+    let mut between = |[low, high]: [f64; 2]| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (seed >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let (mut free, mut held) = (0, 0);
+    for _ in 0..12 {
+        let limits = setup.chain.joints.iter().map(|joint| joint.limits);
+        let at: Vec<Waypoint> = (0..5)
+            .map(|k| {
+                let q: Vec<f64> = limits.clone().map(&mut between).collect();
+                Waypoint { time: 0.8 * f64::from(k), q: JointVector::from_slice(&q) }
+            })
+            .collect();
+        let motion = Motion::through(&at, setup.chain.joints.len()).unwrap();
+        let plan = setup.plan(&dataset, 3.2, 0);
+        let trace = session::run(&setup.haptics, &mut Recorded::new(motion), None, &plan).unwrap();
+        for tick in trace.ticks.iter().step_by(5) {
+            let outside = tick.flags.contains(Flags::OUTSIDE);
+            free += usize::from(outside);
+            held += usize::from(tick.flags.contains(Flags::HELD));
+            if outside {
+                let gap = gap(&tick.proxy);
+                assert!(gap >= 0.0, "{name}: the proxy is {gap} m in the object beyond the grid at {:?}", tick.proxy);
+            }
+            // The torque rises from zero at the start.
+            if tick.time > 0.01 && tick.fault.is_none() && gap(&tick.device) < -DEEP {
+                let torque = tick.device_torque.iter().map(|torque| torque.abs()).fold(0.0, f64::max);
+                assert!(torque > 0.0, "{name}: nothing is felt at {:?}", tick.device);
+            }
+        }
+    }
+    assert!(free > 500 && held > 50, "{name}: {free} ticks free beyond the grid, {held} held at its border");
 }

@@ -81,6 +81,7 @@ step 'formatting' cargo fmt --all --check
 step 'lints' cargo clippy --locked --workspace --all-targets --quiet -- -D warnings
 # The bindings are tested in the same build, so that what they share is compiled once.
 step 'tests' cargo test --locked --workspace --quiet --no-fail-fast
+step 'fuzzing, guided by coverage' bash tests/fuzz.sh 4000
 step 'Python package' bash python/tests/run.sh
 step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --no-deps --quiet
 step 'documentation as a site' bash docs/site/build.sh

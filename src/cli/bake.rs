@@ -42,7 +42,8 @@ pub struct Arguments {
     /// How contact is solved, instead of as the scene says.
     #[arg(long)]
     algorithm: Option<Algorithm>,
-    /// Continue a bake that was interrupted.
+    /// Continue a bake that was interrupted. What was solved is kept; the search for lower equilibria and the measurement of the error, which
+    /// come last, begin anew.
     #[arg(long)]
     resume: bool,
     /// Number of random configurations at which the dataset's error is measured afterwards; 0 skips this. By default a tenth of

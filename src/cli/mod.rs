@@ -47,7 +47,8 @@ mod view;
 
 pub use memory::Remembering;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use crate::haptize::{OTHER_ADAPTER, remedied};
+use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::{
     error::Error,
     ffi::OsString,
@@ -157,8 +158,10 @@ struct Report {
 
 /// Runs what the command line `arguments`, the program's name first, asks for; returns the exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let line = match CommandLine::try_parse_from(arguments) {
-        Ok(line) => line,
+    let parsed = command_line().try_get_matches_from(arguments);
+    let parsed = parsed.and_then(|matches| Ok((CommandLine::from_arg_matches(&matches)?, remedy(&matches))));
+    let (line, remedy) = match parsed {
+        Ok(parsed) => parsed,
         Err(error) => return usage(&error),
     };
     memory::tell_shortage(line.json);
@@ -168,9 +171,21 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(true) => 0,
         Ok(false) => 1,
         Err(failure) => {
-            last_words(&explain(failure.as_ref()), line.json);
+            last_words(&remedied(&explain(failure.as_ref()), remedy), line.json);
             1
         }
+    }
+}
+
+/// What helps where a GPU fails: an option that the command has.
+fn remedy(matches: &ArgMatches) -> &'static str {
+    let line = command_line();
+    let command = matches.subcommand_name().and_then(|name| line.find_subcommand(name));
+    let has = |option| command.is_some_and(|command| command.get_arguments().any(|has| has.get_long() == Some(option)));
+    match () {
+        () if has("backend") => "--backend cpu",
+        () if has("no-gpu") => "--no-gpu",
+        () => OTHER_ADAPTER,
     }
 }
 

@@ -9,13 +9,13 @@ use super::{
     tell,
 };
 use crate::{
-    dataset::{Axis, Dataset, replace_file},
+    dataset::{Dataset, replace_file},
     device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, Watchdog, attach, open},
     render::{
         mcap, realtime,
         recording::Recording,
         session::{self, SessionError},
-        setup::{Setup, labels},
+        setup::{Setup, border_stiffness, labels},
         steal::Steal,
         timing::{Percentiles, Timing},
         trace::{Summary, Trace},
@@ -139,10 +139,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut text = told.unwrap_or_default();
     describe(&mut text, &summary)?;
     if summary.held > 0 {
-        let unit = |axis: &Axis| format!("{}/{}", axis.effort_unit(), axis.unit);
-        let gains = setup.scene.haptics.coupling_stiffness.iter().zip(&dataset.grid.axes);
-        let gains: Vec<String> = gains.map(|(stiffness, axis)| format!("{stiffness} {}", unit(axis))).collect();
-        writeln!(text, "  border       holds the device with the coupling's stiffness Kvc: {}", gains.join(", "))?;
+        let stiffness = border_stiffness(&setup.scene.haptics, &dataset.grid);
+        writeln!(text, "  border       holds the device with the coupling's stiffness Kvc: {stiffness}")?;
     }
     felt.describe(&mut text)?;
     if let Some((time, reason)) = &fault {

@@ -3,6 +3,7 @@
 use super::{Failure, Report, bar::Bar, output::Folder};
 use crate::{
     gpu::{AdapterChoice, Context},
+    haptize::{OTHER_ADAPTER, remedied},
     report::stability::{Bound, Case, Effort, FILES, Outcome, Setting, cases, table, write_all},
 };
 use std::{path::PathBuf, sync::Arc, time::Instant};
@@ -111,7 +112,7 @@ fn adapter(left_out: bool) -> (Option<Arc<Context>>, String) {
             let name = context.adapter().name.clone();
             (Some(Arc::new(context)), name)
         }
-        Err(error) => (None, format!("the GPU's half left out: {error}")),
+        Err(error) => (None, format!("the GPU's half left out: {}", remedied(&error.to_string(), OTHER_ADAPTER))),
     }
 }
 

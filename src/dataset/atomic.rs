@@ -2,7 +2,8 @@
 //!
 //! The contents go to a temporary file in the same folder, are flushed to the disk, and take the name in one rename:
 //! a crash, a full disk or a killed process leaves the old file or the new one, never a half. Who ends the process on purpose removes
-//! the temporary files by [`discard_unfinished`].
+//! the temporary files by [`discard_unfinished`]; what a killed process leaves, the next one to write in that folder removes. A temporary
+//! file is locked as long as it is written, and the system unlocks it however a process ends.
 
 use std::{
     collections::BTreeSet,
@@ -115,12 +116,8 @@ pub fn replace_file<'a>(
             NamedTempFile::from_parts(File::create_new(growing)?, TempPath::try_from_path(growing)?)
         }
         None => {
-            let mut builder = tempfile::Builder::new();
-            builder.prefix(".haptize-").suffix(".tmp");
-            // Like any other new file: readable by whom the umask allows, not by the owner alone.
-            #[cfg(unix)]
-            builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-            builder.tempfile_in(folder)?
+            remove_abandoned(folder);
+            locked_in(folder)?
         }
     };
     let _unfinished = Unfinished::begin(temporary.path());
@@ -135,6 +132,42 @@ pub fn replace_file<'a>(
     #[cfg(unix)]
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
     Ok(())
+}
+
+/// How names of temporary files begin and end.
+const PREFIX: &str = ".haptize-";
+const SUFFIX: &str = ".tmp";
+
+/// Makes a temporary file in `folder`, locked so that no other process takes it for abandoned.
+fn locked_in(folder: &Path) -> io::Result<NamedTempFile> {
+    loop {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(PREFIX).suffix(SUFFIX);
+        // Like any other new file: readable by whom the umask allows, not by the owner alone.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let file = builder.tempfile_in(folder)?;
+        // A file system without locks has no abandoned files that can be told.
+        if file.as_file().lock().is_err() || file.path().exists() {
+            return Ok(file);
+        }
+        // Another process has found it before it was locked, and removed it.
+    }
+}
+
+/// Removes the temporary files in `folder` that nobody writes any more. What cannot be removed stays.
+fn remove_abandoned(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let is_ours = name.to_str().is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(SUFFIX));
+        if is_ours && entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            // Only a lock that is taken at once says that the writer is gone.
+            let unlocked = File::options().write(true).open(entry.path()).ok().filter(|file| file.try_lock().is_ok());
+            if let Some(_locked) = unlocked {
+                let _ = fs::remove_file(entry.path());
+            }
+        }
+    }
 }
 
 /// Removes the regular file that a killed process has left at `path`. Through a link nothing is removed.
@@ -225,6 +258,24 @@ mod tests {
         assert!(refused.to_string().contains("move it away"), "{refused}");
         assert_eq!(std::fs::read(&other).unwrap(), b"precious");
         assert!(growing.is_symlink() && !path.exists());
+    }
+
+    #[test]
+    fn what_a_killed_process_left_is_removed_and_what_another_writes_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, other) = (folder.path().join("a.bin"), folder.path().join("b.bin"));
+        for name in [".haptize-left.tmp", ".haptize-mine", "haptize-mine.tmp"] {
+            std::fs::write(folder.path().join(name), b"half").unwrap();
+        }
+        replace_file(&path, |w| {
+            w.write_all(b"new")?;
+            let before = names(folder.path());
+            assert!(!before.contains(&".haptize-left.tmp".into()) && before.len() == 3, "{before:?}");
+            // Another writer in the same folder meanwhile.
+            replace_file(&other, |w| w.write_all(b"other"))
+        })
+        .unwrap();
+        assert_eq!(names(folder.path()), [".haptize-mine", "a.bin", "b.bin", "haptize-mine.tmp"]);
     }
 
     #[test]

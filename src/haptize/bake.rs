@@ -5,7 +5,7 @@ use crate::{
     JointVector,
     contact::Model,
     dataset::Dataset,
-    object::{Object, ObjectError},
+    object::{Compliance, Object, ObjectError},
     proxy::Chain,
     scene::Scene,
 };
@@ -25,12 +25,19 @@ pub struct SceneObjectError {
     source: ObjectError,
 }
 
-/// Builds the object of `scene`.
+/// Builds the object of `scene`, where there is memory to solve contact with it.
 ///
 /// # Errors
 /// Where it is refused, with its line in the scene.
 pub fn build_object(scene: &Scene) -> Result<Object, SceneObjectError> {
-    Object::build(&scene.object).map_err(|source| {
+    let object = Object::build(&scene.object).and_then(|object| {
+        // Of a larger surface only a part of the compliance is formed, and its size is checked when it is known.
+        if object.surface_nodes <= Model::WHOLE {
+            Compliance::check(&object, object.surface_nodes)?;
+        }
+        Ok(object)
+    });
+    object.map_err(|source| {
         let line = scene.text.lines().position(|line| line.trim_start_matches([' ', '[']).starts_with("object"));
         SceneObjectError { path: scene.path.clone(), line: line.map_or(1, |line| line + 1), source }
     })

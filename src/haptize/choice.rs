@@ -5,6 +5,7 @@ use crate::{
     JointVector,
     contact::{Equilibrium, Model},
     gpu::{ADAPTER_VARIABLE, AdapterChoice, Context, GpuError, GpuSolver, adapters},
+    memory,
 };
 use std::sync::Arc;
 
@@ -40,7 +41,7 @@ pub enum BackendError {
     #[error("no threads to solve on: {0}; close other programs or raise the limit on processes (ulimit -u)")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// There is no adapter, or it cannot take the scene.
-    #[error(transparent)]
+    #[error("{0}{}", memory::scarcity())]
     Gpu(#[from] GpuError),
 }
 
@@ -104,6 +105,15 @@ impl<'a> ChosenBackend<'a> {
             Self::Gpu { chunk, .. } => *chunk,
         }
     }
+}
+
+/// What else can compute and draw than a GPU that fails, where the CPU cannot.
+pub const OTHER_ADAPTER: &str = "another adapter (set WGPU_ADAPTER_NAME)";
+
+/// Returns `message`, in which a GPU's failure may name the option `--backend cpu`, with the remedy `instead` for whom has no such option.
+#[must_use]
+pub fn remedied(message: &str, instead: &str) -> String {
+    message.replace(", for --backend gpu without a GPU", "").replace("--backend cpu", instead)
 }
 
 /// Whether the environment names an adapter that this machine does not have.

@@ -29,7 +29,7 @@ mod table;
 mod tally;
 
 pub use bake::{Bake, BakeError, SceneObjectError, build_object, sample};
-pub use choice::{BackendChoice, BackendError, ChosenBackend};
+pub use choice::{BackendChoice, BackendError, ChosenBackend, OTHER_ADAPTER, remedied};
 pub use cpu::CpuBackend;
 pub use direct::{Direct, DirectError};
 pub use error::SweepError;

@@ -49,13 +49,25 @@ impl Compliance {
     /// # Errors
     /// When it would not fit in memory; nothing has been allocated then.
     pub fn on(object: &Object, nodes: Vec<u32>) -> Result<Self, ObjectError> {
-        let order = nodes.len().saturating_mul(object.factor.rows_per_node());
+        Self::check(object, nodes.len())?;
+        Ok(Self::of(&object.factor, object.rest.len(), object.surface_nodes, nodes))
+    }
+
+    /// Checks that the compliance on `nodes` surface nodes of `object` would fit in memory.
+    ///
+    /// # Errors
+    /// When it would not.
+    pub fn check(object: &Object, nodes: usize) -> Result<(), ObjectError> {
+        let order = nodes.saturating_mul(object.factor.rows_per_node());
         let bytes = order.saturating_mul(order).saturating_mul(size_of::<f64>());
+        if bytes <= memory::SMALL {
+            return Ok(());
+        }
         let limit = memory::left().map_or(MAX_BYTES, |left| left.min(MAX_BYTES));
         if bytes > limit {
-            return Err(ObjectError::TooLarge { nodes: nodes.len(), bytes, limit });
+            return Err(ObjectError::TooLarge { nodes, bytes, limit });
         }
-        Ok(Self::of(&object.factor, object.rest.len(), object.surface_nodes, nodes))
+        Ok(())
     }
 
     /// The whole inverse of the matrix that `factor` factorises, over `nodes` nodes, surface and inner ones.

@@ -1,6 +1,7 @@
 //! Why an object is refused, and what to do about it.
 
 use super::FactorError;
+use crate::memory::Shortage;
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -51,6 +52,14 @@ pub enum ObjectError {
         bytes: usize,
         /// Memory that it may take [B].
         limit: usize,
+    },
+    /// The stiffness would not fit in memory.
+    #[error("an object of {nodes} nodes: {shortage}, or use a coarser surface")]
+    Memory {
+        /// Nodes of the object.
+        nodes: usize,
+        /// Memory that is needed, and that is left.
+        shortage: Shortage,
     },
     /// More nodes than the stiffness is made for.
     #[error("an object of {nodes} nodes is more than the {limit} that are taken: use a coarser surface")]

@@ -13,7 +13,10 @@ use super::{
     ObjectError, Stiffness,
     substitution::{Partition, substitute},
 };
-use crate::tolerances::{MECHANISM_SHIFT, MIN_RECIPROCAL_CONDITION};
+use crate::{
+    memory,
+    tolerances::{MECHANISM_SHIFT, MIN_RECIPROCAL_CONDITION},
+};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::solvers::LltError;
 use faer::perm::PermRef;
@@ -66,10 +69,15 @@ impl Factor {
         let ordering = SymmetricOrdering::Custom(PermRef::new_checked(&order, &rank, order.len()));
         let symbolic = factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, ordering, Default::default())
             .map_err(|error| resources(&error))?;
+        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(PARALLELISM, Default::default());
+        // The values are copied once, to where they are shared.
+        let bytes = 2 * symbolic.len_val() * size_of::<f64>() + scratch.size_bytes();
+        if bytes > memory::SMALL {
+            memory::check(bytes).map_err(|shortage| resources(&shortage))?;
+        }
         let mut values = Vec::new();
         values.try_reserve_exact(symbolic.len_val()).map_err(|error| resources(&error))?;
         values.resize(symbolic.len_val(), 0.0);
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(PARALLELISM, Default::default());
         let mut scratch = MemBuffer::try_new(scratch).map_err(|_| resources(&"out of memory"))?;
         let outcome = symbolic.factorize_numeric_llt(
             &mut values,

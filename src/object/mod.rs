@@ -39,7 +39,10 @@ pub use stiffening::Stiffening;
 pub use stiffness::Stiffness;
 pub use topology::Topology;
 
-use crate::scene::{ElasticSpec, Material, ObjectSpec, Shape};
+use crate::{
+    memory,
+    scene::{ElasticSpec, Material, ObjectSpec, Shape},
+};
 use elasticity::Solid;
 use glam::{DMat3, DVec3};
 use skin::Laplacian;
@@ -199,8 +202,14 @@ fn check_count(nodes: usize) -> Result<(), ObjectError> {
     if nodes > MAX_NODES {
         return Err(ObjectError::TooManyNodes { nodes, limit: MAX_NODES });
     }
-    Ok(())
+    let needed = nodes * LEAST_BYTES_PER_NODE;
+    let enough = if needed > memory::SMALL { memory::check(needed) } else { Ok(()) };
+    enough.map_err(|shortage| ObjectError::Memory { nodes, shortage })
 }
+
+/// Least memory that a node takes [bytes]: nine numbers for the node and for half of the six neighbours that it has on a surface. The factor
+/// takes more, which is known once its pattern is.
+const LEAST_BYTES_PER_NODE: usize = 4 * 9 * size_of::<f64>();
 
 /// Numbers that a scene file has had checked already, and a specification made in code has not.
 fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {

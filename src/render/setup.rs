@@ -21,7 +21,7 @@ use crate::{
     scene::{BOUNDARY_SLOPE, HapticsSpec, Interpolation, ProxyInertia, Rendering, SceneError, THRESHOLD},
     tolerances::LEVER_ARM,
 };
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 /// A dataset, ready to be felt and drawn.
 pub struct Setup {
@@ -215,6 +215,25 @@ pub fn labels(grid: &Grid) -> Vec<JointLabel> {
     grid.axes.iter().map(|axis| JointLabel { name: axis.name.clone(), unit: axis.unit.clone() }).collect()
 }
 
+/// Returns the stiffness with which the device is held at the border of the haptized range, that of the coupling (Kvc), in words: one for
+/// each unit, or one for each joint where joints of a unit differ.
+#[must_use]
+pub fn border_stiffness(gains: &HapticsSpec, grid: &Grid) -> String {
+    let mut of_units = BTreeMap::new();
+    let mut alike = true;
+    let of_joints = gains.coupling_stiffness.iter().zip(&grid.axes).map(|(stiffness, axis)| {
+        let unit = format!("{}/{}", axis.effort_unit(), axis.unit);
+        alike &= *of_units.entry(unit.clone()).or_insert(*stiffness) == *stiffness;
+        format!("{} {stiffness} {unit}", axis.name)
+    });
+    let of_joints: Vec<String> = of_joints.collect();
+    if alike {
+        of_units.iter().map(|(unit, stiffness)| format!("{stiffness} {unit}")).collect::<Vec<_>>().join(", ")
+    } else {
+        of_joints.join(", ")
+    }
+}
+
 fn centre(grid: &Grid) -> JointVector {
     let mut q = JointVector::zeros(grid.joints());
     for (q, axis) in q.iter_mut().zip(&grid.axes) {
@@ -227,6 +246,21 @@ fn centre(grid: &Grid) -> JointVector {
 mod tests {
     use super::*;
     use crate::field::synthetic::{grid, half_space};
+
+    #[test]
+    fn the_borders_stiffness_is_told_once_where_joints_are_alike() {
+        let mut grid = grid(&[(-0.6, 0.1, 13), (-0.06, 0.01, 13), (0.0, 0.1, 2)]);
+        let text = "name = \"x\"\n[[proxy.joint]]\nkind = \"revolute\"\naxis = [1, 0, 0]\nlimits = [0, 1]\n";
+        let mut gains = Rendering::parse(text, "scene").unwrap().haptics;
+        gains.coupling_stiffness = JointVector::from_slice(&[20.0, 20.0, 2000.0]);
+        for (axis, name) in grid.axes.iter_mut().zip(["yaw", "pitch", "lift"]) {
+            axis.name = name.into();
+        }
+        grid.axes[2].unit = "m".into();
+        assert_eq!(border_stiffness(&gains, &grid), "20 N m/rad, 2000 N/m");
+        gains.coupling_stiffness[1] = 10.0;
+        assert_eq!(border_stiffness(&gains, &grid), "yaw 20 N m/rad, pitch 10 N m/rad, lift 2000 N/m");
+    }
 
     #[test]
     fn a_dataset_without_a_scene_is_felt_with_the_defaults() {

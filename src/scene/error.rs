@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The file cannot be read at all.
-    #[error("{}: cannot read the scene: {reason}; check the path and its permissions", .path.display())]
+    #[error("{}: cannot read the scene: {reason}", .path.display())]
     Unreadable {
         /// The scene file.
         path: PathBuf,
-        /// What the system says.
+        /// Why, and what to do.
         reason: String,
     },
     /// The text is not TOML, lacks a key or has an unknown one, or a value is out of range.

@@ -14,6 +14,7 @@ mod inertia;
 mod own_text;
 mod scan;
 mod spec;
+pub(crate) mod text;
 
 pub use device::DeviceSpec;
 pub use effects::{EFFECTS, Effect, Tuning};
@@ -31,7 +32,6 @@ pub use spec::{
 pub(crate) use inertia::is_positive_semidefinite;
 
 use check::Checker;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A whole scene, validated.
@@ -97,9 +97,6 @@ pub struct Rendering {
     /// How a real device stands to the proxy.
     pub device: DeviceSpec,
 }
-
-/// Longest scene file that is read [B]: a scene is a page or two, and its text goes into every dataset.
-const MAX_BYTES: u64 = 1 << 24;
 
 impl Scene {
     /// Reads and validates the scene file at `path`, and checks that the mesh file it names is there.
@@ -181,14 +178,7 @@ impl Rendering {
 
 /// The text of the scene file at `path`.
 fn read_text(path: &Path) -> Result<String, SceneError> {
-    let unreadable = |reason: String| SceneError::Unreadable { path: path.to_owned(), reason };
-    let stream = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
-    let mut text = String::new();
-    stream.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(|error| unreadable(error.to_string()))?;
-    if text.len() as u64 > MAX_BYTES {
-        return Err(unreadable(format!("it is longer than {MAX_BYTES} bytes, which no scene is")));
-    }
-    Ok(text)
+    text::read(path).map_err(|reason| SceneError::Unreadable { path: path.to_owned(), reason })
 }
 
 /// The tables of a scene's text, checked for layout alone.

@@ -1,13 +1,10 @@
 //! XML of a robot file: elements, their attributes as numbers, and errors at their place.
 
 use super::UrdfError;
-use crate::scene::Diagnostic;
+use crate::scene::{self, Diagnostic};
 use glam::DVec3;
 use roxmltree::{Document, Node, ParsingOptions};
-use std::{io::Read, ops::Range, path::Path};
-
-/// Longest file that is read [B]; the largest robots in public collections have a few hundred kB.
-const MAX_BYTES: u64 = 1 << 24;
+use std::{ops::Range, path::Path};
 
 /// Most XML nodes of a file: a hundred times as many as those robots have.
 const MAX_NODES: u32 = 1 << 20;
@@ -27,15 +24,7 @@ pub(super) struct Source<'a> {
 
 /// Reads the file's text.
 pub(super) fn read_text(path: &Path) -> Result<String, UrdfError> {
-    let unreadable = |reason: String| UrdfError::Unreadable { path: path.to_owned(), reason };
-    let stream = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
-    let attributes = stream.metadata().map_err(|error| unreadable(error.to_string()))?;
-    if !attributes.is_file() || attributes.len() > MAX_BYTES {
-        return Err(unreadable(format!("it is not a plain file of at most {MAX_BYTES} bytes")));
-    }
-    let mut text = String::new();
-    stream.take(MAX_BYTES).read_to_string(&mut text).map_err(|error| unreadable(error.to_string()))?;
-    Ok(text)
+    scene::text::read(path).map_err(|reason| UrdfError::Unreadable { path: path.to_owned(), reason })
 }
 
 impl<'a> Source<'a> {

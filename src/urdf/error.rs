@@ -12,7 +12,7 @@ pub enum UrdfError {
     Unreadable {
         /// The robot file.
         path: PathBuf,
-        /// What the system says.
+        /// Why, and what to do.
         reason: String,
     },
     /// The text is not XML or not URDF, or has something that a scene cannot hold.

@@ -141,7 +141,7 @@ impl Viewer {
             Ok(()) => None,
             Err(GpuError::Lost(why)) => Some(why),
             Err(other) => {
-                self.error = Some(other.to_string());
+                self.error = Some(ViewError::from(other).to_string());
                 None
             }
         }

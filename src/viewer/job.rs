@@ -10,7 +10,7 @@ use crate::{
     contact::Model,
     dataset::{Dataset, Surface},
     gpu::{AdapterChoice, AdapterSummary, Context, GpuError, GpuSolver},
-    haptize::{BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, build_object, sample},
+    haptize::{BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, build_object, remedied, sample},
     proxy::Chain,
     scene::Scene,
 };
@@ -92,6 +92,9 @@ pub fn short(name: &str) -> &str {
     name.split(" (").next().unwrap_or(name)
 }
 
+/// What helps in the window where a GPU cannot bake.
+const ON_THE_CPU: &str = "the CPU (Haptization: Solve on CPU)";
+
 /// How a job ended.
 pub enum Outcome {
     /// Ready, with the object where there is one to draw.
@@ -146,7 +149,7 @@ impl Job {
             let outcome = match run(asked, &solver, &context, &flag, &mut progress) {
                 Ok(loaded) => Outcome::Loaded(Box::new(loaded)),
                 Err(error) if is_cancelled(error.as_ref()) => Outcome::Cancelled,
-                Err(error) => Outcome::Failed(error.to_string()),
+                Err(error) => Outcome::Failed(remedied(&error.to_string(), ON_THE_CPU)),
             };
             let _ = sender.send(Report::Over(outcome));
             wake();

@@ -64,14 +64,18 @@ pub use offscreen::{Picture, render_state, screenshot};
 pub use theme::{LEAST_WINDOW, apply as dress};
 pub use window::open;
 
-use crate::gpu::{ADAPTER_VARIABLE, FrameError, GpuError};
+use crate::{
+    gpu::{ADAPTER_VARIABLE, FrameError, GpuError},
+    haptize::{OTHER_ADAPTER, remedied},
+    memory,
+};
 
 /// The viewer cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     /// The device that draws.
-    #[error(transparent)]
-    Gpu(GpuError),
+    #[error("{}", remedied(&.0.to_string(), OTHER_ADAPTER))]
+    Gpu(#[source] GpuError),
     /// There is nothing to draw on.
     #[error(
         "the window needs a Vulkan, Metal or DX12 adapter to draw on, a software one will do; found: {0}. Install your GPU's \
@@ -119,7 +123,7 @@ pub enum ViewError {
 impl From<GpuError> for ViewError {
     fn from(error: GpuError) -> Self {
         match error {
-            GpuError::NoAdapter { found, .. } => Self::NoAdapter(found),
+            GpuError::NoAdapter { found, .. } => Self::NoAdapter(found + &memory::scarcity()),
             error => Self::Gpu(error),
         }
     }

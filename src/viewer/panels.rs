@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     gpu::ADAPTER_VARIABLE,
-    render::{flags::Flags, trace::Tick},
+    render::{flags::Flags, setup::border_stiffness, trace::Tick},
 };
 use eframe::egui::{
     self, Align, Button, CentralPanel, Color32, Frame, Grid, Label, Layout, Panel, ProgressBar, RichText, ScrollArea,
@@ -102,9 +102,13 @@ impl Viewer {
             let Some(session) = &self.session else { return };
             if let Some(tick) = session.history.last() {
                 ui.separator();
-                let contact = contact(tick, session.loaded.knows_nodes());
+                let mut contact = contact(tick, session.loaded.knows_nodes());
                 let held = tick.flags.contains(Flags::HELD);
                 let colour = if held { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
+                if held {
+                    let gains = &session.controls.tuning.haptics;
+                    contact += &format!(", Kvc {}", border_stiffness(gains, &session.loaded.dataset.grid));
+                }
                 ui.colored_label(colour, RichText::new(contact).small());
                 ui.separator();
                 let units = session.loaded.dataset.grid.axes.iter().map(|axis| axis.effort_unit().to_owned());

@@ -200,11 +200,21 @@ fn other_commands_without_memory_end_with_an_error_of_one_json_object() {
     // Larger than what is allowed below: known before anything is read.
     let large = std::fs::File::create(folder.join("large.haptize")).unwrap();
     large.set_len(1 << 32).unwrap();
+    let sphere = |edge: &str, springs: &str| {
+        let object = format!(
+            "sphere = {{ radius = 0.04, edge = {edge} }}\nsprings = {{ kind = \"{springs}\", stiffness = 300.0 }}"
+        );
+        crate::program::scene(&object, 4)
+    };
+    std::fs::write(folder.join("dense.toml"), sphere("0.0035", "axial")).unwrap();
+    std::fs::write(folder.join("fine.toml"), sphere("0.0002", "isotropic")).unwrap();
     for (arguments, expected) in [
         (&["play", "large.haptize"][..], "4295 MB of memory are needed"),
         (&["info", "large.haptize"], "4295 MB of memory are needed"),
         (&["play", "x.haptize", "--seconds", "3600"], "ticks"),
         (&["play", "x.haptize", "--seconds", "0.1"], "memory"),
+        (&["inspect", "dense.toml", "--q=0,0"], "MB of compliance"),
+        (&["bake", "fine.toml", "--backend", "cpu", "-o", "y.haptize"], "MB of memory are needed"),
     ] {
         let arguments = [arguments, &["--json"]].concat();
         let output = run_limited(folder, &arguments, "ulimit -v 150000");

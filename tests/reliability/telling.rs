@@ -3,7 +3,11 @@
 
 use crate::program::{OBJECTS, command, message, succeed, write_scene};
 use haptize::dataset::Dataset;
-use std::{path::Path, process::Output};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+    process::Output,
+};
 
 /// A folder with a scene, its meshes and its dataset `x.haptize`.
 fn home() -> tempfile::TempDir {
@@ -106,6 +110,13 @@ fn messages_name_the_file_and_what_helps() {
         (&["play", "x.haptize", "--motion", "pres"][..], "`press`", "permissions"),
         (&["play", "x.haptize", "--motion", "empty.csv"], "empty.csv: holds no sample", "waypoint"),
         (&["bake", "none.toml"], "check the path", "room"),
+        (&["bake", "x.haptize", "-o", "y.haptize"], "x.haptize: cannot read the scene: it is no text", "UTF-8"),
+        (&["import", "x.haptize", "--tip", "a"], "x.haptize: cannot read the robot: it is no text", "UTF-8"),
+        (
+            &["gridize", "empty.csv", "--columns", "x.haptize", "--step", "1"],
+            "x.haptize: cannot be read: it is no text",
+            "UTF-8",
+        ),
         (&["bake", "ground.toml"], "ground.toml:2: no node lies below", "--resume"),
         (&["inspect", "ground.toml", "--q", "0,0"], "ground.toml:2: no node lies below", "--resume"),
         (&["bake", "huge.toml"], "huge.toml:", "0000000000"),
@@ -124,6 +135,113 @@ fn messages_name_the_file_and_what_helps() {
     };
     let said = message(&blind(&["view", "x.haptize", "--screenshot", "x.png"]));
     assert!(said.contains("mesa-vulkan-drivers") && !said.contains("--backend"), "{said}");
+}
+
+/// Options that `said` names and that the command has not of which it is said: that of the last `haptize COMMAND` in the sentence, or
+/// else `command`.
+fn foreign_options(helps: &BTreeMap<&str, String>, command: &str, said: &str) -> Vec<String> {
+    let (mut foreign, mut of, mut words) = (Vec::new(), command, said.split_whitespace().peekable());
+    while let Some(word) = words.next() {
+        let plain = |word: &str| word.trim_matches(|c: char| !c.is_ascii_alphanumeric() && c != '-').to_owned();
+        if plain(word) == "haptize" {
+            let next = words.peek().map(|next| plain(next)).unwrap_or_default();
+            of = helps.keys().find(|name| **name == next).unwrap_or(&of);
+        }
+        let option = plain(word);
+        if option.starts_with("--") && !helps[of].contains(option.split('=').next().unwrap()) {
+            foreign.push(format!("{option} of {of}"));
+        }
+        if word.ends_with(['.', ';']) {
+            of = command;
+        }
+    }
+    foreign
+}
+
+#[test]
+fn every_option_that_a_message_names_is_one_of_its_command() {
+    let home = home();
+    let names = [
+        "accuracy",
+        "bake",
+        "completions",
+        "device",
+        "doctor",
+        "export",
+        "gridize",
+        "import",
+        "info",
+        "inspect",
+        "man",
+        "new",
+        "paper",
+        "play",
+        "scan",
+        "stability",
+        "view",
+    ];
+    let told = |name: &str| succeed(home.path(), &[name, "--help"]);
+    let mut helps: BTreeMap<&str, String> = names.iter().map(|name| (*name, told(name))).collect();
+    // The demo is the program without a command.
+    helps.insert("", succeed(home.path(), &["--help"]));
+    let listed = helps[""].lines().filter(|line| line.starts_with("  ") && !line.starts_with("   ")).count();
+    assert!(listed >= names.len() && names.iter().all(|name| helps[""].contains(name)));
+    assert_eq!(
+        foreign_options(&helps, "view", "use --backend cpu, or haptize bake --backend gpu; --size or --q"),
+        ["--backend of view", "--q of view"]
+    );
+    std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/sponge.toml"), home.path().join("sponge.toml"))
+        .unwrap();
+    std::fs::write(home.path().join("bytes"), [0xff, 0xfe, 0, 1, 2]).unwrap();
+    std::fs::write(home.path().join("full.toml"), "name = 3\n").unwrap();
+    let mut refusals = BTreeSet::new();
+    for (variable, value) in [("VK_DRIVER_FILES", "/none"), ("WGPU_ADAPTER_NAME", "nosuch")] {
+        for arguments in [
+            &["accuracy", "none.toml", "-o", "a"][..],
+            &["bake", "scene.toml", "-o", "y.haptize"],
+            &["bake", "scene.toml", "-o", "y.haptize", "--backend", "gpu"],
+            &["bake", "scene.toml", "-o", "y.haptize", "--max-error", "1%", "--max-points", "10"],
+            &["completions", "bash", "--json"],
+            &["device", "check", "touch"],
+            &["device", "list"],
+            &["doctor"],
+            &["export", "bytes", "--format", "csv"],
+            &["gridize", "bytes", "--step", "1"],
+            &["import", "bytes"],
+            &["info", "bytes"],
+            &["inspect", "x.haptize", "--q", "0"],
+            &["man", "-o", "bytes"],
+            &["new", "none"],
+            &["new", "sphere", "-o", "full.toml"],
+            &["paper", "-o", "bytes"],
+            &["play", "x.haptize", "--device", "touch", "--seconds", "0.1"],
+            &["play", "x.haptize", "--replay", "bytes"],
+            &["scan", "sponge.toml", "-o", "full.toml"],
+            &["stability", "none"],
+            &["view", "x.haptize", "--screenshot", "x.png"],
+            &["view", "none.toml", "--screenshot", "x.png"],
+        ] {
+            let output = command(home.path(), arguments).env(variable, value).output().unwrap();
+            for said in [&output.stdout, &output.stderr].map(|said| String::from_utf8_lossy(said)) {
+                // A script and an echo of the usage are no messages.
+                if arguments[0] != "completions" && output.status.code() != Some(2) {
+                    let foreign = foreign_options(&helps, arguments[0], &said);
+                    assert!(foreign.is_empty(), "{variable}, {arguments:?}: {foreign:?} in {said}");
+                }
+            }
+            if output.status.code() == Some(1) {
+                refusals.insert(arguments[0]);
+            }
+        }
+    }
+    // Work that takes whatever adapter there is, and that is told of one that is not there.
+    for (arguments, name) in [(&[][..], ""), (&["paper", "-o", "p"], "paper")] {
+        let output = command(home.path(), arguments).env("WGPU_ADAPTER_NAME", "nosuch").output().unwrap();
+        let said = message(&output);
+        assert!(output.status.code() == Some(1) && said.contains("nosuch"), "{name}: {said}");
+        assert!(foreign_options(&helps, name, &said).is_empty(), "{name}: {said}");
+    }
+    assert!(refusals.len() > 10, "{refusals:?}");
 }
 
 #[test]

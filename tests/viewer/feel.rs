@@ -58,6 +58,33 @@ fn a_drag_ends_in_contact_and_shows_torque() {
     assert!(window.torque() > 0.05);
 }
 
+/// The scrape begins and ends beyond the grid of the small scene, whose joints reach farther, and comes to its border in contact.
+#[test]
+fn the_window_tells_the_border_of_the_haptized_range_from_free_space_beyond_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("narrow.toml");
+    std::fs::write(&file, small_scene()).unwrap();
+    let mut window = Window::open(&Start::File(file), [1200.0, 800.0], Theme::Light);
+    assert_eq!(window.harness.state().error(), None);
+    assert!(!window.shows("outside the haptized range"));
+    window.click("Scrape");
+    let (mut beyond, mut held) = (0, 0);
+    for _ in 0..140 {
+        window.advance(0.05);
+        window.harness.run_ok();
+        if window.shows("free, outside the haptized range") {
+            beyond += 1;
+            assert_eq!(window.torque(), 0.0);
+        }
+        if window.shows("held at the border of the haptized range") {
+            held += 1;
+            assert!(window.shows("border of the haptized range, Kvc 20 N m/rad"), "the stiffness is not told");
+            assert!(!window.shows("free, outside"));
+        }
+    }
+    assert!(beyond > 3 && held > 3, "free beyond the grid in {beyond} frames, held in {held}");
+}
+
 #[test]
 fn keys_press_the_arm_onto_the_object_and_off_it() {
     use eframe::egui::Key;

@@ -75,6 +75,12 @@ impl Version {
 pub struct TwoDiy(Version);
 
 impl TwoDiy {
+    /// The messages of such a device.
+    #[must_use]
+    pub fn new(version: Version) -> Self {
+        Self(version)
+    }
+
     /// Opens and sets up the device on the line at `place`.
     ///
     /// # Errors
@@ -87,7 +93,7 @@ impl TwoDiy {
                 return Err(format!("{place} takes no bytes: unplug the device and plug it in again"));
             }
         }
-        SerialDevice::start(Self(version), port, place)
+        SerialDevice::start(Self::new(version), port, place)
     }
 }
 

@@ -2,7 +2,10 @@
 //! dataset without code. `datasets/instrument.toml` is an example with every key explained.
 
 use super::check::check;
-use crate::{haptize::gridize::JointLabel, scene::Diagnostic};
+use crate::{
+    haptize::gridize::JointLabel,
+    scene::{self, Diagnostic},
+};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -200,12 +203,12 @@ fn radians() -> String {
 #[derive(Debug, thiserror::Error)]
 pub enum MappingError {
     /// The file cannot be read.
-    #[error("{file}: cannot be read: {source}; check the path and its permissions")]
+    #[error("{file}: cannot be read: {reason}")]
     Read {
         /// The file.
         file: String,
-        /// What the system said.
-        source: std::io::Error,
+        /// Why, and what to do.
+        reason: String,
     },
     /// Not TOML, an unknown key, a wrong type, or a value that cannot be.
     #[error(transparent)]
@@ -218,8 +221,8 @@ impl Mapping {
     /// # Errors
     /// [`MappingError`] names the file, the line and the key.
     pub fn load(path: &Path) -> Result<Self, MappingError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| MappingError::Read { file: path.display().to_string(), source })?;
+        let text = scene::text::read(path)
+            .map_err(|reason| MappingError::Read { file: path.display().to_string(), reason })?;
         Self::parse(&text, path)
     }
 

@@ -10,6 +10,7 @@ use super::{Accuracy, AccuracyError, Cost, Row, Study, timed};
 use crate::{
     dataset::Dataset,
     gpu::{AdapterChoice, Context, FrameError, FrameMethod, FrameUpdate},
+    haptize::{OTHER_ADAPTER, remedied},
     object::Object,
     render::graphics::{ContactForces, ObjectMotion},
     scene::{GraphicsEffects, Scene},
@@ -66,7 +67,10 @@ pub(super) fn graphics(
     let push = Push { object, effects: graphics.effects, rate: graphics.rate, forces, none };
     frames(&push, study)?;
     if let Err(error) = iterations(&push, study) {
-        study.notes.push(format!("iterations of the graphics on a GPU are not measured: {error}"));
+        study.notes.push(format!(
+            "iterations of the graphics on a GPU are not measured: {}",
+            remedied(&error.to_string(), OTHER_ADAPTER)
+        ));
     }
     Ok(())
 }

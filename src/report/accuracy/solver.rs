@@ -5,8 +5,9 @@ use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},
     haptize::{
-        Backend, BackendChoice, ChosenBackend,
+        Backend, BackendChoice, ChosenBackend, OTHER_ADAPTER,
         reference::{Reference, equilibria},
+        remedied,
     },
     scene::{Algorithm, ContactSpec, Scene},
 };
@@ -91,7 +92,7 @@ pub(super) fn arithmetic(model: &Model<'_>, reference: &Reference, study: &mut A
     let mut gpu = match ChosenBackend::open(BackendChoice::Gpu, model) {
         Ok(gpu) => gpu,
         Err(error) => {
-            study.notes.push(format!("f32 on a GPU is not measured: {error}"));
+            study.notes.push(format!("f32 on a GPU is not measured: {}", remedied(&error.to_string(), OTHER_ADAPTER)));
             return Ok(());
         }
     };
@@ -101,7 +102,9 @@ pub(super) fn arithmetic(model: &Model<'_>, reference: &Reference, study: &mut A
             let cost = cost.over(baseline.least);
             study.rows.push(row(Study::Arithmetic, "gpu", setting, 32.0, cost, &part, &found));
         }
-        Err(error) => study.notes.push(format!("f32 on a GPU is not measured: {error}")),
+        Err(error) => {
+            study.notes.push(format!("f32 on a GPU is not measured: {}", remedied(&error.to_string(), OTHER_ADAPTER)))
+        }
     }
     Ok(())
 }

@@ -1,14 +1,17 @@
-//! Fuzzing without a special compiler: every reader of files gets mutated input, from a fixed seed.
+//! Fuzzing without a special compiler: every reader gets mutated input, from a fixed seed.
 //!
 //! Each target maps an input to an outcome, which is the kind of error or the success. Inputs with a new outcome join the corpus, so
-//! that mutation goes on from them. An execution fails if it panics, takes longer than [`LONGEST`], or takes more memory than
+//! that mutation goes on from them; `tests/fuzz.sh` compiles the library with counters, and then so do inputs that run new code. An
+//! execution fails if it panics, takes longer than [`LONGEST`], or takes more memory than
 //! [`MOST_BYTES`]; its input is kept then, and belongs into `corpus/` once the cause is mended.
 //!
 //! `HAPTIZE_FUZZ` sets the number of executions of each target.
 
+mod coverage;
 mod mutate;
 mod targets;
 
+use coverage::Coverage;
 pub use mutate::Random;
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -129,8 +132,18 @@ fn fail(target: &Target, input: &[u8], offence: &Offence) -> ! {
     panic!("{}: {offence:?}; the input is {}", target.name, kept.display());
 }
 
-/// Executions of a target, and how many kinds of outcomes they had.
-fn fuzz(target: &Target, executions: usize) -> usize {
+/// What executions of a target reached.
+struct Reached {
+    /// Kinds of outcomes.
+    kinds: usize,
+    /// Blocks of the code that ran, and all there are; the first of them with the seeds alone.
+    blocks: [usize; 3],
+    /// Inputs that were mutated in the end.
+    inputs: usize,
+}
+
+/// Runs a target on its seeds, and then on what is made of them.
+fn fuzz(target: &Target, executions: usize) -> Reached {
     let memory = Path::new("/dev/shm");
     let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.unwrap();
     let file = folder.path().join("input").with_extension(target.extension);
@@ -138,7 +151,10 @@ fn fuzz(target: &Target, executions: usize) -> usize {
     let mut inputs = corpus(target.name);
     inputs.extend((target.seeds)());
     assert!(!inputs.is_empty(), "{} has nothing to mutate", target.name);
+    let seeds = inputs.len();
+    let mut of_seeds = 0;
     let mut kinds = HashSet::new();
+    let mut coverage = Coverage::begin();
     // An endless execution cannot be stopped: another thread watches that inputs follow one another.
     let at_hand = Mutex::new(Vec::new());
     let (sender, beats) = mpsc::channel();
@@ -161,7 +177,7 @@ fn fuzz(target: &Target, executions: usize) -> usize {
         // Dropped when the executions end, however they do.
         let sender = sender;
         for execution in 0..executions {
-            let input = match inputs.get(execution) {
+            let input = match inputs.get(execution).filter(|_| execution < seeds) {
                 Some(input) => input.clone(),
                 None => {
                     let (chosen, other) = (random.below(inputs.len()), random.below(inputs.len()));
@@ -173,12 +189,16 @@ fn fuzz(target: &Target, executions: usize) -> usize {
             at_hand.lock().unwrap().clone_from(&input);
             sender.send(()).unwrap();
             let outcome = executed(target, &file, &input).unwrap_or_else(|offence| fail(target, &input, &offence));
-            if kinds.insert(kind(&outcome)) && execution >= inputs.len() && inputs.len() < MOST_INPUTS {
+            let is_new = coverage.take() | kinds.insert(kind(&outcome));
+            if execution < seeds {
+                of_seeds = coverage.blocks().0;
+            } else if is_new && inputs.len() < MOST_INPUTS {
                 inputs.push(input);
             }
         }
     });
-    kinds.len()
+    let (run, all) = coverage.blocks();
+    Reached { kinds: kinds.len(), blocks: [of_seeds, run, all], inputs: inputs.len() }
 }
 
 /// Executions that are asked for.
@@ -189,8 +209,13 @@ fn executions() -> usize {
 fn hold(target: &Target) {
     let began = Instant::now();
     let executions = executions();
-    let kinds = fuzz(target, executions);
-    eprintln!("{}: {executions} executions, {kinds} kinds of outcomes, {:.0?}", target.name, began.elapsed());
+    let Reached { kinds, blocks: [seeds, run, all], inputs } = fuzz(target, executions);
+    let covered = if all > 0 { format!(", {seeds} blocks with its seeds, {run} of {all}") } else { String::new() };
+    eprintln!(
+        "{}: {executions} executions, {kinds} kinds of outcomes{covered}, {inputs} inputs, {:.0?}",
+        target.name,
+        began.elapsed()
+    );
     assert!(
         kinds >= target.kinds,
         "{}: only {kinds} kinds of outcomes: mutation reaches less than it did",
@@ -215,6 +240,9 @@ targets! {
     stl_meshes: targets::STL;
     gmsh_meshes: targets::MSH;
     robots: targets::ROBOTS;
+    joint_states_in_mcap: targets::MCAP;
+    device_mappings: targets::DEVICES;
+    replies_of_devices: targets::REPLIES;
     scan_logs: targets::LOGS;
     column_mappings_and_tables: targets::MAPPINGS;
     recordings: targets::RECORDINGS;

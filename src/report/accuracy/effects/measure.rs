@@ -9,6 +9,7 @@ use crate::{
     dataset::Dataset,
     device::{Motion, Recorded},
     gpu::{AdapterChoice, Context, FrameCost, FrameError, FrameMethod, FrameUpdate},
+    haptize::{OTHER_ADAPTER, remedied},
     render::{
         graphics::{ContactForces, Graphics, Smoothing},
         session::{self, Driver, SessionError},
@@ -101,7 +102,7 @@ pub fn price(scene: &Scene, rounds: usize, progress: &mut dyn FnMut(&str)) -> Re
     let mut device = match on_the_device(&setups, &datasets) {
         Ok(device) => device,
         Err(error) => {
-            notes.push(format!("frames on a GPU are not priced: {error}"));
+            notes.push(format!("frames on a GPU are not priced: {}", remedied(&error.to_string(), OTHER_ADAPTER)));
             Device { adapter: None, bodies: variants.iter().map(|_| None).collect() }
         }
     };
