@@ -51,16 +51,16 @@ pub struct Address {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{text}\" is no device: give one of {known}, or KIND:PLACE; `haptize device list` shows what is there", known = known())]
 pub struct AddressError {
-    /// What was given.
+    /// The text that was given.
     pub text: String,
 }
 
-/// What this machine has of a kind of device.
+/// Devices of a kind that this machine has.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Finding {
     /// Addresses that can be opened, as far as can be seen without opening them.
     pub places: Vec<String>,
-    /// What is missing, each with the remedy.
+    /// Missing parts, each with the remedy.
     pub missing: Vec<String>,
 }
 
@@ -72,7 +72,7 @@ pub enum OpenError {
     Device {
         /// Its address.
         device: String,
-        /// What is wrong, and the remedy.
+        /// The defect, and the remedy.
         what: String,
     },
     /// The device answers, but not as it should.
@@ -86,9 +86,9 @@ pub enum OpenError {
     /// Another number of joints.
     #[error("the device has {device} joints and the scene's arm {scene}: take the device that the scene is for")]
     Joints {
-        /// Of the device.
+        /// Joints of the device.
         device: usize,
-        /// Of the scene.
+        /// Joints of the scene.
         scene: usize,
     },
     /// A scan controls joints.

@@ -26,7 +26,7 @@ pub enum Phase {
     Push,
 }
 
-/// What a phase found.
+/// The findings of a phase.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CheckReport {
     /// Which.

@@ -55,12 +55,12 @@ pub struct Guard {
     enabled: bool,
 }
 
-/// What a tick left the device with, in the device's coordinates.
+/// The effort that a tick left the device with, in the device's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Held {
     /// On the device until the next tick [N m or N].
     pub effort: JointVector,
-    /// What was clamped.
+    /// Clamps that acted.
     pub clamps: Clamps,
     /// Why the effort is zero, if it was brought there.
     pub halt: Option<Halt>,

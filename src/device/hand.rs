@@ -25,9 +25,9 @@ pub enum HandError {
     /// The scene's haptics have another number of joints than what the hand is to follow.
     #[error("the hand is told {told} joints and the haptic device has {device}")]
     Joints {
-        /// Of the motion or the pointer.
+        /// Joints of the motion or the pointer.
         told: usize,
-        /// Of the scene's device.
+        /// Joints of the scene's device.
         device: usize,
     },
     /// Hand and device have no inertia at a joint.

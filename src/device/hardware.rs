@@ -36,16 +36,16 @@ impl Coordinates {
     }
 }
 
-/// What a device can do and what watches over it.
+/// The limits of a device, and the watchdog over it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Maximum size of each effort [N m or N].
     pub effort: JointVector,
-    /// What the device does when commands stop.
+    /// The reaction of the device when commands stop.
     pub watchdog: Watchdog,
 }
 
-/// What a device does by itself when commands stop.
+/// The reaction of a device by itself when commands stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Watchdog {
@@ -57,7 +57,7 @@ pub enum Watchdog {
     Unstated,
 }
 
-/// What a device measured.
+/// A measurement of a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measurement {
     /// In the device's coordinates [rad or m].

@@ -9,8 +9,8 @@
 //! reading without force, so that a loop that hangs does not leave the last force on. Force is sent only while the
 //! device says that it is calibrated, ready and powered.
 //!
-//! What the service adds to forces (compensation of gravity, a force gate, damping) is the user's own setting and stays
-//! as it is.
+//! The service adds to forces what its user has set: compensation of gravity, a force gate, damping. These settings stay as
+//! they are.
 //!
 //! Source: the maker's public documentation, version 3.5, and recorded messages of its client library. Not tried on
 //! hardware.
@@ -48,7 +48,7 @@ const PATIENCE: Duration = Duration::from_millis(500);
 /// Longest message of the service [bytes]: an inventory of many devices has some thousand.
 const LONGEST_MESSAGE: usize = 1 << 20;
 
-/// What is used of a state frame; anything else may be there or not.
+/// The part of a state frame that is used; anything else may be there or not.
 #[derive(Deserialize)]
 struct Frame {
     #[serde(default)]
@@ -88,7 +88,7 @@ impl StatusFrame {
     }
 }
 
-/// What the thread passes to the loop.
+/// Message of the thread to the loop.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     position: [f64; 3],
@@ -97,7 +97,7 @@ struct Seen {
     ended: Option<Halt>,
 }
 
-/// What the loop passes to the thread.
+/// Message of the loop to the thread.
 #[derive(Clone, Copy, Debug)]
 struct Wanted {
     /// None before motors are enabled.

@@ -1,4 +1,4 @@
-//! What drives the haptic loop: a device that reports joint positions and takes joint torques.
+//! Devices that drive the haptic loop: a device that reports joint positions and takes joint torques.
 //!
 //! Simulated devices implement [`Device`] themselves. A real one is a [`Hardware`], its protocol in its own
 //! coordinates; a [`Guard`] around it is the safety layer, the same for all; [`JointDevice`] or [`TipDevice`] makes of
@@ -75,7 +75,7 @@ pub trait Device: Send {
     }
 }
 
-/// What a device made of a torque that it was given.
+/// The torque that a device made of one that it was given.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Applied {
     /// Torque that it holds until the next tick [N m or N].
@@ -94,7 +94,7 @@ impl Applied {
     }
 }
 
-/// What a device reports.
+/// A report of a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     /// y [rad or m].

@@ -46,7 +46,7 @@ pub enum MotionError {
     Waypoint {
         /// Number of the waypoint, from one.
         waypoint: usize,
-        /// What it gives.
+        /// The configuration that it gives.
         q: JointVector,
         /// Number of joints of the proxy.
         joints: usize,
@@ -72,7 +72,7 @@ pub enum MotionError {
         file: PathBuf,
         /// Line number, from one.
         line: usize,
-        /// What is wrong.
+        /// The defect.
         what: String,
         /// Number of joints of the proxy.
         joints: usize,

@@ -13,7 +13,7 @@ pub enum ObjectError {
     File {
         /// The file that the scene names.
         file: PathBuf,
-        /// What the system or the reader says.
+        /// Message of the system or the reader.
         reason: String,
     },
     /// The mesh file's extension names no known format.
@@ -27,7 +27,7 @@ pub enum ObjectError {
     Surface {
         /// The mesh file, or `sphere`.
         surface: String,
-        /// What is wrong with it.
+        /// Its defect.
         defect: SurfaceDefect,
     },
     /// A number is out of range.
@@ -35,15 +35,15 @@ pub enum ObjectError {
     Parameter {
         /// Which number.
         name: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
-        /// What it may be.
+        /// Its valid range.
         range: &'static str,
     },
     /// The dense compliance would not fit in memory.
     #[error(
         "the proxy reaches {nodes} surface nodes, which need {} MB of compliance, more than the {} MB of memory that it may take: use \
-         a coarser surface or a smaller grid, or close other programs", .bytes.div_ceil(1_000_000), .limit / 1_000_000
+         a coarser surface or a smaller grid, close other programs, or raise the limit (ulimit -v)", .bytes.div_ceil(1_000_000), .limit / 1_000_000
     )]
     TooLarge {
         /// Surface nodes that the proxy reaches.
@@ -173,7 +173,7 @@ pub enum ObjectError {
     Factor(#[from] FactorError),
 }
 
-/// What keeps triangles from being a closed, orientable surface of proper triangles.
+/// A defect that keeps triangles from being a closed, orientable surface of proper triangles.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceDefect {
     /// There are no triangles.

@@ -74,7 +74,7 @@ pub struct Object {
     pub mass: Vec<f64>,
     /// Damping of each node against the ground [N s/m].
     pub damping: Vec<f64>,
-    /// What was repaired on the way, one sentence each, for the user to read.
+    /// Repairs made on the way, one sentence each, for the user to read.
     pub warnings: Vec<String>,
 }
 

@@ -47,7 +47,7 @@ impl Stiffness {
         self.blocks.iter().all(|block| *block == DMat3::from_diagonal(DVec3::splat(block.x_axis.x)))
     }
 
-    /// What each block multiplies the identity with, if every one does: a ninth of the numbers, for products frame after frame [N/m].
+    /// Factor of the identity in each block, if every block is a multiple of it: a ninth of the numbers, for products frame after frame [N/m].
     #[must_use]
     pub fn scales(&self) -> Option<Vec<f64>> {
         self.is_isotropic().then(|| self.blocks.iter().map(|block| block.x_axis.x).collect())

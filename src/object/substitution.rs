@@ -5,7 +5,7 @@
 //! then spend most of their time on being called. Plain loops over the columns read L once in each direction and do little else.
 //! A right-hand side is of numbers, or of vectors where one matrix stands for all three coordinates.
 //!
-//! What takes time is that L comes from memory. So subtrees of the elimination tree, which do not touch each other's rows, are solved
+//! Reading L from memory takes most of the time. So subtrees of the elimination tree, which do not touch each other's rows, are solved
 //! side by side, before the rest forward and after it backward; what they leave in the rest's rows is added up in their order, so
 //! that the result is the same for any number of threads (Liu, The role of elimination trees in sparse factorization, 1990).
 
@@ -13,7 +13,7 @@ use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSuper
 use rayon::prelude::*;
 use std::ops::{AddAssign, Mul, Range, SubAssign};
 
-/// What a right-hand side is made of.
+/// An element of a right-hand side.
 pub(super) trait Entry: Copy + Default + Send + Sync + AddAssign + SubAssign + Mul<f64, Output = Self> {}
 
 impl<T: Copy + Default + Send + Sync + AddAssign + SubAssign + Mul<f64, Output = T>> Entry for T {}
@@ -65,7 +65,7 @@ fn supernode<'f>(symbolic: &'f SymbolicSupernodalCholesky<usize>, values: &'f [f
 }
 
 impl Partition {
-    /// Of a factor large enough to be worth it; else all is the rest.
+    /// Subtrees of a factor large enough to be worth it; else all is the rest.
     pub fn new(symbolic: &SymbolicSupernodalCholesky<usize>) -> Self {
         let count = symbolic.n_supernodes();
         let entries = symbolic.len_val();

@@ -38,7 +38,7 @@ impl Topology {
     }
 }
 
-/// What [`close`] finds.
+/// The findings of [`close`].
 pub(super) struct ClosedSurface {
     pub topology: Topology,
     /// Each edge once, as its two ends.

@@ -55,7 +55,7 @@ pub struct Held {
 }
 
 impl EndForce {
-    /// The force of `trace`; `None` where the chain has not three joints and a contact node.
+    /// The force of `trace`; `None` where the chain has not three joints, or contact nodes elsewhere than on its last link.
     #[must_use]
     pub fn new(name: &str, chain: &Chain, trace: &Trace) -> Option<Self> {
         let at_the_end = chain.nodes.iter().all(|node| node.link + 1 == chain.joints.len());

@@ -1,4 +1,4 @@
-//! What a bake and a press look like: figures drawn without a display, a GPU or a system font.
+//! Figures of a bake and of a press, drawn without a display, a GPU or a system font.
 //!
 //! [`canvas`] is the paper sheet (SVG, and the same sheet rasterised to PNG), [`plot`] draws charts and heat maps on
 //! it, [`raster`] draws solid bodies. The figures themselves are functions of the library's types; none of them knows

@@ -1,6 +1,6 @@
 //! The torque field on a plane of C-space: one heat map a joint, with the contact boundary.
 //!
-//! Of all planes along two joints that cross the contact boundary the one with the largest torques is shown; the other
+//! The plane shown is the one with the largest torques of all planes along two joints that cross the contact boundary; the other
 //! joints stay at that plane's values. The boundary is the zero line of the gap, or, where no gap is stored, the line on which the
 //! contact index, interpolated, is one half (section 3.1).
 

@@ -13,9 +13,9 @@ pub struct DeviceSpec {
     pub offset: Option<JointVector>,
     /// Number of the contact node that the tip of a Cartesian device leads; `None` for the last one.
     pub node: Option<usize>,
-    /// Of the spring between a Cartesian device's tip and that node [N/m].
+    /// Stiffness of the spring between a Cartesian device's tip and that node [N/m].
     pub stiffness: f64,
-    /// Of the damper beside it [N s/m].
+    /// Damping of the damper beside it [N s/m].
     pub damping: f64,
     /// Maximum size of each of the device's efforts, where that is to be less than the device allows [N m or N].
     pub effort_limit: Option<JointVector>,

@@ -13,7 +13,7 @@ pub struct Effect {
     pub key: &'static str,
     /// Its name, for people.
     pub name: &'static str,
-    /// What it does.
+    /// Its action, in words.
     pub what: &'static str,
     /// Its value where a scene does not give one: TOML, with figures that suit a desktop device and soft objects.
     usual: &'static str,
@@ -30,7 +30,7 @@ impl PartialEq for Effect {
 
 impl Eq for Effect {}
 
-/// What loops can be given anew without haptizing again.
+/// The settings that loops can be given anew without haptizing again.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tuning {
     /// Gains and effects of a tick.

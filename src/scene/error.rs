@@ -29,7 +29,7 @@ pub struct Diagnostic {
     pub line: usize,
     /// In characters, from 1.
     pub column: usize,
-    /// What is wrong and what to do.
+    /// The defect and its remedy.
     pub message: String,
     /// The line, as far as it fits.
     excerpt: String,

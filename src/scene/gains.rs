@@ -9,7 +9,7 @@ pub enum GainError {
     /// No gain of that name.
     #[error("there is no gain {key:?}: take one of {}", GAINS.map(|(key, ..)| key).join(", "))]
     Unknown {
-        /// What was named.
+        /// The name that was given.
         key: String,
     },
     /// Not one number for all joints, nor one each.
@@ -27,7 +27,7 @@ pub enum GainError {
     Value {
         /// The gain.
         key: &'static str,
-        /// What was given.
+        /// The value that was given.
         value: f64,
         /// Whether it may be zero.
         zero: bool,

@@ -75,7 +75,7 @@ pub struct ScanScene {
     pub device: DeviceSpec,
 }
 
-/// What rendering needs of a scene, whether its object is virtual, real, or only known from a log.
+/// The part of a scene that rendering needs, whether its object is virtual, real, or only known from a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendering {
     /// Where it was read from.

@@ -1,4 +1,4 @@
-//! What `[scan]` says: how a real object is haptized (section 2.2), and the simulated specimen that stands in for it.
+//! The content of `[scan]`: how a real object is haptized (section 2.2), and the simulated specimen that stands in for it.
 
 use super::GridSpec;
 use crate::JointVector;
@@ -11,7 +11,7 @@ pub struct ScanSpec {
     pub plan: PlanSpec,
     /// How it is driven there, and when a measurement counts.
     pub control: ScanControl,
-    /// What stops it.
+    /// Limits that stop it.
     pub limits: ScanLimits,
     /// The specimen that is simulated in place of a real one.
     pub simulated: SpecimenSpec,
@@ -78,7 +78,7 @@ pub struct ScanControl {
     pub epsilon: f64,
 }
 
-/// What stops a scan at once.
+/// Limits that stop a scan at once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanLimits {
     /// Control torque less gravity, in size [N m].
@@ -96,7 +96,7 @@ pub struct SpecimenSpec {
     pub corner: DVec3,
     /// Extent along x, y and z [m].
     pub size: DVec3,
-    /// What lies on its surface.
+    /// Layer on its surface.
     pub cover: Cover,
     /// Coefficient of friction between proxy and surface [1].
     pub friction: f64,
@@ -108,7 +108,7 @@ pub struct SpecimenSpec {
     pub joint_friction: f64,
 }
 
-/// What lies on the specimen's surface.
+/// Layer on the specimen's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Cover {

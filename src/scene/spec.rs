@@ -1,4 +1,4 @@
-//! What a scene says, validated: plain data that the other rooms read.
+//! The content of a scene, validated: plain data that the other rooms read.
 //!
 //! All quantities are SI. Gains of the haptic loop are given joint by joint, because the coordinates of a chain may mix
 //! radians and metres: where a doc says [N m/rad], a prismatic joint has [N/m], and so on.
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 pub struct ObjectSpec {
     /// Where the surface comes from.
     pub shape: Shape,
-    /// What resists deformation beside the skin, Kn.
+    /// Material that resists deformation beside the skin, Kn.
     pub material: Material,
     /// The skin of the surface, where it has one.
     pub skin: Option<SkinSpec>,
@@ -72,7 +72,7 @@ pub enum Shape {
     },
 }
 
-/// What resists deformation.
+/// Material that resists deformation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Material {
     /// Springs along the edges of the surface, or of the tetrahedra.
@@ -121,7 +121,7 @@ pub struct InclusionSpec {
 /// Which part of a solid an inclusion is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InclusionPlace {
-    /// What lies in a sphere.
+    /// The part inside a sphere.
     Sphere {
         /// [m]
         centre: DVec3,
@@ -370,7 +370,7 @@ pub struct HapticsSpec {
     pub encoder_step: JointVector,
     /// Dry friction of each joint of the device; zero where it is not told [N m].
     pub device_friction: JointVector,
-    /// What the tick does beyond the paper's, if anything.
+    /// Effects of the tick beyond the paper's, if any.
     pub effects: HapticEffects,
     /// The hand that holds the device.
     pub hand: HandSpec,
@@ -405,9 +405,9 @@ pub struct FrictionSpec {
     pub coefficient: f64,
     /// Tangential over normal force at which sticking ends; at least `coefficient` [1].
     pub static_coefficient: f64,
-    /// Of a bristle: how fast friction builds up while sticking [N/m].
+    /// Stiffness of a bristle: how fast friction builds up while sticking [N/m].
     pub stiffness: f64,
-    /// Of a bristle while sticking [N s/m].
+    /// Damping of a bristle while sticking [N s/m].
     pub damping: f64,
     /// Where the scene's text names it [bytes].
     pub place: Range<usize>,
@@ -475,7 +475,7 @@ pub struct HandSpec {
     pub stiffness: JointVector,
     /// Between the motion and the hand [N m s/rad].
     pub damping: JointVector,
-    /// Of the hand itself, moving with the device [kg m^2].
+    /// Inertia of the hand itself, moving with the device [kg m^2].
     pub inertia: JointVector,
 }
 
@@ -484,7 +484,7 @@ pub struct HandSpec {
 pub struct GraphicsSpec {
     /// Frames per second [Hz].
     pub rate: f64,
-    /// What it does beyond the paper's.
+    /// Effects beyond the paper's.
     pub effects: GraphicsEffects,
 }
 

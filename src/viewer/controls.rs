@@ -1,4 +1,4 @@
-//! What can be turned while one feels: gains, interpolation, effects with their prices, what is shown, and how the scene is
+//! Settings that can be turned while one feels: gains, interpolation, effects with their prices, what is shown, and how the scene is
 //! baked.
 
 use super::{

@@ -49,7 +49,7 @@ impl Files {
     }
 
     /// Returns a file of the folder that is not there yet: `name` and the extension, with a number between them where needed.
-    /// What is no letter, digit, dot or underscore in `name` becomes a hyphen.
+    /// Returns `name` with a hyphen for every character that is no letter, digit, dot or underscore.
     #[must_use]
     pub fn fresh(&self, name: &str, extension: &str) -> PathBuf {
         fresh(&self.folder, name, extension)

@@ -92,7 +92,7 @@ pub fn short(name: &str) -> &str {
     name.split(" (").next().unwrap_or(name)
 }
 
-/// What helps in the window where a GPU cannot bake.
+/// The remedy in the window where a GPU cannot bake.
 const ON_THE_CPU: &str = "the CPU (Haptization: Solve on CPU)";
 
 /// How a job ended.

@@ -1,4 +1,4 @@
-//! What is open in the window: a dataset with everything its rendering needs, and how it came to be.
+//! The content of the window: a dataset with everything its rendering needs, and how it came to be.
 
 use crate::{
     JointVector,

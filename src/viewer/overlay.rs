@@ -1,4 +1,4 @@
-//! What lies on top of the 3-D picture: axes, a scale, what colours and arrows say.
+//! Labels on top of the 3-D picture: axes, a scale, the meaning of colours and arrows.
 
 use super::{
     body::Body,

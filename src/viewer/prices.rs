@@ -1,4 +1,4 @@
-//! What each effect costs, and each way to interpolate, measured on this machine for what is open.
+//! The cost of each effect and of each way to interpolate, measured on this machine for what is open.
 //!
 //! A tick: the scene's first motion is played by a simulated hand as fast as it goes. A frame: the object is advanced on
 //! the window's device, and waited for after some frames. Both are timed in short blocks, again and again, in the background,

@@ -1,4 +1,4 @@
-//! What is drawn besides the surface, as rounded cones: links, nodes, force arrows, axes.
+//! Rounded cones, drawn besides the surface: links, nodes, force arrows, axes.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;

@@ -37,7 +37,7 @@ const LONGEST_SILENCE: f64 = 0.1;
 /// Longest message of any protocol [bytes].
 const LONGEST: usize = 128;
 
-/// What a protocol makes of the bytes that have come.
+/// The reading by a protocol of the bytes that have come.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reply {
     /// Not yet a whole reply.

@@ -23,7 +23,7 @@ use std::{
 };
 
 functions! {
-    /// What is used of `libdrd`.
+    /// The functions of `libdrd` that are used.
     struct Functions {
         dhdOpen: fn() -> c_int;
         dhdClose: fn(c_char) -> c_int;

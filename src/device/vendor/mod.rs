@@ -14,7 +14,7 @@ use std::path::PathBuf;
 pub struct LibraryFiles {
     /// Paths, and names that the system's loader searches for, in order.
     pub candidates: Vec<PathBuf>,
-    /// What to install.
+    /// Instructions to install it.
     pub remedy: &'static str,
 }
 

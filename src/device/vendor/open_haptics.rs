@@ -46,7 +46,7 @@ const _: () = assert!(size_of::<ErrorInfo>() == 12);
 type Callback = unsafe extern "C" fn(*mut c_void) -> c_uint;
 
 functions! {
-    /// What is used of `libHD`.
+    /// The functions of `libHD` that are used.
     struct Functions {
         hdInitDevice: fn(*const c_char) -> c_uint;
         hdDisableDevice: fn(c_uint);

@@ -194,8 +194,8 @@ pub(super) fn solver(accuracy: &Accuracy) -> Canvas {
     canvas
 }
 
-/// What refining the scene changes: mesh and contact nodes, which must converge, beside skin and contact compliance, which say what the
-/// body is.
+/// Draws how refining the scene changes the torque: mesh and contact nodes, which must converge, beside skin and contact compliance, which
+/// describe the body.
 #[must_use]
 pub(super) fn refinement(accuracy: &Accuracy) -> Canvas {
     let mut canvas = sheet(

@@ -1,4 +1,4 @@
-//! What accuracy costs in time: work-precision diagrams of one scene against directly solved configurations.
+//! The cost of accuracy in time: work-precision diagrams of one scene against directly solved configurations.
 //!
 //! The reference is equation (2) in the energy form, in f64, with the geometry that follows the deformation, solved to
 //! [`REFERENCE_TOLERANCE`](crate::tolerances::REFERENCE_TOLERANCE) at random configurations of the scene's grid that no dataset holds. Its own error is how much it
@@ -93,7 +93,7 @@ pub struct Row {
     pub value: f64,
     /// Grid points (spacing), nodes or iterations on average; 0 where there are none.
     pub points: usize,
-    /// Of the grid's points, those in contact that were solved: a free one costs a distance, however the grid is made. 0 in other
+    /// Grid points in contact that were solved: a free one costs a distance, however the grid is made. 0 in other
     /// studies.
     pub solved: usize,
     /// Size of the dataset; 0 where there is none [bytes].

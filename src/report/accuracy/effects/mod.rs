@@ -1,4 +1,4 @@
-//! What each effect of a scene costs, alone and in the scene, beside the same scene without it in the same run.
+//! The cost of each effect of a scene, alone and in the scene, beside the same scene without it in the same run.
 //!
 //! *Plain* is the scene without effects and without graphics: no contact force is stored, no frame drawn. `graphics` adds the
 //! graphics loop, each of the others one effect with the scene's own value, or a usual one where the scene does not name

@@ -40,7 +40,7 @@ fn largest_step(path: &[Equilibrium]) -> (f64, f64, usize) {
     (largest, size, path.iter().filter(|result| torque(result).is_none()).count())
 }
 
-/// What is measured with nodes of one kind: their name, radius [m] and Kc [N/m].
+/// A measurement with nodes of one kind: their name, radius [m] and Kc [N/m].
 type Measure = fn(Effort, Processor<'_>, &str, f64, f64) -> Result<Outcome, Failure>;
 
 /// `measure` of balls and points, soft and stiff.

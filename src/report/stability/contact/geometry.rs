@@ -114,7 +114,7 @@ pub fn coincident_nodes(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     Ok(outcomes)
 }
 
-/// What becomes of configurations.
+/// The outcome for some configurations.
 #[derive(Default)]
 struct Tally {
     /// Neither balanced nor flagged.

@@ -14,7 +14,7 @@ use glam::DVec3;
 /// Where the base stands [m]: its links reach the sphere stretched out, a little off the plane in which its edges lie.
 const BASE: DVec3 = DVec3::new(-0.2, 0.003, 0.04);
 
-/// What is singular, the joints, and their coordinates when the links are turned by an angle.
+/// A singular pose: its name, the joints, and their coordinates when the links are turned by an angle.
 type Arm = (&'static str, Vec<JointSpec>, fn(f64) -> Vec<f64>);
 
 fn revolute(origin: DVec3, nodes: Vec<ProxyNodeSpec>) -> JointSpec {

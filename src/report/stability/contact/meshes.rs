@@ -17,7 +17,7 @@ use std::{fmt::Write, path::Path};
 /// A surface in the making.
 type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
 
-/// What becomes of a surface.
+/// The outcome for a surface.
 enum Fate {
     /// Repaired, with these words in a warning.
     Repaired(&'static str),

@@ -67,7 +67,7 @@ impl<'a> Processor<'a> {
         self.left_to_cpu
     }
 
-    /// What was varied, and where unless on the CPU.
+    /// Describes what was varied, and where unless on the CPU.
     pub fn name(&self, varied: &str) -> String {
         format!("{varied}{}", self.choose("", ", GPU"))
     }

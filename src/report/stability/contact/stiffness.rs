@@ -24,7 +24,7 @@ use std::{
 /// by balls finer than its facets; what does not converge is flagged.
 const DEPTHS: [(f64, f64, [f64; 2]); 2] = [(0.0, 0.2, [0.95, 0.999]), (0.2, 0.5, [0.85, 0.999])];
 
-/// What the bodies are made of, in the order of their bounds.
+/// Materials of the bodies, in the order of their bounds.
 const BODIES: [&str; 2] = ["springs", "skin"];
 
 /// How many of how many converge, and what time they take together.
@@ -41,7 +41,7 @@ impl Share {
         Self { converged: usize::from(converged), solved: 1, time }
     }
 
-    /// What part converges; of none it is no number, which keeps no bound.
+    /// The part that converges; without any body it is no number, which keeps no bound.
     fn part(self) -> f64 {
         self.converged as f64 / self.solved as f64
     }
@@ -55,7 +55,7 @@ impl AddAssign for Share {
     }
 }
 
-/// What the cells of the table add up.
+/// The sums in the cells of the table.
 #[derive(Default)]
 struct Cell {
     all: Share,

@@ -1,4 +1,4 @@
-//! What the cases, and tests of contact, touch, and with what.
+//! The objects that the cases and the tests of contact touch, and the arms that touch them.
 
 use super::super::Failure;
 use crate::{

@@ -49,13 +49,13 @@ coupling_damping = 0.01
 device_damping = 0.02
 ";
 
-/// What became of all that was tried in a case.
+/// The outcome of all that was tried in a case.
 struct Watch {
     limit: JointVector,
     torque: f64,
     /// Worst of all runs, each over its own turnover at its end.
     residual: f64,
-    /// Of the present run: greatest residual, and its turnover so far [J].
+    /// Greatest residual of the present run, and its turnover so far [J].
     run: [f64; 2],
     given: f64,
     /// At the object's port, beyond what the controller took there [J].
