@@ -59,7 +59,7 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
         )?,
         [] => writeln!(
             text,
-            "graphics adapters      none found: `--backend gpu` needs a Vulkan driver, nothing else does"
+            "graphics adapters      none found: `haptize bake --backend gpu` and `haptize view` need a Vulkan driver, nothing else does"
         )?,
         found => {
             for (rank, adapter) in found.iter().enumerate() {
@@ -72,7 +72,7 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
             )?;
         }
     }
-    writeln!(text, "{:<22} {automatic} (a hardware GPU, else all CPU threads)", "`--backend auto` takes")?;
+    writeln!(text, "{:<22} {automatic} (a hardware GPU, else all CPU threads)", "haptize bake takes")?;
     for finding in &findings {
         writeln!(text, "{:<22} {}", finding.subject, finding.seen)?;
         if !finding.good {

@@ -44,7 +44,12 @@ impl Felt {
         let played = play::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, false)?;
         self.forces.extend(EndForce::new(&name(path, &dataset), &setup.chain, &played.trace));
         if self.forces.len() < 2 {
-            return Err("--beside compares the force at the end of arms of three joints with contact nodes".into());
+            return Err(format!(
+                "--beside compares the force at the end of arms that have three joints, and contact nodes on the last link alone; \
+                 play {} by itself",
+                path.display()
+            )
+            .into());
         }
         Ok(())
     }

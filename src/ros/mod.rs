@@ -6,6 +6,7 @@
 
 mod cdr;
 mod joint_state;
+mod messages;
 mod table;
 mod write;
 

@@ -5,18 +5,17 @@
 //! empty field, which the import drops or refuses as its mapping says. Time is the message's stamp; if all stamps are
 //! zero, the time at which it was logged.
 
-use super::{JointState, MESSAGE_ENCODING, RosError, TYPE};
-use mcap::{io::MessageReader, sans_io::LinearReaderOptions};
+use super::{JointState, RosError, TYPE, messages::Messages};
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fmt::Write as _,
     fs::File,
-    io::{self, BufReader, Read},
-    path::{Path, PathBuf},
+    io::{self, Read},
+    path::Path,
 };
 
-/// Longest record or chunk that is read [bytes]: a chunk of a recorder's is a few MiB.
-const LONGEST_RECORD: usize = 1 << 28;
+/// Most joints of a topic: ten times as many as those of a humanoid with hands.
+const MOST_JOINTS: usize = 1 << 10;
 
 /// A topic of joint states.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -25,41 +24,6 @@ pub struct Topic {
     pub name: String,
     /// Its messages.
     pub messages: u64,
-}
-
-/// Messages of joint states in the file at `path`: topic, log time [ns], bytes.
-struct Messages {
-    path: PathBuf,
-    reader: MessageReader<BufReader<File>>,
-}
-
-impl Messages {
-    fn open(path: &Path) -> Result<Self, RosError> {
-        let file = File::open(path).map_err(|source| RosError::File { file: path.to_owned(), source })?;
-        if !is_mcap(path) {
-            return Err(RosError::mcap(path, &mcap::McapError::BadMagic));
-        }
-        let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
-        let reader = MessageReader::new_with_options(BufReader::with_capacity(1 << 16, file), options);
-        Ok(Self { path: path.to_owned(), reader })
-    }
-}
-
-impl Iterator for Messages {
-    type Item = Result<(String, u64, Vec<u8>), RosError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            let message = match self.reader.next()? {
-                Ok(message) => message,
-                Err(error) => return Some(Err(RosError::mcap(&self.path, &error))),
-            };
-            let typed = message.channel.schema.as_ref().is_some_and(|schema| schema.name == TYPE);
-            if typed && message.channel.message_encoding == MESSAGE_ENCODING {
-                return Some(Ok((message.channel.topic.clone(), message.log_time, message.data.into_owned())));
-            }
-        }
-    }
 }
 
 /// Returns whether the file at `path` begins like an MCAP file.
@@ -99,7 +63,7 @@ impl JointStateTable {
     /// [`RosError`] if the file cannot be read, the topic is not there or not unique, or a message is none.
     pub fn open(path: &Path, topic: Option<&str>) -> Result<Self, RosError> {
         let topic = chosen(path, topic)?;
-        let (mut joints, mut stamped, mut number) = (Vec::new(), false, 0);
+        let (mut joints, mut known, mut stamped, mut number) = (Vec::new(), BTreeSet::new(), false, 0);
         for message in Messages::open(path)? {
             let (name, _, bytes) = message?;
             if name == topic {
@@ -107,9 +71,13 @@ impl JointStateTable {
                 let state = decode(path, &topic, number, &bytes)?;
                 stamped |= state.stamp > 0;
                 for joint in state.names {
-                    if !joints.contains(&joint) {
+                    if known.insert(joint.clone()) {
                         joints.push(joint);
                     }
+                }
+                if joints.len() > MOST_JOINTS {
+                    let what = format!("its messages name more than {MOST_JOINTS} joints");
+                    return Err(RosError::Message { file: path.to_owned(), topic, number, what });
                 }
             }
         }

@@ -238,6 +238,22 @@ fn page(
         accuracy.reference_error,
         accuracy.rounds
     )?;
+    offers_table(&mut html, accuracy)?;
+    for (_, canvas, caption) in sheets {
+        writeln!(html, "<figure>{}<figcaption>{caption}</figcaption></figure>", canvas.svg())?;
+    }
+    if let Some((effects, figure)) = priced {
+        effects::html(&mut html, effects, figure)?;
+    }
+    all_rows(&mut html, accuracy)?;
+    for note in &accuracy.notes {
+        writeln!(html, "<p>Note: {}</p>", escaped(note))?;
+    }
+    html.push_str("</html>\n");
+    Ok(html)
+}
+/// Writes which grid reaches which error.
+fn offers_table(html: &mut String, accuracy: &Accuracy) -> fmt::Result {
     html.push_str(
         "<h2>For which error take what</h2>\n<table><tr><th>error<th>interpolation<th>spacing<th>points<th>bake time",
     );
@@ -262,12 +278,11 @@ fn page(
             100.0 * least
         )?;
     }
-    for (_, canvas, caption) in sheets {
-        writeln!(html, "<figure>{}<figcaption>{caption}</figcaption></figure>", canvas.svg())?;
-    }
-    if let Some((effects, figure)) = priced {
-        effects::html(&mut html, effects, figure)?;
-    }
+    Ok(())
+}
+
+/// Writes the table of all rows of all studies.
+fn all_rows(html: &mut String, accuracy: &Accuracy) -> fmt::Result {
     html.push_str(
         "<h2>All rows</h2>\n<table><tr><th>study<th>series<th>setting<th>points or iterations<th>solved<th>bytes<th>time",
     );
@@ -292,9 +307,5 @@ fn page(
         )?;
     }
     html.push_str("</table>\n");
-    for note in &accuracy.notes {
-        writeln!(html, "<p>Note: {}</p>", escaped(note))?;
-    }
-    html.push_str("</html>\n");
-    Ok(html)
+    Ok(())
 }

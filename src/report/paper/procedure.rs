@@ -20,56 +20,72 @@ const ROWS: [f64; 3] = [118.0, 228.0, 338.0];
 const DATASET_WIDTH: f64 = 136.0;
 const ARROW: Colour = colour::SOFT_INK;
 
+/// Where the boxes are.
+struct Boxes {
+    virtual_object: Area,
+    real_object: Area,
+    solver: Area,
+    scan: Area,
+    gridization: Area,
+    dataset: Area,
+    interpolation: Area,
+    proxy: Area,
+    device: Area,
+    coupling: Area,
+    forces: Area,
+    motion: Area,
+}
+
+impl Boxes {
+    fn new() -> Self {
+        let [objects, haptization, dataset, first, second] = COLUMNS;
+        let place = |x: f64, row: usize| Area { x, y: ROWS[row], width: BOX[0], height: BOX[1] };
+        Self {
+            virtual_object: place(objects, 0),
+            real_object: place(objects, 1),
+            solver: place(haptization, 0),
+            scan: place(haptization, 1),
+            gridization: place(haptization, 2),
+            dataset: Area { x: dataset, y: ROWS[0], width: DATASET_WIDTH, height: ROWS[2] + BOX[1] - ROWS[0] },
+            interpolation: place(first, 0),
+            proxy: place(second, 0),
+            device: place(first, 1),
+            coupling: place(second, 1),
+            forces: place(first, 2),
+            motion: place(second, 2),
+        }
+    }
+}
+
 /// Draws the procedure.
 #[must_use]
 pub fn procedure(sphere: Sphere<'_>, scans: Scans<'_>) -> Canvas {
-    let count = ticks::thousands;
-    let nodes = sphere.dataset.surface.as_ref().map_or(0, |surface| surface.nodes.len() / 3);
-    let haptics = &sphere.scene.haptics;
-    let graphics = sphere.scene.graphics.map_or(0.0, |graphics| graphics.rate);
     let mut canvas = Canvas::new(WIDTH, HEIGHT);
     chart::headline(&mut canvas, "Procedure of C-space data-driven haptic rendering");
     band(&mut canvas, COLUMNS[0], COLUMNS[1] + BOX[0], "Haptization, beforehand (section 2)");
     band(&mut canvas, COLUMNS[3], COLUMNS[4] + BOX[0], "Rendering, in real time (section 3)");
+    let boxes = Boxes::new();
+    haptization(&mut canvas, &boxes, sphere, scans);
+    rendering(&mut canvas, &boxes, sphere);
+    arrows(&mut canvas, &boxes);
+    canvas
+}
 
-    let [objects, haptization, _, first, second] = COLUMNS;
-    let place = |x: f64, row: usize| Area { x, y: ROWS[row], width: BOX[0], height: BOX[1] };
-    let virtual_object = place(objects, 0);
-    let real_object = place(objects, 1);
-    let solver = place(haptization, 0);
-    let scan = place(haptization, 1);
-    let gridization = place(haptization, 2);
-    let dataset = Area { x: COLUMNS[2], y: ROWS[0], width: DATASET_WIDTH, height: ROWS[2] + BOX[1] - ROWS[0] };
-    let interpolation = place(first, 0);
-    let proxy = place(second, 0);
-    let device = place(first, 1);
-    let coupling = place(second, 1);
-    let forces = place(first, 2);
-    let motion = place(second, 2);
-
+/// Draws the boxes from the objects to the dataset.
+fn haptization(canvas: &mut Canvas, boxes: &Boxes, sphere: Sphere<'_>, scans: Scans<'_>) {
+    let count = ticks::thousands;
+    let nodes = sphere.dataset.surface.as_ref().map_or(0, |surface| surface.nodes.len() / 3);
     let points = sphere.dataset.grid.points();
-    labelled(&mut canvas, virtual_object, "Virtual object", &[&format!("{nodes} nodes, springs Kn"), "and ground Kg"]);
-    labelled(
-        &mut canvas,
-        solver,
-        "Contact solver",
-        &["equilibrium (2) and contact", &format!("nodes at {} q", count(points))],
-    );
-    labelled(&mut canvas, real_object, "Real object", &["a spongy block,", "simulated here"]);
+    labelled(canvas, boxes.virtual_object, "Virtual object", &[&format!("{nodes} nodes, springs Kn"), "and ground Kg"]);
+    let solved = format!("nodes at {} q", count(points));
+    labelled(canvas, boxes.solver, "Contact solver", &["equilibrium (2) and contact", &solved]);
+    labelled(canvas, boxes.real_object, "Real object", &["a spongy block,", "simulated here"]);
     let samples = [scans.bare, scans.side].map(|scanned| count(scanned.samples.len()));
-    labelled(
-        &mut canvas,
-        scan,
-        "Scan under PD control",
-        &["τ = −(control torque) at", &format!("{} and {} q", samples[0], samples[1])],
-    );
+    let scanned = format!("{} and {} q", samples[0], samples[1]);
+    labelled(canvas, boxes.scan, "Scan under PD control", &["τ = −(control torque) at", &scanned]);
     let step = scans.bare.dataset.grid.axes.first().map_or(0.0, |axis| axis.step);
-    labelled(
-        &mut canvas,
-        gridization,
-        "Uniform gridization",
-        &["scattered torques to a grid", &format!("of {} rad", ticks::number(step, 2))],
-    );
+    let gridded = format!("of {} rad", ticks::number(step, 2));
+    labelled(canvas, boxes.gridization, "Uniform gridization", &["scattered torques to a grid", &gridded]);
     let gridized = [scans.bare, scans.side].map(|scanned| count(inside(scanned)));
     let lines = [
         "configuration q",
@@ -84,33 +100,37 @@ pub fn procedure(sphere: Sphere<'_>, scans: Scans<'_>) -> Canvas {
         &format!("{} of the block", gridized[0]),
         &format!("{} of its side", gridized[1]),
     ];
-    labelled(&mut canvas, dataset, "Dataset D(q)", &lines);
-    loop_title(&mut canvas, interpolation, &format!("Haptic loop, {} Hz", haptics.rate));
-    loop_title(&mut canvas, forces, &format!("Graphics loop, {graphics} Hz"));
-    labelled(
-        &mut canvas,
-        interpolation,
-        "Interpolated torque",
-        &[&format!("where contact index > {},", haptics.threshold), "smoothed with slope Ks"],
-    );
-    labelled(&mut canvas, proxy, "Virtual proxy", &["multi-link, stepped", "passively (NPMI)"]);
-    labelled(&mut canvas, coupling, "Virtual coupling", &["spring Kvc, damper Bvc"]);
-    labelled(&mut canvas, device, "Haptic device", &["position y from the hand,", "torque τ(t) to it"]);
-    labelled(&mut canvas, forces, "Interpolated forces", &["fj on the nodes Cvo", "at the proxy's q"]);
-    labelled(&mut canvas, motion, "Deforming object", &["nodes n stepped", "passively (NPMI), drawn"]);
+    labelled(canvas, boxes.dataset, "Dataset D(q)", &lines);
+}
 
-    across(&mut canvas, virtual_object, solver, false);
-    across(&mut canvas, real_object, scan, false);
-    across(&mut canvas, solver, dataset, false);
-    across(&mut canvas, gridization, dataset, false);
-    down(&mut canvas, scan, gridization, false);
-    across(&mut canvas, dataset, interpolation, false);
-    across(&mut canvas, dataset, forces, false);
-    across(&mut canvas, interpolation, proxy, true);
-    down(&mut canvas, proxy, coupling, true);
-    across(&mut canvas, device, coupling, true);
-    across(&mut canvas, forces, motion, false);
-    canvas
+/// Draws the boxes of the two loops.
+fn rendering(canvas: &mut Canvas, boxes: &Boxes, sphere: Sphere<'_>) {
+    let haptics = &sphere.scene.haptics;
+    let graphics = sphere.scene.graphics.map_or(0.0, |graphics| graphics.rate);
+    loop_title(canvas, boxes.interpolation, &format!("Haptic loop, {} Hz", haptics.rate));
+    loop_title(canvas, boxes.forces, &format!("Graphics loop, {graphics} Hz"));
+    let threshold = format!("where contact index > {},", haptics.threshold);
+    labelled(canvas, boxes.interpolation, "Interpolated torque", &[&threshold, "smoothed with slope Ks"]);
+    labelled(canvas, boxes.proxy, "Virtual proxy", &["multi-link, stepped", "passively (NPMI)"]);
+    labelled(canvas, boxes.coupling, "Virtual coupling", &["spring Kvc, damper Bvc"]);
+    labelled(canvas, boxes.device, "Haptic device", &["position y from the hand,", "torque τ(t) to it"]);
+    labelled(canvas, boxes.forces, "Interpolated forces", &["fj on the nodes Cvo", "at the proxy's q"]);
+    labelled(canvas, boxes.motion, "Deforming object", &["nodes n stepped", "passively (NPMI), drawn"]);
+}
+
+/// Draws the arrows between the boxes.
+fn arrows(canvas: &mut Canvas, boxes: &Boxes) {
+    across(canvas, boxes.virtual_object, boxes.solver, false);
+    across(canvas, boxes.real_object, boxes.scan, false);
+    across(canvas, boxes.solver, boxes.dataset, false);
+    across(canvas, boxes.gridization, boxes.dataset, false);
+    down(canvas, boxes.scan, boxes.gridization, false);
+    across(canvas, boxes.dataset, boxes.interpolation, false);
+    across(canvas, boxes.dataset, boxes.forces, false);
+    across(canvas, boxes.interpolation, boxes.proxy, true);
+    down(canvas, boxes.proxy, boxes.coupling, true);
+    across(canvas, boxes.device, boxes.coupling, true);
+    across(canvas, boxes.forces, boxes.motion, false);
 }
 
 /// Shades the boxes that belong together, from `left` to `right`, under their title.

@@ -5,7 +5,8 @@
 //! execution fails if it panics, takes longer than [`LONGEST`], or takes more memory than
 //! [`MOST_BYTES`]; its input is kept then, and belongs into `corpus/` once the cause is mended.
 //!
-//! `HAPTIZE_FUZZ` sets the number of executions of each target.
+//! `HAPTIZE_FUZZ` sets the number of executions of each target. With `HAPTIZE_FUZZ_BY_KINDS` new code is counted but not followed, to see
+//! what that gains.
 
 mod coverage;
 mod mutate;
@@ -155,6 +156,7 @@ fn fuzz(target: &Target, executions: usize) -> Reached {
     let mut of_seeds = 0;
     let mut kinds = HashSet::new();
     let mut coverage = Coverage::begin();
+    let by_coverage = std::env::var_os("HAPTIZE_FUZZ_BY_KINDS").is_none();
     // An endless execution cannot be stopped: another thread watches that inputs follow one another.
     let at_hand = Mutex::new(Vec::new());
     let (sender, beats) = mpsc::channel();
@@ -189,7 +191,7 @@ fn fuzz(target: &Target, executions: usize) -> Reached {
             at_hand.lock().unwrap().clone_from(&input);
             sender.send(()).unwrap();
             let outcome = executed(target, &file, &input).unwrap_or_else(|offence| fail(target, &input, &offence));
-            let is_new = coverage.take() | kinds.insert(kind(&outcome));
+            let is_new = (coverage.take() && by_coverage) | kinds.insert(kind(&outcome));
             if execution < seeds {
                 of_seeds = coverage.blocks().0;
             } else if is_new && inputs.len() < MOST_INPUTS {

@@ -14,11 +14,12 @@ use crate::{
         graphics::{ContactForces, Graphics, Smoothing},
         session::{self, Driver, SessionError},
         setup::Setup,
+        trace::Trace,
     },
     scene::{EFFECTS, Effect, Scene, Waypoint},
 };
 use glam::DVec3;
-use std::{sync::Arc, time::Instant};
+use std::{collections::BTreeSet, sync::Arc, time::Instant};
 
 /// A variant of the scene.
 struct Variant {
@@ -39,70 +40,28 @@ type Times = Vec<Option<Vec<f64>>>;
 pub fn price(scene: &Scene, rounds: usize, progress: &mut dyn FnMut(&str)) -> Result<Effects, AccuracyError> {
     let mut notes = Vec::new();
     let (variants, priced) = variants(scene, &mut notes)?;
-    progress("effects: bake");
-    let mut datasets: Vec<Option<Dataset>> = variants.iter().map(|_| None).collect();
     let timed = (rounds, variants.len());
-    let bakes = by_rounds(timed, 1, |k| {
-        let begun = Instant::now();
-        let (dataset, _) = baked(&variants[k].scene)?;
-        let seconds = begun.elapsed().as_secs_f64();
-        datasets[k] = Some(dataset);
-        Ok(Some(vec![seconds]))
-    })?;
-    let datasets: Vec<Dataset> = datasets.into_iter().flatten().collect();
+    progress("effects: bake");
+    let (datasets, bakes) = bake_all(&variants, timed)?;
     let setups: Vec<Setup> = datasets.iter().map(Setup::new).collect::<Result<_, _>>()?;
     progress("effects: ticks");
     let motion = motion(scene, &datasets[0])?;
     let plain = &setups[PLAIN];
     let plan = plain.plan(&datasets[PLAIN], motion.duration(), 0);
     let felt = session::run(&plain.haptics, &mut Recorded::new(motion.clone()), None, &plan)?;
-    let blocks = plan.ticks / BLOCK + 1;
-    let mut faults = Vec::new();
-    let ticks = by_rounds(timed, TRIES, |k| {
-        let haptics = &setups[k].haptics;
-        let mut device = Recorded::new(motion.clone());
-        let mut driver = Driver::new(haptics, &mut device).map_err(SessionError::from)?;
-        let mut fault = false;
-        let block = |_| {
-            let begun = Instant::now();
-            for _ in 0..BLOCK {
-                fault |= driver.tick(haptics.period(), haptics.period()).0.fault.is_some();
-            }
-            begun.elapsed().as_secs_f64() / (blocks * BLOCK) as f64
-        };
-        let seconds = (0..blocks).map(block).collect();
-        if fault && !faults.contains(&variants[k].name) {
-            faults.push(variants[k].name.clone());
-        }
-        Ok(Some(seconds))
-    })?;
+    let (ticks, faults) = feel_all(&setups, &motion, plan.ticks / BLOCK + 1, timed)?;
     if !faults.is_empty() {
-        notes.push(format!("the loop let go along the motion, so that its tick is too cheap: {}", faults.join(", ")));
+        let names: Vec<&str> = faults.into_iter().map(|k| variants[k].name.as_str()).collect();
+        notes.push(format!("the loop let go along the motion, so that its tick is too cheap: {}", names.join(", ")));
     }
     progress("effects: frames");
-    let rate = setups.iter().find_map(|setup| setup.scene.graphics).map_or(0.0, |graphics| graphics.rate);
-    let frames = (motion.duration() * rate) as usize;
-    // The same forces for all: those of the plain scene.
-    let places: Vec<(JointVector, f64)> = (0..frames)
-        .map(|frame| felt.ticks[frame * felt.ticks.len() / frames].proxy)
-        .map(|q| (q, setups[PLAIN].haptics.field().sample(&q)))
-        .map(|(q, sample)| (q, if sample.contact { sample.share } else { 0.0 }))
-        .collect();
-    let mut drawn: Vec<Option<Graphics<'_>>> =
-        setups.iter().zip(&datasets).map(|(setup, data)| setup.graphics(data)).collect::<Result<_, _>>()?;
-    let frames = by_rounds(timed, TRIES, |k| {
-        let Some(graphics) = &mut drawn[k] else { return Ok(None) };
-        let frame = |(q, share): &(JointVector, f64)| {
-            let begun = Instant::now();
-            graphics.frame(q, *share);
-            begun.elapsed().as_secs_f64() / places.len() as f64
-        };
-        Ok(Some(places.iter().map(frame).collect()))
-    })?;
+    let places = places(&setups, &felt, motion.duration());
+    let frames = draw_all(&setups, &datasets, &places, timed)?;
     let mut device = match on_the_device(&setups, &datasets) {
         Ok(device) => device,
         Err(error) => {
-            notes.push(format!("frames on a GPU are not priced: {}", remedied(&error.to_string(), OTHER_ADAPTER)));
+            let why = remedied(&error.to_string(), OTHER_ADAPTER);
+            notes.push(format!("frames on a GPU are not priced: {why}"));
             Device { adapter: None, bodies: variants.iter().map(|_| None).collect() }
         }
     };
@@ -116,6 +75,7 @@ pub fn price(scene: &Scene, rounds: usize, progress: &mut dyn FnMut(&str)) -> Re
         (Some(body), _) => Some(body.update.takes()),
         (None, adapter) => adapter.as_ref().map(|_| FrameCost::default()),
     };
+    let sizes: Vec<usize> = datasets.iter().map(|dataset| dataset.summary().bytes).collect();
     // Costs of variant k over those of `plain`, and of `drawn` for what is drawn.
     let costs = |k: usize, plain: usize, drawn: usize| {
         let bytes = |k: usize| takes(k).map_or(0.0, |takes| takes.bytes as f64);
@@ -125,8 +85,16 @@ pub fn price(scene: &Scene, rounds: usize, progress: &mut dyn FnMut(&str)) -> Re
             frame: cost(&frames, k, drawn),
             gpu_frame: cost(&gpu_frames, k, drawn),
             device: (bytes(drawn) > 0.0).then(|| bytes(k) / bytes(drawn)),
-            dataset: datasets[k].summary().bytes as f64 / datasets[plain].summary().bytes as f64,
+            dataset: sizes[k] as f64 / sizes[plain] as f64,
         }
+    };
+    let price = |k: usize| Price {
+        name: variants[k].name.clone(),
+        setting: variants[k].setting.clone(),
+        alone: costs(k, PLAIN, GRAPHICS),
+        within: variants[k].within.map(|[with, without]| costs(with, without, without)),
+        device: takes(k),
+        dataset_bytes: sizes[k],
     };
     let least = |times: &Times, k: usize| times[k].as_ref().map(|times| Cost::of(times).least);
     let contacts = felt.ticks.iter().filter(|tick| tick.contact).count();
@@ -137,21 +105,85 @@ pub fn price(scene: &Scene, rounds: usize, progress: &mut dyn FnMut(&str)) -> Re
             frame: least(&frames, GRAPHICS).unwrap_or(0.0),
             gpu_frame: least(&gpu_frames, GRAPHICS),
         },
-        prices: (0..priced)
-            .map(|k| Price {
-                name: variants[k].name.clone(),
-                setting: variants[k].setting.clone(),
-                alone: costs(k, PLAIN, GRAPHICS),
-                within: variants[k].within.map(|[with, without]| costs(with, without, without)),
-                device: takes(k),
-                dataset_bytes: datasets[k].summary().bytes,
-            })
-            .collect(),
+        prices: (0..priced).map(price).collect(),
         in_contact: contacts as f64 / felt.ticks.len().max(1) as f64,
         nodes: setups.iter().find_map(|setup| setup.object.as_ref()).map_or(0, |object| object.rest.len()),
         adapter: device.adapter,
         notes,
         rounds,
+    })
+}
+
+/// Haptizes all variants in each round; the datasets, and the times.
+fn bake_all(variants: &[Variant], timed: (usize, usize)) -> Result<(Vec<Dataset>, Times), AccuracyError> {
+    let mut datasets: Vec<Option<Dataset>> = variants.iter().map(|_| None).collect();
+    let times = by_rounds(timed, 1, |k| {
+        let begun = Instant::now();
+        let (dataset, _) = baked(&variants[k].scene)?;
+        let seconds = begun.elapsed().as_secs_f64();
+        datasets[k] = Some(dataset);
+        Ok(Some(vec![seconds]))
+    })?;
+    Ok((datasets.into_iter().flatten().collect(), times))
+}
+
+/// Feels all variants along `motion`, in so many blocks of ticks; the times, and the variants whose loop had a fault.
+fn feel_all(
+    setups: &[Setup],
+    motion: &Motion,
+    blocks: usize,
+    timed: (usize, usize),
+) -> Result<(Times, BTreeSet<usize>), AccuracyError> {
+    let mut faults = BTreeSet::new();
+    let times = by_rounds(timed, TRIES, |k| {
+        let haptics = &setups[k].haptics;
+        let mut device = Recorded::new(motion.clone());
+        let mut driver = Driver::new(haptics, &mut device).map_err(SessionError::from)?;
+        let mut fault = false;
+        let block = |_| {
+            let begun = Instant::now();
+            for _ in 0..BLOCK {
+                fault |= driver.tick(haptics.period(), haptics.period()).0.fault.is_some();
+            }
+            begun.elapsed().as_secs_f64() / (blocks * BLOCK) as f64
+        };
+        let seconds = (0..blocks).map(block).collect();
+        if fault {
+            faults.insert(k);
+        }
+        Ok(Some(seconds))
+    })?;
+    Ok((times, faults))
+}
+
+/// Configuration and share of the forces in each frame of the session `felt`: those of the plain scene for all variants.
+fn places(setups: &[Setup], felt: &Trace, duration: f64) -> Vec<(JointVector, f64)> {
+    let rate = setups.iter().find_map(|setup| setup.scene.graphics).map_or(0.0, |graphics| graphics.rate);
+    let frames = (duration * rate) as usize;
+    (0..frames)
+        .map(|frame| felt.ticks[frame * felt.ticks.len() / frames].proxy)
+        .map(|q| (q, setups[PLAIN].haptics.field().sample(&q)))
+        .map(|(q, sample)| (q, if sample.contact { sample.share } else { 0.0 }))
+        .collect()
+}
+
+/// Draws the frames at `places` of all variants, on the CPU; the times.
+fn draw_all(
+    setups: &[Setup],
+    datasets: &[Dataset],
+    places: &[(JointVector, f64)],
+    timed: (usize, usize),
+) -> Result<Times, AccuracyError> {
+    let mut drawn: Vec<Option<Graphics<'_>>> =
+        setups.iter().zip(datasets).map(|(setup, data)| setup.graphics(data)).collect::<Result<_, _>>()?;
+    by_rounds(timed, TRIES, |k| {
+        let Some(graphics) = &mut drawn[k] else { return Ok(None) };
+        let frame = |(q, share): &(JointVector, f64)| {
+            let begun = Instant::now();
+            graphics.frame(q, *share);
+            begun.elapsed().as_secs_f64() / places.len() as f64
+        };
+        Ok(Some(places.iter().map(frame).collect()))
     })
 }
 

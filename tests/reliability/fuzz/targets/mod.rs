@@ -174,8 +174,8 @@ pub const SCENES: Target = Target {
     name: "scenes",
     extension: "toml",
     seeds: || {
-        let shipped =
-            ["sphere", "mesh", "paper", "sponge", "sponge_side"].map(|name| shipped(&format!("datasets/{name}.toml")));
+        let shipped = ["sphere", "mesh", "paper", "sponge", "sponge_side", "touch", "nodule"]
+            .map(|name| shipped(&format!("datasets/{name}.toml")));
         let small = program::OBJECTS.map(|(_, object)| program::scene(object, 4).into_bytes());
         shipped.into_iter().chain(small).collect()
     },

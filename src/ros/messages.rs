@@ -1,0 +1,159 @@
+//! Messages of joint states in an MCAP file, record by record.
+//!
+//! Records are taken apart here and not by `mcap::parse_record` (0.26), which sets aside as many bytes as a text's length says, up to
+//! 4 GB, before it looks whether they are there. Memory is that of the longest record.
+
+use super::{MESSAGE_ENCODING, RosError, TYPE, is_mcap};
+use mcap::{
+    McapError,
+    records::op,
+    sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
+};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs::File,
+    io::{BufReader, ErrorKind, Read},
+    path::{Path, PathBuf},
+};
+
+/// Longest record or chunk that is read [bytes]: a chunk of a recorder's is a few MiB.
+const LONGEST_RECORD: u64 = 1 << 28;
+
+/// The messages: topic, log time [ns], bytes.
+pub(super) struct Messages {
+    pub path: PathBuf,
+    file: BufReader<File>,
+    reader: LinearReader,
+    topics: Topics,
+    over: bool,
+}
+
+/// What records so far have said of later ones.
+#[derive(Default)]
+struct Topics {
+    /// Schemas of the type.
+    schemas: BTreeSet<u16>,
+    /// Topics of its channels.
+    channels: BTreeMap<u16, String>,
+}
+
+impl Messages {
+    pub fn open(path: &Path) -> Result<Self, RosError> {
+        let unreadable = |source| RosError::File { file: path.to_owned(), source };
+        let file = File::open(path).map_err(unreadable)?;
+        if !is_mcap(path) {
+            return Err(RosError::mcap(path, &McapError::BadMagic));
+        }
+        // No record is longer than its file, whatever it says.
+        let longest = file.metadata().map_err(unreadable)?.len().min(LONGEST_RECORD);
+        let options =
+            LinearReaderOptions::default().with_record_length_limit(usize::try_from(longest).unwrap_or(usize::MAX));
+        Ok(Self {
+            path: path.to_owned(),
+            file: BufReader::with_capacity(1 << 16, file),
+            reader: LinearReader::new_with_options(options),
+            topics: Topics::default(),
+            over: false,
+        })
+    }
+
+    /// The next message; `None` at the end.
+    fn advance(&mut self) -> Result<Option<(String, u64, Vec<u8>)>, RosError> {
+        let failed = |error: McapError| RosError::mcap(&self.path, &error);
+        while let Some(event) = self.reader.next_event() {
+            match event.map_err(failed)? {
+                LinearReadEvent::ReadRequest(length) => {
+                    let read = loop {
+                        match self.file.read(self.reader.insert(length)) {
+                            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                            read => break read.map_err(|error| failed(error.into()))?,
+                        }
+                    };
+                    self.reader.notify_read(read);
+                }
+                LinearReadEvent::Record { data, opcode } => {
+                    let message = self.topics.take(opcode, Fields(data)).ok_or_else(|| {
+                        let what = "a record is shorter than it says: the file is damaged; record it again".to_owned();
+                        RosError::Mcap { file: self.path.clone(), what }
+                    })?;
+                    if message.is_some() {
+                        return Ok(message);
+                    }
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl Iterator for Messages {
+    type Item = Result<(String, u64, Vec<u8>), RosError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.over {
+            return None;
+        }
+        let next = self.advance().transpose();
+        self.over = !matches!(next, Some(Ok(_)));
+        next
+    }
+}
+
+impl Topics {
+    /// Takes note of a record, and returns the message of joint states that it is, if it is one. `None` if it is shorter than it says.
+    fn take(&mut self, opcode: u8, mut record: Fields<'_>) -> Option<Option<(String, u64, Vec<u8>)>> {
+        match opcode {
+            op::SCHEMA => {
+                let (schema, name) = (record.u16()?, record.text()?);
+                if name == TYPE.as_bytes() {
+                    self.schemas.insert(schema);
+                }
+            }
+            op::CHANNEL => {
+                let (channel, schema) = (record.u16()?, record.u16()?);
+                let (topic, encoding) = (record.text()?, record.text()?);
+                if self.schemas.contains(&schema) && encoding == MESSAGE_ENCODING.as_bytes() {
+                    self.channels.insert(channel, String::from_utf8_lossy(topic).into_owned());
+                }
+            }
+            op::MESSAGE => {
+                let (channel, _sequence) = (record.u16()?, record.u32()?);
+                let (logged, _published) = (record.u64()?, record.u64()?);
+                let topic = self.channels.get(&channel);
+                return Some(topic.map(|topic| (topic.clone(), logged, record.0.to_vec())));
+            }
+            _ => {}
+        }
+        Some(None)
+    }
+}
+
+/// What is left of a record: numbers are little-endian, a text is preceded by its length.
+struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (array, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(*array)
+    }
+
+    fn u16(&mut self) -> Option<u16> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    fn text(&mut self) -> Option<&'a [u8]> {
+        let length = usize::try_from(self.u32()?).ok()?;
+        let (text, rest) = self.0.split_at_checked(length)?;
+        self.0 = rest;
+        Some(text)
+    }
+}
