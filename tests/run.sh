@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Every check of this repository, in the order in which it is cheapest to fail: formatting, lints, tests, documentation,
-# and the demo as a newcomer runs it. Needs a Rust toolchain; installs lavapipe, Mesa's software Vulkan, where it is
+# the demo as a newcomer runs it, and a minute of fuzzing. Needs a Rust toolchain; installs lavapipe, Mesa's software Vulkan, where it is
 # missing, since the compute kernels are always tested on it: the same on every machine.
 #
 #   bash tests/run.sh
@@ -81,11 +81,12 @@ step 'formatting' cargo fmt --all --check
 step 'lints' cargo clippy --locked --workspace --all-targets --quiet -- -D warnings
 # The bindings are tested in the same build, so that what they share is compiled once.
 step 'tests' cargo test --locked --workspace --quiet --no-fail-fast
-step 'fuzzing, guided by coverage' bash tests/fuzz.sh 4000
 step 'Python package' bash python/tests/run.sh
 step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --no-deps --quiet
 step 'documentation as a site' bash docs/site/build.sh
 step 'demo' demo
+# Last, because it leaves a library and a program in which every block is counted.
+step 'fuzzing, guided by coverage' bash tests/fuzz.sh
 
 printf '\n== summary (%d s)\n' "$SECONDS"
 printf '%s\n' "${summary[@]}"

@@ -30,8 +30,9 @@ static STOP: AtomicBool = AtomicBool::new(false);
 /// Whether there is work that looks at [`STOP`].
 static IS_STOPPABLE: AtomicBool = AtomicBool::new(false);
 
-/// Listens for signals from now on. With `json` the end by a signal is told on standard output, too.
-pub fn listen(json: bool) -> Result<(), Failure> {
+/// Listens for signals from now on. With `json` the end by a signal is told on standard output, too; with `resumes` that `--resume`
+/// continues the work.
+pub fn listen(json: bool, resumes: bool) -> Result<(), Failure> {
     let ignored = ignored();
     ctrlc::set_handler(move || {
         let is_first = !STOP.swap(true, Ordering::Relaxed);
@@ -41,7 +42,7 @@ pub fn listen(json: bool) -> Result<(), Failure> {
                 return;
             }
         }
-        end(json);
+        end(json, resumes);
     })
     .map_err(|error| {
         format!(
@@ -65,11 +66,12 @@ pub fn over() {
 }
 
 /// Ends the program. Whoever holds standard output may be waiting for its reader: that must not hold this up.
-fn end(json: bool) {
+fn end(json: bool, resumes: bool) {
     discard_unfinished();
     let (told, done) = mpsc::channel();
     thread::spawn(move || {
-        last_words("interrupted; an unfinished bake or scan keeps what it has done: --resume continues it", json);
+        let kept = if resumes { "; what is done is kept: --resume continues it" } else { "" };
+        last_words(&format!("interrupted{kept}"), json);
         let _ = told.send(());
     });
     let _ = done.recv_timeout(LAST_WORDS);

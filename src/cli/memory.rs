@@ -47,7 +47,7 @@ mod answer {
     const SAID: [&str; 2] = [
         "out of memory: ",
         " bytes were asked for in vain; close other programs, raise the limit (ulimit -v), or take a coarser grid or surface; what was \
-         written is kept, and --resume continues an unfinished bake or scan",
+         written is kept: an unfinished haptize bake or haptize scan goes on with --resume",
     ];
 
     /// Answers `abort` after a failed allocation. Any other one takes its course.

@@ -159,32 +159,36 @@ struct Report {
 /// Runs what the command line `arguments`, the program's name first, asks for; returns the exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let parsed = command_line().try_get_matches_from(arguments);
-    let parsed = parsed.and_then(|matches| Ok((CommandLine::from_arg_matches(&matches)?, remedy(&matches))));
-    let (line, remedy) = match parsed {
+    let parsed = parsed.and_then(|matches| Ok((CommandLine::from_arg_matches(&matches)?, matches)));
+    let (line, matches) = match parsed {
         Ok(parsed) => parsed,
         Err(error) => return usage(&error),
     };
     memory::tell_shortage(line.json);
-    let begun = interrupt::listen(line.json).and_then(|()| start_threads());
+    let begun = interrupt::listen(line.json, has(&matches, "resume")).and_then(|()| start_threads());
     let report = begun.and_then(|()| line.command.as_ref().map_or_else(demo::run, Command::run));
     match report.and_then(|report| print(&report, line.json).map(|()| report.whole)) {
         Ok(true) => 0,
         Ok(false) => 1,
         Err(failure) => {
-            last_words(&remedied(&explain(failure.as_ref()), remedy), line.json);
+            last_words(&remedied(&explain(failure.as_ref()), remedy(&matches)), line.json);
             1
         }
     }
 }
 
-/// What helps where a GPU fails: an option that the command has.
-fn remedy(matches: &ArgMatches) -> &'static str {
+/// Whether the command that is asked for has `option`.
+fn has(matches: &ArgMatches, option: &str) -> bool {
     let line = command_line();
     let command = matches.subcommand_name().and_then(|name| line.find_subcommand(name));
-    let has = |option| command.is_some_and(|command| command.get_arguments().any(|has| has.get_long() == Some(option)));
+    command.is_some_and(|command| command.get_arguments().any(|argument| argument.get_long() == Some(option)))
+}
+
+/// Returns what helps where a GPU fails: an option of the command, if it has one.
+fn remedy(matches: &ArgMatches) -> &'static str {
     match () {
-        () if has("backend") => "--backend cpu",
-        () if has("no-gpu") => "--no-gpu",
+        () if has(matches, "backend") => "--backend cpu",
+        () if has(matches, "no-gpu") => "--no-gpu",
         () => OTHER_ADAPTER,
     }
 }

@@ -41,7 +41,7 @@ pub enum BackendError {
     #[error("no threads to solve on: {0}; close other programs or raise the limit on processes (ulimit -u)")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// There is no adapter, or it cannot take the scene.
-    #[error("{0}{}", memory::scarcity())]
+    #[error("{}{}", .0, memory::scarcity())]
     Gpu(#[from] GpuError),
 }
 

@@ -27,7 +27,7 @@ use targets::Target;
 
 /// Executions of each target unless the environment says otherwise: some seconds.
 const EXECUTIONS: usize = 20_000;
-/// Longest execution.
+/// Longest execution, in time of the processor: a busy machine takes longer for it.
 const LONGEST: Duration = Duration::from_secs(1);
 /// When an execution is taken for endless: its input is kept, and the process ends.
 const ENDLESS: Duration = Duration::from_secs(30);
@@ -78,13 +78,29 @@ enum Offence {
     Greedy(usize),
 }
 
+/// Time for which a processor has worked on this thread.
+#[cfg(unix)]
+fn worked() -> Duration {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: the clock is one that every Unix has, and the time is written to where it may be.
+    assert_eq!(unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &mut time) }, 0);
+    Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
+}
+
+/// Elsewhere the time that has gone by.
+#[cfg(not(unix))]
+fn worked() -> Duration {
+    static BEGAN: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+    BEGAN.elapsed()
+}
+
 /// Runs `target` on `input`, and returns its outcome.
 fn execute(target: &Target, file: &Path, input: &[u8]) -> Result<String, Offence> {
     let before = TAKEN.get();
     PEAK.set(before);
-    let began = Instant::now();
+    let began = worked();
     let outcome = catch_unwind(AssertUnwindSafe(|| (target.run)(file, input))).map_err(|_| Offence::Panic)?;
-    let time = began.elapsed();
+    let time = worked().saturating_sub(began);
     let bytes = usize::try_from(PEAK.get() - before).unwrap_or(0);
     if time > LONGEST {
         Err(Offence::Slow(time))
@@ -93,19 +109,6 @@ fn execute(target: &Target, file: &Path, input: &[u8]) -> Result<String, Offence
     } else {
         Ok(outcome)
     }
-}
-
-/// The same; a slow one is tried twice more, because the machine may have been busy elsewhere.
-fn executed(target: &Target, file: &Path, input: &[u8]) -> Result<String, Offence> {
-    let tries = (0..3).map(|_| execute(target, file, input));
-    let mut last = Err(Offence::Panic);
-    for tried in tries {
-        last = tried;
-        if !matches!(last, Err(Offence::Slow(_))) {
-            break;
-        }
-    }
-    last
 }
 
 /// What an outcome says without what it quotes from the input: the first words of its first line, behind the file's name.
@@ -190,7 +193,7 @@ fn fuzz(target: &Target, executions: usize) -> Reached {
             };
             at_hand.lock().unwrap().clone_from(&input);
             sender.send(()).unwrap();
-            let outcome = executed(target, &file, &input).unwrap_or_else(|offence| fail(target, &input, &offence));
+            let outcome = execute(target, &file, &input).unwrap_or_else(|offence| fail(target, &input, &offence));
             let is_new = (coverage.take() && by_coverage) | kinds.insert(kind(&outcome));
             if execution < seeds {
                 of_seeds = coverage.blocks().0;
@@ -257,7 +260,8 @@ fn offences_are_seen() {
     assert_eq!(with(|_, _| "fine".into()), Ok("fine".into()));
     assert_eq!(with(|_, _| panic!("seen")), Err(Offence::Panic));
     let slow = with(|_, _| {
-        std::thread::sleep(LONGEST + Duration::from_millis(1));
+        let began = worked();
+        while worked() - began <= LONGEST {}
         String::new()
     });
     assert!(matches!(slow, Err(Offence::Slow(_))));
