@@ -119,6 +119,33 @@ fn a_bake_killed_at_any_moment_continues_to_the_same_dataset_on_software_vulkan(
 }
 
 #[test]
+fn a_killed_command_leaves_one_file_at_most_which_the_next_removes() {
+    let whole = Undisturbed::new("cpu", 60);
+    let folder = whole.folder.path();
+    succeed(folder, &bake("cpu"));
+    std::fs::create_dir(folder.join("o")).unwrap();
+    let export = ["export", "x.haptize", "--format", "csv", "-o", "o/x.csv"];
+    let began = Instant::now();
+    succeed(folder, &export);
+    let longest = began.elapsed().as_secs_f64();
+    let unfinished = || {
+        let names = std::fs::read_dir(folder.join("o")).unwrap().map(|entry| entry.unwrap().file_name());
+        names.filter(|name| name.to_string_lossy().starts_with(".haptize-")).count()
+    };
+    let mut random = Random::new(4);
+    for _ in 0..20 {
+        let mut killed = command(folder, &export).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_secs_f64(longest * random.below(1000) as f64 / 1000.0));
+        // One that was faster has ended by itself.
+        let _ = killed.kill();
+        killed.wait().unwrap();
+        assert!(unfinished() <= 1);
+    }
+    succeed(folder, &export);
+    assert_eq!(unfinished(), 0);
+}
+
+#[test]
 fn the_comparison_sees_one_bit() {
     let whole = Undisturbed::new("cpu", 4);
     succeed(whole.folder.path(), &bake("cpu"));
