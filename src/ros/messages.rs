@@ -1,7 +1,8 @@
 //! Messages of joint states in an MCAP file, record by record.
 //!
-//! Records are taken apart here and not by `mcap::parse_record` (0.26), which sets aside as many bytes as a text's length says, up to
-//! 4 GB, before it looks whether they are there. Memory is that of the longest record.
+//! Records and chunks are taken apart here and not by `mcap` (0.26): its `parse_record` sets aside as many bytes as a text's length says,
+//! up to 4 GB, before it looks whether they are there, and its reader takes a record that is longer than its chunk for one that is not.
+//! Memory is that of the longest record or chunk.
 
 use super::{MESSAGE_ENCODING, RosError, TYPE, is_mcap};
 use mcap::{
@@ -24,9 +25,15 @@ pub(super) struct Messages {
     pub path: PathBuf,
     file: BufReader<File>,
     reader: LinearReader,
+    /// Records of the chunk that is being read, and how many of its bytes have been.
+    chunk: Vec<u8>,
+    taken: usize,
     topics: Topics,
     over: bool,
 }
+
+/// A message: topic, log time [ns], bytes.
+type Logged = (String, u64, Vec<u8>);
 
 /// What records so far have said of later ones.
 #[derive(Default)]
@@ -46,21 +53,34 @@ impl Messages {
         }
         // No record is longer than its file, whatever it says.
         let longest = file.metadata().map_err(unreadable)?.len().min(LONGEST_RECORD);
-        let options =
-            LinearReaderOptions::default().with_record_length_limit(usize::try_from(longest).unwrap_or(usize::MAX));
+        let options = LinearReaderOptions::default()
+            .with_emit_chunks(true)
+            .with_record_length_limit(usize::try_from(longest).unwrap_or(usize::MAX));
         Ok(Self {
             path: path.to_owned(),
             file: BufReader::with_capacity(1 << 16, file),
             reader: LinearReader::new_with_options(options),
+            chunk: Vec::new(),
+            taken: 0,
             topics: Topics::default(),
             over: false,
         })
     }
 
-    /// The next message; `None` at the end.
-    fn advance(&mut self) -> Result<Option<(String, u64, Vec<u8>)>, RosError> {
-        let failed = |error: McapError| RosError::mcap(&self.path, &error);
-        while let Some(event) = self.reader.next_event() {
+    /// Returns the next message; `None` at the end.
+    fn advance(&mut self) -> Result<Option<Logged>, RosError> {
+        loop {
+            while self.taken < self.chunk.len() {
+                let mut rest = Fields(&self.chunk[self.taken..]);
+                let (opcode, record) = rest.record().ok_or_else(|| damaged(&self.path))?;
+                self.taken = self.chunk.len() - rest.0.len();
+                let message = self.topics.take(opcode, Fields(record)).ok_or_else(|| damaged(&self.path))?;
+                if message.is_some() {
+                    return Ok(message);
+                }
+            }
+            let failed = |error: McapError| RosError::mcap(&self.path, &error);
+            let Some(event) = self.reader.next_event() else { return Ok(None) };
             match event.map_err(failed)? {
                 LinearReadEvent::ReadRequest(length) => {
                     let read = loop {
@@ -71,23 +91,29 @@ impl Messages {
                     };
                     self.reader.notify_read(read);
                 }
+                LinearReadEvent::Record { data, opcode: op::CHUNK } => {
+                    let chunk = Fields(data).chunk().ok_or_else(|| damaged(&self.path))?;
+                    (self.chunk, self.taken) = (chunk.map_err(failed)?.to_vec(), 0);
+                }
                 LinearReadEvent::Record { data, opcode } => {
-                    let message = self.topics.take(opcode, Fields(data)).ok_or_else(|| {
-                        let what = "a record is shorter than it says: the file is damaged; record it again".to_owned();
-                        RosError::Mcap { file: self.path.clone(), what }
-                    })?;
+                    let message = self.topics.take(opcode, Fields(data)).ok_or_else(|| damaged(&self.path))?;
                     if message.is_some() {
                         return Ok(message);
                     }
                 }
             }
         }
-        Ok(None)
     }
 }
 
+/// The error of a file whose records are not as long as they say.
+fn damaged(path: &Path) -> RosError {
+    let what = "a record is shorter than it says: the file is damaged; record it again".to_owned();
+    RosError::Mcap { file: path.to_owned(), what }
+}
+
 impl Iterator for Messages {
-    type Item = Result<(String, u64, Vec<u8>), RosError>;
+    type Item = Result<Logged, RosError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.over {
@@ -101,7 +127,7 @@ impl Iterator for Messages {
 
 impl Topics {
     /// Takes note of a record, and returns the message of joint states that it is, if it is one. `None` if it is shorter than it says.
-    fn take(&mut self, opcode: u8, mut record: Fields<'_>) -> Option<Option<(String, u64, Vec<u8>)>> {
+    fn take(&mut self, opcode: u8, mut record: Fields<'_>) -> Option<Option<Logged>> {
         match opcode {
             op::SCHEMA => {
                 let (schema, name) = (record.u16()?, record.text()?);
@@ -150,10 +176,34 @@ impl<'a> Fields<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
+    /// Operation code and content of the next record.
+    fn record(&mut self) -> Option<(u8, &'a [u8])> {
+        let [opcode] = self.array()?;
+        let length = self.u64()?;
+        Some((opcode, self.bytes(length)?))
+    }
+
+    /// The records of a chunk, whose content this is.
+    fn chunk(&mut self) -> Option<Result<&'a [u8], McapError>> {
+        let (_first, _last, _size) = (self.u64()?, self.u64()?, self.u64()?);
+        let (saved, compression, length) = (self.u32()?, self.text()?, self.u64()?);
+        if !compression.is_empty() {
+            return Some(Err(McapError::UnsupportedCompression(String::from_utf8_lossy(compression).into_owned())));
+        }
+        let records = self.bytes(length)?;
+        let calculated = if saved == 0 { 0 } else { crc32fast::hash(records) };
+        Some(if saved == calculated { Ok(records) } else { Err(McapError::BadChunkCrc { saved, calculated }) })
+    }
+
     fn text(&mut self) -> Option<&'a [u8]> {
-        let length = usize::try_from(self.u32()?).ok()?;
-        let (text, rest) = self.0.split_at_checked(length)?;
+        let length = self.u32()?;
+        self.bytes(length.into())
+    }
+
+    fn bytes(&mut self, length: u64) -> Option<&'a [u8]> {
+        let length = usize::try_from(length).ok()?;
+        let (bytes, rest) = self.0.split_at_checked(length)?;
         self.0 = rest;
-        Some(text)
+        Some(bytes)
     }
 }

@@ -41,7 +41,7 @@ fn driven(scene: &Rendering, coordinates: Coordinates) -> Result<(), String> {
     let all = |x: f64| JointVector::from_slice(&vec![x; count]);
     let rest = [0.0, 0.05].map(|time| Waypoint { time, q: all(0.1 * time) });
     let motion = Motion::through(&rest, count).map_err(|error| error.to_string())?;
-    let mut hand = scene.haptics.hand.clone();
+    let mut hand = scene.haptics.hand;
     (hand.stiffness, hand.damping, hand.inertia) = (all(20.0), all(0.4), all(2e-3));
     let hand = SimulatedHand::holding(&hand, &all(1e-3), &all(0.03), motion).map_err(|error| error.to_string())?;
     let limits = Limits { effort: all(1.0), watchdog: Watchdog::None };
