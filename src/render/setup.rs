@@ -250,8 +250,8 @@ mod tests {
     #[test]
     fn the_borders_stiffness_is_told_once_where_joints_are_alike() {
         let mut grid = grid(&[(-0.6, 0.1, 13), (-0.06, 0.01, 13), (0.0, 0.1, 2)]);
-        let text = "name = \"x\"\n[[proxy.joint]]\nkind = \"revolute\"\naxis = [1, 0, 0]\nlimits = [0, 1]\n";
-        let mut gains = Rendering::parse(text, "scene").unwrap().haptics;
+        let scene = Rendering::parse(include_str!("../../datasets/sphere.toml"), "scene").unwrap();
+        let mut gains = scene.haptics;
         gains.coupling_stiffness = JointVector::from_slice(&[20.0, 20.0, 2000.0]);
         for (axis, name) in grid.axes.iter_mut().zip(["yaw", "pitch", "lift"]) {
             axis.name = name.into();
