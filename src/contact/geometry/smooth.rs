@@ -346,10 +346,12 @@ mod tests {
                     // The ends of the edge, and the corners on either side.
                     let (di, dj) = if (x, y) == (1, 1) { (1, -1) } else { (x, y) };
                     let (p, q) = (((i - di) / 2, (j - dj) / 2), ((i + di) / 2, (j + dj) / 2));
-                    let sides = AROUND.iter().map(|(k, l)| (p.0 + k, p.1 + l)).filter(|side| {
-                        AROUND.iter().any(|(k, l)| (q.0 + k, q.1 + l) == *side)
-                    });
-                    3.0 / 8.0 * (old(p.0, p.1) + old(q.0, q.1)) + sides.map(|side| old(side.0, side.1)).sum::<f64>() / 8.0
+                    let sides = AROUND
+                        .iter()
+                        .map(|(k, l)| (p.0 + k, p.1 + l))
+                        .filter(|side| AROUND.iter().any(|(k, l)| (q.0 + k, q.1 + l) == *side));
+                    3.0 / 8.0 * (old(p.0, p.1) + old(q.0, q.1))
+                        + sides.map(|side| old(side.0, side.1)).sum::<f64>() / 8.0
                 }
             };
             let mut finer = HashMap::new();
@@ -365,9 +367,8 @@ mod tests {
     }
 
     /// The nodes of a regular facet on the triangular lattice, in the order of [`Shape`].
-    const LATTICE: [(i64, i64); 12] = [
-        (0, 0), (1, 0), (0, 1), (1, -1), (1, 1), (-1, 1), (-1, 0), (0, -1), (2, -1), (2, 0), (0, 2), (-1, 2),
-    ];
+    const LATTICE: [(i64, i64); 12] =
+        [(0, 0), (1, 0), (0, 1), (1, -1), (1, 1), (-1, 1), (-1, 0), (0, -1), (2, -1), (2, 0), (0, 2), (-1, 2)];
 
     /// Between six neighbours each the control points are those of the limit of subdivision.
     #[test]
@@ -375,8 +376,10 @@ mod tests {
         let shape = Shape::new([6, 6, 6]);
         let mut random = Random::new(8);
         for _ in 0..20 {
-            let heights: HashMap<(i64, i64), f64> =
-                (-3..=4).flat_map(|i| (-3..=4).map(move |j| (i, j))).map(|at| (at, random.between(-1.0, 1.0))).collect();
+            let heights: HashMap<(i64, i64), f64> = (-3..=4)
+                .flat_map(|i| (-3..=4).map(move |j| (i, j)))
+                .map(|at| (at, random.between(-1.0, 1.0)))
+                .collect();
             let (u, v) = (random.between(0.0, 0.5), random.between(0.0, 0.5));
             let w = [1.0 - u - v, u, v];
             let facet = shape.facet(|j| DVec3::splat(heights[&LATTICE[j]]));
