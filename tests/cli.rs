@@ -39,7 +39,7 @@ fn doctor_says_what_the_machine_offers() {
 
     let output = haptize(folder.path(), &["doctor"]);
     assert_eq!(output.status.code(), Some(0));
-    assert!(text(&output.stdout).contains("--backend auto"), "{}", text(&output.stdout));
+    assert!(text(&output.stdout).contains("haptize bake takes"), "{}", text(&output.stdout));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "doctor leaves nothing behind");
 }
 
