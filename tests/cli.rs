@@ -504,3 +504,18 @@ fn a_full_standard_error_stops_no_bake() {
     assert_eq!(status.code(), Some(0));
     assert!(folder.path().join("finger.haptize").is_file());
 }
+
+#[test]
+fn a_plan_has_lines_for_schedulers_that_a_shell_takes() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("my finger.toml"), FINGER).unwrap();
+    let plan = json(folder.path(), &["plan", "my finger.toml", "--shards", "4", "--cores", "2", "--json"]);
+    assert_eq!((&plan["points"], plan["shards"].as_array().unwrap().len()), (&8.into(), 4));
+    let lines = |name: &str| -> Vec<String> { serde_json::from_value(plan["lines"][name].clone()).unwrap() };
+    assert!(lines("slurm")[0].contains("--array=0-3 --cpus-per-task=2"), "{plan}");
+    for line in ["slurm", "parallel", "hyperqueue"].into_iter().flat_map(lines) {
+        let checked = Command::new("sh").args(["-n", "-c", &line]).status().unwrap();
+        assert!(checked.success(), "{line}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "a plan writes nothing");
+}

@@ -37,11 +37,14 @@ mod keyboard;
 mod man;
 mod max_error;
 mod memory;
+mod merge;
 mod new;
 mod output;
 mod paper;
+mod plan;
 mod play;
 mod scan;
+mod shard;
 mod stability;
 mod view;
 
@@ -99,10 +102,14 @@ enum Command {
     Inspect(inspect::Arguments),
     /// Write the manual pages.
     Man(man::Arguments),
+    /// Put the shards of a bake together into its dataset.
+    Merge(merge::Arguments),
     /// Write a commented scene to begin with.
     New(new::Arguments),
     /// Remake the figures and numbers of the paper, with a table that compares them.
     Paper(paper::Arguments),
+    /// State what the shards of a bake take, with lines for job schedulers.
+    Plan(plan::Arguments),
     /// Feel a dataset with a simulated hand or a real device: traces and figures.
     Play(play::Arguments),
     /// Measure a real object by touching it with a rig (the rig that ships is simulated).
@@ -127,8 +134,10 @@ impl Command {
             Self::Info(arguments) => info::run(arguments),
             Self::Inspect(arguments) => inspect::run(arguments),
             Self::Man(arguments) => man::run(arguments),
+            Self::Merge(arguments) => merge::run(arguments),
             Self::New(arguments) => new::run(arguments),
             Self::Paper(arguments) => paper::run(arguments),
+            Self::Plan(arguments) => plan::run(arguments),
             Self::Play(arguments) => play::run(arguments),
             Self::Scan(arguments) => scan::run(arguments),
             Self::Stability(arguments) => stability::run(arguments),

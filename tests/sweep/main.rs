@@ -13,3 +13,4 @@ mod memory;
 mod program;
 mod results;
 mod resume;
+mod shards;
