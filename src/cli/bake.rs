@@ -5,6 +5,7 @@ use super::{
     bar::Bar,
     info, interrupt, max_error,
     output::{self, Kind},
+    reach,
     shard::ShardChoice,
     tell,
 };
@@ -80,6 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     let earlier = output::check(&output, Kind::Dataset, [arguments.scene.as_path()])?;
     output::check(&Sweep::growing_of(&output), Kind::Dataset, [])?;
+    let scene = reach::complete(scene, arguments.backend, arguments.max_error.is_some())?;
     if let Some(aim) = arguments.max_error {
         let wanted = max_error::Wanted { aim, points: arguments.max_points, output: &output, resume: arguments.resume };
         let mut report = max_error::run(&scene, &wanted, arguments.backend)?;

@@ -43,6 +43,7 @@ mod output;
 mod paper;
 mod plan;
 mod play;
+mod reach;
 mod scan;
 mod shard;
 mod stability;
@@ -112,6 +113,8 @@ enum Command {
     Plan(plan::Arguments),
     /// Feel a dataset with a simulated hand or a real device: traces and figures.
     Play(play::Arguments),
+    /// Find where contact is, before anything is baked: ranges, depth, and what a grid over them takes.
+    Reach(reach::Arguments),
     /// Measure a real object by touching it with a rig (the rig that ships is simulated).
     Scan(scan::Arguments),
     /// Run the stress tests of every module and compare the worst value of each measure with its limit.
@@ -139,6 +142,7 @@ impl Command {
             Self::Paper(arguments) => paper::run(arguments),
             Self::Plan(arguments) => plan::run(arguments),
             Self::Play(arguments) => play::run(arguments),
+            Self::Reach(arguments) => reach::run(arguments),
             Self::Scan(arguments) => scan::run(arguments),
             Self::Stability(arguments) => stability::run(arguments),
             Self::View(arguments) => view::run(arguments),

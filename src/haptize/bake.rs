@@ -7,7 +7,7 @@ use crate::{
     dataset::Dataset,
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::Scene,
+    scene::{AxisSpec, Scene},
 };
 use std::{
     path::{Path, PathBuf},
@@ -153,10 +153,18 @@ pub(super) fn sweep_of<'a>(
 /// Grid points at which the proxy's reach is looked up, at most: between them it grows by less than what is added to it.
 const SAMPLES: usize = 1 << 16;
 
-/// Configurations spread over the scene's grid, all of them where they are few: what [`Model::reaching`] looks at.
+/// Configurations spread over the scene's grid, all of them where they are few, or over the joint limits where it leaves the grid out: what
+/// [`Model::reaching`] looks at.
 #[must_use]
 pub fn sample(scene: &Scene) -> Vec<JointVector> {
-    let axes = &scene.grid.axes;
+    let joints = &scene.proxy.joints;
+    let count = (SAMPLES as f64).powf(1.0 / joints.len().max(1) as f64) as usize;
+    let limits =
+        |[least, greatest]: [f64; 2]| AxisSpec { start: least, step: (greatest - least) / (count - 1) as f64, count };
+    let axes = match &scene.grid.axes[..] {
+        [] => joints.iter().map(|joint| limits(joint.limits)).collect(),
+        axes => axes.to_vec(),
+    };
     let points: usize = axes.iter().map(|axis| axis.count).fold(1, usize::saturating_mul);
     // The same stride along each axis, the last line always included.
     let stride = (1..).find(|stride| points / usize::pow(*stride, axes.len() as u32).max(1) <= SAMPLES).unwrap_or(1);

@@ -110,6 +110,7 @@ impl<'a> Sweep<'a> {
             count: axis.count,
         });
         let grid = Grid { axes: axes.collect() };
+        check_given(scene)?;
         if grid.joints() != scene.proxy.joints.len() {
             return Err(SweepError::Grid(format!("{} axes for {} joints", grid.joints(), scene.proxy.joints.len())));
         }
@@ -428,6 +429,12 @@ impl<'a> Sweep<'a> {
             provenance,
         }
     }
+}
+
+/// Checks that `scene` has a grid.
+pub(super) fn check_given(scene: &Scene) -> Result<(), SweepError> {
+    let reason = "the scene leaves it out; `haptize reach SCENE --write` finds one and writes it there";
+    if scene.grid.axes.is_empty() { Err(SweepError::Grid(reason.into())) } else { Ok(()) }
 }
 
 /// CRC-32 of all that contact knows of `object`.
