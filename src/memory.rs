@@ -53,6 +53,12 @@ pub fn scarcity() -> String {
     }
 }
 
+/// Returns the most memory that this process has taken so far, where the system tells [bytes].
+#[must_use]
+pub fn greatest() -> Option<usize> {
+    kilobytes(&std::fs::read_to_string("/proc/self/status").unwrap_or_default(), "VmHWM")
+}
+
 /// Number behind `key` in a text of lines such as `MemFree:  123 kB` [bytes].
 fn kilobytes(text: &str, key: &str) -> Option<usize> {
     let line = text.lines().find_map(|line| line.strip_prefix(key))?;

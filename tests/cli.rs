@@ -506,3 +506,51 @@ fn a_full_standard_error_stops_no_bake() {
     assert_eq!(status.code(), Some(0));
     assert!(folder.path().join("finger.haptize").is_file());
 }
+
+#[test]
+fn a_plan_has_lines_for_schedulers_that_a_shell_takes() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("my finger.toml"), FINGER).unwrap();
+    let plan = json(folder.path(), &["plan", "my finger.toml", "--shards", "4", "--cores", "2", "--json"]);
+    assert_eq!((&plan["points"], plan["shards"].as_array().unwrap().len()), (&8.into(), 4));
+    let lines = |name: &str| -> Vec<String> { serde_json::from_value(plan["lines"][name].clone()).unwrap() };
+    assert!(lines("slurm")[0].contains("--array=0-3 --cpus-per-task=2"), "{plan}");
+    for line in ["slurm", "parallel", "hyperqueue"].into_iter().flat_map(lines) {
+        let checked = Command::new("sh").args(["-n", "-c", &line]).status().unwrap();
+        assert!(checked.success(), "{line}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "a plan writes nothing");
+}
+
+/// The finger without its grid, and a comment that is to survive.
+fn without_grid() -> String {
+    changed("[grid]\naxes = [{ start = 0.0, stop = 0.28, count = 8 }]\n", "# no grid\n")
+}
+
+#[test]
+fn a_scene_that_leaves_the_grid_out_gets_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("finger.toml");
+    std::fs::write(&scene, without_grid()).unwrap();
+    let found = json(folder.path(), &["reach", "finger.toml", "--json", "--backend", "cpu"]);
+    assert_eq!(std::fs::read_to_string(&scene).unwrap(), without_grid(), "nothing is written unless asked for");
+    let [low, high] = [0, 1].map(|end| found["joints"][0]["range"][end].as_f64().unwrap());
+    // The finger touches once its tip has come down by a tenth of its length.
+    assert!((0.05..0.2).contains(&low) && (low + 0.1..=0.5).contains(&high), "{found}");
+    assert!(
+        found["costs"].as_array().unwrap().len() > 1 && found["grid"].as_str().unwrap().starts_with("[grid]"),
+        "{found}"
+    );
+    let baked = json(folder.path(), &["bake", "finger.toml", "--backend", "cpu", "--json"]);
+    let shard = haptize(folder.path(), &["bake", "finger.toml", "--shard", "0/2"]);
+    assert!(text(&shard.stderr).contains("haptize reach"), "{}", text(&shard.stderr));
+    json(folder.path(), &["reach", "finger.toml", "--write", "--json", "--backend", "cpu"]);
+    let written = std::fs::read_to_string(&scene).unwrap();
+    assert!(written.starts_with(without_grid().trim_end()) && written.contains("# no grid"), "{written}");
+    let again = json(folder.path(), &["bake", "finger.toml", "--backend", "cpu", "--json"]);
+    assert_eq!(again["points"], baked["points"]);
+    let refused = haptize(folder.path(), &["reach", "finger.toml", "--write"]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("has a [grid] already"), "{}", text(&refused.stderr));
+    assert_eq!(std::fs::read_to_string(&scene).unwrap(), written);
+}

@@ -1,7 +1,8 @@
 //! `haptize accuracy`: what accuracy costs in time, for one scene.
 
-use super::{Failure, Report, output::Folder, tell};
+use super::{Failure, Report, output::Folder, reach, tell};
 use crate::{
+    haptize::BackendChoice,
     report::accuracy::{self, Extent},
     scene::Scene,
 };
@@ -45,6 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     let folder = Folder::check(&arguments.output, accuracy::FILES, [arguments.scene.as_path()])?;
     let mut progress = |what: &str| tell(format_args!("haptize: {what} ..."));
+    let scene = reach::complete(scene, BackendChoice::Cpu, false)?;
     let mut found = accuracy::measure(&scene, extent, &mut progress)?;
     if arguments.effects {
         found.effects = Some(accuracy::effects::price(&scene, extent.rounds, &mut progress)?);

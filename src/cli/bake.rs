@@ -5,11 +5,13 @@ use super::{
     bar::Bar,
     info, interrupt, max_error,
     output::{self, Kind},
+    reach,
+    shard::ShardChoice,
     tell,
 };
 use crate::{
     haptize::{
-        Aim, BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, Sweep, SweepReport,
+        Aim, BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, Shard, Sweep, SweepReport,
     },
     scene::{Algorithm, Scene},
 };
@@ -27,13 +29,14 @@ Examples:
   haptize bake sphere.toml
   haptize bake sphere.toml --max-error 5%
   haptize bake sphere.toml --max-error 0.002Nm -o fine.haptize
-  haptize bake sphere.toml --backend gpu --resume",
+  haptize bake sphere.toml --backend gpu --resume
+  haptize bake sphere.toml --shard auto/64 -o shards     one task of a cluster's array; see haptize plan",
     adapter_help!()
 ))]
 pub struct Arguments {
     /// The scene.
     scene: PathBuf,
-    /// The dataset to write; by default the scene's name in the current folder, ending in .haptize.
+    /// The dataset to write; by default the scene's name in the current folder, ending in .haptize. With --shard the folder to write to.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// The backend that solves contact.
@@ -57,6 +60,10 @@ pub struct Arguments {
     /// Maximum number of grid points that --max-error may choose.
     #[arg(long, default_value_t = 2_000_000, value_name = "POINTS")]
     max_points: usize,
+    /// Solve one of N shards, counted from 0, into a file of its own: "3/64"; "auto/64" takes the number from the environment of the job
+    /// scheduler. An unfinished shard is continued, a whole one left as it is. `haptize merge` puts them together.
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["max_error", "measure_error"])]
+    shard: Option<ShardChoice>,
 }
 
 /// Haptizes the scene. Ctrl-C leaves a part that `--resume` continues.
@@ -65,6 +72,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if let Some(algorithm) = arguments.algorithm {
         scene.contact.algorithm = algorithm;
     }
+    if let Some(shard) = arguments.shard {
+        return run_shard(arguments, &scene, shard.shard(|name| std::env::var(name).ok())?);
+    }
     let output = match &arguments.output {
         Some(output) => output.clone(),
         None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file")?)
@@ -72,6 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     let earlier = output::check(&output, Kind::Dataset, [arguments.scene.as_path()])?;
     output::check(&Sweep::growing_of(&output), Kind::Dataset, [])?;
+    let scene = reach::complete(scene, arguments.backend, arguments.max_error.is_some())?;
     if let Some(aim) = arguments.max_error {
         let wanted = max_error::Wanted { aim, points: arguments.max_points, output: &output, resume: arguments.resume };
         let mut report = max_error::run(&scene, &wanted, arguments.backend)?;
@@ -87,6 +98,28 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     describe(&mut text, &output, &report, None)?;
     earlier.tell(&mut text, &mut json);
     // Every point was solved and says what became of it: that is the whole work.
+    Ok(Report { text, json, whole: true })
+}
+
+/// Solves one shard.
+fn run_shard(arguments: &Arguments, scene: &Scene, shard: Shard) -> Result<Report, Failure> {
+    let folder = arguments.output.clone().unwrap_or_else(|| PathBuf::from("."));
+    let (file, report) = watched(scene, arguments.backend, |bake| bake.to_shard(&folder, shard))?;
+    let file = file.display();
+    let (text, mut json) = match report {
+        None => (format!("{file}: shard {shard}, there already\n"), serde_json::json!({})),
+        Some(report) => {
+            warn(&report);
+            let SweepReport { points, contact_points, resumed_points, seconds, backend, adapter, .. } = &report;
+            let text = format!(
+                "{file}: shard {shard}, {points} points, {contact_points} in contact, {resumed_points} of an earlier run; {seconds:.2} s on \
+                 {backend} ({adapter})\n"
+            );
+            (text, serde_json::to_value(&report)?)
+        }
+    };
+    json["file"] = file.to_string().into();
+    json["shard"] = serde_json::to_value(shard)?;
     Ok(Report { text, json, whole: true })
 }
 
@@ -149,15 +182,19 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Optio
         writeln!(text, "  skin         {skin}")?;
     }
     info::mesh_ripple(text, report.mesh_ripple)?;
-    if let Some(Lowered { points, converged, greatest, rounds, searches, seconds }) = report.lowered {
-        writeln!(
-            text,
-            "  lowered      {points} points by neighbours' equilibria, {converged} of them unconverged from rest, energy by at most {:.1} %; \
-             {rounds} rounds, {searches} searches, {seconds:.2} s",
-            100.0 * greatest
-        )?;
-    }
+    lowered(text, report.lowered)?;
     info::error(text, report.error.as_ref(), aim)
+}
+
+/// Describes what the search for lower equilibria did.
+pub fn lowered(text: &mut String, lowered: Option<Lowered>) -> fmt::Result {
+    let Some(Lowered { points, converged, greatest, rounds, searches, seconds }) = lowered else { return Ok(()) };
+    writeln!(
+        text,
+        "  lowered      {points} points by neighbours' equilibria, {converged} of them unconverged from rest, energy by at most {:.1} %; \
+         {rounds} rounds, {searches} searches, {seconds:.2} s",
+        100.0 * greatest
+    )
 }
 
 /// Prints what the sweep is going to take, before it begins.
@@ -169,10 +206,13 @@ fn announce(progress: &Progress) {
     let resumed = if *done > 0 { format!(", {done} of them done") } else { String::new() };
     let size = match (disk, forecast) {
         (Bounds { most: 0, .. }, _) => None,
-        (_, Some(forecast)) => Some(format!("about {}", megabytes(forecast.disk))),
-        (Bounds { least, most }, None) => Some(format!("{} to {}", megabytes(*least), megabytes(*most))),
+        (_, Some(forecast)) => {
+            Some(format!("about {} of disk (twice that for a moment at the end)", megabytes(forecast.disk)))
+        }
+        // Few points, or a shard, which is not put together at the end.
+        (Bounds { least, most }, None) => Some(format!("{} to {} of disk", megabytes(*least), megabytes(*most))),
     };
-    let size = size.map_or(String::new(), |size| format!(" and {size} of disk (twice that for a moment at the end)"));
+    let size = size.map_or(String::new(), |size| format!(" and {size}"));
     tell(format_args!(
         "haptize: {points} points{resumed}; results take at most {} of memory{size}",
         megabytes(memory.most)
@@ -187,7 +227,7 @@ fn announce(progress: &Progress) {
 }
 
 /// Writes a time as people say it: `0.4 s`, `35 s`, `12 min`, `7.5 h`.
-fn duration(seconds: f64) -> String {
+pub fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 10.0 => format!("{s:.1} s"),
         s if s < 120.0 => format!("{s:.0} s"),

@@ -37,11 +37,15 @@ mod keyboard;
 mod man;
 mod max_error;
 mod memory;
+mod merge;
 mod new;
 mod output;
 mod paper;
+mod plan;
 mod play;
+mod reach;
 mod scan;
+mod shard;
 mod stability;
 mod view;
 
@@ -100,12 +104,18 @@ enum Command {
     Inspect(inspect::Arguments),
     /// Write the manual pages.
     Man(man::Arguments),
+    /// Put the shards of a bake together into its dataset.
+    Merge(merge::Arguments),
     /// Write a commented scene to begin with.
     New(new::Arguments),
     /// Remake the figures and numbers of the paper, with a table that compares them.
     Paper(paper::Arguments),
+    /// State what the shards of a bake take, with lines for job schedulers.
+    Plan(plan::Arguments),
     /// Feel a dataset with a simulated hand or a real device: traces and figures.
     Play(play::Arguments),
+    /// Find where contact is, before anything is baked: ranges, depth, and what a grid over them takes.
+    Reach(reach::Arguments),
     /// Measure a real object by touching it with a rig (the rig that ships is simulated).
     Scan(scan::Arguments),
     /// Run the stress tests of every module and compare the worst value of each measure with its limit.
@@ -128,9 +138,12 @@ impl Command {
             Self::Info(arguments) => info::run(arguments),
             Self::Inspect(arguments) => inspect::run(arguments),
             Self::Man(arguments) => man::run(arguments),
+            Self::Merge(arguments) => merge::run(arguments),
             Self::New(arguments) => new::run(arguments),
             Self::Paper(arguments) => paper::run(arguments),
+            Self::Plan(arguments) => plan::run(arguments),
             Self::Play(arguments) => play::run(arguments),
+            Self::Reach(arguments) => reach::run(arguments),
             Self::Scan(arguments) => scan::run(arguments),
             Self::Stability(arguments) => stability::run(arguments),
             Self::View(arguments) => view::run(arguments),

@@ -1,13 +1,13 @@
 //! From a scene to its dataset: object and proxy are built, a backend is chosen, and the grid is swept.
 
-use super::{BackendChoice, BackendError, ChosenBackend, Progress, Run, Sweep, SweepError, SweepReport};
+use super::{BackendChoice, BackendError, ChosenBackend, Progress, Run, Shard, Sweep, SweepError, SweepReport};
 use crate::{
     JointVector,
     contact::Model,
     dataset::Dataset,
     object::{Compliance, Object, ObjectError},
     proxy::Chain,
-    scene::Scene,
+    scene::{AxisSpec, Scene},
 };
 use std::{
     path::{Path, PathBuf},
@@ -97,36 +97,81 @@ impl Bake<'_> {
         self.with(|sweep, backend, run| sweep.run(backend, run))
     }
 
+    /// Solves one shard into a file in `folder`; see [`Sweep::bake_shard`].
+    ///
+    /// # Errors
+    /// Any [`BakeError`].
+    pub fn to_shard(self, folder: &Path, shard: Shard) -> Result<(PathBuf, Option<SweepReport>), BakeError> {
+        self.prepared(|sweep, backend, run| Ok(sweep.bake_shard(backend, folder, shard, run)?))
+    }
+
     fn with<T>(
         self,
         sweep_with: impl FnOnce(&Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, SweepError>,
     ) -> Result<T, BakeError> {
+        self.prepared(|sweep, backend, run| {
+            let is_timed = matches!(backend, ChosenBackend::Cpu(_));
+            sweep.predict(backend, is_timed)?;
+            Ok(sweep_with(sweep, backend, run)?)
+        })
+    }
+
+    /// Builds all that a sweep needs, and does `work` with it.
+    pub(super) fn prepared<T>(
+        self,
+        work: impl FnOnce(&mut Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, BakeError>,
+    ) -> Result<T, BakeError> {
         let Self { scene, backend, measured, aim, date, stop, progress } = self;
         let object = build_object(scene)?;
         let chain = Chain::new(&scene.proxy);
-        let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
-        model.with_tangent = scene.uses_tangent();
+        let model = model_of(scene, &object, &chain)?;
         let mut backend = ChosenBackend::open(backend, &model)?;
-        let mut sweep = Sweep::new(scene, &object, backend.name(), &backend.adapter(), date)?;
-        sweep.diagnose(&model);
-        sweep.skip_free_space(&model)?;
-        sweep.find_lowest(&model)?;
-        sweep.measure_error(&model, &scene.haptics, measured)?;
+        let mut sweep = sweep_of(scene, &object, &model, [backend.name(), &backend.adapter(), date], measured)?;
         sweep.aim_at(aim);
-        let is_timed = matches!(backend, ChosenBackend::Cpu(_));
-        sweep.predict(&mut backend, is_timed)?;
         let run = Run { chunk: backend.chunk(), stop, progress };
-        Ok(sweep_with(&sweep, &mut backend, run)?)
+        work(&mut sweep, &mut backend, run)
     }
+}
+
+/// The model by which the grid of `scene` is solved.
+pub(super) fn model_of<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) -> Result<Model<'a>, ObjectError> {
+    let mut model = Model::reaching(object, chain, scene.contact, &sample(scene))?;
+    model.with_tangent = scene.uses_tangent();
+    Ok(model)
+}
+
+/// The sweep of `scene`, whose object and model these are, with all that a dataset is to say; `solved` are backend, adapter and date, and
+/// `measured` is as in [`Bake::measured`].
+pub(super) fn sweep_of<'a>(
+    scene: &Scene,
+    object: &Object,
+    model: &'a Model<'a>,
+    solved: [&str; 3],
+    measured: Option<usize>,
+) -> Result<Sweep<'a>, SweepError> {
+    let mut sweep = Sweep::new(scene, object, solved[0], solved[1], solved[2])?;
+    sweep.diagnose(model);
+    sweep.skip_free_space(model)?;
+    sweep.find_lowest(model)?;
+    sweep.measure_error(model, &scene.haptics, measured)?;
+    Ok(sweep)
 }
 
 /// Grid points at which the proxy's reach is looked up, at most: between them it grows by less than what is added to it.
 const SAMPLES: usize = 1 << 16;
 
-/// Configurations spread over the scene's grid, all of them where they are few: what [`Model::reaching`] looks at.
+/// Configurations spread over the scene's grid, all of them where they are few, or over the joint limits where it leaves the grid out: what
+/// [`Model::reaching`] looks at.
 #[must_use]
 pub fn sample(scene: &Scene) -> Vec<JointVector> {
-    let axes = &scene.grid.axes;
+    let joints = &scene.proxy.joints;
+    let count = (SAMPLES as f64).powf(1.0 / joints.len().max(1) as f64) as usize;
+    let limits =
+        |[least, greatest]: [f64; 2]| AxisSpec { start: least, step: (greatest - least) / (count - 1) as f64, count };
+    let axes = match &scene.grid.axes[..] {
+        [] => joints.iter().map(|joint| limits(joint.limits)).collect(),
+        axes => axes.to_vec(),
+    };
     let points: usize = axes.iter().map(|axis| axis.count).fold(1, usize::saturating_mul);
     // The same stride along each axis, the last line always included.
     let stride = (1..).find(|stride| points / usize::pow(*stride, axes.len() as u32).max(1) <= SAMPLES).unwrap_or(1);

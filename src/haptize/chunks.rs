@@ -128,7 +128,7 @@ impl Sweep<'_> {
         store: &mut dyn Store,
     ) -> Result<Solved, SweepError> {
         let Begun { mut tally, mut provenance } = begun;
-        let (points, resumed, start) = (self.grid.points(), tally.points, Instant::now());
+        let (points, resumed, start) = (self.points(), tally.points, Instant::now());
         let left_before = backend.left_to_cpu();
         let (mesh_ripple, forecast) = (self.mesh_ripple(), self.forecast);
         let mut tell = |tally: &Tally, rate| {
@@ -137,18 +137,20 @@ impl Sweep<'_> {
         };
         tell(&tally, 0.0);
         let (free_space, mut skipped) = (self.free_space(), 0);
-        let mut size = ChunkSize::new(run.chunk.clamp(1, points));
+        let mut size = ChunkSize::new(run.chunk.clamp(1, points.max(1)));
         let mut columns = Columns::default();
+        let rest = |done| self.shard.rest(self.grid.points(), done);
         while tally.points < points {
-            let slab = free_space.as_ref().map_or(0..points, |free_space| free_space.slab(tally.points));
+            let whole = 0..self.grid.points();
+            let slab = free_space.as_ref().map_or(whole, |free_space| free_space.slab(rest(tally.points).start));
             let gaps = free_space.as_ref().map(|free_space| self.gaps(free_space, slab.clone())).transpose()?;
             let free_gap = |point| gaps.as_ref()?.gap(point);
-            while tally.points < slab.end {
-                let first = tally.points;
+            while tally.points < points && rest(tally.points).start < slab.end {
+                let Range { start: first, end } = rest(tally.points);
                 if run.stop.load(Ordering::Relaxed) {
-                    return Err(SweepError::Stopped { done: first, points, part: store.path().map(Into::into) });
+                    return Err(SweepError::Stopped { done: tally.points, points, part: store.path().map(Into::into) });
                 }
-                let chunk = self.cut(first..slab.end, size.size, free_gap);
+                let chunk = self.cut(first..end.min(slab.end), size.size, free_gap);
                 let begun = Instant::now();
                 let equilibria = solved(backend, &chunk.configurations, chunk.points.clone())?;
                 size.adapt(chunk.configurations.len(), begun.elapsed());

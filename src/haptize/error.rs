@@ -81,7 +81,7 @@ pub enum SweepError {
     },
     /// The part cannot be read or written.
     #[error(
-        "{path}: {source}; free some space (memory, if that is what is missing), then continue with the same command and --resume"
+        "{path}: {source}; free some space (memory, if that is what is missing), then continue with the same command, a bake with --resume"
     )]
     Part {
         /// The part.
@@ -122,7 +122,7 @@ pub enum SweepError {
         difference: &'static str,
     },
     /// The finished dataset could not be written; its points are in the part.
-    #[error("{source}; all points are kept in {part}: afterwards give the same command with --resume")]
+    #[error("{source}; all points are kept in {part}: afterwards give the same command, a bake with --resume")]
     Dataset {
         /// Where the points are.
         part: PathBuf,

@@ -36,6 +36,8 @@ pub struct Forecast {
     pub seconds: Option<f64>,
     /// The dataset on disk [bytes].
     pub disk: usize,
+    /// The results on disk while they are collected, with the forces from which lower equilibria are searched for [bytes].
+    pub part: usize,
     /// Points that were sampled.
     pub sampled: usize,
 }
@@ -65,14 +67,16 @@ impl Sweep<'_> {
         }
         let per_sample = points as f64 / sampled.max(1) as f64;
         let seconds = per_sample * start.elapsed().as_secs_f64();
-        let all = |of_sample: usize| (per_sample * of_sample as f64).round() as usize;
-        let stored = Shape { with_forces: self.with_forces, ..self.shape };
-        let [contacts, touches] = [(contacts, stored.with_forces), (touches, stored.with_touches)]
-            .map(|(rows, is_stored)| if is_stored { all(rows) } else { 0 });
+        let bytes = |shape: Shape| {
+            let [contacts, touches] = [(contacts, shape.with_forces), (touches, shape.with_touches)]
+                .map(|(rows, is_stored)| if is_stored { (per_sample * rows as f64).round() as usize } else { 0 });
+            Columns::bytes(points, shape.width(), contacts, touches)
+        };
         self.forecast = Some(Forecast {
             contact_fraction: touching as f64 / sampled.max(1) as f64,
             seconds: is_timed.then_some(seconds),
-            disk: Columns::bytes(points, stored.width(), contacts, touches),
+            disk: bytes(Shape { with_forces: self.with_forces, ..self.shape }),
+            part: bytes(self.shape),
             sampled,
         });
         Ok(())

@@ -1,7 +1,7 @@
 //! The part: an unfinished sweep on disk, so that killing the process loses one chunk at most.
 //!
 //! ```text
-//! "haptize part 4\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
+//! "haptize part 5\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
 //! ```
 //!
 //! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`], or [`NOTICE`] and a text. Frames are only
@@ -9,8 +9,9 @@
 //! number to a dataset, and the finished file is the same, bit for bit, as without the interruption.
 
 use super::{
-    SweepError,
+    Shard, SweepError,
     columns::{Columns, Opening, Replaced, Section, Width},
+    shard,
     table::{Block, Table},
     tally::Tally,
 };
@@ -20,10 +21,11 @@ use serde::{Deserialize, Serialize};
 use std::{
     fs::{File, OpenOptions, TryLockError},
     io::{self, BufReader, Read, Seek, SeekFrom, Write},
+    ops::Range,
     path::{Path, PathBuf},
 };
 
-const MAGIC: &[u8] = b"haptize part 4\n";
+const MAGIC: &[u8] = b"haptize part 5\n";
 /// Length and checksum before each body [bytes].
 const FRAME: usize = 8 + 4;
 
@@ -37,7 +39,11 @@ const NOTICE: [u8; 8] = [u8::MAX; 8];
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Binding {
     pub grid: Grid,
+    /// Which of the grid's points it is to hold.
+    pub shard: Shard,
     pub scene: String,
+    /// Where the scene was read from, absolute: what it names lies beside it.
+    pub scene_path: String,
     /// CRC-32 of the object: all its nodes at rest, its surface and its stiffness. It may come from a mesh file, whose contents the
     /// scene does not hold.
     pub object: u32,
@@ -49,7 +55,24 @@ pub(super) struct Binding {
 }
 
 impl Binding {
-    fn width(&self) -> Width {
+    /// Name of its file, where it is a shard: the same for all shards of a bake but for their numbers.
+    pub fn file_name(&self) -> String {
+        let Provenance { version, algorithm, tolerance, .. } = &self.provenance;
+        let grid: Vec<_> = self.grid.axes.iter().map(|axis| (axis.start, axis.step, axis.count)).collect();
+        let identity = format!("{version} {algorithm} {tolerance:?} {grid:?} {:08x} {}", self.object, self.scene);
+        let stem = Path::new(&self.scene_path).file_stem().unwrap_or_default().to_string_lossy();
+        let (hash, Shard { index, count }) = (crc32fast::hash(identity.as_bytes()), self.shard);
+        let digits = count.to_string().len();
+        format!("{stem}-{hash:08x}.{index:0digits$}-of-{count}.{}", shard::EXTENSION)
+    }
+
+    /// Number of points that it is to hold.
+    pub fn points(&self) -> usize {
+        self.shard.points(self.grid.points())
+    }
+
+    /// Numbers that each point has.
+    pub fn width(&self) -> Width {
         Width::new(self.grid.joints(), self.with_tangent, self.with_touches)
     }
 
@@ -57,10 +80,20 @@ impl Binding {
     fn difference(&self, other: &Self) -> Option<&'static str> {
         let (mine, its) = (&self.provenance, &other.provenance);
         let differences = [
-            ("another version of this program", mine.version != its.version),
-            ("another algorithm", mine.algorithm != its.algorithm),
             ("another backend", mine.backend != its.backend),
             ("another adapter", mine.adapter != its.adapter),
+            ("another shard", self.shard != other.shard),
+        ];
+        let different = differences.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what);
+        self.other_sweep(other).or(different)
+    }
+
+    /// What differs from `other` so that the two are not of one dataset, whatever solves them and whichever points they are to hold.
+    pub fn other_sweep(&self, other: &Self) -> Option<&'static str> {
+        let (mine, its) = (&self.provenance, &other.provenance);
+        let differences = [
+            ("another version of this program", mine.version != its.version),
+            ("another algorithm", mine.algorithm != its.algorithm),
             ("another tolerance", mine.tolerance != its.tolerance),
             ("another grid", self.grid != other.grid),
             ("another text of the scene", self.scene != other.scene),
@@ -126,6 +159,13 @@ impl Part {
         self.write(&[&NOTICE, notice.as_bytes()]).map_err(|source| SweepError::Part { path: self.path.clone(), source })
     }
 
+    /// Gives the part, which is whole now, its name, so that it is there after a power cut, too.
+    pub fn finish(self, file: &Path) -> Result<(), SweepError> {
+        let Self { path, file: part, .. } = self;
+        let finished = part.sync_all().and_then(|()| std::fs::rename(&path, file));
+        finished.map_err(|source| SweepError::Part { path, source })
+    }
+
     /// Removes the part, whose points are all in a finished file now.
     pub fn remove(self) -> Result<(), SweepError> {
         let Self { path, file, .. } = self;
@@ -153,7 +193,7 @@ impl Part {
     }
 
     /// Appends a frame whose body comes in pieces.
-    fn write(&mut self, body: &[&[u8]]) -> io::Result<()> {
+    pub fn write(&mut self, body: &[&[u8]]) -> io::Result<()> {
         let length: usize = body.iter().map(|piece| piece.len()).sum();
         let mut hasher = crc32fast::Hasher::new();
         body.iter().for_each(|piece| hasher.update(piece));
@@ -272,7 +312,7 @@ impl Part {
         if let Some(difference) = found.difference(binding) {
             return Err(SweepError::OtherPart { path: self.path.clone(), difference });
         }
-        let (points, width) = (binding.grid.points(), binding.width());
+        let (points, width) = (binding.points(), binding.width());
         let (results, mut tally, mut forces) = (whole, Tally::default(), [0; 2]);
         loop {
             let before = whole;
@@ -281,7 +321,8 @@ impl Part {
                 binding.provenance.notices.push(String::from_utf8_lossy(notice).into_owned());
                 continue;
             }
-            match Columns::decode(&body, tally.points, width) {
+            let first = binding.shard.rest(binding.grid.points(), tally.points).start;
+            match Columns::decode(&body, first, width) {
                 Some(chunk) if chunk.points() <= points - tally.points => {
                     tally.add(&chunk);
                     forces = add(forces, &chunk);
@@ -303,6 +344,41 @@ impl Part {
     fn foreign(&self, reason: &str) -> SweepError {
         SweepError::ForeignPart { path: self.path.clone(), reason: reason.into() }
     }
+}
+
+/// What a frame holds.
+pub(super) enum Frame {
+    /// Results of consecutive points.
+    Block,
+    /// Something that provenance will tell.
+    Notice(String),
+}
+
+/// The binding of the part in `bytes`, and where its results begin; or why it has none.
+pub(super) fn binding(bytes: &[u8]) -> Result<(Binding, usize), String> {
+    let not_ours = "it is no part of a bake by this version";
+    let mut place = if bytes.starts_with(MAGIC) { MAGIC.len() } else { return Err(not_ours.into()) };
+    let body = body(bytes, &mut place).and_then(|body| bytes.get(body)).ok_or("its beginning is damaged")?;
+    let binding = serde_json::from_slice(body).map_err(|error| error.to_string())?;
+    Ok((binding, place))
+}
+
+/// The frame at `place` in the part `bytes`, behind which `place` then is, and where its body lies; `None` when there is no whole one.
+pub(super) fn next(bytes: &[u8], place: &mut usize) -> Option<(Frame, Range<usize>)> {
+    let body = body(bytes, place)?;
+    let notice = bytes.get(body.clone())?.strip_prefix(&NOTICE);
+    let frame = notice.map_or(Frame::Block, |text| Frame::Notice(String::from_utf8_lossy(text).into_owned()));
+    Some((frame, body))
+}
+
+/// Where the body of the frame at `place` lies, if it is whole.
+fn body(bytes: &[u8], place: &mut usize) -> Option<Range<usize>> {
+    let mut rest = bytes.get(*place..)?;
+    let mut left = rest.len() as u64;
+    let body = frame(&mut rest, &mut left).ok()??;
+    let end = bytes.len() - rest.len();
+    *place = end;
+    Some(end - body.len()..end)
 }
 
 /// `forces` and those of `chunk`.

@@ -12,6 +12,7 @@ use super::{
     BackendChoice, Bake, BakeError, ChosenBackend, Footprint, Sweep, build_object,
     reference::{Reference, ReferenceError, equilibria},
     sample, spacing,
+    sweep::check_given,
 };
 use crate::{
     contact::Model,
@@ -118,6 +119,25 @@ pub struct Pilot {
     pub tolerance: f64,
     /// Time of the finest trial's points [s].
     pub seconds_per_point: f64,
+    /// The finest trial's dataset, over its points [bytes].
+    pub bytes_per_point: f64,
+}
+
+/// What an error takes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Cost {
+    /// Rms error over the rms torque [1].
+    pub relative: f64,
+    /// Grid points.
+    pub points: f64,
+    /// See [`Prospect::finer`].
+    pub finer: f64,
+    /// Solving them on this machine, at the pilot's rate [s].
+    pub seconds: f64,
+    /// The dataset [bytes].
+    pub bytes: f64,
+    /// Whether the grid is no finer than errors are extrapolated to.
+    pub is_known: bool,
 }
 
 /// What is going to be baked.
@@ -185,12 +205,13 @@ impl Pilot {
     /// # Errors
     /// Any [`PilotError`] but [`PilotError::OutOfReach`].
     pub fn run(scene: &Scene, aim: Aim, backend: BackendChoice, stop: &AtomicBool) -> Result<Self, PilotError> {
+        check_given(scene).map_err(BakeError::from)?;
         let ground = Ground::new(scene)?;
         let model = ground.model(scene)?;
         let reference = Reference::in_contact(scene, &model, SEED, CONTACTS)?;
         let joints = scene.grid.axes.len();
         let finest = (spacing::points(scene) as f64 / PILOT_POINTS).powf(1.0 / joints as f64).max(1.0);
-        let (mut trials, mut seconds_per_point) = (Vec::new(), 0.0);
+        let (mut trials, mut seconds_per_point, mut bytes_per_point) = (Vec::new(), 0.0, 0.0);
         for coarser in COARSER {
             let spaced = spacing::spaced(scene, |steps| (steps / (finest * coarser)).round());
             let points = spacing::points(&spaced);
@@ -200,9 +221,11 @@ impl Pilot {
             let start = Instant::now();
             let bake =
                 Bake { scene: &spaced, backend, measured: Some(0), aim: None, date: "", stop, progress: &mut |_| () };
-            let (dataset, _) = bake.in_memory()?;
+            let (dataset, report) = bake.in_memory()?;
             if trials.is_empty() {
                 seconds_per_point = start.elapsed().as_secs_f64() / points as f64;
+                let bytes = report.forecast.map_or(report.footprint.memory.least, |forecast| forecast.disk);
+                bytes_per_point = bytes as f64 / points as f64;
             }
             for interpolation in Interpolation::ALL {
                 let (rms, worst) = errors(scene, &reference, &dataset, interpolation)?;
@@ -225,7 +248,27 @@ impl Pilot {
             tolerance: tolerance(scene, &model, &reference, SOLVER_SHARE * aim)?,
             trials,
             seconds_per_point,
+            bytes_per_point,
         })
+    }
+
+    /// What an rms error of `relative` of the rms torque takes with the interpolation of `scene`, which was tried; `None` where its error does
+    /// not fall.
+    #[must_use]
+    pub fn cost(&self, scene: &Scene, relative: f64) -> Option<Cost> {
+        let all = prospects(&self.trials, SPACING_SHARE * relative * self.torque, scene.grid.axes.len());
+        let own = scene.haptics.interpolation.name();
+        let Prospect { points, finer, .. } = all.into_iter().find(|prospect| prospect.interpolation == own)?;
+        let (seconds, bytes) = (points * self.seconds_per_point, points * self.bytes_per_point);
+        Some(Cost { relative, points, finer, seconds, bytes, is_known: finer <= FARTHEST_EXTRAPOLATION })
+    }
+
+    /// `scene`, which was tried, with a grid `finer` times as fine as the pilot's finest.
+    #[must_use]
+    pub fn spaced(&self, scene: &Scene, finer: f64) -> Scene {
+        let finest = self.trials.first().map_or(1.0, |trial| trial.spacing);
+        let coarser = finest / finer / spacing::spacing_of(scene);
+        spacing::spaced(scene, |steps| (steps / coarser).ceil())
     }
 
     /// What to bake: the fewest points with which the measured order keeps the aim, of at most `limit`.
@@ -237,9 +280,7 @@ impl Pilot {
         let Some(best) = best.filter(|best| best.points <= limit as f64 && best.finer <= FARTHEST_EXTRAPOLATION) else {
             return Err(PilotError::OutOfReach(self.refusal(limit)));
         };
-        let finest = self.trials.first().map_or(1.0, |trial| trial.spacing);
-        let coarser = finest / best.finer / spacing::spacing_of(scene);
-        let mut chosen = spacing::spaced(scene, |steps| (steps / coarser).ceil());
+        let mut chosen = self.spaced(scene, best.finer);
         chosen.contact.tolerance = self.tolerance;
         let interpolation = Interpolation::ALL.into_iter().find(|i| i.name() == best.interpolation);
         chosen.haptics.interpolation = interpolation.unwrap_or(scene.haptics.interpolation);
@@ -256,8 +297,9 @@ impl Pilot {
         })
     }
 
-    /// Why nothing was chosen, and what to do.
-    fn refusal(&self, limit: usize) -> String {
+    /// Why no grid of at most `limit` points was chosen, and what to do.
+    #[must_use]
+    pub fn refusal(&self, limit: usize) -> String {
         let aim = format!("an rms error of {:.2e} N m, {} % of the rms torque", self.aim, percent(self.relative));
         let Some(finest) = self.trials.first() else { return format!("{aim}, is out of reach: no grid was tried") };
         let tried = self.trials.iter().filter(|trial| trial.points == finest.points);

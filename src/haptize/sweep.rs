@@ -12,6 +12,7 @@ use super::{
     lowest,
     measured::ErrorCheck,
     part::{Binding, Part},
+    shard::Shard,
     table::{Block, Table},
     tally::Tally,
 };
@@ -62,10 +63,13 @@ pub struct Run<'a> {
 /// A sweep, ready to run.
 pub struct Sweep<'a> {
     pub(super) grid: Grid,
+    /// Which of the grid's points are solved.
+    pub(super) shard: Shard,
     surface: Surface,
     /// See [`Binding::object`].
     object: u32,
     scene: String,
+    scene_path: String,
     provenance: Provenance,
     /// What is kept of each point until the dataset is whole.
     pub(super) shape: Shape,
@@ -106,6 +110,7 @@ impl<'a> Sweep<'a> {
             count: axis.count,
         });
         let grid = Grid { axes: axes.collect() };
+        check_given(scene)?;
         if grid.joints() != scene.proxy.joints.len() {
             return Err(SweepError::Grid(format!("{} axes for {} joints", grid.joints(), scene.proxy.joints.len())));
         }
@@ -121,9 +126,11 @@ impl<'a> Sweep<'a> {
             },
             with_forces,
             grid,
+            shard: Shard::WHOLE,
             object: content(object),
             surface: Surface::of(object),
             scene: scene.text.clone(),
+            scene_path: std::path::absolute(&scene.path).unwrap_or_default().to_string_lossy().into_owned(),
             provenance: Provenance {
                 version: env!("CARGO_PKG_VERSION").into(),
                 algorithm: scene
@@ -224,8 +231,8 @@ impl<'a> Sweep<'a> {
     /// What a sweep in memory, or else into a file, takes up with chunks of `chunk` configurations.
     #[must_use]
     pub fn footprint(&self, chunk: usize, in_memory: bool) -> Footprint {
-        let points = self.grid.points();
-        let solved = chunk.clamp(1, points);
+        let points = self.points();
+        let solved = chunk.clamp(1, points.max(1));
         let free_space = self.free_space();
         let together = points.min(if free_space.is_some() { together(solved) } else { solved });
         let slab = free_space.map_or(0, |free_space| 4 * free_space.largest_slab());
@@ -234,7 +241,9 @@ impl<'a> Sweep<'a> {
             let chunk = footprint::chunk(solved, together, touching, self.shape).saturating_add(slab);
             chunk.saturating_add(if in_memory { results(touching) } else { assembly::BUFFERS })
         };
-        let stored = Shape { with_forces: self.with_forces, ..self.shape };
+        // A shard holds the forces from which lower equilibria are searched for.
+        let with_forces = self.with_forces || (self.shard != Shard::WHOLE && self.shape.with_forces);
+        let stored = Shape { with_forces, ..self.shape };
         let disk = |touching| if in_memory { 0 } else { footprint::results(points, touching, stored) };
         Footprint { memory: Bounds::of(self.proxy_nodes, memory), disk: Bounds::of(self.proxy_nodes, disk) }
     }
@@ -293,17 +302,10 @@ impl<'a> Sweep<'a> {
         }
         // The part grows beside the file that a link leads to: only there can that be replaced.
         let output = &dataset::resolved(output).map_err(|source| SweepError::Folder { path: output.into(), source })?;
-        let mut binding = Binding {
-            grid: self.grid.clone(),
-            scene: self.scene.clone(),
-            object: self.object,
-            with_tangent: self.shape.with_tangent,
-            with_touches: self.shape.with_touches,
-            provenance: self.provenance.clone(),
-        };
+        let mut binding = self.binding();
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
         let mut provenance = binding.provenance;
-        if !provenance.notices.is_empty() {
+        if !provenance.notices.is_empty() && tally.points < self.points() {
             let Provenance { backend, adapter, .. } = &self.provenance;
             let notice = format!("from grid point {} on: resumed on {backend} ({adapter})", tally.points);
             part.note(&notice)?;
@@ -344,6 +346,25 @@ impl<'a> Sweep<'a> {
         Ok(report)
     }
 
+    /// What its numbers depend on.
+    pub(super) fn binding(&self) -> Binding {
+        Binding {
+            grid: self.grid.clone(),
+            shard: self.shard,
+            scene: self.scene.clone(),
+            scene_path: self.scene_path.clone(),
+            object: self.object,
+            with_tangent: self.shape.with_tangent,
+            with_touches: self.shape.with_touches,
+            provenance: self.provenance.clone(),
+        }
+    }
+
+    /// Number of points that are solved.
+    pub(super) fn points(&self) -> usize {
+        self.shard.points(self.grid.points())
+    }
+
     /// Finds the lowest equilibria and measures the error, as far as the sweep was asked to.
     fn complete(
         &self,
@@ -375,7 +396,7 @@ impl<'a> Sweep<'a> {
         Ok(self.report(solved))
     }
 
-    fn report(&self, solved: Solved) -> (SweepReport, Provenance) {
+    pub(super) fn report(&self, solved: Solved) -> (SweepReport, Provenance) {
         let Solved { tally, facts, provenance } = solved;
         let report = SweepReport::of(&tally, facts, &provenance, &self.warnings);
         (SweepReport { skin: self.skin, forecast: self.forecast, ..report }, provenance)
@@ -408,6 +429,12 @@ impl<'a> Sweep<'a> {
             provenance,
         }
     }
+}
+
+/// Checks that `scene` has a grid.
+pub(super) fn check_given(scene: &Scene) -> Result<(), SweepError> {
+    let reason = "the scene leaves it out; `haptize reach SCENE --write` finds one and writes it there";
+    if scene.grid.axes.is_empty() { Err(SweepError::Grid(reason.into())) } else { Ok(()) }
 }
 
 /// CRC-32 of all that contact knows of `object`.

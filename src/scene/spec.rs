@@ -312,7 +312,7 @@ pub enum Algorithm {
 /// The uniform grid over C-space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridSpec {
-    /// One per joint, in the chain's order.
+    /// One per joint, in the chain's order; none where the scene leaves the grid out.
     pub axes: Vec<AxisSpec>,
 }
 

@@ -15,7 +15,7 @@ use std::{
 };
 
 /// A ball of 8 mm on two slides, 10 to 16 mm below the top of a sphere of 102 nodes; equilibria change every few millimetres.
-const SCENE: &str = r#"
+pub const SCENE: &str = r#"
 name = "deep ball"
 [object]
 sphere = { radius = 0.05, rings = 10, segments = 10 }

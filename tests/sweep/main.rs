@@ -11,5 +11,7 @@ mod max_error;
 mod memory;
 #[cfg(unix)]
 mod program;
+mod reach;
 mod results;
 mod resume;
+mod shards;

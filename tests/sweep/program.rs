@@ -98,3 +98,57 @@ fn a_full_disk_leaves_the_earlier_file_and_no_rubbish() {
     assert!(haptize("", "bake small.toml --backend cpu --resume").status.success());
     assert_eq!(folder.names(), ["small.haptize", "small.toml"]);
 }
+
+/// Task `index` of an array of Slurm.
+fn task(folder: &Folder, index: usize) -> std::process::Command {
+    let mut command = program(folder, &["--shard", "auto/3", "-o", "parts"]);
+    for other in ["HQ_TASK_ID", "PBS_ARRAY_INDEX", "SGE_TASK_ID", "JOB_COMPLETION_INDEX", "PMI_RANK", "PMIX_RANK"] {
+        command.env_remove(other);
+    }
+    command.env("SLURM_ARRAY_TASK_ID", index.to_string());
+    command
+}
+
+#[test]
+fn killed_shards_are_continued_and_merged_to_the_numbers_of_one_bake() {
+    let folder = Folder::new();
+    let fine = SCENE
+        .replace("step = 0.1, count = 7", "stop = 0.3, count = 350")
+        .replace("step = 0.004, count = 9", "step = 0.0004, count = 90");
+    std::fs::write(folder.0.path().join("fine.toml"), fine).unwrap();
+    let parts = folder.0.path().join("parts");
+    let largest = || {
+        let files = std::fs::read_dir(&parts).into_iter().flatten().flatten();
+        files.filter_map(|file| Some(file.metadata().ok()?.len())).max().unwrap_or(0)
+    };
+    let mut killed = task(&folder, 1).spawn().unwrap();
+    while largest() < 50_000 {
+        assert!(killed.try_wait().unwrap().is_none(), "ended before its part was seen");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    let json = |output: &std::process::Output| serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap();
+    assert!(task(&folder, 0).output().unwrap().status.success());
+    let merge = || {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
+        command
+            .current_dir(folder.0.path())
+            .args(["merge", "parts", "-o", "merged.haptize", "--json"])
+            .output()
+            .unwrap()
+    };
+    let lacking = merge();
+    assert_eq!((lacking.status.code(), &json(&lacking)["missing"]), (Some(1), &"1-2".into()));
+    let said = String::from_utf8(lacking.stderr).unwrap();
+    assert!(said.contains("--array=1-2") && !folder.0.path().join("merged.haptize").exists(), "{said}");
+    assert!(task(&folder, 2).output().unwrap().status.success());
+    let continued = task(&folder, 1).output().unwrap();
+    assert!(json(&continued)["resumed_points"].as_u64() > Some(0), "{continued:?}");
+    let again = task(&folder, 1).output().unwrap();
+    assert!(again.status.success() && json(&again).get("points").is_none(), "{again:?}");
+    assert!(!task(&folder, 3).output().unwrap().status.success(), "there is no such shard");
+    assert!(merge().status.success());
+    assert!(program(&folder, &[]).output().unwrap().status.success());
+    assert!(columns(&folder.0.path().join("merged.haptize")) == columns(&folder.0.path().join("fine.haptize")));
+}

@@ -13,7 +13,7 @@ mod skin;
 use super::check::Checker;
 use super::error::SceneError;
 use super::file::{ContactTable, GraphicsEntry, GraphicsTable, NumberOr, SceneTable};
-use super::{Algorithm, ContactSpec, ContactSurface, Interpolation, ProxySpec, Rendering, ScanScene, Scene};
+use super::{Algorithm, ContactSpec, ContactSurface, GridSpec, Interpolation, ProxySpec, Rendering, ScanScene, Scene};
 use toml::Spanned;
 
 /// Default relative residual of the contact solver, in the energy norm [1]. Forces are promised to balance K u to 1e-6 of the
@@ -25,9 +25,9 @@ const CONTACT_ITERATIONS: u32 = 400;
 
 /// Validates `table`, read from the checker's text, as a scene with a virtual object.
 pub(super) fn scene(checker: &Checker<'_>, table: &SceneTable) -> Result<Scene, SceneError> {
-    let (Some(object), Some(contact_table), Some(grid)) = (&table.object, &table.contact, &table.grid) else {
-        let message = "the scene needs [object], [contact] and [grid] to be baked; a scene of a real object, with [scan], \
-                       is haptized by `haptize scan`";
+    let (Some(object), Some(contact_table)) = (&table.object, &table.contact) else {
+        let message = "the scene needs [object] and [contact] to be baked; a scene of a real object, with [scan], is haptized \
+                       by `haptize scan`";
         return Err(checker.error(0..0, message));
     };
     let Rendering { path, text, name, proxy, haptics, graphics, motion, .. } = rendering(checker, table)?;
@@ -37,7 +37,10 @@ pub(super) fn scene(checker: &Checker<'_>, table: &SceneTable) -> Result<Scene, 
         name,
         object: object::convert(checker, object)?,
         contact: contact(checker, contact_table, &proxy)?,
-        grid: grid::convert(checker, grid, &proxy.joints)?,
+        grid: match &table.grid {
+            Some(grid) => grid::convert(checker, grid, &proxy.joints)?,
+            None => GridSpec { axes: Vec::new() },
+        },
         haptics,
         graphics,
         motion,

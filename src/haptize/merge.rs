@@ -1,0 +1,339 @@
+//! The shards of a sweep, read, compared, and put together into the dataset that one bake would have made.
+//!
+//! Blocks of points are copied in the order of the grid into the part of the output, which then lacks nothing: what follows (the lowest
+//! equilibria, the error, the file) is what a bake does that is continued after its last point. So the dataset has the same bits.
+
+use super::{
+    Backend, Progress, Run, SceneObjectError, Shard, SweepError, SweepReport,
+    bake::{model_of, sweep_of},
+    build_object,
+    columns::Columns,
+    part::{self, Binding, Frame, Part},
+    shard::{EXTENSION, ranges},
+    sweep::Sweep,
+};
+use crate::{
+    JointVector,
+    contact::Equilibrium,
+    object::ObjectError,
+    proxy::Chain,
+    scene::{Algorithm, Scene, SceneError},
+};
+use clap::ValueEnum;
+use memmap2::Mmap;
+use std::{
+    collections::BTreeMap,
+    convert::Infallible,
+    fs::{self, File},
+    io,
+    ops::Range,
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
+
+/// A shard's file, mapped into memory and checked.
+pub(super) struct Contents {
+    path: PathBuf,
+    map: Mmap,
+    binding: Binding,
+    /// First point of each block of points, and its place in the file.
+    blocks: Vec<(usize, Range<usize>)>,
+    notices: Vec<String>,
+    /// Whether all points of the shard are there, and nothing is damaged.
+    is_whole: bool,
+}
+
+impl Contents {
+    /// Reads the file at `path`. What is behind the first damage does not count.
+    pub fn read(path: &Path) -> Result<Self, SweepError> {
+        let failed = |source| SweepError::Part { path: path.into(), source };
+        let file = File::open(path).map_err(failed)?;
+        // SAFETY: the mapping is read-only, and a shard that has its name is not written to any more. Another program that truncates
+        // it ends this process, as it would with any mapped file; no haptic loop reads it.
+        let map = unsafe { Mmap::map(&file) }.map_err(failed)?;
+        let foreign = |reason: &str| SweepError::ForeignPart { path: path.into(), reason: reason.into() };
+        let (binding, mut place) = part::binding(&map).map_err(|reason| foreign(&reason))?;
+        binding.grid.check().map_err(|reason| foreign(&reason))?;
+        binding.shard.check().map_err(|reason| foreign(&reason))?;
+        let (mut blocks, mut notices, mut done) = (Vec::new(), Vec::new(), 0);
+        let (points, width) = (binding.grid.points(), binding.width());
+        while let Some((frame, body)) = part::next(&map, &mut place) {
+            match frame {
+                Frame::Notice(text) => notices.push(text),
+                Frame::Block => {
+                    let rest = binding.shard.rest(points, done);
+                    let block = map.get(body.clone()).and_then(|block| Columns::decode(block, rest.start, width));
+                    let Some(block) = block.filter(|block| block.points() <= rest.len()) else { break };
+                    blocks.push((rest.start, body));
+                    done += block.points();
+                }
+            }
+        }
+        let is_whole = place == map.len() && done == binding.points();
+        Ok(Self { path: path.into(), map, binding, blocks, notices, is_whole })
+    }
+
+    /// Whether this is the whole shard that `binding` is of.
+    pub fn is_whole_of(&self, binding: &Binding) -> Result<bool, SweepError> {
+        let different =
+            binding.other_sweep(&self.binding).or((binding.shard != self.binding.shard).then_some("another shard"));
+        match different {
+            Some(difference) => Err(SweepError::OtherPart { path: self.path.clone(), difference }),
+            None => Ok(self.is_whole),
+        }
+    }
+}
+
+/// Shards cannot be merged.
+#[derive(Debug, thiserror::Error)]
+pub enum MergeError {
+    /// No shard is there.
+    #[error(
+        "{path}: holds no shards (files ending in .{EXTENSION}); name the folder that `haptize bake --shard` wrote to"
+    )]
+    NoShards {
+        /// What was to be read.
+        path: PathBuf,
+    },
+    /// A folder or file cannot be read.
+    #[error("{path}: cannot be read: {source}")]
+    Unreadable {
+        /// Its path.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A file that is no shard.
+    #[error("{path}: is no shard: {reason}; leave it out, or solve it anew with `haptize bake --shard`")]
+    NoShard {
+        /// Its path.
+        path: PathBuf,
+        /// What gave it away.
+        reason: String,
+    },
+    /// What another bake or merge has left is in the way.
+    #[error(
+        "{path}: holds what an unfinished bake or a merge of other shards has left; delete it, or choose another output"
+    )]
+    InTheWay {
+        /// Its path.
+        path: PathBuf,
+    },
+    /// Stopped from outside.
+    #[error("stopped; the same command continues")]
+    Stopped,
+    /// Shards of several bakes.
+    #[error("{path} does not belong to {other}: it was begun with {difference}; merge the shards of one bake")]
+    Different {
+        /// A shard.
+        path: PathBuf,
+        /// Another one.
+        other: PathBuf,
+        /// What is different.
+        difference: &'static str,
+    },
+    /// Not all shards are there.
+    #[error(
+        "shards {missing} of {count} are missing; solve them with `haptize bake --shard I/{count}`, then merge again"
+    )]
+    Missing {
+        /// Their numbers, as schedulers take them.
+        missing: String,
+        /// Number of shards.
+        count: usize,
+    },
+    /// The scene in the shards is not valid.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The scene's object is refused.
+    #[error(transparent)]
+    Refused(#[from] SceneObjectError),
+    /// The object is too large for contact.
+    #[error(transparent)]
+    Object(#[from] ObjectError),
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    Sweep(SweepError),
+}
+
+impl From<SweepError> for MergeError {
+    fn from(error: SweepError) -> Self {
+        match error {
+            SweepError::ForeignPart { path, reason } => Self::NoShard { path, reason },
+            SweepError::Unfinished { path } | SweepError::OtherPart { path, .. } => Self::InTheWay { path },
+            SweepError::Stopped { .. } => Self::Stopped,
+            other => Self::Sweep(other),
+        }
+    }
+}
+
+/// The shards of one sweep.
+pub struct Merge {
+    /// Whole ones, by index.
+    shards: BTreeMap<usize, Contents>,
+    /// Number of shards of the sweep.
+    count: usize,
+    /// Whole ones that are there twice, and damaged ones, a sentence without its full stop each.
+    pub notes: Vec<String>,
+}
+
+/// A dataset put together.
+#[derive(Clone, Debug)]
+pub struct Merged {
+    /// Number of shards.
+    pub shards: usize,
+    /// As of a bake that is continued after its last point.
+    pub report: SweepReport,
+}
+
+impl Merge {
+    /// Reads the shards at `paths`: files, and all that lie in folders.
+    ///
+    /// # Errors
+    /// When there are none, one cannot be read, or two are of different bakes.
+    pub fn gather(paths: &[PathBuf]) -> Result<Self, MergeError> {
+        let (mut shards, mut notes, mut first) = (BTreeMap::<usize, Contents>::new(), Vec::new(), None);
+        for file in files(paths)? {
+            let found = Contents::read(&file)?;
+            let (path, binding) = first.get_or_insert_with(|| (file.clone(), found.binding.clone()));
+            let is_other = binding.shard.count != found.binding.shard.count;
+            if let Some(difference) =
+                binding.other_sweep(&found.binding).or(is_other.then_some("another number of shards"))
+            {
+                return Err(MergeError::Different { path: file, other: path.clone(), difference });
+            }
+            let Shard { index, .. } = found.binding.shard;
+            if !found.is_whole {
+                notes.push(format!("{} is damaged: shard {index} counts as missing", file.display()));
+            } else if let Some(kept) = shards.get(&index) {
+                notes.push(format!("shard {index} is there twice: {} is taken", kept.path.display()));
+            } else {
+                shards.insert(index, found);
+            }
+        }
+        let Some((_, binding)) = first else {
+            return Err(MergeError::NoShards { path: paths.first().cloned().unwrap_or_default() });
+        };
+        Ok(Self { shards, count: binding.shard.count, notes })
+    }
+
+    /// Number of shards of the sweep.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Shards that are not there, ascending.
+    #[must_use]
+    pub fn missing(&self) -> Vec<usize> {
+        (0..self.count).filter(|index| !self.shards.contains_key(index)).collect()
+    }
+
+    /// Puts the dataset `output` together, with its error measured at `measured` configurations as in [`super::Bake::measured`]. What an
+    /// interrupted merge has left is continued.
+    ///
+    /// # Errors
+    /// Any [`MergeError`]; an earlier file `output` is then untouched.
+    pub fn to_file(
+        &self,
+        output: &Path,
+        measured: Option<usize>,
+        stop: &AtomicBool,
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<Merged, MergeError> {
+        let missing = self.missing();
+        let Some(first) = self.shards.values().next().filter(|_| missing.is_empty()) else {
+            return Err(MergeError::Missing { missing: ranges(&missing), count: self.count });
+        };
+        let mut binding = first.binding.clone();
+        let dates = self.shards.values().map(|shard| shard.binding.provenance.date.clone());
+        binding.provenance.date = dates.min().unwrap_or_default();
+        let mut scene = Scene::parse(&binding.scene, &binding.scene_path)?;
+        if let Ok(algorithm) = Algorithm::from_str(&binding.provenance.algorithm, true) {
+            scene.contact.algorithm = algorithm;
+        }
+        let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
+        let model = model_of(&scene, &object, &chain)?;
+        let by = [&binding.provenance.backend, &binding.provenance.adapter, &binding.provenance.date];
+        let sweep = sweep_of(&scene, &object, &model, by.map(String::as_str), measured)?;
+        if let Some(difference) = sweep.binding().other_sweep(&binding) {
+            let (path, other) = (first.path.clone(), scene.path);
+            return Err(MergeError::Different { path, other, difference });
+        }
+        self.copy(&sweep, output)?;
+        let run = Run { chunk: 1, stop, progress };
+        let report = sweep.bake(&mut Idle, output, true, run)?;
+        Ok(Merged { shards: self.count, report })
+    }
+
+    /// Copies what a part of `output` lacks into it.
+    fn copy(&self, sweep: &Sweep<'_>, output: &Path) -> Result<(), SweepError> {
+        let path = Sweep::part_of(output);
+        let failed = |source| SweepError::Part { path: path.clone(), source };
+        let mut binding = sweep.binding();
+        let (mut part, tally) = Part::open(&path, true, &mut binding)?;
+        let mut blocks: Vec<(usize, &[u8])> = Vec::new();
+        for shard in self.shards.values() {
+            blocks.extend(shard.blocks.iter().map(|(first, body)| (*first, &shard.map[body.clone()])));
+        }
+        blocks.sort_unstable_by_key(|(first, _)| *first);
+        let begin = blocks.partition_point(|(first, _)| *first < tally.points);
+        let next = blocks.get(begin).map_or(binding.points(), |(first, _)| *first);
+        if next != tally.points {
+            return Err(SweepError::Unfinished { path });
+        }
+        for (_, block) in &blocks[begin..] {
+            part.write(&[block]).map_err(failed)?;
+        }
+        for notice in self.notices().get(binding.provenance.notices.len()..).unwrap_or_default() {
+            part.note(notice)?;
+        }
+        Ok(())
+    }
+
+    /// What provenance will tell: shards that another backend than that of the first one solved, then the shards' own notices.
+    fn notices(&self) -> Vec<String> {
+        let mut solved_by = BTreeMap::<_, Vec<usize>>::new();
+        for (&index, shard) in &self.shards {
+            let by = &shard.binding.provenance;
+            solved_by.entry((&by.backend, &by.adapter)).or_default().push(index);
+        }
+        let others =
+            solved_by.into_iter().filter(|(_, shards)| !shards.contains(&0)).map(|((backend, adapter), shards)| {
+                format!("shards {} of {} were solved on {backend} ({adapter})", ranges(&shards), self.count)
+            });
+        others.chain(self.shards.values().flat_map(|shard| shard.notices.clone())).collect()
+    }
+}
+
+/// The files among `paths`, and those in folders that end in [`EXTENSION`], sorted.
+fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, MergeError> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let unreadable = |source| MergeError::Unreadable { path: path.clone(), source };
+        for entry in fs::read_dir(path).map_err(unreadable)? {
+            let file = entry.map_err(unreadable)?.path();
+            if file.extension().is_some_and(|extension| extension == EXTENSION) {
+                files.push(file);
+            }
+        }
+    }
+    files.sort();
+    files.dedup();
+    Ok(files)
+}
+
+/// Solves nothing: all points are there.
+struct Idle;
+
+impl Backend for Idle {
+    type Error = Infallible;
+
+    fn solve(&mut self, _: &[JointVector]) -> Result<Vec<Equilibrium>, Infallible> {
+        Ok(Vec::new())
+    }
+}
