@@ -105,7 +105,7 @@ pub struct Touch {
     /// Number of the proxy's node.
     pub proxy_node: u32,
     /// The object's nodes of the touched facet, and the share of the reaction that each carries, in sum one: the three corners of a flat
-    /// facet, or the twelve nodes on which a smooth one depends, some of whose shares are negative.
+    /// facet, or the nodes on which a smooth one depends: its corners and all their neighbours.
     pub carriers: Vec<(u32, f64)>,
     /// Force on the proxy node [N].
     pub force: DVec3,
