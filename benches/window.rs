@@ -9,7 +9,7 @@ use egui_kittest::{Harness, wgpu::WgpuTestRenderer};
 use haptize::{
     gpu::{AdapterChoice, Context},
     render::timing::Percentiles,
-    viewer::{self, Pace, Start, Viewer},
+    viewer::{self, Start, TickSource, Viewer},
 };
 use std::{
     sync::Arc,
@@ -27,7 +27,7 @@ const FRAME: Duration = Duration::from_micros(16_667);
 fn main() {
     let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
     let render = viewer::render_state(&context).unwrap();
-    let viewer = Viewer::new(Arc::clone(&context), render.clone(), Pace::Clock, ".".into()).unwrap();
+    let viewer = Viewer::new(Arc::clone(&context), render.clone(), TickSource::Clock, ".".into()).unwrap();
     let mut harness = Harness::builder()
         .with_size([1280.0, 800.0])
         .with_context_setup(viewer::dress)

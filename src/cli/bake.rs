@@ -84,7 +84,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     output::check(&Sweep::growing_of(&output), Kind::Dataset, [])?;
     let scene = reach::complete(scene, arguments.backend, arguments.max_error.is_some())?;
     if let Some(aim) = arguments.max_error {
-        let wanted = max_error::Wanted { aim, points: arguments.max_points, output: &output, resume: arguments.resume };
+        let wanted =
+            max_error::AccuracyGoal { aim, points: arguments.max_points, output: &output, resume: arguments.resume };
         let mut report = max_error::run(&scene, &wanted, arguments.backend)?;
         earlier.tell(&mut report.text, &mut report.json);
         return Ok(report);

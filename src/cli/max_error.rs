@@ -12,7 +12,7 @@ use std::{fmt::Write, path::Path};
 const MEASURED: usize = 400;
 
 /// The accuracy that is asked for.
-pub struct Wanted<'a> {
+pub struct AccuracyGoal<'a> {
     /// The error to stay below.
     pub aim: Aim,
     /// Most grid points.
@@ -24,7 +24,7 @@ pub struct Wanted<'a> {
 }
 
 /// Chooses, states and bakes. Nothing is baked where no grid keeps the error; exit code 1 where the error that the bake measures is larger.
-pub fn run(scene: &Scene, wanted: &Wanted<'_>, backend: BackendChoice) -> Result<Report, Failure> {
+pub fn run(scene: &Scene, wanted: &AccuracyGoal<'_>, backend: BackendChoice) -> Result<Report, Failure> {
     let (pilot, choice, report) = bake::watched(scene, backend, |bake| {
         tell(format_args!("haptize: pilot: coarse grids against random configurations ..."));
         let pilot = Pilot::run(scene, wanted.aim, bake.backend, bake.stop)?;

@@ -1,11 +1,10 @@
 //! `haptize play`: a dataset felt by a simulated hand, and the object seen to deform; traces and figures of it.
 
 use super::{
-    Failure, Report,
-    felt::Felt,
-    interrupt,
+    Failure, Report, interrupt,
     keyboard::Keyboard,
     output::{self, Folder, Kind as FileKind},
+    playback_report::PlaybackReport,
     tell,
 };
 use crate::{
@@ -117,7 +116,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         files.push(file.clone());
     }
     files.extend(write(&setup, &dataset, &played, &folder)?);
-    let mut felt = Felt::new(&arguments.dataset, &dataset, &setup, &played.trace);
+    let mut felt = PlaybackReport::new(&arguments.dataset, &dataset, &setup, &played.trace);
     if let Some(path) = &arguments.beside {
         felt.beside(path, motion(&setup, &arguments.motion)?, played.trace.summary().seconds)?;
         let drawn = felt.draw(&folder, &played.trace)?;

@@ -4,7 +4,7 @@ use super::{Failure, Report, bar::Bar, output::Folder};
 use crate::{
     gpu::{AdapterChoice, Context},
     haptize::{OTHER_ADAPTER, remedied},
-    report::stability::{Bound, Case, Effort, FILES, Outcome, Setting, cases, table, write_all},
+    report::stability::{Bound, Case, CaseResult, Effort, FILES, Setting, cases, table, write_all},
 };
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut text = String::new();
     for room in ["contact", "gridization", "loop", "graphics"] {
         let of_room = outcomes.iter().filter(|(of, _)| *of == room).map(|(_, outcome)| outcome.clone());
-        let of_room: Vec<Outcome> = of_room.collect();
+        let of_room: Vec<CaseResult> = of_room.collect();
         if !of_room.is_empty() {
             text += &format!("{room}\n{}\n", table(&of_room));
         }
@@ -116,8 +116,8 @@ fn adapter(left_out: bool) -> (Option<Arc<Context>>, String) {
     }
 }
 
-fn not_run(case: &Case, error: &Failure) -> Outcome {
-    Outcome {
+fn not_run(case: &Case, error: &Failure) -> CaseResult {
+    CaseResult {
         case: case.name.to_owned(),
         varied: "not run".to_owned(),
         measure: "errors".to_owned(),

@@ -99,7 +99,7 @@ impl Detection {
 
     /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns the smallest signed distance of a
     /// proxy node to the surface at rest, less its radius [m].
-    pub fn take_up(&mut self, model: &Model, nodes: &[DVec3]) -> f64 {
+    pub fn set_configuration(&mut self, model: &Model, nodes: &[DVec3]) -> f64 {
         // The node that is most likely the nearest rules out most others.
         let first = self.place(model, nodes);
         let mut gap = f64::MAX;
@@ -386,7 +386,7 @@ mod tests {
             for _ in 0..40 {
                 let world: Vec<DVec3> =
                     (0..30).map(|_| model.surface.centre + DVec3::new(next(), next(), next()) * 0.06).collect();
-                let gap = detection.take_up(&model, &world);
+                let gap = detection.set_configuration(&model, &world);
                 let x: Vec<DVec3> = world.iter().map(|node| *node - model.surface.centre).collect();
                 let deepest =
                     brute_force(&model, &x, &model.surface.positions).iter().map(|c| c.depth).fold(0.0, f64::max);

@@ -33,8 +33,8 @@ pub struct Model<'a> {
     pub with_tangent: bool,
     /// The surface at rest.
     pub surface: Arc<RestSurface<'a>>,
-    /// Largest trace of a covered node's own block C_jj: no node moves farther than sqrt(softest) times |u| in the energy norm [m/N].
-    pub softest: f64,
+    /// Largest trace of a covered node's own block C_jj: no node moves farther than sqrt(max_nodal_compliance) times |u| in the energy norm [m/N].
+    pub max_nodal_compliance: f64,
     /// Largest eigenvalue of a covered node's own block C_jj, or a bound of it: no node moves farther than sqrt(mobility) times |u| in
     /// the energy norm [m/N].
     pub mobility: f64,
@@ -88,7 +88,7 @@ impl<'a> Model<'a> {
         let mut model = Self {
             object,
             chain,
-            softest: 0.0,
+            max_nodal_compliance: 0.0,
             mobility: 0.0,
             bulge_mobility: 0.0,
             covered_leaves: Arc::default(),
@@ -111,7 +111,7 @@ impl<'a> Model<'a> {
 
     /// Takes from the compliance how far the surface moves, and how stiff rigid contact is.
     fn measure_compliance(&mut self) {
-        (self.softest, self.mobility) = softest(&self.compliance);
+        (self.max_nodal_compliance, self.mobility) = max_nodal_compliance(&self.compliance);
         self.bulge_mobility =
             self.surface.smooth.as_ref().map_or(0.0, |smooth| bulge_mobility(smooth, &self.compliance));
         self.covered_leaves = Arc::new(reach::covered_leaves(&self.surface, &self.compliance));
@@ -133,7 +133,7 @@ impl<'a> Model<'a> {
     /// Takes another contact stiffness Kc; infinity is rigid [N/m].
     pub fn set_stiffness(&mut self, stiffness: f64) {
         self.contact.stiffness =
-            if stiffness.is_infinite() { RIGID_STIFFNESS / (3.0 * self.softest) } else { stiffness };
+            if stiffness.is_infinite() { RIGID_STIFFNESS / (3.0 * self.max_nodal_compliance) } else { stiffness };
         self.kc = 3.0 * self.contact.stiffness;
     }
 
@@ -170,11 +170,14 @@ fn bulge_mobility(smooth: &SmoothSurface, compliance: &Compliance) -> f64 {
 
 /// Largest trace of a node's own block, and a bound of its largest eigenvalue: that of an isotropic object's block is a third of its
 /// trace [m/N].
-fn softest(compliance: &Compliance) -> (f64, f64) {
+fn max_nodal_compliance(compliance: &Compliance) -> (f64, f64) {
     let trace = |j: usize| {
         let own = compliance.block(j, j);
         own.x_axis.x + own.y_axis.y + own.z_axis.z
     };
-    let softest = (0..compliance.nodes.len()).map(trace).fold(0.0, f64::max);
-    (softest, if compliance.rows_per_node == 1 { softest / 3.0 } else { softest })
+    let max_nodal_compliance = (0..compliance.nodes.len()).map(trace).fold(0.0, f64::max);
+    (
+        max_nodal_compliance,
+        if compliance.rows_per_node == 1 { max_nodal_compliance / 3.0 } else { max_nodal_compliance },
+    )
 }

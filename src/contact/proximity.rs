@@ -28,7 +28,7 @@ impl<'a> Proximity<'a> {
     /// The gap at the joint coordinates `q`, [`super::Equilibrium::gap`], which no proxy node changes by more than it moves [m].
     pub fn gap(&mut self, q: &[f64]) -> f64 {
         self.model.chain.pose(q, &mut self.pose);
-        self.detection.take_up(self.model, &self.pose.nodes)
+        self.detection.set_configuration(self.model, &self.pose.nodes)
     }
 
     /// A lower bound of what each proxy node contributes to the last gap [m].

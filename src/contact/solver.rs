@@ -1,7 +1,7 @@
 //! Equilibrium of one configuration: dispatch to the scene's algorithm and the account of its result.
 
 use super::detection::Detection;
-use super::equilibrium::energy::{EnergySearch, Geometry, Limits, Outcome};
+use super::equilibrium::energy::{EnergySearch, Geometry, SolverStats, StoppingCriteria};
 use super::equilibrium::paper::PaperIteration;
 use super::linear::support::dot;
 use super::model::Model;
@@ -75,7 +75,13 @@ impl<'a> Solver<'a> {
     /// The same by the energy form, from near the solution on: where `forces` on the object's nodes hold it with contact stiffness
     /// `kc` [N/m].
     #[must_use]
-    pub(crate) fn settle(&mut self, q: &[f64], forces: &[NodeForce], kc: f64, limits: Limits) -> Equilibrium {
+    pub(crate) fn solve_with_guess(
+        &mut self,
+        q: &[f64],
+        forces: &[NodeForce],
+        kc: f64,
+        limits: StoppingCriteria,
+    ) -> Equilibrium {
         let geometry = match self.model.contact.algorithm {
             Algorithm::Linearised => Geometry::Frozen,
             Algorithm::Energy | Algorithm::Paper => Geometry::Deformed,
@@ -86,12 +92,13 @@ impl<'a> Solver<'a> {
     /// The same by the energy form, from where `forces` on the object's nodes hold it, with the scene's tolerance and iterations.
     #[must_use]
     pub(crate) fn solve_from(&mut self, q: &[f64], forces: &[NodeForce]) -> Equilibrium {
-        let limits = Limits { tolerance: self.model.contact.tolerance, iterations: self.model.contact.max_iterations };
-        self.settle(q, forces, self.model.kc, limits)
+        let limits =
+            StoppingCriteria { tolerance: self.model.contact.tolerance, iterations: self.model.contact.max_iterations };
+        self.solve_with_guess(q, forces, self.model.kc, limits)
     }
 
     /// What `search` finds at `q`, where there is contact.
-    fn find(&mut self, q: &[f64], search: impl FnOnce(&mut Self, &mut Equilibrium) -> Outcome) -> Equilibrium {
+    fn find(&mut self, q: &[f64], search: impl FnOnce(&mut Self, &mut Equilibrium) -> SolverStats) -> Equilibrium {
         let model = self.model;
         (self.held_by, self.displacement) = (HeldBy::Nothing, None);
         let joints = model.chain.joints.len();
@@ -99,7 +106,7 @@ impl<'a> Solver<'a> {
             return unknown(joints);
         }
         model.chain.pose(q, &mut self.pose);
-        let gap = self.take_up();
+        let gap = self.set_configuration();
         if !gap.is_finite() {
             return unknown(joints);
         }
@@ -152,12 +159,12 @@ impl<'a> Solver<'a> {
             return f64::NAN;
         }
         self.model.chain.pose(q, &mut self.pose);
-        self.take_up()
+        self.set_configuration()
     }
 
     /// The gap of the configuration posed last, which detection takes up [m].
-    fn take_up(&mut self) -> f64 {
-        self.detection.take_up(self.model, &self.pose.nodes)
+    fn set_configuration(&mut self) -> f64 {
+        self.detection.set_configuration(self.model, &self.pose.nodes)
     }
 
     /// Displacement u of the surface nodes at the last configuration solved, three numbers a node [m].
@@ -194,13 +201,13 @@ impl<'a> Solver<'a> {
     fn minimise(
         &mut self,
         geometry: Geometry,
-        near: Option<((&[NodeForce], f64), Limits)>,
+        near: Option<((&[NodeForce], f64), StoppingCriteria)>,
         equilibrium: &mut Equilibrium,
-    ) -> Outcome {
+    ) -> SolverStats {
         let Self { model, detection, energy, .. } = self;
         let outcome = match near {
             None => energy.search(model, detection, geometry),
-            Some((forces, limits)) => energy.settle(model, detection, geometry, forces, limits),
+            Some((forces, limits)) => energy.solve_with_guess(model, detection, geometry, forces, limits),
         };
         let state = &self.energy.state;
         self.held_by = HeldBy::Energy;
@@ -223,7 +230,7 @@ impl<'a> Solver<'a> {
     /// The paper's iteration: touches, displacement and U.
     ///
     /// Its three forces on the nodes of a tie need not be parallel; the weights of a touch are their shares along the whole.
-    fn iterate(&mut self, equilibrium: &mut Equilibrium) -> Outcome {
+    fn iterate(&mut self, equilibrium: &mut Equilibrium) -> SolverStats {
         let outcome = self.paper.iterate(self.model, &mut self.detection);
         self.held_by = HeldBy::Paper;
         for (slot, &node) in self.paper.support.nodes().iter().enumerate() {

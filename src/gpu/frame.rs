@@ -172,7 +172,7 @@ impl FrameUpdate {
         let mut buffers = vec![state.size(), forces.size(), structure.size(), blocks.size(), even.size()];
         buffers.extend(inertia.iter().chain(&loads).map(StorageBuffer::size));
         if let (Some(stiffening), Some(loads), Some(spec)) = (&stiffening, &loads, effects.stiffening) {
-            let reach: Vec<f32> = stiffening.reach().iter().map(|&reach| reach as f32).collect();
+            let reach: Vec<f32> = stiffening.unit_strain_force().iter().map(|&force| force as f32).collect();
             let reach = StorageBuffer::from_slice(gpu, "reach of the springs", &reach)?;
             buffers.push(reach.size());
             let constants = [("FACTOR", spec.factor), ("STRAIN", spec.strain)];

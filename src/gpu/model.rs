@@ -37,7 +37,7 @@ pub struct DeviceModel {
 /// Contact stiffness of the energy form in f32 [N/m]. The kernels give it to every proxy node; each node's own, which differs where a link
 /// has a stiffness per length, enters when the result is settled in f64.
 pub(super) fn stiffness(model: &contact::Model<'_>) -> f64 {
-    model.kc.min(tolerances::GPU_STIFFNESS / model.softest)
+    model.kc.min(tolerances::GPU_STIFFNESS / model.max_nodal_compliance)
 }
 
 impl DeviceModel {
@@ -74,7 +74,7 @@ impl DeviceModel {
                 stiffness: contact.stiffness as f32,
                 kc: stiffness(model) as f32,
                 tolerance: contact.tolerance.max(tolerances::GPU_LEAST_TOLERANCE) as f32,
-                softest: model.softest as f32,
+                softest: model.max_nodal_compliance as f32,
                 least_distance: (tolerances::GPU_LEAST_DISTANCE_PER_EXTENT * extent) as f32,
                 depth_rounding: (tolerances::GPU_DEPTH_ROUNDING_PER_EDGE * longest_edge) as f32,
                 clusters: clusters.len().div_ceil(CLUSTER) as u32,

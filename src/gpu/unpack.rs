@@ -11,7 +11,7 @@ use super::{
     solver::free,
 };
 use crate::{
-    contact::{self, Equilibrium, NodeForce, Status, equilibrium::energy::Limits},
+    contact::{self, Equilibrium, NodeForce, Status, equilibrium::energy::StoppingCriteria},
     scene::Algorithm,
     tolerances::{GPU_RESOLVED_RESIDUAL, GPU_SETTLED_RESIDUAL, MINIMUM_SQUARE, SETTLING_STEPS},
 };
@@ -57,8 +57,8 @@ fn settled(
         .map(|(node, force)| NodeForce { node, force: DVec3::from(force.map(f64::from)) })
         .collect();
     let tolerance = model.contact.tolerance.clamp(GPU_SETTLED_RESIDUAL, GPU_RESOLVED_RESIDUAL);
-    let limits = Limits { tolerance, iterations: SETTLING_STEPS };
-    let result = solver.settle(q, &forces, stiffness(model), limits);
+    let limits = StoppingCriteria { tolerance, iterations: SETTLING_STEPS };
+    let result = solver.solve_with_guess(q, &forces, stiffness(model), limits);
     Equilibrium { iterations: outcome.iterations + result.iterations, ..result }
 }
 

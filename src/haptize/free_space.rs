@@ -47,7 +47,7 @@ const SLAB: usize = 1 << 20;
 pub struct FreeSpace<'a> {
     model: &'a Model<'a>,
     grid: &'a Grid,
-    reach: Reach,
+    jacobians: JacobianBounds,
     /// Most points of a slab.
     most: usize,
 }
@@ -86,7 +86,7 @@ impl<'a> FreeSpace<'a> {
     /// For `grid`, which has an axis for each joint of the chain of `model`.
     #[must_use]
     pub fn new(model: &'a Model<'a>, grid: &'a Grid) -> Self {
-        Self { model, grid, reach: Reach::new(model.chain, grid), most: SLAB }
+        Self { model, grid, jacobians: JacobianBounds::new(model.chain, grid), most: SLAB }
     }
 
     /// The slab with `point`: whole lines of the grid that follow each other, cut from the grid alone, so that bounds can be
@@ -132,7 +132,7 @@ impl<'a> FreeSpace<'a> {
             if block.points() <= SHARE {
                 shares.push(block);
             } else {
-                blocks.extend(block.halves(self.grid, &self.reach));
+                blocks.extend(block.halves(self.grid, &self.jacobians));
             }
         }
         shares.par_iter().for_each_init(
@@ -195,8 +195,8 @@ impl Block {
     }
 
     /// The two halves across the axis along which the block is widest in terms of the proxy's motion.
-    fn halves(self, grid: &Grid, reach: &Reach) -> [Self; 2] {
-        let width = |j: usize| (self.high[j] - self.low[j] - 1) as f64 * grid.axes[j].step * reach.greatest[j];
+    fn halves(self, grid: &Grid, jacobians: &JacobianBounds) -> [Self; 2] {
+        let width = |j: usize| (self.high[j] - self.low[j] - 1) as f64 * grid.axes[j].step * jacobians.greatest[j];
         let wide = (0..grid.joints()).filter(|&j| self.high[j] - self.low[j] > 1);
         let axis = wide.max_by(|&i, &j| width(i).total_cmp(&width(j))).unwrap_or(0);
         let (mut left, mut right) = (self, self);
@@ -208,7 +208,7 @@ impl Block {
 }
 
 /// Bounds on how far joints move nodes.
-struct Reach {
+struct JacobianBounds {
     /// r_ij, joint fastest [m/rad, or 1].
     bounds: Vec<JointVector>,
     /// Greatest of each joint.
@@ -217,7 +217,7 @@ struct Reach {
     length: f64,
 }
 
-impl Reach {
+impl JacobianBounds {
     fn new(chain: &Chain, grid: &Grid) -> Self {
         // The margin reaches beyond the grid.
         let range = |axis: &Axis| {
@@ -256,7 +256,7 @@ impl FreeSpace<'_> {
             touching => touching,
         };
         if touching.is_none_or(|place| !block.is_all_near(&place)) {
-            for half in block.halves(self.grid, &self.reach) {
+            for half in block.halves(self.grid, &self.jacobians) {
                 self.search(proximity, half, touching, gaps);
             }
         }
@@ -272,7 +272,7 @@ impl FreeSpace<'_> {
             wide[j] = (steps + FreeSpace::MARGIN as f64) * axis.step;
         }
         let nearest = proximity.place(&centre);
-        let rounding = FREE_SPACE_ROUNDING * (self.reach.length + self.model.surface.extent);
+        let rounding = FREE_SPACE_ROUNDING * (self.jacobians.length + self.model.surface.extent);
         let stays = |(i, clearance): (usize, f64)| clearance - self.motion(proximity, i, &wide) > rounding;
         let least = proximity.clearances().nth(nearest).unwrap_or(f64::INFINITY);
         if stays((nearest, least)) && proximity.clearances().enumerate().all(stays) {
@@ -301,7 +301,7 @@ impl FreeSpace<'_> {
 
     /// m_ij over the block of half-widths `wide` around the configuration placed last.
     fn slope(&self, proximity: &Proximity<'_>, node: usize, joint: usize, wide: &JointVector) -> f64 {
-        let bounds = &self.reach.bounds[node];
+        let bounds = &self.jacobians.bounds[node];
         let here = self.model.chain.jacobian_column(proximity.pose(), node, joint).length();
         let turn: f64 = wide.iter().enumerate().map(|(k, h)| bounds[joint.max(k)] * h).sum();
         bounds[joint].min(here + turn)

@@ -19,7 +19,7 @@ pub struct Stiffening {
     /// K1 [N/m].
     bound: Stiffness,
     /// Force of a spring in K1 at strain one, kappa k L, for each block; zero on the diagonal [N].
-    reach: Vec<f64>,
+    unit_strain_force: Vec<f64>,
     /// kappa [1].
     factor: f64,
     /// eps [1].
@@ -31,7 +31,7 @@ impl Stiffening {
     #[must_use]
     pub fn new(object: &Object, factor: f64, strain: f64) -> Self {
         let mut bound = object.stiffness.clone();
-        let mut reach = vec![0.0; bound.blocks.len()];
+        let mut unit_strain_force = vec![0.0; bound.blocks.len()];
         for node in 0..bound.nodes() {
             let row = bound.offsets[node]..bound.offsets[node + 1];
             let mut springs = DMat3::ZERO;
@@ -44,11 +44,12 @@ impl Stiffening {
                 }
                 springs -= bound.blocks[entry];
                 bound.blocks[entry] *= factor;
-                reach[entry] = stiffness(&bound.blocks[entry]) * object.rest[node].distance(object.rest[other]);
+                unit_strain_force[entry] =
+                    stiffness(&bound.blocks[entry]) * object.rest[node].distance(object.rest[other]);
             }
             bound.blocks[diagonal] += (factor - 1.0) * springs;
         }
-        Self { bound, reach, factor, strain }
+        Self { bound, unit_strain_force, factor, strain }
     }
 
     /// K1, the stiffness that no strain exceeds [N/m].
@@ -59,8 +60,8 @@ impl Stiffening {
 
     /// See the field: what the GPU's twin needs of each block [N].
     #[must_use]
-    pub fn reach(&self) -> &[f64] {
-        &self.reach
+    pub fn unit_strain_force(&self) -> &[f64] {
+        &self.unit_strain_force
     }
 
     /// By how much K1 u exceeds the springs' force grad W(u), added to `force` [N].
@@ -75,10 +76,10 @@ impl Stiffening {
     pub fn relief_on(&self, node: usize, displacement: &[DVec3]) -> DVec3 {
         let mut relief = DVec3::ZERO;
         for entry in self.bound.offsets[node]..self.bound.offsets[node + 1] {
-            if self.reach[entry] > 0.0 {
+            if self.unit_strain_force[entry] > 0.0 {
                 let other = displacement[self.bound.columns[entry] as usize];
                 let pull = self.bound.blocks[entry] * (other - displacement[node]);
-                let strain = pull.length() / self.reach[entry];
+                let strain = pull.length() / self.unit_strain_force[entry];
                 let sigma = 1.0 + (self.factor - 1.0) * strain / (strain.hypot(self.strain) + self.strain);
                 relief += (1.0 - sigma / self.factor) * pull;
             }
@@ -93,12 +94,12 @@ impl Stiffening {
         for node in 0..displacement.len() {
             for entry in self.bound.offsets[node]..self.bound.offsets[node + 1] {
                 let other = self.bound.columns[entry] as usize;
-                if other < node && self.reach[entry] > 0.0 {
+                if other < node && self.unit_strain_force[entry] > 0.0 {
                     let length = object.rest[node].distance(object.rest[other]);
                     let pull = self.bound.blocks[entry] * (displacement[other] - displacement[node]);
-                    let (r, eps) = (pull.length() / self.reach[entry], self.strain);
+                    let (r, eps) = (pull.length() / self.unit_strain_force[entry], self.strain);
                     let integral = 0.5 * (r * r.hypot(eps) + eps * eps * (r / eps).asinh()) - eps * r;
-                    energy += self.reach[entry] / self.factor * length * (self.factor - 1.0) * integral;
+                    energy += self.unit_strain_force[entry] / self.factor * length * (self.factor - 1.0) * integral;
                 }
             }
         }

@@ -20,7 +20,7 @@
 //! so that Colgate's condition counts `Kvc + c2 Ks` (`passivity.rs`). The accounts book their work, the passivity
 //! controller and the guard of `haptic.rs` act on it as on all else.
 
-use super::npmi::{Stage, flush};
+use super::npmi::{MidpointInertia, flush};
 use crate::{
     JointVector,
     scene::{FourChannelSpec, HapticsSpec},
@@ -120,7 +120,7 @@ impl Channels {
 
     /// Returns what the channels add to the torque on the proxy, whose inertia is that of `stage` [N m].
     #[must_use]
-    pub fn proxy_torque(&self, state: &ChannelState, stage: &Stage) -> JointVector {
+    pub fn proxy_torque(&self, state: &ChannelState, stage: &MidpointInertia) -> JointVector {
         let [c1, _, c3, _] = self.spec.channels;
         let mut torque = stage.inertial_torque(&state.device_acceleration);
         for (a, torque) in torque.iter_mut().enumerate() {

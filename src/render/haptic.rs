@@ -17,9 +17,9 @@ use super::{
     coupling::Coupling,
     effects::{ContactEffects, EffectState, Pending},
     flags::{Fault, Flags},
-    held::Held,
     npmi::{Motion, Npmi},
-    watchdog::{self, Pace, Watchdog},
+    torque_history::TorqueHistory,
+    watchdog::{self, TickRate, Watchdog},
 };
 use crate::{
     JointVector,
@@ -54,9 +54,9 @@ pub struct State {
     /// Last good device position y [rad or m].
     device: JointVector,
     /// Torques on the device.
-    held: Held,
+    held: TorqueHistory,
     /// How the ticks have come lately.
-    pace: Pace,
+    pace: TickRate,
     /// The first fault since the loop began.
     fault: Option<Fault>,
     accounts: Accounts,
@@ -198,7 +198,7 @@ impl Haptics {
             motion: Motion::at_rest(position),
             proxy_velocity: JointVector::zeros(joints),
             device: *position,
-            held: Held::new(joints, self.period),
+            held: TorqueHistory::new(joints, self.period),
             pace: self.watchdog.start(),
             fault: None,
             accounts: Accounts::default(),

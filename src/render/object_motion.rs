@@ -134,10 +134,9 @@ impl<'object> ObjectMotion<'object> {
         let factor = self.dynamics.as_ref().map_or(0, |dynamics| {
             dynamics.factor.bytes() + dynamics.scales.as_ref().map_or(0, |scales| size_of_val(&**scales))
         });
-        let stiffening = self
-            .stiffening
-            .as_ref()
-            .map_or(0, |stiffening| size_of_val(&*stiffening.bound().blocks) + size_of_val(stiffening.reach()));
+        let stiffening = self.stiffening.as_ref().map_or(0, |stiffening| {
+            size_of_val(&*stiffening.bound().blocks) + size_of_val(stiffening.unit_strain_force())
+        });
         vectors * size_of::<DVec3>() + factor + stiffening
     }
 

@@ -30,9 +30,9 @@ pub struct Watchdog {
 
 /// How the ticks have come lately: their number n, older ones weighing less [1].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace(f64);
+pub struct TickRate(f64);
 
-impl Pace {
+impl TickRate {
     /// Mean time between ticks [s].
     #[must_use]
     pub fn mean(self) -> f64 {
@@ -66,15 +66,15 @@ impl Watchdog {
 
     /// The pace before the first tick: the nominal one.
     #[must_use]
-    pub fn start(&self) -> Pace {
-        Pace(PACE_WINDOW / self.period + 1.0)
+    pub fn start(&self) -> TickRate {
+        TickRate(PACE_WINDOW / self.period + 1.0)
     }
 
     /// Takes in that `elapsed` [s], which can lie between two ticks, lay before this one.
     ///
     /// # Errors
     /// When deadlines are missed persistently.
-    pub fn follow(&self, pace: &mut Pace, elapsed: f64) -> Result<(), Fault> {
+    pub fn follow(&self, pace: &mut TickRate, elapsed: f64) -> Result<(), Fault> {
         pace.0 = pace.0 / (1.0 + elapsed / PACE_WINDOW) + 1.0;
         if pace.mean() > self.greatest_mean() { Err(Fault::Overrun) } else { Ok(()) }
     }

@@ -45,7 +45,7 @@ pub struct EndForce {
 
 /// The force while a contact went on: over its middle half, along the axis of the world along which it is greatest.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Held {
+pub struct SteadyForce {
     /// `x`, `y` or `z`.
     pub axis: char,
     /// Mean [N].
@@ -71,7 +71,7 @@ impl EndForce {
 
     /// Returns the held force; `None` without contact or if the force is not known throughout.
     #[must_use]
-    pub fn held(&self) -> Option<Held> {
+    pub fn held(&self) -> Option<SteadyForce> {
         let [from, to] = self.contact?;
         let quarter = 0.25 * (to - from);
         let middle = || self.forces.iter().filter(|(time, _)| (from + quarter..=to - quarter).contains(time));
@@ -80,7 +80,11 @@ impl EndForce {
         let axis = (0..3).max_by(|&a, &b| mean[a].abs().total_cmp(&mean[b].abs()))?;
         let most = middle().map(|(_, force)| (force[axis] - mean[axis]).abs()).fold(0.0, f64::max);
         let variation = most / mean[axis].abs().max(f64::MIN_POSITIVE);
-        (count > 0 && mean.is_finite()).then_some(Held { axis: ['x', 'y', 'z'][axis], mean: mean[axis], variation })
+        (count > 0 && mean.is_finite()).then_some(SteadyForce {
+            axis: ['x', 'y', 'z'][axis],
+            mean: mean[axis],
+            variation,
+        })
     }
 }
 

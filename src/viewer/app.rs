@@ -3,10 +3,10 @@
 
 use super::{
     ViewError,
-    feel::Pace,
+    feel::TickSource,
     files::Files,
     gamepad::Gamepad,
-    job::{Job, Outcome, Solver, Task},
+    job::{Job, JobResult, Solver, Task},
     plots::Plots,
     scene::{SceneView, Shown},
     session::Session,
@@ -57,7 +57,7 @@ const SPHERE: &str = include_str!("../../datasets/sphere.toml");
 /// The viewer.
 pub struct Viewer {
     pub(super) context: Arc<Context>,
-    pub(super) pace: Pace,
+    pub(super) pace: TickSource,
     pub(super) gamepad: Gamepad,
     pub(super) session: Option<Session>,
     pub(super) scene: SceneView,
@@ -112,15 +112,20 @@ impl Viewer {
     ///
     /// # Errors
     /// When the device refuses the drawing shaders.
-    pub fn new(context: Arc<Context>, render: RenderState, pace: Pace, folder: PathBuf) -> Result<Self, ViewError> {
+    pub fn new(
+        context: Arc<Context>,
+        render: RenderState,
+        pace: TickSource,
+        folder: PathBuf,
+    ) -> Result<Self, ViewError> {
         // A software rasteriser that has to keep up with the clock has no time for more.
-        let hasty = pace == Pace::Clock && !context.adapter().hardware;
+        let hasty = pace == TickSource::Clock && !context.adapter().hardware;
         let samples = if hasty { 1 } else { SAMPLES };
         Ok(Self {
             scene: SceneView::new(Arc::clone(&context), render, samples)?,
             context,
             pace,
-            gamepad: if pace == Pace::Clock { Gamepad::new() } else { Gamepad::default() },
+            gamepad: if pace == TickSource::Clock { Gamepad::new() } else { Gamepad::default() },
             session: None,
             plots: Plots::default(),
             files: Files::new(folder),
@@ -129,7 +134,7 @@ impl Viewer {
             solver: Solver::Auto,
             error: None,
             frame_rate: None,
-            shows_steps: pace == Pace::Clock,
+            shows_steps: pace == TickSource::Clock,
             shown_at: (JointVector::zeros(0), JointVector::zeros(0)),
             still: 0.0,
         })
@@ -218,11 +223,11 @@ impl Viewer {
         }
     }
 
-    fn take(&mut self, outcome: Outcome, egui: &egui::Context) {
+    fn take(&mut self, outcome: JobResult, egui: &egui::Context) {
         match outcome {
-            Outcome::Cancelled => {}
-            Outcome::Failed(reason) => self.error = Some(reason),
-            Outcome::Loaded(loaded) => {
+            JobResult::Cancelled => {}
+            JobResult::Failed(reason) => self.error = Some(reason),
+            JobResult::Loaded(loaded) => {
                 let (loaded, body) = *loaded;
                 let egui = egui.clone();
                 match Session::new(loaded, &self.context, &self.gamepad, self.pace, move || egui.request_repaint()) {
@@ -297,7 +302,7 @@ impl Viewer {
 
     /// Lets `elapsed` [s] go by: the loop where it runs by steps, the object, and what is in the background.
     pub fn advance(&mut self, elapsed: f64, egui: &egui::Context) {
-        if self.pace == Pace::Clock && elapsed > 0.0 && elapsed < LONGEST_FRAME {
+        if self.pace == TickSource::Clock && elapsed > 0.0 && elapsed < LONGEST_FRAME {
             let rate = self.frame_rate.map_or(elapsed, |rate| (1.0 - LATEST) / rate + LATEST * elapsed).recip();
             self.frame_rate = Some(rate);
         }

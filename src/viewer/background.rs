@@ -6,14 +6,14 @@ use std::{
 };
 
 /// Something that is being made, and is taken once it is there. Whoever drops it before lets it come to nothing.
-pub struct Coming<T> {
+pub struct Pending<T> {
     made: mpsc::Receiver<T>,
 }
 
 /// Message for a thread that ended without its result.
 pub const ENDED: &str = "the work ended unexpectedly; please report this";
 
-impl<T: Send + 'static> Coming<T> {
+impl<T: Send + 'static> Pending<T> {
     /// Begins to `make` it in a thread called `name`; `wake` is called once it is there.
     ///
     /// # Errors
@@ -54,7 +54,7 @@ impl<T: Send + 'static> Coming<T> {
 pub struct Following<W, T> {
     /// The result, or why there is none; absent before the first.
     last: Option<W>,
-    coming: Option<(W, Coming<T>)>,
+    coming: Option<(W, Pending<T>)>,
 }
 
 impl<W: Clone + PartialEq + Send + 'static, T: Send + 'static> Following<W, T> {
@@ -86,7 +86,7 @@ impl<W: Clone + PartialEq + Send + 'static, T: Send + 'static> Following<W, T> {
         }
         if self.coming.is_none() && self.last.as_ref() != Some(wanted) {
             let asked = wanted.clone();
-            match Coming::begin(name, move || make(&asked), wake) {
+            match Pending::begin(name, move || make(&asked), wake) {
                 Ok(coming) => self.coming = Some((wanted.clone(), coming)),
                 Err(error) => {
                     self.last = Some(wanted.clone());
@@ -102,10 +102,10 @@ impl<W: Clone + PartialEq + Send + 'static, T: Send + 'static> Following<W, T> {
     /// # Errors
     /// In words, when the thread ended without it.
     pub fn wait(&mut self) -> Result<Option<T>, String> {
-        self.over().map(Coming::wait).transpose()
+        self.over().map(Pending::wait).transpose()
     }
 
-    fn over(&mut self) -> Option<Coming<T>> {
+    fn over(&mut self) -> Option<Pending<T>> {
         let (wanted, coming) = self.coming.take()?;
         self.last = Some(wanted);
         Some(coming)
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn a_result_is_there_once_it_is_made() {
         let (awake, woken) = mpsc::channel();
-        let coming = Coming::begin("test", || 7, move || awake.send(()).unwrap()).unwrap();
+        let coming = Pending::begin("test", || 7, move || awake.send(()).unwrap()).unwrap();
         woken.recv().unwrap();
         assert_eq!(coming.poll(), Some(Ok(7)));
     }
@@ -160,7 +160,7 @@ mod tests {
     fn work_that_ends_without_a_result_is_told_once() {
         let (sender, made) = mpsc::channel::<i32>();
         drop(sender);
-        let mut following = Following { last: Some(0), coming: Some((1, Coming { made })) };
+        let mut following = Following { last: Some(0), coming: Some((1, Pending { made })) };
         assert_eq!(following.follow(&1, "test", |wanted| *wanted, || ()), Err(ENDED.to_owned()));
         assert_eq!(following.follow(&1, "test", |wanted| *wanted, || ()), Ok(None));
     }

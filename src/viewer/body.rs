@@ -1,6 +1,6 @@
 //! The object in the window: its nodes advanced on the GPU by the interpolated contact forces, frame after frame.
 
-use super::{loaded::Loaded, stage::Surface};
+use super::{loaded::Loaded, view_renderer::Surface};
 use crate::{
     contact::Status,
     gpu::{Context, FrameError, FrameMethod, FrameUpdate, GpuError},

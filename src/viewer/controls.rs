@@ -8,8 +8,8 @@ use super::{
     palette,
     prices::{Item, Prices},
     scene::Shown,
-    stage::Quantity,
     theme::{CHOICE_WIDTH, GROUP_GAP},
+    view_renderer::Quantity,
 };
 use crate::{
     dataset::Dataset,

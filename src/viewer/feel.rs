@@ -3,7 +3,7 @@
 //! motion does not depend on the window's frame rate.
 //!
 //! A picture without a window has no time of its own: there the same loop runs by steps that are told
-//! ([`Pace::Steps`]), and gives the same numbers on every machine.
+//! ([`TickSource::Steps`]), and gives the same numbers on every machine.
 
 use super::{background::spawn, gamepad::Gamepad, guide::Guide};
 use crate::{
@@ -29,7 +29,7 @@ use std::{
 
 /// The source of ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
+pub enum TickSource {
     /// The clock, in a thread with real-time priority where that is permitted.
     Clock,
     /// The caller.
@@ -76,7 +76,7 @@ impl Feel {
         gains: &HapticsSpec,
         guide: Guide,
         gamepad: Gamepad,
-        pace: Pace,
+        pace: TickSource,
     ) -> Result<Self, String> {
         let (pointer, input) = Pointer::new(gains, &guide.goal()).map_err(|error| error.to_string())?;
         let guide = Arc::new(Mutex::new(guide));
@@ -90,13 +90,13 @@ impl Feel {
         let (steps, asked) = mpsc::channel();
         let mut threads = Vec::new();
         let steps = match pace {
-            Pace::Clock => {
+            TickSource::Clock => {
                 let (leader, over) = (Arc::clone(&guide), Arc::clone(&stop));
                 threads.push(spawn("guide", move || lead(&leader, &gamepad, input, &over))?);
                 threads.push(spawn("haptic", move || body.by_the_clock(&report, &refuse))?);
                 None
             }
-            Pace::Steps => {
+            TickSource::Steps => {
                 let leader = Arc::clone(&guide);
                 threads.push(spawn("haptic", move || {
                     body.by_steps(&leader, &gamepad, input, &report, &asked, &acknowledge)

@@ -96,7 +96,7 @@ pub fn short(name: &str) -> &str {
 const ON_THE_CPU: &str = "the CPU (Haptization: Solve on CPU)";
 
 /// How a job ended.
-pub enum Outcome {
+pub enum JobResult {
     /// Ready, with the object where there is one to draw.
     Loaded(Box<(Loaded, Option<Body>)>),
     /// Somebody cancelled it.
@@ -118,7 +118,7 @@ pub struct Job {
 
 enum Report {
     Progress(Progress),
-    Over(Outcome),
+    Over(JobResult),
 }
 
 impl Job {
@@ -147,9 +147,9 @@ impl Job {
                 wake();
             };
             let outcome = match run(asked, &solver, &context, &flag, &mut progress) {
-                Ok(loaded) => Outcome::Loaded(Box::new(loaded)),
-                Err(error) if is_cancelled(error.as_ref()) => Outcome::Cancelled,
-                Err(error) => Outcome::Failed(remedied(&error.to_string(), ON_THE_CPU)),
+                Ok(loaded) => JobResult::Loaded(Box::new(loaded)),
+                Err(error) if is_cancelled(error.as_ref()) => JobResult::Cancelled,
+                Err(error) => JobResult::Failed(remedied(&error.to_string(), ON_THE_CPU)),
             };
             let _ = sender.send(Report::Over(outcome));
             wake();
@@ -160,14 +160,14 @@ impl Job {
     }
 
     /// Takes the news; answers with the outcome once it is over.
-    pub fn poll(&mut self) -> Option<Outcome> {
+    pub fn poll(&mut self) -> Option<JobResult> {
         loop {
             match self.reports.try_recv() {
                 Ok(Report::Progress(progress)) => self.progress = progress,
                 Ok(Report::Over(outcome)) => return Some(outcome),
                 Err(mpsc::TryRecvError::Empty) => return None,
                 Err(mpsc::TryRecvError::Disconnected) => {
-                    return Some(Outcome::Failed(ENDED.into()));
+                    return Some(JobResult::Failed(ENDED.into()));
                 }
             }
         }
@@ -175,7 +175,7 @@ impl Job {
 
     /// Waits until it is over.
     #[must_use]
-    pub fn wait(mut self) -> Outcome {
+    pub fn wait(mut self) -> JobResult {
         loop {
             if let Some(outcome) = self.poll() {
                 return outcome;
@@ -283,7 +283,8 @@ mod tests {
         let scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
         let gone = AdapterSummary { name: "Unplugged (1)".into(), ..context.adapter().clone() };
         let task = Task::Bake(Arc::new(scene), None);
-        let Outcome::Failed(why) = Job::begin(task, Solver::Adapter(gone), Arc::clone(&context), || ()).unwrap().wait()
+        let JobResult::Failed(why) =
+            Job::begin(task, Solver::Adapter(gone), Arc::clone(&context), || ()).unwrap().wait()
         else {
             panic!("an adapter that is not there baked")
         };
@@ -303,7 +304,7 @@ mod tests {
             let task = Task::Bake(Arc::new(scene.clone()), surface);
             Job::begin(task, Solver::Cpu, Arc::clone(&context), || ()).unwrap().wait()
         };
-        assert!(matches!(bake(Some(surface)), Outcome::Loaded(_)));
-        assert!(matches!(bake(None), Outcome::Failed(why) if why.contains("gone.obj")));
+        assert!(matches!(bake(Some(surface)), JobResult::Loaded(_)));
+        assert!(matches!(bake(None), JobResult::Failed(why) if why.contains("gone.obj")));
     }
 }

@@ -1,6 +1,6 @@
 //! The window's picture without a window: the same panels, laid out and painted by egui into a texture that is read back.
 
-use super::{Pace, Start, ViewError, Viewer, dress, guide::LEAD_IN, pixels, theme};
+use super::{Start, TickSource, ViewError, Viewer, dress, guide::LEAD_IN, pixels, theme};
 use crate::{
     dataset::replace_file,
     gpu::{AdapterChoice, Context, GpuError},
@@ -72,7 +72,7 @@ pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), V
     let egui = egui::Context::default();
     egui.set_theme(if picture.dark { Theme::Dark } else { Theme::Light });
     dress(&egui);
-    let mut viewer = Viewer::new(Arc::clone(&context), render.clone(), Pace::Steps, PathBuf::from("."))?;
+    let mut viewer = Viewer::new(Arc::clone(&context), render.clone(), TickSource::Steps, PathBuf::from("."))?;
     viewer.start(start, &egui);
     viewer.wait(&egui);
     if let Some(error) = viewer.error() {

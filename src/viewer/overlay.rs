@@ -6,9 +6,9 @@ use super::{
     number,
     palette::Palette,
     slices::gradient,
-    stage::Quantity,
     theme::{self, AXIS_LINE, COLOUR_BAR, FINE_GAP, GAP, GROUP_GAP, TICK},
     trimmed,
+    view_renderer::Quantity,
 };
 use crate::report::colour::ColourMap;
 use eframe::egui::{Align2, Painter, Rect, Stroke, Ui, Vec2, vec2};

@@ -2,7 +2,7 @@
 
 use super::{
     app::{Viewer, not_drawn},
-    feel::Pace,
+    feel::TickSource,
     gamepad::{Found, Gamepad},
     guide::Guide,
     job::{Job, Task, short},
@@ -142,7 +142,7 @@ impl Viewer {
                 }
                 let jitter = session.history.jitter().percentiles();
                 let cost = session.history.cost().percentiles();
-                if cost.count > 0 && self.pace == Pace::Clock {
+                if cost.count > 0 && self.pace == TickSource::Clock {
                     let words = format!("tick {} µs, jitter {} µs at 99 %", number(cost.p50), number(jitter.p99));
                     let refused = session.history.refused();
                     let label = ui.label(RichText::new(words).small());

@@ -10,8 +10,8 @@ use super::{
     overlay,
     palette::{self, Palette},
     shapes::Shape,
-    stage::{Look, Quantity, Stage},
     steering::Steering,
+    view_renderer::{Look, Quantity, ViewRenderer},
 };
 use crate::{
     gpu::{Context, FrameError},
@@ -43,7 +43,7 @@ pub struct Shown {
 pub struct SceneView {
     context: Arc<Context>,
     render: RenderState,
-    stage: Stage,
+    stage: ViewRenderer,
     texture: Option<(egui::TextureId, [usize; 2])>,
     steering: Steering,
     body: Option<Body>,
@@ -82,7 +82,7 @@ impl SceneView {
     /// When the device refuses the drawing shaders.
     pub fn new(context: Arc<Context>, render: RenderState, samples: u32) -> Result<Self, ViewError> {
         Ok(Self {
-            stage: Stage::new(Arc::clone(&context), samples)?,
+            stage: ViewRenderer::new(Arc::clone(&context), samples)?,
             context,
             render,
             texture: None,

@@ -4,7 +4,7 @@ use super::{
     background::Following,
     cloud::Cloud,
     controls::Controls,
-    feel::{Feel, Pace},
+    feel::{Feel, TickSource},
     gamepad::Gamepad,
     guide::Guide,
     history::History,
@@ -27,7 +27,7 @@ pub struct Session {
     pub feel: Feel,
     pub history: History,
     gamepad: Gamepad,
-    pace: Pace,
+    pace: TickSource,
     /// The loop with the gains that the controls have, made in the background.
     retuning: Following<HapticsSpec, Result<Tuned, SetupError>>,
     slices: Slices,
@@ -51,7 +51,7 @@ impl Session {
         loaded: Loaded,
         context: &Arc<Context>,
         gamepad: &Gamepad,
-        pace: Pace,
+        pace: TickSource,
         wake: impl Fn() + Send + 'static,
     ) -> Result<Self, String> {
         let controls = Controls::new(&loaded, context, wake);
@@ -163,7 +163,7 @@ mod tests {
         };
         let loaded = Loaded::new(bake.in_memory().unwrap().0, None, None).unwrap();
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-        let mut session = Session::new(loaded, &context, &Gamepad::default(), Pace::Steps, || ()).unwrap();
+        let mut session = Session::new(loaded, &context, &Gamepad::default(), TickSource::Steps, || ()).unwrap();
         let (open, gate) = mpsc::channel::<()>();
         let other = HapticsSpec { interpolation: Interpolation::Potential, ..session.controls.tuning.haptics.clone() };
         session.controls.tuning.haptics = other.clone();

@@ -1,7 +1,7 @@
 //! Whence the 3-D scene is seen, and the hand in it: orbit, pan, zoom, reset; the pointer takes the proxy by a node and drags
 //! it; keys move joints.
 
-use super::{camera::Camera, grip::Grip, guide::Guide, pad::JOINTS};
+use super::{camera::Camera, guide::Guide, node_drag::NodeDrag, pad::JOINTS};
 use crate::proxy::{Chain, Pose};
 use eframe::egui::{CursorIcon, InputState, Key, PointerButton, Pos2, Rect, Response, Ui};
 use glam::Vec2;
@@ -12,7 +12,7 @@ pub struct Steering {
     pub camera: Camera,
     home: Camera,
     /// The node in the pointer's hand.
-    pub grip: Option<Grip>,
+    pub grip: Option<NodeDrag>,
 }
 
 /// Actions of pointer and keys over the scene, for the window's help.
@@ -56,7 +56,7 @@ impl Steering {
         if response.drag_started_by(PointerButton::Primary)
             && let Some(origin) = pressed
         {
-            self.grip = Grip::take(&self.camera, aspect, at(origin), pose);
+            self.grip = NodeDrag::take(&self.camera, aspect, at(origin), pose);
         }
         if response.drag_stopped() {
             self.grip = None;
@@ -89,7 +89,7 @@ impl Steering {
         if self.grip.is_some() {
             ui.ctx().set_cursor_icon(CursorIcon::Grabbing);
         } else if let Some(pointer) = response.hover_pos()
-            && Grip::take(&self.camera, aspect, at(pointer), pose).is_some()
+            && NodeDrag::take(&self.camera, aspect, at(pointer), pose).is_some()
         {
             ui.ctx().set_cursor_icon(CursorIcon::Grab);
         }

@@ -1,6 +1,6 @@
 //! The viewer in a window of the desktop.
 
-use super::{Pace, Rescue, Start, ViewError, Viewer, dress, theme};
+use super::{Rescue, Start, TickSource, ViewError, Viewer, dress, theme};
 use crate::gpu::{AdapterChoice, Context, GpuError};
 use eframe::{
     egui::{self, ViewportBuilder},
@@ -79,7 +79,7 @@ fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<(Rescue, String)>
         let render = creation.wgpu_render_state.clone().ok_or("the window has no renderer")?;
         dress(&creation.egui_ctx);
         let folder = std::env::current_dir().unwrap_or_else(|_| ".".into());
-        let mut viewer = Viewer::new(device, render, Pace::Clock, folder)?;
+        let mut viewer = Viewer::new(device, render, TickSource::Clock, folder)?;
         match begin {
             Begin::Start(start) => viewer.start(&start, &creation.egui_ctx),
             Begin::Resume(rescue, why) => viewer.resume(*rescue, &why, &creation.egui_ctx),

@@ -43,7 +43,7 @@ fn check_one(object: &Object, chain: &Chain, model: &Model, solver: &mut Solver,
     assert!(equilibrium.residual <= model.contact.tolerance);
     check_account(object, chain, q, &equilibrium).unwrap();
     // Stored forces that are off by a residual r displace the surface by C r, and the law there by kc C r.
-    let tolerance = (10.0 * equilibrium.residual * model.kc * model.softest).max(1e-6);
+    let tolerance = (10.0 * equilibrium.residual * model.kc * model.max_nodal_compliance).max(1e-6);
     check_contact_law(object, chain, q, model.kc, &equilibrium, tolerance).unwrap();
     true
 }

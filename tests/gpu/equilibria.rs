@@ -403,13 +403,13 @@ fn updates_are_refused() {
 /// origin, torque along paths and against the energy, singular arms; not the search for lower equilibria, which is the CPU's alone.
 #[test]
 fn the_gpu_keeps_the_bounds_of_its_hard_cases() {
-    use haptize::report::stability::{Effort, Outcome, Setting, cases, table};
+    use haptize::report::stability::{CaseResult, Effort, Setting, cases, table};
     let setting = Setting { effort: Effort::Sample, gpu: Some(context()) };
     for case in cases().into_iter().filter(|case| case.room == "contact" && case.name != "lowest equilibrium") {
         let outcomes = (case.run)(&setting).unwrap();
-        let on_gpu: Vec<Outcome> = outcomes.into_iter().filter(|outcome| outcome.varied.contains("GPU")).collect();
+        let on_gpu: Vec<CaseResult> = outcomes.into_iter().filter(|outcome| outcome.varied.contains("GPU")).collect();
         assert!(!on_gpu.is_empty(), "{}", case.name);
-        assert!(on_gpu.iter().all(Outcome::passed), "{}", table(&on_gpu));
+        assert!(on_gpu.iter().all(CaseResult::passed), "{}", table(&on_gpu));
     }
 }
 

@@ -5,7 +5,7 @@ use eframe::egui::{Pos2, RawInput, Rect, Theme, accesskit::Role, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 use haptize::{
     gpu::{AdapterChoice, Context},
-    viewer::{self, Pace, Start, Viewer},
+    viewer::{self, Start, TickSource, Viewer},
 };
 use std::{
     collections::BTreeSet,
@@ -219,7 +219,7 @@ fn a_bake_can_be_cancelled_and_leaves_what_was_open() {
 fn to_be_lost(folder: &Path) -> (Arc<Context>, eframe::egui::Context, Viewer) {
     let device = Arc::new(Context::open(AdapterChoice::Any).unwrap());
     let render = viewer::render_state(&device).unwrap();
-    let viewer = Viewer::new(Arc::clone(&device), render, Pace::Steps, folder.to_owned()).unwrap();
+    let viewer = Viewer::new(Arc::clone(&device), render, TickSource::Steps, folder.to_owned()).unwrap();
     (device, eframe::egui::Context::default(), viewer)
 }
 

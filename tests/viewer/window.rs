@@ -11,7 +11,7 @@ use haptize::{
     gpu::{AdapterChoice, Context},
     haptize::{BackendChoice, Bake},
     scene::Scene,
-    viewer::{self, Pace, Start, Viewer},
+    viewer::{self, Start, TickSource, Viewer},
 };
 use std::{
     path::{Path, PathBuf},
@@ -71,7 +71,8 @@ impl Window {
         let device = DEVICE.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = tempfile::tempdir().unwrap();
         let render = viewer::render_state(&device).unwrap();
-        let viewer = Viewer::new(Arc::clone(&device), render.clone(), Pace::Steps, folder.path().to_owned()).unwrap();
+        let viewer =
+            Viewer::new(Arc::clone(&device), render.clone(), TickSource::Steps, folder.path().to_owned()).unwrap();
         let harness = Harness::builder()
             .with_size(size)
             .with_theme(theme)

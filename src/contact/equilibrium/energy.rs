@@ -57,7 +57,7 @@ pub struct State {
 
 /// When a search ends.
 #[derive(Clone, Copy, Debug)]
-pub struct Limits {
+pub struct StoppingCriteria {
     /// Relative residual at which it has converged [1].
     pub tolerance: f64,
     /// Steps tried at most.
@@ -66,7 +66,7 @@ pub struct Limits {
 
 /// What became of a search.
 #[derive(Clone, Copy, Debug)]
-pub struct Outcome {
+pub struct SolverStats {
     /// Whether forces are balanced to the tolerance, or to what depths are rounded by.
     pub converged: bool,
     /// Steps tried.
@@ -126,15 +126,15 @@ impl EnergySearch {
     }
 
     /// The equilibrium of the configuration that `detection` has taken up, searched from the rest state.
-    pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> Outcome {
+    pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> SolverStats {
         self.kc = match geometry {
-            Geometry::Deformed => model.kc.min(CONTINUATION_START / model.softest),
+            Geometry::Deformed => model.kc.min(CONTINUATION_START / model.max_nodal_compliance),
             Geometry::Frozen => model.kc,
         };
         self.last_kc = model.kc;
         self.start(model, detection, geometry);
-        let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
-        let limits = Limits { tolerance: model.contact.tolerance, iterations: model.contact.max_iterations };
+        let mut outcome = SolverStats { converged: false, iterations: 0, residual: f64::MAX };
+        let limits = StoppingCriteria { tolerance: model.contact.tolerance, iterations: model.contact.max_iterations };
         self.descend(model, detection, geometry, limits, &mut outcome);
         let updates = if geometry == Geometry::Frozen { model.contact.updates } else { 0 };
         for _ in 0..updates {
@@ -144,19 +144,19 @@ impl EnergySearch {
             self.freeze_here(model, detection);
             self.descend(model, detection, geometry, limits, &mut outcome);
         }
-        Outcome { residual: self.imbalance, ..outcome }
+        SolverStats { residual: self.imbalance, ..outcome }
     }
 
     /// Searches from where `forces` on the object's nodes hold it, which should be near the minimum with contact stiffness `kc` [N/m], for
     /// the configuration that `detection` has taken up.
-    pub fn settle(
+    pub fn solve_with_guess(
         &mut self,
         model: &Model,
         detection: &mut Detection,
         geometry: Geometry,
         (forces, kc): (&[NodeForce], f64),
-        limits: Limits,
-    ) -> Outcome {
+        limits: StoppingCriteria,
+    ) -> SolverStats {
         (self.kc, self.last_kc) = (kc, model.kc);
         self.support.clear();
         if geometry == Geometry::Frozen {
@@ -170,9 +170,9 @@ impl EnergySearch {
         }
         self.take_trial(model, detection, geometry);
         self.kc = model.kc;
-        let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
+        let mut outcome = SolverStats { converged: false, iterations: 0, residual: f64::MAX };
         self.descend(model, detection, geometry, limits, &mut outcome);
-        Outcome { residual: self.imbalance, ..outcome }
+        SolverStats { residual: self.imbalance, ..outcome }
     }
 
     /// Takes what the trial's forces lead to for the state.
@@ -188,8 +188,8 @@ impl EnergySearch {
         model: &Model,
         detection: &mut Detection,
         geometry: Geometry,
-        limits: Limits,
-        outcome: &mut Outcome,
+        limits: StoppingCriteria,
+        outcome: &mut SolverStats,
     ) {
         let mut greatest = self.begin_stage(model, outcome);
         // Length of the last step, if it was poor.
@@ -206,7 +206,7 @@ impl EnergySearch {
             let balanced = self.kc == self.last_kc && outcome.residual <= limits.tolerance;
             if balanced && outcome.iterations < limits.iterations && self.leave_saddle(model, detection, geometry) {
                 outcome.iterations += 1;
-                outcome.residual = self.balance(model);
+                outcome.residual = self.update_residual(model);
                 continue;
             }
             outcome.converged = balanced;
@@ -234,7 +234,7 @@ impl EnergySearch {
             if ratio >= ACCEPTED_SHARE {
                 std::mem::swap(&mut self.state, &mut self.trial);
                 self.history.push(self.state.energy);
-                outcome.residual = self.balance(model);
+                outcome.residual = self.update_residual(model);
             }
         }
     }
@@ -324,12 +324,12 @@ impl EnergySearch {
 
     /// Takes up a new contact stiffness at the current state; returns how far from rest any iterate can be in the energy norm:
     /// 1/2 |u|^2 never exceeds E.
-    fn begin_stage(&mut self, model: &Model, outcome: &mut Outcome) -> f64 {
+    fn begin_stage(&mut self, model: &Model, outcome: &mut SolverStats) -> f64 {
         self.state.energy = self.state.elastic + contact_energy(&self.state.contacts, self.kc);
         self.history.clear();
         self.history.push(self.state.energy);
         self.damping = Damping::default();
-        outcome.residual = self.balance(model);
+        outcome.residual = self.update_residual(model);
         (2.0 * self.state.energy).sqrt()
     }
 
@@ -345,7 +345,7 @@ impl EnergySearch {
             // 1/2 |u|^2 <= E <= E(0) in the energy norm and |u_j|^2 <= trace(C_jj) |u|^2, all along the search: nodes
             // farther from the surface than this can never touch.
             let energy = contact_energy(&self.state.contacts, self.kc);
-            let reach = (2.0 * energy * model.softest).sqrt();
+            let reach = (2.0 * energy * model.max_nodal_compliance).sqrt();
             detection.frozen(model, reach, &mut self.frozen);
             frozen_contacts(model, &self.frozen, detection, &mut self.state.contacts);
         }
@@ -354,7 +354,7 @@ impl EnergySearch {
     /// Brings the support, the contact forces and the residual force r = c - f up to date with the current state; returns
     /// the relative residual sqrt(r . C r) / sqrt(c . C c), where forces of depths that are known to less than the tolerance count as those of
     /// the least depth that is.
-    fn balance(&mut self, model: &Model) -> f64 {
+    fn update_residual(&mut self, model: &Model) -> f64 {
         let Self { state, support, slots, contact_forces, residual, product, kc, .. } = self;
         slots.clear();
         for Contact { carriers, .. } in &state.contacts {
@@ -381,7 +381,7 @@ impl EnergySearch {
         support.multiply(residual, product);
         let out_of_balance = dot(residual, product);
         let resolved_depth = DEPTH_ROUNDING * model.surface.extent / model.contact.tolerance;
-        let floor = *kc * resolved_depth * model.softest.sqrt();
+        let floor = *kc * resolved_depth * model.max_nodal_compliance.sqrt();
         self.imbalance = root(out_of_balance) / root(scale).max(RESIDUAL_FLOOR);
         root(out_of_balance) / root(scale).max(floor).max(RESIDUAL_FLOOR)
     }

@@ -82,14 +82,14 @@ pub struct Newton {
     /// The force of each row after the step, to first order, over kc [m].
     pub forces_over_kc: Vec<f64>,
     /// By how much the step deepens each row, to first order [m].
-    deepening: Vec<f64>,
+    depth_change: Vec<f64>,
     /// The step du = C df on the support [m].
     displacement: Vec<f64>,
     /// The step of the pass before.
     previous_force: Vec<f64>,
     previous_displacement: Vec<f64>,
     /// Which contacts touch, in this pass.
-    touching: Vec<bool>,
+    active: Vec<bool>,
     /// Times K, what the object resists with: 1 + mu [1].
     stiffening: f64,
     residual: Vec<f64>,
@@ -97,11 +97,11 @@ pub struct Newton {
     product: Vec<f64>,
     woodbury: Woodbury,
     /// The residual preconditioned, as force and as displacement.
-    relieved_force: Vec<f64>,
-    relieved: Vec<f64>,
+    preconditioned_force: Vec<f64>,
+    preconditioned: Vec<f64>,
     direction_force: Vec<f64>,
     direction: Vec<f64>,
-    image: Vec<f64>,
+    hessian_direction: Vec<f64>,
 }
 
 impl Newton {
@@ -133,7 +133,7 @@ impl Newton {
     pub fn factorise(&mut self, support: &Support, springs: Springs) {
         self.stiffening = 1.0;
         self.reset(support.order(), springs.contacts);
-        self.woodbury.set_up(support, springs, &self.touching, self.stiffening);
+        self.woodbury.set_up(support, springs, &self.active, self.stiffening);
     }
 
     /// The displacement du on the support with which (K + B) du is the force `load` on the support to `tolerance`, B the Hessian of the
@@ -150,8 +150,8 @@ impl Newton {
         self.displacement.fill(0.0);
         self.residual.copy_from_slice(load);
         support.multiply(&self.residual, &mut self.product);
-        self.relieve(springs);
-        let stop = tolerance * tolerance * dot(&self.residual, &self.relieved);
+        self.precondition(springs);
+        let stop = tolerance * tolerance * dot(&self.residual, &self.preconditioned);
         let mut left = INNER_ITERATIONS_PER_UNKNOWN * support.order();
         self.conjugate_gradients(support, springs, stop, &mut left).ok()?;
         Some((&self.displacement, &self.residual))
@@ -179,25 +179,25 @@ impl Newton {
         for pass in 0..MODEL_PASSES {
             self.previous_force.copy_from_slice(&self.force);
             self.previous_displacement.copy_from_slice(&self.displacement);
-            self.woodbury.set_up(support, springs, &self.touching, self.stiffening);
-            self.relieve(springs);
+            self.woodbury.set_up(support, springs, &self.active, self.stiffening);
+            self.precondition(springs);
             if pass == 0 {
-                stop = tolerance * tolerance * dot(&self.residual, &self.relieved);
+                stop = tolerance * tolerance * dot(&self.residual, &self.preconditioned);
             }
             self.conjugate_gradients(support, springs, stop, &mut left)?;
-            let decrease = self.assess(springs, residual);
+            let decrease = self.model_decrease(springs, residual);
             if pass > 0 && (decrease <= predicted || decrease.is_nan()) {
                 // Contacts came and went to no avail: the pass before was better.
                 std::mem::swap(&mut self.force, &mut self.previous_force);
                 std::mem::swap(&mut self.displacement, &mut self.previous_displacement);
-                self.assess(springs, residual);
+                self.model_decrease(springs, residual);
                 break;
             }
             predicted = decrease;
             if !self.update_touching() {
                 break;
             }
-            self.balance(springs, residual);
+            self.update_model_residual(springs, residual);
             support.multiply(&self.residual, &mut self.product);
         }
         Ok(predicted)
@@ -214,18 +214,18 @@ impl Newton {
             &mut self.previous_displacement,
             &mut self.residual,
             &mut self.product,
-            &mut self.relieved_force,
-            &mut self.relieved,
+            &mut self.preconditioned_force,
+            &mut self.preconditioned,
             &mut self.direction_force,
             &mut self.direction,
-            &mut self.image,
+            &mut self.hessian_direction,
         ] {
             vector.resize(order, 0.0);
         }
-        self.deepening.clear();
-        self.deepening.resize(contacts.len(), 0.0);
-        self.touching.clear();
-        self.touching.extend(contacts.iter().map(|contact| contact.push > 0.0));
+        self.depth_change.clear();
+        self.depth_change.resize(contacts.len(), 0.0);
+        self.active.clear();
+        self.active.extend(contacts.iter().map(|contact| contact.push > 0.0));
         self.forces_over_kc.clear();
         self.forces_over_kc.resize(contacts.len(), 0.0);
     }
@@ -239,52 +239,52 @@ impl Newton {
         stop: f64,
         left: &mut usize,
     ) -> Result<(), f64> {
-        self.direction_force.copy_from_slice(&self.relieved_force);
-        self.direction.copy_from_slice(&self.relieved);
-        let mut square = dot(&self.residual, &self.relieved);
+        self.direction_force.copy_from_slice(&self.preconditioned_force);
+        self.direction.copy_from_slice(&self.preconditioned);
+        let mut square = dot(&self.residual, &self.preconditioned);
         while *left > 0 && square > stop {
             *left -= 1;
-            for k in 0..self.image.len() {
-                self.image[k] = self.stiffening * self.direction_force[k];
+            for k in 0..self.hessian_direction.len() {
+                self.hessian_direction[k] = self.stiffening * self.direction_force[k];
             }
-            add_contact_hessian(springs, &self.touching, &self.direction, &mut self.image);
-            let curvature = dot(&self.direction, &self.image);
+            add_contact_hessian(springs, &self.active, &self.direction, &mut self.hessian_direction);
+            let curvature = dot(&self.direction, &self.hessian_direction);
             if curvature <= 0.0 {
                 return Err(-curvature / dot(&self.direction, &self.direction_force));
             }
             let share = square / curvature;
             add_scaled(share, &self.direction_force, &mut self.force);
             add_scaled(share, &self.direction, &mut self.displacement);
-            add_scaled(-share, &self.image, &mut self.residual);
+            add_scaled(-share, &self.hessian_direction, &mut self.residual);
             support.multiply(&self.residual, &mut self.product);
-            self.relieve(springs);
-            let next = dot(&self.residual, &self.relieved);
+            self.precondition(springs);
+            let next = dot(&self.residual, &self.preconditioned);
             let ratio = next / square;
             square = next;
-            turn(ratio, &self.relieved_force, &mut self.direction_force);
-            turn(ratio, &self.relieved, &mut self.direction);
+            update_direction(ratio, &self.preconditioned_force, &mut self.direction_force);
+            update_direction(ratio, &self.preconditioned, &mut self.direction);
         }
         Ok(())
     }
 
     /// Preconditions the residual.
-    fn relieve(&mut self, springs: Springs) {
-        let Self { woodbury, residual, product, relieved_force, relieved, .. } = self;
-        woodbury.apply(springs, (residual, product), relieved_force, relieved);
+    fn precondition(&mut self, springs: Springs) {
+        let Self { woodbury, residual, product, preconditioned_force, preconditioned, .. } = self;
+        woodbury.apply(springs, (residual, product), preconditioned_force, preconditioned);
     }
 
     /// Notes by how much the step deepens each row, g_i . du, and the rows' forces after it; returns m(0) - m(df), in differences that
     /// do not cancel near the solution [J].
-    fn assess(&mut self, springs: Springs, residual: &[f64]) -> f64 {
+    fn model_decrease(&mut self, springs: Springs, residual: &[f64]) -> f64 {
         let own = 0.5 * self.stiffening * dot(&self.displacement, &self.force);
         let mut decrease = dot(&self.displacement, residual) - own;
-        let Self { deepening, forces_over_kc, displacement, .. } = self;
+        let Self { depth_change, forces_over_kc, displacement, .. } = self;
         springs.for_each(|first, rows| {
-            let changes = &mut deepening[first..first + rows.len()];
+            let changes = &mut depth_change[first..first + rows.len()];
             let forces = &mut forces_over_kc[first..first + rows.len()];
             for (k, row) in rows.iter().enumerate() {
                 let v = springs.variation(first + k, displacement);
-                changes[k] = row.deepening(&v);
+                changes[k] = row.depth_change(&v);
                 if row.multiplier != 0.0 {
                     decrease -= 0.5 * row.multiplier * row.second_variation(&v).dot(&v);
                 }
@@ -309,16 +309,16 @@ impl Newton {
     /// Notes which rows touch at the step; true when that has changed.
     fn update_touching(&mut self) -> bool {
         let mut changed = false;
-        for (touching, force) in self.touching.iter_mut().zip(&self.forces_over_kc) {
+        for (active, force) in self.active.iter_mut().zip(&self.forces_over_kc) {
             let touches = *force > 0.0;
-            changed |= touches != *touching;
-            *touching = touches;
+            changed |= touches != *active;
+            *active = touches;
         }
         changed
     }
 
     /// Residual force of the model at the step.
-    fn balance(&mut self, springs: Springs, residual: &[f64]) {
+    fn update_model_residual(&mut self, springs: Springs, residual: &[f64]) {
         for k in 0..residual.len() {
             self.residual[k] = residual[k] - self.stiffening * self.force[k];
         }
@@ -339,7 +339,7 @@ fn add_scaled(share: f64, direction: &[f64], sum: &mut [f64]) {
 }
 
 /// direction = residual + ratio * direction.
-fn turn(ratio: f64, residual: &[f64], direction: &mut [f64]) {
+fn update_direction(ratio: f64, residual: &[f64], direction: &mut [f64]) {
     for (direction, residual) in direction.iter_mut().zip(residual) {
         *direction = residual + ratio * *direction;
     }

@@ -15,7 +15,7 @@
 //! repeats an earlier one to the last bit (Brent 1980: compared with the pass of the last power of two). A node with a radius, which the paper does not have, acts through its deepest
 //! point x_i - r_i N_i.
 
-use super::energy::Outcome;
+use super::energy::SolverStats;
 use crate::contact::detection::{Detection, Facets};
 use crate::contact::geometry::normals;
 use crate::contact::law::depth::Contact;
@@ -92,8 +92,8 @@ impl PaperIteration {
     }
 
     /// Iterates from the rest state, for the configuration that `detection` has taken up.
-    pub fn iterate(&mut self, model: &Model, detection: &mut Detection) -> Outcome {
-        let mut outcome = Outcome { converged: false, iterations: 0, residual: f64::MAX };
+    pub fn iterate(&mut self, model: &Model, detection: &mut Detection) -> SolverStats {
+        let mut outcome = SolverStats { converged: false, iterations: 0, residual: f64::MAX };
         self.displacement.fill(0.0);
         self.ties.clear();
         self.forces.clear();

@@ -16,7 +16,7 @@ use crate::contact::linear::support::Support;
 use crate::tolerances::FACET_COMPLIANCE;
 
 /// Springs of a block for [`add_rows`].
-const TOGETHER: usize = 3;
+const BLOCK_SIZE: usize = 3;
 
 /// The preconditioner for the springs that touch; its vectors are reused.
 #[derive(Default)]
@@ -46,7 +46,7 @@ impl Woodbury {
         self.stiffening = stiffening;
         *order = support.order();
         pushes.clear();
-        pushes.resize(count.next_multiple_of(TOGETHER), 0.0);
+        pushes.resize(count.next_multiple_of(BLOCK_SIZE), 0.0);
         columns.clear();
         columns.resize(pushes.len() * *order, 0.0);
         factor.resize(count * count, 0.0);
@@ -60,7 +60,7 @@ impl Woodbury {
                     let along = carrying(springs, other).map(|(slot, weight)| weight * scalars[slot]).sum::<f64>();
                     contact.normal.dot(springs.contacts[other].normal) * along
                 } else {
-                    springs.deepening(other, column)
+                    springs.depth_change(other, column)
                 };
                 factor[a * count + b] = deepened + stiffening * given;
             }
@@ -81,14 +81,14 @@ impl Woodbury {
         let Self { taken, columns, order, stiffening, factor, pushes, .. } = self;
         let count = taken.len();
         for (push, &row) in pushes.iter_mut().zip(&*taken) {
-            *push = -springs.deepening(row, product);
+            *push = -springs.depth_change(row, product);
         }
         cholesky::solve(factor, pushes[..count].as_chunks_mut::<1>().0);
         for (&row, &push) in taken.iter().zip(&*pushes) {
             springs.add_reaction(row, &springs.contacts[row].spread(push), force);
         }
-        let blocks = columns.chunks_exact((TOGETHER * *order).max(1));
-        add_rows(blocks.zip(pushes.as_chunks::<TOGETHER>().0.iter().copied()), displacement);
+        let blocks = columns.chunks_exact((BLOCK_SIZE * *order).max(1));
+        add_rows(blocks.zip(pushes.as_chunks::<BLOCK_SIZE>().0.iter().copied()), displacement);
         if *stiffening > 1.0 {
             force.iter_mut().chain(displacement).for_each(|entry| *entry /= *stiffening);
         }
@@ -138,7 +138,7 @@ mod tests {
                 sample.support().multiply(&force, &mut product);
                 let size = displacement.iter().fold(0.0_f64, |size, entry| size.max(entry.abs()));
                 assert!(off(&displacement, &product) < 1e-12 * size, "{kc} {stiffening}");
-                // Rounding of a spring's deepening, of about 1e-2 m, times kc.
+                // Rounding of a spring's depth_change, of about 1e-2 m, times kc.
                 let rounding = 1e-13 * kc.max(1.0);
                 assert!(off(&sample.resist(stiffening, &force), &residual) < rounding, "{kc} {stiffening}");
                 assert!(off(&sample.resist(1.01 * stiffening, &force), &residual) > rounding);

@@ -304,7 +304,7 @@ impl Contact {
     /// By how much a variation brings the feature nearer, to first order [m].
     #[inline]
     #[must_use]
-    pub fn deepening(&self, variation: &Variation) -> f64 {
+    pub fn depth_change(&self, variation: &Variation) -> f64 {
         self.normal.dot(variation.point)
     }
 
@@ -384,7 +384,7 @@ mod tests {
     /// Product of the Hessian of 1/2 kc depth^2 with `v`, times `w`.
     fn hessian(contact: &Contact, kc: f64, v: &[DVec3], w: &[DVec3]) -> f64 {
         let (v, w) = (contact.variation(|j| v[j]), contact.variation(|j| w[j]));
-        let stretch = kc * contact.deepening(&v) * contact.deepening(&w);
+        let stretch = kc * contact.depth_change(&v) * contact.depth_change(&w);
         stretch + contact.multiplier * contact.second_variation(&v).dot(&w)
     }
 
@@ -435,7 +435,7 @@ mod tests {
                     Feature::Face => 2,
                 };
                 seen[kind + if inside { 3 } else { 0 }] += 1;
-                let slope_along = |c: &Contact, v: &[DVec3]| kc * c.depth * c.deepening(&c.variation(|j| v[j]));
+                let slope_along = |c: &Contact, v: &[DVec3]| kc * c.depth * c.depth_change(&c.variation(|j| v[j]));
                 let energy = |c: &Contact| 0.5 * kc * c.depth * c.depth;
                 let slope = (energy(&after) - energy(&before)) / (2.0 * h);
                 let expected = slope_along(&here, &v);

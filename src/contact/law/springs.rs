@@ -31,28 +31,28 @@ impl<'a> Springs<'a> {
     }
 
     /// Calls `add` with each row of the spring `rows` and the reaction with which it resists the variation `v` of the row: the Hessian of
-    /// its energy, with the rows that are `touching` and the multipliers as they are [N].
+    /// its energy, with the rows that are `active` and the multipliers as they are [N].
     pub fn resist(
         self,
         rows: &[Contact],
-        touching: impl Fn(usize) -> bool,
+        active: impl Fn(usize) -> bool,
         v: impl Fn(usize) -> Variation,
         mut add: impl FnMut(usize, Variation),
     ) {
         let shared = if rows.len() == 1 {
             0.0
         } else {
-            shared_change((0..rows.len()).filter(|&k| touching(k)).map(|k| rows[k].deepening(&v(k))))
+            shared_change((0..rows.len()).filter(|&k| active(k)).map(|k| rows[k].depth_change(&v(k))))
         };
         for (k, row) in rows.iter().enumerate() {
-            if !touching(k) && row.multiplier == 0.0 {
+            if !active(k) && row.multiplier == 0.0 {
                 continue;
             }
             let v = v(k);
-            let own = match (touching(k), rows.len()) {
+            let own = match (active(k), rows.len()) {
                 (false, _) => 0.0,
-                (true, 1) => row.deepening(&v),
-                (true, _) => (row.deepening(&v) - shared) / FACET_COMPLIANCE,
+                (true, 1) => row.depth_change(&v),
+                (true, _) => (row.depth_change(&v) - shared) / FACET_COMPLIANCE,
             };
             if own != 0.0 || row.multiplier != 0.0 {
                 add(k, stretched_and_bent(row, self.kc * row.share * own, &v));
@@ -71,7 +71,7 @@ impl<'a> Springs<'a> {
     /// By how much the displacement `vector` on the support deepens row `k`, to first order [m].
     #[inline]
     #[must_use]
-    pub fn deepening(self, k: usize, vector: &[f64]) -> f64 {
+    pub fn depth_change(self, k: usize, vector: &[f64]) -> f64 {
         let (nodes, slots, row) = (vector.as_chunks::<3>().0, &self.slots[k], &self.contacts[k]);
         row.normal.dot(row.moved(|j| DVec3::from_array(nodes[slots[j] as usize])))
     }
@@ -99,11 +99,11 @@ pub fn stretched_and_bent(row: &Contact, push: f64, v: &Variation) -> Variation 
 }
 
 /// Adds B p, the product of the Hessian of the contact energy with the displacement `p` on the support, to `product`.
-pub fn add_contact_hessian(springs: Springs, touching: &[bool], p: &[f64], product: &mut [f64]) {
+pub fn add_contact_hessian(springs: Springs, active: &[bool], p: &[f64], product: &mut [f64]) {
     springs.for_each(|first, rows| {
         springs.resist(
             rows,
-            |k| touching[first + k],
+            |k| active[first + k],
             |k| springs.variation(first + k, p),
             |k, reaction| springs.add_reaction(first + k, &reaction, product),
         );

@@ -41,8 +41,8 @@ struct Weigh<'s, L> {
 }
 
 /// Nodes whose sums are kept in registers, and numbers of so many vectors.
-const TOGETHER: usize = 4;
-const NUMBERS: usize = 3 * TOGETHER;
+const BLOCK_SIZE: usize = 4;
+const NUMBERS: usize = 3 * BLOCK_SIZE;
 
 impl<L: Iterator<Item = (usize, [f64; 3])> + Clone> Kernel for Weigh<'_, L> {
     type Output = ();
@@ -51,11 +51,11 @@ impl<L: Iterator<Item = (usize, [f64; 3])> + Clone> Kernel for Weigh<'_, L> {
     fn run(self) {
         let Self { entries, loads, sums } = self;
         let (together, rest) = sums.as_chunks_mut::<NUMBERS>();
-        let done = TOGETHER * together.len();
+        let done = BLOCK_SIZE * together.len();
         for (k, together) in together.iter_mut().enumerate() {
-            let mut vectors = [[0.0; 4]; TOGETHER];
+            let mut vectors = [[0.0; 4]; BLOCK_SIZE];
             for (start, [a, b, c]) in loads.clone() {
-                let row = &entries[start + TOGETHER * k..][..TOGETHER];
+                let row = &entries[start + BLOCK_SIZE * k..][..BLOCK_SIZE];
                 for (sum, entry) in vectors.iter_mut().zip(row) {
                     for (sum, scale) in sum.iter_mut().zip([a, b, c, 0.0]) {
                         *sum += entry * scale;

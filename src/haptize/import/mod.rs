@@ -26,7 +26,7 @@ use crate::{
     tolerances,
 };
 use cells::{Cells, Direction};
-use rows::{Outcome, Row, Rows};
+use rows::{ReadRowResult, Row, Rows};
 use std::{
     fs::File,
     io::{BufRead, BufReader, Read},
@@ -231,9 +231,9 @@ impl<'a> Import<'a> {
         let mut rows = Rows::new(mapping, reader, file);
         loop {
             let row = match rows.next()? {
-                Outcome::End => break,
-                Outcome::Row(row) => row,
-                Outcome::Dropped(reason) => {
+                ReadRowResult::End => break,
+                ReadRowResult::Row(row) => row,
+                ReadRowResult::Dropped(reason) => {
                     self.report.rows += 1;
                     self.drop_row(reason, file, rows.line());
                     continue;

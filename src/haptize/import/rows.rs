@@ -48,7 +48,7 @@ struct Layout {
 }
 
 /// What became of a line.
-pub(super) enum Outcome {
+pub(super) enum ReadRowResult {
     Row(Row),
     /// Left out, and why.
     Dropped(Reason),
@@ -77,10 +77,10 @@ impl<'a, R: BufRead> Rows<'a, R> {
     }
 
     /// The next row, or why a line was left out.
-    pub fn next(&mut self) -> Result<Outcome, ImportError> {
+    pub fn next(&mut self) -> Result<ReadRowResult, ImportError> {
         loop {
             if !self.read_line()? {
-                return Ok(Outcome::End);
+                return Ok(ReadRowResult::End);
             }
             let comment = self.mapping.table.comment.as_bytes();
             if self.text.is_empty() || !comment.is_empty() && self.text.starts_with(comment) {
@@ -124,7 +124,7 @@ impl<'a, R: BufRead> Rows<'a, R> {
     }
 
     /// What a line that is no comment means; `None` for the header.
-    fn line_outcome(&mut self, text: &[u8]) -> Result<Option<Outcome>, ImportError> {
+    fn line_outcome(&mut self, text: &[u8]) -> Result<Option<ReadRowResult>, ImportError> {
         let delimiter = self.mapping.table.delimiter;
         let Ok(text) = std::str::from_utf8(text) else {
             return self.refuse(Reason::NotANumber, "the line is not text".to_owned()).map(Some);
@@ -169,13 +169,13 @@ impl<'a, R: BufRead> Rows<'a, R> {
     }
 
     /// Places a row in time: repeated stamps are left out, going back is refused, a long pause begins a segment.
-    fn timed(&mut self, stamp: Option<f64>, q: JointVector, torque: JointVector) -> Result<Outcome, ImportError> {
+    fn timed(&mut self, stamp: Option<f64>, q: JointVector, torque: JointVector) -> Result<ReadRowResult, ImportError> {
         let period = self.mapping.time.period.unwrap_or(0.0);
         let time = stamp.unwrap_or(self.count as f64 * period);
         let mut first = self.last_time.is_none();
         if let Some(last) = self.last_time {
             if time == last {
-                return Ok(Outcome::Dropped(Reason::RepeatedTime));
+                return Ok(ReadRowResult::Dropped(Reason::RepeatedTime));
             }
             if time < last {
                 return self.refuse(Reason::TimeGoesBack, format!("time goes back from {last} s to {time} s"));
@@ -185,12 +185,12 @@ impl<'a, R: BufRead> Rows<'a, R> {
         }
         self.last_time = Some(time);
         self.count += 1;
-        Ok(Outcome::Row(Row { first, line: self.line, time, q, torque }))
+        Ok(ReadRowResult::Row(Row { first, line: self.line, time, q, torque }))
     }
 
-    fn refuse(&self, reason: Reason, message: String) -> Result<Outcome, ImportError> {
+    fn refuse(&self, reason: Reason, message: String) -> Result<ReadRowResult, ImportError> {
         match self.mapping.table.bad_rows {
-            BadRows::Drop => Ok(Outcome::Dropped(reason)),
+            BadRows::Drop => Ok(ReadRowResult::Dropped(reason)),
             BadRows::Refuse => Err(self.error(format!("{message}; `bad_rows = \"drop\"` would leave the row out"))),
         }
     }

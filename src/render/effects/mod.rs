@@ -10,7 +10,7 @@ pub use friction::Friction;
 
 use super::{
     accounts::Extra,
-    npmi::{Load, Motion, Npmi, Stage, Step},
+    npmi::{Load, MidpointInertia, Motion, Npmi, Step},
 };
 use crate::{
     JointVector, MAX_JOINTS,
@@ -37,7 +37,7 @@ pub(super) struct Pending<'a> {
     /// Who makes it.
     pub npmi: &'a Npmi,
     /// Inertia in its middle.
-    pub stage: &'a Stage,
+    pub stage: &'a MidpointInertia,
     /// T [s].
     pub interval: f64,
     /// Forces beside those of the effects.

@@ -51,14 +51,14 @@ pub struct Npmi {
 #[derive(Clone, Debug)]
 enum Inertia {
     /// The same everywhere.
-    Constant(Box<Stage>),
+    Constant(Box<MidpointInertia>),
     /// That of the chain at each configuration.
     Chain(Chain),
 }
 
 /// M, its factor L and the gyroscopic S at the middle of a step.
 #[derive(Clone, Copy, Debug)]
-pub struct Stage {
+pub struct MidpointInertia {
     inertia: JointMatrix,
     factor: JointMatrix,
     gyroscopic: JointMatrix,
@@ -141,7 +141,7 @@ impl Npmi {
         let (joints, limits) = checked(limits)?;
         let symmetric = (0..joints).all(|i| (0..i).all(|j| inertia[i][j] == inertia[j][i]));
         let factor = cholesky(inertia, joints).filter(|_| symmetric).ok_or(InertiaError::NotPositiveDefinite)?;
-        let stage = Stage { inertia: *inertia, factor, gyroscopic: [[0.0; MAX_JOINTS]; MAX_JOINTS] };
+        let stage = MidpointInertia { inertia: *inertia, factor, gyroscopic: [[0.0; MAX_JOINTS]; MAX_JOINTS] };
         Ok(Self { joints, inertia: Inertia::Constant(Box::new(stage)), limits })
     }
 
@@ -190,10 +190,10 @@ impl Npmi {
 
     /// L, M and S for a step of `interval` T [s] from `motion`.
     #[must_use]
-    pub fn stage(&self, motion: &Motion, interval: f64) -> Stage {
+    pub fn stage(&self, motion: &Motion, interval: f64) -> MidpointInertia {
         match &self.inertia {
             Inertia::Constant(stage) => **stage,
-            Inertia::Chain(chain) => Stage::of(chain, motion, interval),
+            Inertia::Chain(chain) => MidpointInertia::of(chain, motion, interval),
         }
     }
 
@@ -204,7 +204,7 @@ impl Npmi {
     }
 
     /// [`Npmi::step`] with the `stage` of the same motion and interval, for those who try several loads.
-    pub fn advance(&self, stage: &Stage, motion: &mut Motion, interval: f64, load: &Load) -> Step {
+    pub fn advance(&self, stage: &MidpointInertia, motion: &mut Motion, interval: f64, load: &Load) -> Step {
         let half = 0.5 * interval;
         let mut matrix = stage.inertia;
         let mut right = product(&stage.factor, &motion.momentum);
@@ -258,7 +258,7 @@ impl Npmi {
     }
 }
 
-impl Stage {
+impl MidpointInertia {
     /// Of `chain` at the predicted midpoint of a step of `interval` T [s] from `motion`.
     fn of(chain: &Chain, motion: &Motion, interval: f64) -> Self {
         let joints = motion.position.len();

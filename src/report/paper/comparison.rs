@@ -3,7 +3,7 @@
 use super::{Scanned, Scans, Sphere};
 use crate::{
     report::{
-        force::{EndForce, Held},
+        force::{EndForce, SteadyForce},
         ticks::thousands,
     },
     scene::{HapticsSpec, PlanSpec, ScanSpec},
@@ -269,7 +269,7 @@ fn real_objects(Scans { bare, fabric, side }: Scans<'_>) -> Vec<Row> {
                         and on where the block stands, which the paper does not give";
     let row = |quantity, paper, ours, why: &str| Row::new("4.2", quantity, paper, ours, why);
     let held = |of: Scanned<'_>| EndForce::new("", of.chain, of.trace).and_then(|force| force.held());
-    let steady = |held: Option<Held>| held.map_or(f64::NAN, |held| 100.0 * held.variation);
+    let steady = |held: Option<SteadyForce>| held.map_or(f64::NAN, |held| 100.0 * held.variation);
     let [on_bare, on_fabric] = [held(bare), held(fabric)];
     let ratio = on_bare.zip(on_fabric).map_or(f64::NAN, |(bare, fabric)| fabric.mean / bare.mean);
     let pressed = side.trace.summary();

@@ -1,6 +1,6 @@
 //! The outcomes as a picture, how much of its bound each figure takes, and as tables in Markdown.
 
-use super::{Bound, Outcome, figure as number};
+use super::{Bound, CaseResult, figure as number};
 use crate::report::{
     ReportError,
     canvas::{Anchor, Area, Canvas},
@@ -33,7 +33,7 @@ pub const FILES: [&str; 3] = ["stability.svg", "stability.png", "stability.md"];
 ///
 /// # Errors
 /// [`ReportError::Write`] when a file cannot be written.
-pub fn write_all(folder: &Path, outcomes: &[(&str, Outcome)], adapter: &str) -> Result<Vec<PathBuf>, ReportError> {
+pub fn write_all(folder: &Path, outcomes: &[(&str, CaseResult)], adapter: &str) -> Result<Vec<PathBuf>, ReportError> {
     let mut files = write_both(folder, "stability", &figure(outcomes, adapter))?.to_vec();
     files.push(write(folder.join("stability.md"), markdown(outcomes).as_bytes())?);
     Ok(files)
@@ -41,7 +41,7 @@ pub fn write_all(folder: &Path, outcomes: &[(&str, Outcome)], adapter: &str) -> 
 
 /// Of its bound, how much a figure takes: above one it is broken, and so it is where it is no number. Of a share that must reach
 /// some part of one, what it lacks over what it may lack.
-fn share(outcome: &Outcome) -> f64 {
+fn share(outcome: &CaseResult) -> f64 {
     let share = match outcome.bound {
         Bound::AtMost(bound) => outcome.worst / bound,
         Bound::AtLeast(bound) if 0.0 < bound && bound < 1.0 && outcome.worst <= 1.0 => {
@@ -74,7 +74,7 @@ struct Row<'a> {
 }
 
 /// The rows of one room, in the order of their first figures.
-fn rows<'a>(room: &'a [(&str, Outcome)]) -> Vec<Row<'a>> {
+fn rows<'a>(room: &'a [(&str, CaseResult)]) -> Vec<Row<'a>> {
     let mut rows: Vec<Row<'a>> = Vec::new();
     for (_, outcome) in room {
         let share = share(outcome);
@@ -87,7 +87,7 @@ fn rows<'a>(room: &'a [(&str, Outcome)]) -> Vec<Row<'a>> {
 }
 
 /// One row a measure of a case, room by room.
-fn figure(outcomes: &[(&str, Outcome)], adapter: &str) -> Canvas {
+fn figure(outcomes: &[(&str, CaseResult)], adapter: &str) -> Canvas {
     let rooms: Vec<(&str, Vec<Row<'_>>)> =
         outcomes.chunk_by(|a, b| a.0 == b.0).map(|room| (room[0].0, rows(room))).collect();
     let height = rooms.iter().map(|(_, rows)| (rows.len() + 2) as f64 * ROW).sum();
@@ -148,7 +148,7 @@ fn shortened(text: &str, width: impl Fn(&str) -> f64) -> String {
 }
 
 /// A table for each room.
-fn markdown(outcomes: &[(&str, Outcome)]) -> String {
+fn markdown(outcomes: &[(&str, CaseResult)]) -> String {
     let mut text = String::new();
     for room in outcomes.chunk_by(|a, b| a.0 == b.0) {
         // A String takes everything, here and below.
@@ -175,9 +175,16 @@ fn markdown(outcomes: &[(&str, Outcome)]) -> String {
 mod tests {
     use super::*;
 
-    fn outcome(worst: f64, bound: Bound) -> Outcome {
+    fn outcome(worst: f64, bound: Bound) -> CaseResult {
         let text = |text: &str| text.to_owned();
-        Outcome { case: text("case"), varied: text("a | b"), measure: text("size [m]"), worst, bound, note: text("") }
+        CaseResult {
+            case: text("case"),
+            varied: text("a | b"),
+            measure: text("size [m]"),
+            worst,
+            bound,
+            note: text(""),
+        }
     }
 
     #[test]

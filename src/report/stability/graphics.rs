@@ -3,7 +3,7 @@
 //! All keep one figure: the most that kinetic, elastic and gravitational energy rose in a frame beyond the work of the forces,
 //! over the most that was ever stored. In exact arithmetic it is never positive (`render/object_motion.rs`).
 
-use super::{Bound, Case, Effort, Failure, Outcome, Setting};
+use super::{Bound, Case, CaseResult, Effort, Failure, Setting};
 use crate::{
     gpu::{FrameMethod, FrameUpdate},
     object::Object,
@@ -72,11 +72,11 @@ fn gain(object: &Object, period: f64, effects: &GraphicsEffects, size: f64, effo
     Ok(gain / most)
 }
 
-fn outcome(case: &str, varied: &str, gains: &[f64], bound: f64) -> Outcome {
+fn outcome(case: &str, varied: &str, gains: &[f64], bound: f64) -> CaseResult {
     // A run that is no number is the worst.
     let worst =
         gains.iter().fold(f64::NEG_INFINITY, |worst, &gain| if gain > worst || gain.is_nan() { gain } else { worst });
-    Outcome {
+    CaseResult {
         case: case.into(),
         varied: varied.into(),
         measure: "energy gained beyond the work done, over the most stored [1]".into(),
@@ -86,7 +86,7 @@ fn outcome(case: &str, varied: &str, gains: &[f64], bound: f64) -> Outcome {
     }
 }
 
-fn stiff(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn stiff(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let mut outcomes = Vec::new();
     for period in PERIODS {
         let mut gains = Vec::new();
@@ -103,7 +103,7 @@ fn stiff(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     Ok(outcomes)
 }
 
-fn effects(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn effects(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let mut outcomes = Vec::new();
     for factor in [2.0, 100.0] {
         let stiffening = Some(StiffeningSpec { factor, strain: 0.02 });
@@ -121,7 +121,7 @@ fn effects(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     Ok(outcomes)
 }
 
-fn cut_short(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn cut_short(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let Some(context) = &setting.gpu else { return Ok(Vec::new()) };
     let object = sphere(SpringKind::Axial, 300.0, setting.effort)?;
     let spec = StiffeningSpec { factor: 10.0, strain: 0.02 };
@@ -164,11 +164,11 @@ mod tests {
     #[test]
     fn the_object_gains_no_energy_from_nowhere() {
         let setting = Setting { effort: Effort::Sample, gpu: None };
-        let outcomes: Vec<Outcome> = CASES.iter().flat_map(|case| (case.run)(&setting).unwrap()).collect();
+        let outcomes: Vec<CaseResult> = CASES.iter().flat_map(|case| (case.run)(&setting).unwrap()).collect();
         let table = table(&outcomes);
         println!("{table}");
         assert_eq!(outcomes.len(), 6);
-        assert!(outcomes.iter().all(Outcome::passed), "{table}");
+        assert!(outcomes.iter().all(CaseResult::passed), "{table}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! A torque linear in q is reproduced exactly by linear interpolation on any triangulation, so that its error shows every
 //! sliver, inverted simplex and lost point. Its size is judged relative to the greatest torque.
 
-use super::{Bound, Case, Effort, Failure, Outcome, Setting};
+use super::{Bound, Case, CaseResult, Effort, Failure, Setting};
 use crate::{
     contact::Status,
     dataset::Dataset,
@@ -78,14 +78,14 @@ fn worst_error(points: &[Point], step: f64) -> Result<(f64, usize, usize), Failu
     Ok((inside(&dataset).map(error).fold(0.0, f64::max) / greatest, report.inside, report.points - report.inside))
 }
 
-fn outcome(case: &str, varied: &str, measure: &str, worst: f64, bound: Bound, note: String) -> Outcome {
-    Outcome { case: case.to_owned(), varied: varied.to_owned(), measure: measure.to_owned(), worst, bound, note }
+fn outcome(case: &str, varied: &str, measure: &str, worst: f64, bound: Bound, note: String) -> CaseResult {
+    CaseResult { case: case.to_owned(), varied: varied.to_owned(), measure: measure.to_owned(), worst, bound, note }
 }
 
 const ERROR: &str = "error of a linear torque [1]";
 
 /// Worst error of all `arrangements`, each gridized at `step`.
-fn reproduced(case: &str, varied: &str, arrangements: &[(Vec<Point>, f64)]) -> Result<(Outcome, usize), Failure> {
+fn reproduced(case: &str, varied: &str, arrangements: &[(Vec<Point>, f64)]) -> Result<(CaseResult, usize), Failure> {
     let (mut worst, mut inside, mut outside) = (0.0_f64, 0, 0);
     for (points, step) in arrangements {
         let (error, found, lost) = worst_error(points, *step)?;
@@ -98,7 +98,7 @@ fn reproduced(case: &str, varied: &str, arrangements: &[(Vec<Point>, f64)]) -> R
 }
 
 /// Every cell of an exact grid is cospherical, its hull is coplanar, and grid points lie on both.
-fn exact_grids(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn exact_grids(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let full = setting.effort == Effort::Full;
     let sides: &[(usize, usize)] =
         if full { &[(1, 40), (2, 40), (3, 20), (4, 6), (5, 4)] } else { &[(1, 12), (2, 10), (3, 6), (4, 3)] };
@@ -110,7 +110,7 @@ fn exact_grids(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     Ok(vec![reproduced, lost])
 }
 
-fn cospherical(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn cospherical(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let rings = if setting.effort == Effort::Full { 40 } else { 10 };
     let mut sphere = vec![vec![0.0; 3]];
     for i in 0..2 * rings {
@@ -126,7 +126,7 @@ fn cospherical(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     Ok(vec![reproduced("cospherical points", "sphere, circle, scan lines", &arrangements)?.0])
 }
 
-fn duplicates(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn duplicates(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let count = if setting.effort == Effort::Full { 2000 } else { 120 };
     let mut arrangements = Vec::new();
     for joints in [2, 3, 4] {
@@ -140,7 +140,7 @@ fn duplicates(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     Ok(vec![reproduced("duplicates", "distance 0 to 1e-6 rad, 2 to 4 joints", &arrangements)?.0])
 }
 
-fn slabs(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn slabs(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let count = if setting.effort == Effort::Full { 5000 } else { 300 };
     let mut arrangements = Vec::new();
     for thickness in [1e-1, 1e-2, 1e-3, 1e-4] {
@@ -157,7 +157,7 @@ fn slabs(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
 }
 
 /// A joint counted in other units must not change what is interpolated.
-fn units(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn units(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let mut points = scattered(if setting.effort == Effort::Full { 3000 } else { 300 }, 2);
     // Both joints extend from 0 to 1, so that each is scaled as it would be alone.
     points.extend([vec![0.0, 0.0], vec![1.0, 1.0]]);
@@ -181,7 +181,7 @@ fn units(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     Ok(vec![outcome("units", varied, "change of torque [N m]", worst, Bound::AtMost(GRIDIZED_LINEAR), String::new())])
 }
 
-fn order(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn order(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let count = if setting.effort == Effort::Full { 5000 } else { 300 };
     let mut worst = 0.0_f64;
     for joints in [2, 3] {
@@ -200,7 +200,7 @@ fn order(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
 }
 
 /// Linear interpolation never exceeds what was measured.
-fn bounded(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn bounded(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let full = setting.effort == Effort::Full;
     let mut worst = 0.0_f64;
     for (joints, count, step) in
@@ -215,7 +215,7 @@ fn bounded(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     Ok(vec![outcome("bounded by the samples", varied, "overshoot [1]", worst, bound, String::new())])
 }
 
-fn refused(_: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn refused(_: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let good = || samples(&scattered(60, 3), linear);
     let changed = |change: &dyn Fn(&mut Samples)| {
         let mut samples = good();
@@ -254,7 +254,7 @@ mod tests {
         let setting = Setting { effort: Effort::Sample, gpu: None };
         for case in cases() {
             let outcomes = (case.run)(&setting).unwrap();
-            let failed: Vec<Outcome> = outcomes.iter().filter(|outcome| !outcome.passed()).cloned().collect();
+            let failed: Vec<CaseResult> = outcomes.iter().filter(|outcome| !outcome.passed()).cloned().collect();
             assert!(!outcomes.is_empty() && failed.is_empty(), "{}", super::super::table(&failed));
         }
     }

@@ -1,6 +1,6 @@
 //! Hard cases: that they stay numerically stable is run and printed, not claimed.
 //!
-//! A [`Case`] varies one thing that is known to break solvers, loops or grids, and returns an [`Outcome`] for each figure
+//! A [`Case`] varies one thing that is known to break solvers, loops or grids, and returns an [`CaseResult`] for each figure
 //! that it measured: the worst one found, the bound that it must keep, and so whether it passed. One file a room holds
 //! its cases; tests run them at [`Effort::Sample`], the whole table takes [`Effort::Full`].
 
@@ -46,7 +46,7 @@ pub struct Case {
     /// The difficulty, in a few words.
     pub name: &'static str,
     /// Runs it. An error means that it could not be run, not that it failed its bound.
-    pub run: fn(&Setting) -> Result<Vec<Outcome>, Failure>,
+    pub run: fn(&Setting) -> Result<Vec<CaseResult>, Failure>,
 }
 
 /// The limit of a figure.
@@ -70,7 +70,7 @@ impl fmt::Display for Bound {
 
 /// One figure of a case.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Outcome {
+pub struct CaseResult {
     /// Name of the case.
     pub case: String,
     /// The quantity that was varied, and its range.
@@ -85,7 +85,7 @@ pub struct Outcome {
     pub note: String,
 }
 
-impl Outcome {
+impl CaseResult {
     /// Whether the worst figure keeps its bound; what is not a number does not.
     #[must_use]
     pub fn passed(&self) -> bool {
@@ -104,7 +104,7 @@ pub fn cases() -> Vec<Case> {
 
 /// The outcomes as one table of aligned columns, a line each.
 #[must_use]
-pub fn table(outcomes: &[Outcome]) -> String {
+pub fn table(outcomes: &[CaseResult]) -> String {
     let heads = ["case", "varied", "measure", "worst", "bound", "", "beside"].map(str::to_owned);
     let rows: Vec<[String; 7]> = std::iter::once(heads)
         .chain(outcomes.iter().map(|outcome| {
@@ -155,9 +155,9 @@ fn figure(value: f64) -> String {
 mod tests {
     use super::*;
 
-    fn outcome(worst: f64, bound: Bound) -> Outcome {
+    fn outcome(worst: f64, bound: Bound) -> CaseResult {
         let text = |text: &str| text.to_owned();
-        Outcome { case: text("case"), varied: text("it"), measure: text("size [m]"), worst, bound, note: text("") }
+        CaseResult { case: text("case"), varied: text("it"), measure: text("size [m]"), worst, bound, note: text("") }
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! neighbouring configurations by the work of the torque; what is left is a jump. An independent search starts from forces that have
 //! nothing to do with the rest state: those that hold neighbours on the grid, weaker and stronger ones, and those of configurations elsewhere.
 
-use super::super::{Bound, Effort, Failure, Outcome, Setting};
+use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Solver, Status},
@@ -34,7 +34,7 @@ const JUMP: f64 = 0.01;
 const LOWEST: f64 = 0.995;
 
 /// Both measures.
-pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let (steps, searched) = match setting.effort {
         Effort::Full => (1000, 500),
         Effort::Sample => (8, 40),
@@ -67,7 +67,7 @@ impl Space<'_> {
     }
 
     /// U along random lines one grid step long.
-    fn along_lines(&self, count: usize) -> Outcome {
+    fn along_lines(&self, count: usize) -> CaseResult {
         let mut random = Random::new(21);
         let lines: Vec<(JointVector, JointVector)> = (0..count)
             .map(|_| {
@@ -97,7 +97,7 @@ impl Space<'_> {
                 worst = worst.max(unexplained(&pair[0], &pair[1]) / (size * step));
             }
         }
-        Outcome {
+        CaseResult {
             case: "lowest equilibrium".into(),
             varied: format!("{count} lines of one grid step in {FINE} parts, sphere with a skin"),
             measure: "greatest jump of U over rms torque times step [1]".into(),
@@ -108,7 +108,7 @@ impl Space<'_> {
     }
 
     /// Independent searches for a lower equilibrium.
-    fn searched_anew(&self, count: usize) -> Outcome {
+    fn searched_anew(&self, count: usize) -> CaseResult {
         let mut random = Random::new(22);
         let mut solver = Solver::new(self.model);
         let mut touching = Vec::new();
@@ -144,7 +144,7 @@ impl Space<'_> {
         };
         let beaten = (0..count).into_par_iter().map_init(|| Solver::new(self.model), lower).filter(|beaten| *beaten);
         let beaten = beaten.count();
-        Outcome {
+        CaseResult {
             case: "lowest equilibrium".into(),
             varied: format!("{count} configurations from {} starts each", 2 * self.steps.len() + ELSEWHERE + 4),
             measure: "share whose equilibrium from rest is the lowest found [1]".into(),

@@ -4,7 +4,7 @@
 //! jumps it does not. Balls see the surface round. A point that lies inside changes facets at the planes that bisect convex
 //! edges, where its normal turns at once: its tau jumps there, by no more than facets turn.
 
-use super::super::{Bound, Effort, Failure, Outcome, Setting};
+use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::{Processor, processors};
 use super::world::{BALL, PAPER, RADIUS, contact, floating_bar, pressed, sphere};
 use crate::{
@@ -41,10 +41,10 @@ fn largest_step(path: &[Equilibrium]) -> (f64, f64, usize) {
 }
 
 /// A measurement with nodes of one kind: their name, radius [m] and Kc [N/m].
-type Measure = fn(Effort, Processor<'_>, &str, f64, f64) -> Result<Outcome, Failure>;
+type Measure = fn(Effort, Processor<'_>, &str, f64, f64) -> Result<CaseResult, Failure>;
 
 /// `measure` of balls and points, soft and stiff.
-fn of_each(measure: Measure, setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+fn of_each(measure: Measure, setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let mut outcomes = Vec::new();
     for (name, radius) in [("balls", BALL), ("points", 0.0)] {
         for stiffness in [1e2, 1e4] {
@@ -57,7 +57,7 @@ fn of_each(measure: Measure, setting: &Setting) -> Result<Vec<Outcome>, Failure>
 }
 
 /// Paths from contact to contact, refined ten times.
-pub fn continuity(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn continuity(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     of_each(refined, setting)
 }
 
@@ -68,7 +68,7 @@ fn refined(
     name: &str,
     radius: f64,
     stiffness: f64,
-) -> Result<Outcome, Failure> {
+) -> Result<CaseResult, Failure> {
     let (paths, steps) = match effort {
         Effort::Full => processor.choose((20, 400), (5, 200)),
         Effort::Sample => processor.choose((3, 100), (2, 20)),
@@ -99,7 +99,7 @@ fn refined(
         ("largest step left, over tau: a jump [1]", jump, TURN, beside)
     };
     let varied = format!("{paths} paths of {steps} steps refined 10 times, {name}, Kc {stiffness:.0e}");
-    Ok(Outcome {
+    Ok(CaseResult {
         case: "continuous torque".into(),
         varied: processor.name(&varied),
         measure: measure.into(),
@@ -110,7 +110,7 @@ fn refined(
 }
 
 /// Central differences of U at random configurations.
-pub fn curl(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn curl(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     of_each(against_energy, setting)
 }
 
@@ -142,7 +142,7 @@ fn against_energy(
     name: &str,
     radius: f64,
     stiffness: f64,
-) -> Result<Outcome, Failure> {
+) -> Result<CaseResult, Failure> {
     let object = sphere(PAPER)?;
     let count = if effort == Effort::Full { 200 } else { 20 };
     let chain = floating_bar(radius);
@@ -167,7 +167,7 @@ fn against_energy(
     let kinks = errors.iter().filter(|error| **error > 1e-3).count();
     let share = (errors.len() - kinks) as f64 / errors.len().max(1) as f64;
     let median = errors.get(errors.len() / 2).copied().unwrap_or(f64::NAN);
-    Ok(Outcome {
+    Ok(CaseResult {
         case: "torque from energy".into(),
         varied: processor.name(&format!("{count} configurations, {name}, Kc {stiffness:.0e}")),
         measure: "share with tau = -dU/dq to 1e-3 [1]".into(),

@@ -1,7 +1,7 @@
 //! Exact places and awkward arrangements: nodes on faces, edges and vertices to the last bit, on each other, in the middle of
 //! the object, right through it, in hollows, and on two sides at once.
 
-use super::super::{Bound, Effort, Failure, Outcome, Setting};
+use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::{Processor, processors};
 use super::world::{BALL, PAPER, RADIUS, contact, floating_bar, gantry, pressed, sphere, torus};
 use crate::{
@@ -15,8 +15,8 @@ use glam::DVec3;
 /// Contact stiffnesses at which the arrangements are tried [N/m].
 const STIFFNESSES: [f64; 3] = [1e2, 1e4, f64::INFINITY];
 
-fn outcome(case: &str, varied: &str, measure: &str, worst: f64, bound: Bound, note: String) -> Outcome {
-    Outcome { case: case.into(), varied: varied.into(), measure: measure.into(), worst, bound, note }
+fn outcome(case: &str, varied: &str, measure: &str, worst: f64, bound: Bound, note: String) -> CaseResult {
+    CaseResult { case: case.into(), varied: varied.into(), measure: measure.into(), worst, bound, note }
 }
 
 /// A point on a triangle, edge or vertex of the object, and a direction out of the surface there.
@@ -44,7 +44,7 @@ fn at(place: DVec3) -> JointVector {
 
 /// A node on a face, an edge, a vertex, and 1 nm off it to either side: contact just where the gap is below zero, and forces that
 /// vanish with the depth.
-pub fn exact_places(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn exact_places(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let object = sphere(PAPER)?;
     let chain = gantry(vec![ProxyNodeSpec { position: DVec3::ZERO, radius: 0.0, length: 0.0 }]);
     let mut model = Model::new(&object, &chain, contact(1.0));
@@ -83,7 +83,7 @@ pub fn exact_places(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
 }
 
 /// Two nodes in one place are one spring of twice the stiffness.
-pub fn coincident_nodes(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn coincident_nodes(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let object = sphere(PAPER)?;
     let mut outcomes = Vec::new();
     for mut processor in processors(setting) {
@@ -148,7 +148,7 @@ impl Tally {
 }
 
 /// A node from one side of the sphere to the other, through its very centre, through vertices, and past them.
-pub fn right_through(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn right_through(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let object = sphere(PAPER)?;
     let mut outcomes = Vec::new();
     for mut processor in processors(setting) {
@@ -175,7 +175,7 @@ pub fn right_through(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
 }
 
 /// The bar in the hole and the groove of a torus.
-pub fn concave(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn concave(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let object = torus(DVec3::ZERO)?;
     let count = if setting.effort == Effort::Full { 200 } else { 30 };
     let mut outcomes = Vec::new();
@@ -203,7 +203,7 @@ pub fn concave(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
 
 /// Two nodes on opposite poles of the sphere push it equally: the forces on the gantry's slide between them cancel. Sideways a point
 /// in a vertex leans on one of its facets.
-pub fn two_regions(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn two_regions(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let object = sphere(PAPER)?;
     let mut outcomes = Vec::new();
     for mut processor in processors(setting) {

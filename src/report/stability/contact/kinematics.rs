@@ -1,6 +1,6 @@
 //! Arms in singular postures, at their limits, with axes that coincide: contact sees where the nodes are and nothing else.
 
-use super::super::{Bound, Failure, Outcome, Setting};
+use super::super::{Bound, CaseResult, Failure, Setting};
 use super::processor::{Processor, processors};
 use super::world::{PAPER, contact, joint, sphere};
 use crate::{
@@ -28,7 +28,7 @@ fn nodes(from: f64) -> Vec<ProxyNodeSpec> {
 }
 
 /// Equilibria of one posture by arms of one, two and three joints that put the same nodes in the same place.
-pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let object = sphere(PAPER)?;
     let plain = vec![revolute(BASE, nodes(0.1))];
     // Two joints about one axis.
@@ -70,7 +70,7 @@ pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
                     worst = worst.max((expected.torque[0] - found.torque[0]).abs() / (size * 0.2));
                 }
             }
-            outcomes.push(Outcome {
+            outcomes.push(CaseResult {
                 case: "singular arms".into(),
                 varied: processor.name(name),
                 measure: "forces and torque against a plain arm's, relative [1]".into(),

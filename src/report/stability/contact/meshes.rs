@@ -1,7 +1,7 @@
 //! Broken surfaces: repaired with a warning that says what was done, and then of the same torque as the sound one; or refused
 //! with the reason. Slivers are sound, and their torque is that of the stored energy.
 
-use super::super::{Bound, Failure, Outcome, Setting};
+use super::super::{Bound, CaseResult, Failure, Setting};
 use super::processor::{Processor, processors};
 use super::world::{PAPER, RADIUS, contact, joint, probe, sphere, sphere_spec};
 use crate::{
@@ -127,7 +127,7 @@ fn torques(object: &Object) -> Vec<f64> {
 }
 
 /// All of them.
-pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let folder = tempfile::tempdir()?;
     let sound = sphere(PAPER)?;
     let surface = (sound.rest.clone(), sound.triangles.clone());
@@ -152,7 +152,7 @@ pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
             (Fate::Refused(_), Ok(_)) => (f64::INFINITY, "accepted".into()),
         };
         let said = note.replace(&folder.path().display().to_string(), "");
-        outcomes.push(Outcome {
+        outcomes.push(CaseResult {
             case: "broken meshes".into(),
             varied: (*name).into(),
             measure: "torque against the sound surface's, relative; refused: 0 [1]".into(),
@@ -168,7 +168,7 @@ pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
 }
 
 /// A box with strips of aspect 1e4 along its edges.
-fn slivers(mut processor: Processor<'_>) -> Result<Outcome, Failure> {
+fn slivers(mut processor: Processor<'_>) -> Result<CaseResult, Failure> {
     let (size, strip) = (0.1, 1e-5);
     let lines = [0.0, strip, 0.5 * size, size - strip, size];
     let count = lines.len();
@@ -224,7 +224,7 @@ fn slivers(mut processor: Processor<'_>) -> Result<Outcome, Failure> {
     if unconverged == tried {
         worst = f64::INFINITY;
     }
-    Ok(Outcome {
+    Ok(CaseResult {
         case: "broken meshes".into(),
         varied: processor.name("slivers of aspect 1e4; points and balls"),
         measure: "tau against -dU/dq, relative [1]".into(),

@@ -35,7 +35,7 @@ pub fn cases() -> Vec<Case> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Effort, Outcome, Setting, table};
+    use super::super::{CaseResult, Effort, Setting, table};
     use super::*;
 
     /// On the CPU; the GPU's half is in `tests/gpu`.
@@ -45,7 +45,7 @@ mod tests {
         for case in cases() {
             let outcomes = (case.run)(&setting).unwrap();
             assert!(!outcomes.is_empty(), "{}", case.name);
-            let failed: Vec<Outcome> = outcomes.into_iter().filter(|outcome| !outcome.passed()).collect();
+            let failed: Vec<CaseResult> = outcomes.into_iter().filter(|outcome| !outcome.passed()).collect();
             assert!(failed.is_empty(), "{}", table(&failed));
         }
     }

@@ -2,7 +2,7 @@
 //! and resolutions, and with a skin: what share converges, with how many iterations, in what time; that E never rises and no number breaks. Beside it the same on the GPU, of the
 //! fine surface a tenth, and a tenth of all by the paper's iteration.
 
-use super::super::{Bound, Effort, Failure, Outcome, Setting};
+use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::Processor;
 use super::world::{BALL, Ball, RADIUS, contact, floating_bar, pressed, skinned, sphere};
 use crate::{
@@ -80,7 +80,7 @@ struct Worst {
 }
 
 /// The sweep.
-pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let full = setting.effort == Effort::Full;
     let stiffnesses: &[f64] =
         if full { &[1.0, 10.0, 1e2, 1e3, 1e4, 1e5, 1e6, f64::INFINITY] } else { &[1.0, 1e3, 1e6, f64::INFINITY] };
@@ -122,7 +122,7 @@ pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
             too_large += cell.gpu_too_large;
         }
         if setting.gpu.is_some() {
-            outcomes.push(Outcome {
+            outcomes.push(CaseResult {
                 case: "stiffness".into(),
                 varied: format!("all of these, on the GPU, depth {from} to {to} R"),
                 measure: "share converged [1]".into(),
@@ -132,7 +132,7 @@ pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
             });
         }
     }
-    let figure = |varied: &str, measure: &str, worst: f64, bound: f64| Outcome {
+    let figure = |varied: &str, measure: &str, worst: f64, bound: f64| CaseResult {
         case: "stiffness".into(),
         varied: varied.into(),
         measure: measure.into(),
@@ -141,7 +141,7 @@ pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
         note: String::new(),
     };
     let note = format!("{} configurations", worst.checked);
-    outcomes.push(Outcome {
+    outcomes.push(CaseResult {
         note,
         ..figure(
             "all of these",
@@ -162,7 +162,7 @@ pub fn run(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
 
 impl Cell {
     /// The cell as a line of the table.
-    fn outcome(&self, stiffness: f64, varied: &str, share: f64) -> Outcome {
+    fn outcome(&self, stiffness: f64, varied: &str, share: f64) -> CaseResult {
         let mut iterations = self.iterations.clone();
         iterations.sort_unstable();
         let median = iterations.get(iterations.len() / 2).copied().unwrap_or(0);
@@ -183,7 +183,7 @@ impl Cell {
             note += &format!("; GPU {:.1} %, {on_cpu:.0} % of them by the CPU", percent(self.gpu));
         }
         let stiffness = if stiffness.is_finite() { format!("{stiffness:.0e} N/m") } else { "rigid".into() };
-        Outcome {
+        CaseResult {
             case: "stiffness".into(),
             varied: format!("Kc {stiffness}, {varied}"),
             measure: "share converged, worst combination [1]".into(),

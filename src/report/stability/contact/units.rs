@@ -1,6 +1,6 @@
 //! Units and places of the world that must not matter: lengths in millimetres, an object a kilometre from the origin.
 
-use super::super::{Bound, Failure, Outcome, Setting};
+use super::super::{Bound, CaseResult, Failure, Setting};
 use super::processor::{Processor, processors};
 use super::world::{PAPER, RADIUS, contact, floating_bar, joint, pressed, sphere, sphere_spec};
 use crate::{
@@ -15,9 +15,9 @@ use glam::DVec3;
 /// Depths of the configurations [m].
 const DEPTH: f64 = 0.2 * RADIUS;
 
-fn outcome(case: &str, varied: &str, measure: &str, worst: f64, bound: f64, note: String) -> Outcome {
+fn outcome(case: &str, varied: &str, measure: &str, worst: f64, bound: f64, note: String) -> CaseResult {
     let (case, varied, measure) = (case.into(), varied.into(), measure.into());
-    Outcome { case, varied, measure, worst, bound: Bound::AtMost(bound), note }
+    CaseResult { case, varied, measure, worst, bound: Bound::AtMost(bound), note }
 }
 
 /// Largest difference of energies and torques, relative to the largest torque, each entry of `b` being times `energy` and `torque`
@@ -50,7 +50,7 @@ fn bar(radius: f64, scale: f64) -> Chain {
 
 /// A world measured in other lengths: stiffness in newtons per that length, torque and energy in newtons times it. By a power
 /// of two every product rounds alike, and results agree to the last bit; by a thousand, to rounding.
-pub fn units(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn units(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let object = sphere(PAPER)?;
     let mut outcomes = Vec::new();
     for (name, scale, bound) in [("mm for m, by 1000", 1e3, 1e-7), ("by 1024, exact in binary", 1024.0, 0.0)] {
@@ -92,7 +92,7 @@ fn arm(base: DVec3, radius: f64) -> Chain {
 
 /// Object and arm a kilometre away from the origin: coordinates there are rounded at 1e-13 m in f64, and would be at 6e-5 m in
 /// f32, which is why contact is computed relative to the object.
-pub fn far_away(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub fn far_away(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let shift = DVec3::new(1000.0, -700.0, 300.0);
     let near = sphere(PAPER)?;
     let far = Object::build(&sphere_spec(PAPER, shift, 1.0, 1.0))?;

@@ -1,6 +1,6 @@
 //! Devices that lie: they leap, report no numbers, or see the hand in coarse steps.
 
-use super::{Altered, DESKTOP, Failure, Outcome, Setting, Watch, on_time, open, presses, seconds};
+use super::{Altered, CaseResult, DESKTOP, Failure, Setting, Watch, on_time, open, presses, seconds};
 use crate::{device::Reading, render::flags::Fault};
 
 /// `reading` with each joint's position changed.
@@ -10,7 +10,7 @@ fn moved(reading: Reading, change: impl Fn(f64) -> f64) -> Reading {
     Reading { position, ..reading }
 }
 
-pub(super) fn leap(_: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn leap(_: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let setup = open(3, DESKTOP)?;
     let mut watch = Watch::new(&setup.scene.haptics);
     for by in [1.0, -1.0, 0.1] {
@@ -21,7 +21,7 @@ pub(super) fn leap(_: &Setting) -> Result<Vec<Outcome>, Failure> {
     Ok(watch.must_let_go("leaping device", "by 1, -1 and 0.1 rad within a tick, in contact", &[Fault::Leap]))
 }
 
-pub(super) fn not_finite(_: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn not_finite(_: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let setup = open(3, DESKTOP)?;
     let mut watch = Watch::new(&setup.scene.haptics);
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
@@ -37,7 +37,7 @@ pub(super) fn not_finite(_: &Setting) -> Result<Vec<Outcome>, Failure> {
     ))
 }
 
-pub(super) fn encoders(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn encoders(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 1.0, 60.0);
     let setup = open(3, DESKTOP)?;
     let mut watch = Watch::new(&setup.scene.haptics);

@@ -1,6 +1,6 @@
 //! Long hours: ten simulated minutes at rest, and as long dragged along in jerks.
 
-use super::{Bound, DESKTOP, Failure, Outcome, Setting, Watch, on_time, open, seconds, way};
+use super::{Bound, CaseResult, DESKTOP, Failure, Setting, Watch, on_time, open, seconds, way};
 use crate::{
     JointVector,
     device::{Device, Motion},
@@ -10,7 +10,7 @@ use crate::{
     tolerances::ACCOUNT_ROUNDING,
 };
 
-pub(super) fn rest(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn rest(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 10.0, 600.0);
     let setup = open(3, DESKTOP)?;
     let mut watch = Watch::new(&setup.scene.haptics);
@@ -25,7 +25,7 @@ pub(super) fn rest(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     }
     let varied = format!("pressed for {seconds} s");
     let mut outcomes = watch.outcomes("ten minutes at rest", &varied);
-    outcomes.push(Outcome {
+    outcomes.push(CaseResult {
         measure: "motion at the end within 0.1 s [rad]".into(),
         worst: drift,
         bound: Bound::AtMost(STILL),
@@ -37,7 +37,7 @@ pub(super) fn rest(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
 /// Motion of a device at rest [rad]: a hundredth of the finest encoder's step.
 const STILL: f64 = 1e-7;
 
-pub(super) fn stick_slip(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn stick_slip(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 10.0, 600.0);
     // A hand so soft that it drags the finger along in jerks.
     let haptics = "[haptics]
@@ -75,14 +75,14 @@ hand = { stiffness = [600.0, 400.0], damping = [0.2, 20.0], inertia = [0.1, 0.1]
     watch.end();
     let mut outcomes =
         watch.outcomes("ten minutes of stick and slip", &format!("dragged for {seconds} s by a soft hand"));
-    outcomes.push(Outcome {
+    outcomes.push(CaseResult {
         measure: "energy given by friction in one tick, over the turnover [1]".into(),
         worst: -least,
         bound: Bound::AtMost(ACCOUNT_ROUNDING),
         note: format!("{slips} slips, {taken:.3} J taken"),
         ..outcomes[0].clone()
     });
-    outcomes.push(Outcome {
+    outcomes.push(CaseResult {
         measure: "slips [1]".into(),
         worst: slips as f64,
         bound: Bound::AtLeast(seconds / 2.0),

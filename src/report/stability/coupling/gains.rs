@@ -1,6 +1,6 @@
 //! Gains at their bounds and far beyond, with and without what takes the energy that they create.
 
-use super::{Bound, DESKTOP, Failure, Outcome, Setting, Watch, on_time, open, presses, seconds, way};
+use super::{Bound, CaseResult, DESKTOP, Failure, Setting, Watch, on_time, open, presses, seconds, way};
 use crate::{
     render::{
         passivity::{greatest_slope, greatest_stiffness},
@@ -33,7 +33,7 @@ device_damping = 0.02
 const FACTORS: [(f64, &str); 3] =
     [(0.1, "a tenth of Ks and Kvc"), (1.0, "Ks and Kvc at the bound"), (10.0, "ten times Ks and Kvc")];
 
-pub(super) fn about_their_bound(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn about_their_bound(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 2.0, 60.0);
     let mut outcomes = Vec::new();
     for (factor, varied) in FACTORS {
@@ -48,13 +48,13 @@ pub(super) fn about_their_bound(setting: &Setting) -> Result<Vec<Outcome>, Failu
 }
 
 /// The controller feeds from the leak, which a torque that is exactly a gradient has from sampling only.
-pub(super) fn control_over_a_potential(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn control_over_a_potential(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 2.0, 60.0);
     let potential = "interpolation = \"potential\"\npassivity_control = true\n";
     let mut outcomes = Vec::new();
     let mut judge = |watch: &Watch, varied: &str| {
         outcomes.extend(watch.outcomes("control over a potential", varied));
-        outcomes.push(Outcome {
+        outcomes.push(CaseResult {
             measure: "energy created at the object's port and not taken by the controller [J]".into(),
             worst: watch.created,
             bound: Bound::AtMost(GREATEST_GIVEN_ENERGY),

@@ -10,7 +10,7 @@ mod gains;
 mod places;
 mod time;
 
-use super::{Bound, Case, Effort, Failure, Outcome, Setting, worlds::half_space};
+use super::{Bound, Case, CaseResult, Effort, Failure, Setting, worlds::half_space};
 use crate::{
     JointVector,
     device::{Applied, Device, Motion, Reading, SimulatedHand},
@@ -126,8 +126,8 @@ impl Watch {
         }
     }
 
-    fn outcomes(&self, case: &str, varied: &str) -> Vec<Outcome> {
-        let judged = |measure: &str, worst: f64, bound: f64| Outcome {
+    fn outcomes(&self, case: &str, varied: &str) -> Vec<CaseResult> {
+        let judged = |measure: &str, worst: f64, bound: f64| CaseResult {
             case: case.into(),
             varied: varied.into(),
             measure: measure.into(),
@@ -143,9 +143,9 @@ impl Watch {
     }
 
     /// The same, and that each run ended without torque for one of the `reasons`.
-    fn must_let_go(&self, case: &str, varied: &str, reasons: &[Fault]) -> Vec<Outcome> {
+    fn must_let_go(&self, case: &str, varied: &str, reasons: &[Fault]) -> Vec<CaseResult> {
         let mut outcomes = self.outcomes(case, varied);
-        outcomes.push(Outcome {
+        outcomes.push(CaseResult {
             measure: "runs that did not end without torque and with the reason [1]".into(),
             worst: (self.runs - self.faults.iter().filter(|fault| reasons.contains(fault)).count()) as f64 + self.left,
             bound: Bound::AtMost(0.0),

@@ -1,9 +1,9 @@
 //! Places where the dataset or the arm fails: cells absent or unconverged, configurations that are singular.
 
-use super::{DESKTOP, Failure, Outcome, Setting, Watch, noise, on_time, open, presses, seconds, way};
+use super::{CaseResult, DESKTOP, Failure, Setting, Watch, noise, on_time, open, presses, seconds, way};
 use crate::{contact::Status, dataset::Dataset, render::setup::Setup, report::stability::worlds::half_space};
 
-pub(super) fn bad_cells(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn bad_cells(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 2.0, 60.0);
     let setup = open(3, DESKTOP)?;
     let mut watch = Watch::new(&setup.scene.haptics);
@@ -34,7 +34,7 @@ fn spoilt(data: Dataset, share: f64) -> Dataset {
     Dataset { status: status.into(), torque: torque.into(), ..data }
 }
 
-pub(super) fn singular(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn singular(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 2.0, 60.0);
     let mut outcomes = Vec::new();
     for joints in [3, 6] {

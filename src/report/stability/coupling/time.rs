@@ -1,10 +1,12 @@
 //! Time that is not what it should be: ticks that jitter, are dropped or late for good, positions from the past.
 
-use super::{Altered, Bound, DESKTOP, Failure, Outcome, Setting, Watch, drive, noise, on_time, open, presses, seconds};
+use super::{
+    Altered, Bound, CaseResult, DESKTOP, Failure, Setting, Watch, drive, noise, on_time, open, presses, seconds,
+};
 use crate::{device::Reading, render::flags::Fault, tolerances::GREATEST_GIVEN_ENERGY};
 use std::collections::VecDeque;
 
-pub(super) fn jitter(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn jitter(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 5.0, 120.0);
     let setup = open(3, DESKTOP)?;
     let mut watch = Watch::new(&setup.scene.haptics);
@@ -17,7 +19,7 @@ pub(super) fn jitter(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     Ok(watch.outcomes("jittering ticks", "T from 0.2 to 20 ms, with and without passivity control"))
 }
 
-pub(super) fn dropped(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn dropped(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 2.0, 60.0);
     let setup = open(3, DESKTOP)?;
     let mut watch = Watch::new(&setup.scene.haptics);
@@ -31,7 +33,7 @@ pub(super) fn dropped(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
 }
 
 /// The energy that a hold gives is seen when it is over: beyond the guard's energy there may be what one hold could give.
-pub(super) fn overruns(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn overruns(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 2.0, 20.0);
     let setup = open(3, DESKTOP)?;
     let mut outcomes = Vec::new();
@@ -50,7 +52,7 @@ pub(super) fn overruns(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
     Ok(outcomes)
 }
 
-pub(super) fn delay(setting: &Setting) -> Result<Vec<Outcome>, Failure> {
+pub(super) fn delay(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 2.0, 60.0);
     let setup = open(3, DESKTOP)?;
     let mut watch = Watch::new(&setup.scene.haptics);

@@ -5,7 +5,7 @@ use crate::{JointVector, tolerances::GREATEST_POSITION_AGE};
 
 /// The last torques on the device, in a ring as long as a position may be old.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Held {
+pub(super) struct TorqueHistory {
     /// On the device [N m or N].
     torques: Vec<JointVector>,
     last: usize,
@@ -15,7 +15,7 @@ pub(super) struct Held {
     period: f64,
 }
 
-impl Held {
+impl TorqueHistory {
     /// No torque on `joints` joints, with a tick every `period` [s].
     pub fn new(joints: usize, period: f64) -> Self {
         let ticks = (GREATEST_POSITION_AGE / period).ceil() as usize + 1;
@@ -54,7 +54,7 @@ mod tests {
 
     #[test]
     fn torques_are_remembered_as_long_as_a_position_may_be_old() {
-        let mut held = Held::new(1, 1e-3);
+        let mut held = TorqueHistory::new(1, 1e-3);
         for k in 0..50 {
             held.push(&JointVector::from_slice(&[f64::from(k)]));
         }

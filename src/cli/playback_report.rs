@@ -8,7 +8,7 @@ use crate::{
     render::{setup::Setup, trace::Trace},
     report::{
         self,
-        force::{EndForce, Held, force},
+        force::{EndForce, SteadyForce, force},
     },
 };
 use serde_json::{Value, json};
@@ -21,13 +21,13 @@ use std::{
 const STEADY: f64 = 0.25;
 
 /// The result of a playback.
-pub struct Felt {
+pub struct PlaybackReport {
     provenance: Provenance,
     absent: Vec<&'static str>,
     forces: Vec<EndForce>,
 }
 
-impl Felt {
+impl PlaybackReport {
     /// Returns the result of playing the dataset at `path`, recorded in `trace`.
     pub fn new(path: &Path, dataset: &Dataset, setup: &Setup, trace: &Trace) -> Self {
         Self {
@@ -69,7 +69,7 @@ impl Felt {
     /// For people.
     pub fn describe(&self, text: &mut String) -> fmt::Result {
         for felt in &self.forces {
-            if let Some(Held { axis, mean, variation }) = felt.held().filter(|held| held.variation < STEADY) {
+            if let Some(SteadyForce { axis, mean, variation }) = felt.held().filter(|held| held.variation < STEADY) {
                 let (percent, name) = (100.0 * variation, &felt.name);
                 write!(text, "  held force   {mean:.3} N along {axis} on {name}, ")?;
                 writeln!(text, "constant to {percent:.1} % over the middle half of the contact")?;

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 
 /// A node of the proxy in the pointer's hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Grip {
+pub struct NodeDrag {
     /// Number of the proxy's node.
     pub node: usize,
     /// Where the node was when it was gripped [m]: a point of the plane in which it is moved.
@@ -23,7 +23,7 @@ pub struct Grip {
 /// How near to a node the pointer must be, in heights of the picture.
 const REACH: f32 = 0.05;
 
-impl Grip {
+impl NodeDrag {
     /// Takes the node nearest to the picture point `at` (x right, y up, from -1 to 1), if one is near.
     #[must_use]
     pub fn take(camera: &Camera, aspect: f32, at: Vec2, pose: &Pose) -> Option<Self> {
@@ -72,13 +72,13 @@ mod tests {
         let aspect = 1.3;
         let node = pose.nodes.len() - 1;
         let shown = camera.clip(aspect).project_point3(pose.nodes[node].as_vec3()).truncate();
-        let grip = Grip::take(&camera, aspect, shown, &pose).unwrap();
+        let grip = NodeDrag::take(&camera, aspect, shown, &pose).unwrap();
         assert_eq!(grip.node, node);
         let target = shown + Vec2::new(0.02, -0.05);
         let led = grip.lead(&camera, aspect, target, &chain, &q).unwrap();
         chain.pose(&led, &mut pose);
         let now = camera.clip(aspect).project_point3(pose.nodes[node].as_vec3()).truncate();
         assert!(now.distance(target) < 1e-4, "{now} is not {target}");
-        assert!(Grip::take(&camera, aspect, Vec2::new(0.9, -0.9), &pose).is_none());
+        assert!(NodeDrag::take(&camera, aspect, Vec2::new(0.9, -0.9), &pose).is_none());
     }
 }

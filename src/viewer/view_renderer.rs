@@ -45,7 +45,7 @@ pub struct Look {
 }
 
 /// Pipelines and targets.
-pub struct Stage {
+pub struct ViewRenderer {
     context: Arc<Context>,
     surface: wgpu::RenderPipeline,
     shapes: wgpu::RenderPipeline,
@@ -92,7 +92,7 @@ impl Surface {
     }
 }
 
-impl Stage {
+impl ViewRenderer {
     /// Compiles the drawing shaders, for one or four `samples` a pixel.
     ///
     /// # Errors
