@@ -53,7 +53,7 @@ pub fn scarcity() -> String {
     }
 }
 
-/// Returns the most memory that this process has taken so far, where the system tells [bytes].
+/// Returns the most memory that this process has taken so far, if the system reports it [bytes].
 #[must_use]
 pub fn greatest() -> Option<usize> {
     kilobytes(&std::fs::read_to_string("/proc/self/status").unwrap_or_default(), "VmHWM")

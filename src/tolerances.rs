@@ -26,7 +26,7 @@ pub const GPU_FAR_AWAY: f32 = 1e18;
 pub const GPU_LEAST_DIVISOR: f32 = 1e-36;
 
 /// Least relative residual that the f32 solver is asked for [1]: rounding of f32 (6e-8) grows over sums of about a
-/// hundred products to a few 1e-6, so 1e-5 is what can be told from zero.
+/// hundred products to a few 1e-6, so 1e-5 is the least that can be distinguished from zero.
 pub const GPU_LEAST_TOLERANCE: f64 = 1e-5;
 
 /// Largest relative residual of a GPU's result that is passed on as converged, however rough the scene's tolerance [1]: what is promised of
@@ -38,7 +38,7 @@ pub const GPU_RESOLVED_RESIDUAL: f64 = 1e-4;
 /// where the pseudonormal is the better one.
 pub const GPU_LEAST_DISTANCE_PER_EXTENT: f64 = 1e-6;
 
-/// What a depth is rounded by, relative to the longest edge of the surface [1]: three coordinates of a corner relative to
+/// Rounding error of a depth, relative to the longest edge of the surface [1]: three coordinates of a corner relative to
 /// the proxy node, each rounded by 6e-8 of at most an edge, enter with weights that sum to one.
 pub const GPU_DEPTH_ROUNDING_PER_EDGE: f64 = 2e-7;
 
@@ -81,7 +81,7 @@ pub const SETTLING_STEPS: u32 = 4;
 /// moves by more than a thousandth of its displacement.
 pub const GPU_STIFFNESS: f64 = 1e3;
 
-/// What the contact forces of a result of the energy form may lack after these steps unless the scene asks for less, relative, in the energy
+/// Residual of the contact forces of the energy form that is allowed after these steps unless the scene asks for less, relative, in the energy
 /// norm [1]: soft directions of a deep dent raise it a hundredfold in the torque, which is to agree to 1e-5 with the CPU's.
 pub const GPU_SETTLED_RESIDUAL: f64 = 1e-7;
 
@@ -242,7 +242,7 @@ pub const RIPPLE_WARNING: f64 = 0.1;
 /// contact it moves by that depth along the normal, and as much again leaves room for what neighbouring nodes drag along.
 pub const EXPECTED_MOTION: f64 = 2.0;
 
-/// What a gap and the motion it is held against may be rounded by, relative to the lengths of chain and object [1]: a pose is a
+/// Rounding error of a gap and of the motion it is held against, relative to the lengths of chain and object [1]: a pose is a
 /// product of at most seven rotations, a distance a difference of coordinates, each good to some ten eps of those lengths.
 pub const FREE_SPACE_ROUNDING: f64 = 1e-12;
 
@@ -339,7 +339,7 @@ pub const HYPER_WEIGHT: f64 = 1e-9;
 /// give 70.
 pub const HYPER_STEPS: usize = 10_000;
 
-/// Cells that one worker keeps in 4 to 6 joints before it starts anew: about 500 bytes each.
+/// Cells that one worker keeps in 4 to 6 joints before it starts again: about 500 bytes each.
 pub const HYPER_CELLS: usize = 200_000;
 
 /// Pivot below which the corners of a simplex span nothing in a direction, as a fraction of the extent: between the
@@ -382,7 +382,7 @@ pub const IMPORT_CELLS: usize = 1_000_000;
 /// a force belongs to, and gaps are stored in f32, which keeps their relative accuracy down to 1e-38.
 pub const LEAST_GAP: f64 = 1e-12;
 
-/// Least stored energy over that of free space whose square root is told from zero [J]: a nanonewton over a femtometre,
+/// Least stored energy over that of free space whose square root is distinguished from zero [J]: a nanonewton over a femtometre,
 /// as in [`RESIDUAL_FLOOR`].
 pub const LEAST_ENERGY: f64 = RESIDUAL_FLOOR * RESIDUAL_FLOOR;
 

@@ -46,7 +46,7 @@ pub struct Arguments {
     #[arg(long)]
     algorithm: Option<Algorithm>,
     /// Continue a bake that was interrupted. What was solved is kept; the search for lower equilibria and the measurement of the error, which
-    /// come last, begin anew.
+    /// come last, start again.
     #[arg(long)]
     resume: bool,
     /// Number of random configurations at which the dataset's error is measured afterwards; 0 skips this. By default a tenth of

@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// What to do with devices.
+/// Arguments of `device`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:

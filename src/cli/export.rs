@@ -25,7 +25,7 @@ pub struct Arguments {
     output: Option<PathBuf>,
 }
 
-/// Opens and checks the dataset, and writes it anew.
+/// Opens and checks the dataset, and writes it again.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let dataset = Dataset::open(&arguments.dataset)?;
     let beside = || arguments.dataset.with_extension(arguments.format.extension());

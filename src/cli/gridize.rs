@@ -53,7 +53,7 @@ pub struct Arguments {
     /// The topic of joint states to read of an MCAP file; by default its only one.
     #[arg(long)]
     topic: Option<String>,
-    /// What the efforts of an MCAP file are, without --columns: the torque of the motors, or that of the contact on the arm. They must
+    /// Meaning of the efforts of an MCAP file, without --columns: the torque of the motors, or that of the contact on the arm. They must
     /// hold no weight of the arm.
     #[arg(long, default_value = "motor", conflicts_with = "columns")]
     effort: Effort,
@@ -85,7 +85,7 @@ pub struct Arguments {
 /// Figures beside [`report::FIGURES`].
 const FIGURES: [&str; 4] = ["gridized.svg", "gridized.png", "hysteresis.svg", "hysteresis.png"];
 
-/// What efforts are.
+/// Meaning of efforts.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Effort {
     /// Torque of the motors, which balances that of the contact.

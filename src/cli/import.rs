@@ -45,7 +45,7 @@ fn lock(text: &str) -> Result<Lock, String> {
     Ok(Lock { joint: joint.trim().to_owned(), value })
 }
 
-/// Writes the scene, and tells what the robot's file lacks.
+/// Writes the scene, and lists what the robot's file lacks.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let robot = Robot::load(&arguments.robot)?;
     let arm = Arm::new(&robot, &arguments.tip, &arguments.lock)?;

@@ -30,7 +30,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 /// Whether there is work that looks at [`STOP`].
 static IS_STOPPABLE: AtomicBool = AtomicBool::new(false);
 
-/// Listens for signals from now on. With `json` the end by a signal is told on standard output, too; with `resumes` that `--resume`
+/// Listens for signals from now on. With `json` the end by a signal is reported on standard output, too; with `resumes` that `--resume`
 /// continues the work.
 pub fn listen(json: bool, resumes: bool) -> Result<(), Failure> {
     let ignored = ignored();

@@ -43,7 +43,7 @@ unsafe impl GlobalAlloc for Remembering {
 mod answer {
     use super::{FAILED, Ordering};
 
-    /// What is said around the number of bytes.
+    /// Text around the number of bytes.
     const SAID: [&str; 2] = [
         "out of memory: ",
         " bytes were asked for in vain; close other programs, raise the limit (ulimit -v), or take a coarser grid or surface; what was \
@@ -94,5 +94,5 @@ mod answer {
     pub fn tell_shortage(_: bool) {}
 }
 
-/// Has a failed allocation told with the remedy from now on; with `json` on standard output, too.
+/// Reports a failed allocation with the remedy from now on; with `json` on standard output, too.
 pub use answer::tell_shortage;

@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     Ok(Report { text, json, whole: true })
 }
 
-/// What is said where shards are missing.
+/// Returns the message about missing shards.
 fn lacking(merge: &Merge, missing: &[usize]) -> Report {
     let (numbers, count) = (ranges(missing), merge.count());
     let error = MergeError::Missing { missing: numbers.clone(), count };

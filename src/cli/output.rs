@@ -1,5 +1,5 @@
 //! What a command writes: never over one of its inputs, over a file of another kind, or over what is no regular file. What is
-//! replaced is told.
+//! replaced is reported.
 
 use super::Failure;
 use crate::dataset::resolved;
@@ -165,7 +165,7 @@ impl Folder {
         Ok(())
     }
 
-    /// Removes what an earlier run has left and this one has not `written` anew, and tells what was replaced and removed.
+    /// Removes what an earlier run has left and this one has not `written` again, and reports what was replaced and removed.
     ///
     /// # Errors
     /// When such a file cannot be removed.

@@ -163,7 +163,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     Ok(Report { text, json, whole })
 }
 
-/// What `arguments` drove, and how often it was clamped and stopped; null where no device was named.
+/// Returns the device that `arguments` named and how often it was clamped and stopped; null if none was named.
 fn device_json(arguments: &Arguments, tally: &Tally) -> Result<Value, Failure> {
     let Some(address) = &arguments.device else { return Ok(Value::Null) };
     Ok(json!({ "name": address.to_string(), "tally": serde_json::to_value(tally)? }))

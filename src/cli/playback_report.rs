@@ -1,4 +1,4 @@
-//! What `haptize play` tells of a session beside its traces: the force at the end of the proxy, of one dataset or of two
+//! The report of `haptize play` beside its traces: the force at the end of the proxy, of one dataset or of two
 //! felt by the same motion, where the torque came from, and what the dataset does not hold.
 
 use super::{Failure, play};
@@ -17,7 +17,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Variation of a force below which it is told as a held one [1].
+/// Variation of a force below which it is reported as steady [1].
 const STEADY: f64 = 0.25;
 
 /// The result of a playback.

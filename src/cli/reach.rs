@@ -50,7 +50,7 @@ const ERROR: &str = "5%";
 /// Most points of such a grid [1].
 const POINTS: usize = 2_000_000;
 
-/// Errors over the rms torque whose cost is told [1].
+/// Errors over the rms torque whose cost is listed [1].
 const ERRORS: [f64; 4] = [0.1, 0.05, 0.02, 0.01];
 
 fn depth(text: &str) -> Result<f64, String> {
@@ -124,7 +124,7 @@ pub fn complete(scene: Scene, backend: BackendChoice, chosen: bool) -> Result<Sc
     Ok(Scene { text, grid, ..scene })
 }
 
-/// What was found of a scene.
+/// Result for a scene.
 struct Found {
     reach: Reach,
     pilot: Pilot,

@@ -65,7 +65,7 @@ const LONGEST: f64 = 36_000.0;
 /// Seed of the simulated rig's noise.
 const SEED: u64 = 1;
 
-/// Scans. Ctrl-C stops after the point at hand and leaves a log that `--resume` continues.
+/// Scans. Ctrl-C stops after the current point and leaves a log that `--resume` continues.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let scene = ScanScene::load(&arguments.scene)?;
     if let Some(seconds) = arguments.guided.filter(|seconds| !(*seconds > 0.0 && *seconds <= LONGEST)) {

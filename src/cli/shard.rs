@@ -4,7 +4,7 @@ use super::Failure;
 use crate::haptize::Shard;
 use std::str::FromStr;
 
-/// How a scheduler tells a task its number.
+/// How a scheduler passes a task its number.
 struct Variable {
     name: &'static str,
     /// Number of its first task.
@@ -50,7 +50,7 @@ impl ShardChoice {
     /// Returns the shard that is meant; `variable` looks up the environment.
     ///
     /// # Errors
-    /// Where the environment does not tell, tells several, or one that there is not.
+    /// The environment holds no number, several, or one out of range.
     pub fn shard(self, variable: impl Fn(&str) -> Option<String>) -> Result<Shard, Failure> {
         let count = match self {
             Self::Given(shard) => return Ok(shard),
@@ -103,7 +103,7 @@ mod tests {
         }
         let none = ShardChoice::Auto(4).shard(|_| None).unwrap_err().to_string();
         assert!(none.contains("SLURM_ARRAY_TASK_ID") && none.contains("--shard 0/4"), "{none}");
-        // A job of Grid Engine that is no array; and an array that was submitted anew for some tasks keeps their numbers.
+        // A job of Grid Engine that is no array; and an array that was submitted again for some tasks keeps their numbers.
         assert!(ShardChoice::Auto(4).shard(|name| (name == "SGE_TASK_ID").then(|| "undefined".into())).is_err());
         assert_eq!("3/8".parse::<ShardChoice>().unwrap().shard(|_| None).unwrap(), Shard { index: 3, count: 8 });
         assert!("auto/0".parse::<ShardChoice>().is_err() && "auto".parse::<ShardChoice>().is_err());

@@ -67,7 +67,7 @@ pub struct Detection {
     nodes: Vec<DVec3>,
     at_rest: Vec<RestDistance>,
     deformation: Deformation,
-    /// Facets that the ball at hand may feel.
+    /// Facets that the current ball may feel.
     facets: Vec<Closest>,
     parts: Vec<f64>,
 }
@@ -278,7 +278,7 @@ fn find_at_rest(surface: &RestSurface, x: DVec3, known: &mut RestDistance) -> Cl
 }
 
 /// The contact (or near miss, with depth <= 0) of proxy node `i` at `x` with the closest point of `facet`, on the side that
-/// `pseudonormal` tells.
+/// `pseudonormal` decides.
 #[inline(always)]
 fn contact_with(model: &Model, i: usize, x: DVec3, closest: &Closest, facet: &Facet, pseudonormal: DVec3) -> Contact {
     let radius = model.chain.nodes[i].radius;

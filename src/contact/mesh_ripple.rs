@@ -15,9 +15,9 @@ use std::fmt;
 /// By how much the force on a contact point changes while it slides over a facet at constant depth, relative to its mean [1].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeshRipple {
-    /// Of the facet in the middle of all that can be reached.
+    /// Median over the facets that can be reached.
     pub median: f64,
-    /// Of the worst facet.
+    /// Value at the worst facet.
     pub worst: f64,
     /// Mean length of the mesh's edges [m].
     pub edge: f64,
@@ -47,7 +47,7 @@ impl MeshRipple {
         Some(Self { median, worst, edge: model.surface.mean_edge, skin: model.object.skin.is_some() })
     }
 
-    /// What to do where the mesh shows through by more than [`RIPPLE_WARNING`].
+    /// Returns the remedy if the ripple exceeds [`RIPPLE_WARNING`].
     #[must_use]
     pub fn remedy(&self) -> Option<&'static str> {
         (self.median > RIPPLE_WARNING).then_some(if self.skin {
@@ -95,7 +95,7 @@ mod tests {
         MeshRipple::new(&Model::new(object, &chain, contact(1e4))).unwrap()
     }
 
-    /// Of a body with a skin the ripple falls like h^2 ln(1/h) with the mesh's edges h, as the deflection of a plate within h of
+    /// The ripple of a body with a skin falls like h^2 ln(1/h) with the mesh's edges h, as the deflection of a plate within h of
     /// a force does; of one of springs it does not fall at all.
     #[test]
     fn a_skin_smooths_what_springs_do_not() {

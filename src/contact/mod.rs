@@ -26,7 +26,7 @@ pub use proximity::Proximity;
 pub use solver::Solver;
 pub(crate) use solvers::{SHARE, Solvers};
 
-/// What became of one configuration.
+/// How the solution of one configuration ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Status {
@@ -66,7 +66,7 @@ impl Status {
 /// Equilibrium of the object with the proxy at one configuration.
 #[derive(Clone, Debug)]
 pub struct Equilibrium {
-    /// What became of it.
+    /// How it ended.
     pub status: Status,
     /// Steps tried (`energy`, `linearised`) or passes (`paper`).
     pub iterations: u32,

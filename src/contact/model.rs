@@ -40,7 +40,7 @@ pub struct Model<'a> {
     pub mobility: f64,
     /// The same for what facets stand off the flat triangles by, where contact is with a smooth surface [m/N].
     bulge_mobility: f64,
-    /// Of each leaf of the surface's tree, whether the compliance covers all nodes of its facets.
+    /// Whether the compliance covers all nodes of the facets of a leaf (leaves of the surface's tree).
     pub(super) covered_leaves: Arc<Vec<bool>>,
 }
 

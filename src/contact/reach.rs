@@ -65,7 +65,7 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
     }
 }
 
-/// Of each leaf of the tree of `surface`, whether `compliance` covers all nodes of its facets.
+/// Returns whether `compliance` covers all nodes of the facets of each leaf of the tree of `surface`.
 pub(super) fn covered_leaves(surface: &RestSurface<'_>, compliance: &Compliance) -> Vec<bool> {
     let covered = |t: &u32| surface.carriers(*t).0.iter().all(|&node| compliance.place(node).is_some());
     surface.bounds.leaves.iter().map(|leaf| leaf.triangles.iter().all(covered)).collect()

@@ -22,7 +22,7 @@ pub struct Solver<'a> {
     detection: Detection,
     energy: EnergySearch,
     paper: PaperIteration,
-    /// What holds the displacement of the last configuration.
+    /// Search that holds the displacement of the last configuration.
     held_by: HeldBy,
     /// That displacement, where it was asked for [m].
     displacement: Option<Vec<f64>>,
@@ -97,7 +97,7 @@ impl<'a> Solver<'a> {
         self.solve_with_guess(q, forces, self.model.kc, limits)
     }
 
-    /// What `search` finds at `q`, where there is contact.
+    /// Returns the equilibrium that `search` finds at `q`, if there is contact.
     fn find(&mut self, q: &[f64], search: impl FnOnce(&mut Self, &mut Equilibrium) -> SolverStats) -> Equilibrium {
         let model = self.model;
         (self.held_by, self.displacement) = (HeldBy::Nothing, None);

@@ -26,7 +26,7 @@ impl<'a> Solvers<'a> {
         self.solvers.len()
     }
 
-    /// What `solve` makes of each item, in the same order, on the pool that this is called on, else on the program's.
+    /// Applies `solve` to each item and returns the results in the same order. Runs on the thread pool of the caller, else on the program's.
     pub fn map<T: Sync, R: Send>(&self, items: &[T], solve: impl Fn(&mut Solver<'a>, &T) -> R + Sync) -> Vec<R> {
         items
             .par_iter()

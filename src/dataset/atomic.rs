@@ -99,7 +99,7 @@ pub fn resolved(path: &Path) -> io::Result<PathBuf> {
 /// Replaces the file `target` by what `write` writes. Unless the target says otherwise, it grows under a name that no other file has.
 ///
 /// # Errors
-/// What `write` or the system says; then the old file is untouched and the temporary one is gone.
+/// Returns the error of `write` or of the system; then the old file is untouched and the temporary one is gone.
 pub fn replace_file<'a>(
     target: impl Into<Target<'a>>,
     write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
@@ -147,7 +147,7 @@ fn locked_in(folder: &Path) -> io::Result<NamedTempFile> {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let file = builder.tempfile_in(folder)?;
-        // A file system without locks has no abandoned files that can be told.
+        // A file system without locks has no abandoned files that can be recognised.
         if file.as_file().lock().is_err() || file.path().exists() {
             return Ok(file);
         }

@@ -19,7 +19,7 @@ pub enum Error {
     Memory {
         /// The file.
         path: PathBuf,
-        /// What is needed and what there is.
+        /// Bytes needed and bytes available.
         shortage: Shortage,
     },
     /// The folder is missing or read-only, or the disk is full. Whatever stood at `path` before is still there.

@@ -69,7 +69,7 @@ impl Grid {
     /// points than can be counted.
     ///
     /// # Errors
-    /// What is wrong.
+    /// Problem, in words.
     pub fn check(&self) -> Result<usize, String> {
         if self.axes.is_empty() || self.axes.len() > MAX_JOINTS {
             return Err(format!("the grid has {} axes, not 1 to {MAX_JOINTS}", self.axes.len()));

@@ -114,7 +114,7 @@ pub struct Provenance {
     pub adapter: String,
     /// Date of the bake, ISO 8601, UTC.
     pub date: String,
-    /// What happened on the way, such as a GPU that was lost and from which grid point on the CPU solved instead.
+    /// Notices of the run, such as a GPU that was lost and the grid point from which the CPU solved instead.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notices: Vec<String>,
     /// The error that the bake measured; absent where that was left out.

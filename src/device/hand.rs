@@ -33,7 +33,7 @@ pub enum HandError {
     /// Hand and device have no inertia at a joint.
     #[error("hand and device have no inertia at joint {0}: give the device or the hand a positive one")]
     Inertia(usize),
-    /// The pointer is told a place that is none.
+    /// The pointer receives an invalid place.
     #[error("{0:?} is no place for a hand: its coordinates must be finite and within reach")]
     Place(JointVector),
 }

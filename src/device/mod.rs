@@ -16,7 +16,7 @@
 //! | `inverse3` | Haply Inverse3, through the maker's service |
 //! | `serial` | Haply 2DIY and WoodenHaptics |
 //! | `vendor` | Force Dimension and 3D Systems, through their makers' libraries |
-//! | `simulated` | a simulated device that fails as it is told |
+//! | `simulated` | a simulated device that fails on command |
 
 mod catalogue;
 mod check;

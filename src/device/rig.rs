@@ -20,7 +20,7 @@ pub struct DeviceRig<'a> {
     hand: Option<Key>,
     /// Waits until `period` [s] after the last tick; returns the time since then [s].
     wait: Box<dyn FnMut(f64) -> f64 + 'a>,
-    /// Ends the scan at once, not after the point at hand: motors are on.
+    /// Ends the scan at once, not after the current point: motors are on.
     stop: &'a AtomicBool,
     time: f64,
 }

@@ -1,4 +1,4 @@
-//! A device that is simulated behind the protocol of a real one, and fails as it is told: what rehearses the safety
+//! A device that is simulated behind the protocol of a real one, and fails on command: what rehearses the safety
 //! layer.
 
 use super::{Command, Coordinates, Device, Halt, Hardware, Limits, Measurement};

@@ -90,7 +90,7 @@ fn fill<T: Send>(
 
 impl TorqueField {
     /// Torques at `configurations`, one entry per joint in each row of both [rad or m; N m or N], on all cores; and where it is asked for
-    /// the number of the status of each, as [`Sample::status`] tells it. The same numbers as [`TorqueField::sample`] gives.
+    /// the number of the status of each, as [`Sample::status`] reports it. The same numbers as [`TorqueField::sample`] gives.
     ///
     /// # Errors
     /// When the lengths do not fit, or a coordinate is not finite.

@@ -73,7 +73,7 @@ impl BoundaryLayer {
     }
 
     /// Depth of each grid point behind the boundary where the contact index is `threshold` Ith [sqrt(J)]. `greatest`:
-    /// largest size of a torque in the dataset [sqrt(J)]; depths beyond it are told apart no further, since nothing is held
+    /// largest size of a torque in the dataset [sqrt(J)]; depths beyond it are not distinguished, since nothing is held
     /// back there.
     #[must_use]
     pub fn depths_behind_index(&self, lattice: &Lattice, free: &[bool], threshold: f64, greatest: f64) -> Vec<f64> {

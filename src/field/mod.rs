@@ -67,7 +67,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// What is known of the configuration: [`Status::Outside`] outside the grid or beside a grid point that was not computed,
+    /// Returns the status of the configuration: [`Status::Outside`] outside the grid or beside a grid point that was not computed,
     /// [`Status::Unconverged`] beside one that did not converge; else whether there is contact.
     #[must_use]
     pub fn status(&self) -> Status {

@@ -4,7 +4,7 @@ use super::{FieldError, Flags, stencil::Lattice};
 use crate::{JointMatrix, contact::Status, dataset::Dataset, tolerances::GREATEST_INPUT};
 use std::collections::VecDeque;
 
-/// What is not interpolated.
+/// Values of a grid point that are not interpolated.
 #[derive(Clone, Copy)]
 pub(super) struct Point {
     /// Object nodes in contact.

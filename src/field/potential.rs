@@ -47,7 +47,7 @@ pub(super) struct Gradient {
     pub energy: f64,
     /// Whether w is positive.
     pub contact: bool,
-    /// What multilinear interpolation of w over the corners in contact is to be multiplied by to give w, 0 to 1: contact
+    /// Factor from the multilinear interpolation of w over the corners in contact to w, 0 to 1: contact
     /// forces, which grow like w, end with it at the boundary.
     pub share: f64,
 }

@@ -36,7 +36,7 @@ pub struct Stencil {
     pub points: [usize; MAX_CORNERS],
     /// Interpolation weight of each corner; they sum to one.
     pub weights: [f64; MAX_CORNERS],
-    /// Fraction of the cell along each axis, 0 to 1. Bit a of a corner's number tells its side along axis a.
+    /// Fraction of the cell along each axis, 0 to 1. Bit a of a corner's number is its side along axis a.
     pub fractions: [f64; MAX_JOINTS],
     /// One inside the grid, falling to zero one cell outside.
     pub fade: f64,

@@ -62,9 +62,9 @@ pub enum BakeError {
 
 /// How a scene is haptized.
 pub struct Bake<'a> {
-    /// What is haptized.
+    /// Scene.
     pub scene: &'a Scene,
-    /// What solves.
+    /// Backend that solves.
     pub backend: BackendChoice,
     /// Random configurations at which the dataset's error is measured; 0 leaves it out. By default a tenth of the points in contact, at
     /// least 100 and at most 1,000.

@@ -9,7 +9,7 @@ use crate::{
 };
 use std::sync::Arc;
 
-/// What may be asked for.
+/// Choices of a backend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum BackendChoice {
     /// A hardware GPU, else the CPU.
@@ -27,7 +27,7 @@ pub enum ChosenBackend<'a> {
     Cpu(CpuBackend<'a>),
     /// Thousands of configurations at a time, f32; the CPU once the device is lost for good.
     Gpu {
-        /// What solves.
+        /// Backend that solves.
         solver: Box<WithFallback<'a, GpuSolver<'a>>>,
         /// A good number of configurations for one call.
         chunk: usize,
@@ -88,7 +88,7 @@ impl<'a> ChosenBackend<'a> {
         }
     }
 
-    /// What solves, as a dataset's provenance says it.
+    /// Returns the backend's name as a dataset's provenance states it.
     #[must_use]
     pub fn adapter(&self) -> String {
         match self {
@@ -107,7 +107,7 @@ impl<'a> ChosenBackend<'a> {
     }
 }
 
-/// What else can compute and draw than a GPU that fails, where the CPU cannot.
+/// Remedy for a GPU that fails, if the CPU cannot take its place.
 pub const OTHER_ADAPTER: &str = "another adapter (set WGPU_ADAPTER_NAME)";
 
 /// Returns `message`, in which a GPU's failure may name the option `--backend cpu`, with the remedy `instead` for whom has no such option.

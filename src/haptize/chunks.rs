@@ -66,13 +66,13 @@ impl Store for Columns {
     }
 }
 
-/// What there is of a sweep before a run.
+/// State of a sweep before a run.
 pub(super) struct Begun {
     pub tally: Tally,
     pub provenance: Provenance,
 }
 
-/// What a run made of a sweep's points.
+/// Results of a run.
 pub(super) struct Solved {
     pub tally: Tally,
     pub facts: RunFacts,
@@ -113,7 +113,7 @@ impl ChunkSize {
 /// A stretch of points under way.
 struct Chunk {
     points: Range<usize>,
-    /// Of those that are to be solved.
+    /// Configurations that are to be solved.
     configurations: Vec<JointVector>,
 }
 

@@ -13,7 +13,7 @@ use bytemuck::Pod;
 use glam::DVec3;
 use std::collections::{BTreeMap, TryReserveError};
 
-/// What every point of a sweep has.
+/// Columns of a sweep.
 #[derive(Clone, Copy)]
 pub(super) struct Shape {
     pub joints: usize,
@@ -27,7 +27,7 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// What every point has a fixed number of.
+    /// Returns the number of entries in each column of fixed width.
     pub fn width(self) -> Width {
         Width::new(self.joints, self.with_tangent, self.with_touches)
     }
@@ -45,7 +45,7 @@ pub(super) struct Width {
 }
 
 impl Width {
-    /// Of `joints` joints.
+    /// Creates the widths for `joints` joints.
     pub fn new(joints: usize, with_tangent: bool, with_touches: bool) -> Self {
         let tangent = if with_tangent { JointMatrix::entries(joints) } else { 0 };
         Self { joints, tangent, touches: with_touches.into() }

@@ -8,7 +8,7 @@ use crate::{
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::convert::Infallible;
 
-/// Shares of each thread in a chunk: progress is told several times a second, and threads rarely wait at a chunk's end.
+/// Shares of each thread in a chunk: progress is reported several times a second, and threads rarely wait at a chunk's end.
 const SHARES: usize = 32;
 
 /// Solves configurations on all cores.
@@ -40,7 +40,7 @@ impl<'a> CpuBackend<'a> {
         SHARE * SHARES * self.threads()
     }
 
-    /// What [`crate::dataset::Provenance::adapter`] says of this backend.
+    /// Returns the name of this backend in [`crate::dataset::Provenance::adapter`].
     #[must_use]
     pub fn adapter() -> String {
         format!("{} cores, f64", std::env::consts::ARCH)

@@ -21,7 +21,7 @@ pub enum SweepError {
         points: usize,
         /// Memory of their columns [bytes].
         bytes: usize,
-        /// What the allocator said.
+        /// Error of the allocator.
         source: TryReserveError,
     },
     /// The columns need more memory than is left.
@@ -32,7 +32,7 @@ pub enum SweepError {
     Shortage {
         /// Grid points.
         points: usize,
-        /// What is needed and what there is.
+        /// Bytes needed and bytes available.
         shortage: Shortage,
     },
     /// The backend failed; what was solved before is in the part, where there is one.
@@ -70,7 +70,7 @@ pub enum SweepError {
     Folder {
         /// The part.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// There is a folder of the output's name.
@@ -86,7 +86,7 @@ pub enum SweepError {
     Part {
         /// The part.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// Another process writes the part.
@@ -110,7 +110,7 @@ pub enum SweepError {
     ForeignPart {
         /// The part.
         path: PathBuf,
-        /// What gave it away.
+        /// Evidence of the damage, in words.
         reason: String,
     },
     /// The part of another sweep.
@@ -118,7 +118,7 @@ pub enum SweepError {
     OtherPart {
         /// The part.
         path: PathBuf,
-        /// What is different.
+        /// Difference, in words.
         difference: &'static str,
     },
     /// The finished dataset could not be written; its points are in the part.

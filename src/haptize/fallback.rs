@@ -1,8 +1,8 @@
 //! A backend on a device that may fail for good, and the CPU in its place from then on.
 //!
 //! A GPU is lost by a driver's reset, by sleep, by being pulled out, or by other programs that take its memory. Its solver
-//! first tries again by itself with smaller batches; what it cannot mend ends here. The batch at hand and all that follow are
-//! then solved by the CPU, so that a sweep of hours goes on, and [`Backend::notices`] tells it.
+//! first tries again by itself with smaller batches; what it cannot mend ends here. The current batch and all that follow are
+//! then solved by the CPU, so that a sweep of hours goes on, and [`Backend::notices`] reports it.
 
 use super::{Backend, CpuBackend};
 use crate::{
@@ -17,7 +17,7 @@ pub struct WithFallback<'a, B> {
     /// `None` once it has failed.
     device: Option<B>,
     cpu: Option<CpuBackend<'a>>,
-    /// What the device is called.
+    /// Name of the device.
     name: String,
     notices: Vec<String>,
     /// By the device, before it failed.
@@ -30,7 +30,7 @@ impl<'a, B: Backend> WithFallback<'a, B> {
         Self { model, device: Some(device), cpu: None, name: name.to_string(), notices: Vec::new(), left_to_cpu: 0 }
     }
 
-    /// What the device is called.
+    /// Name of the device.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name

@@ -27,7 +27,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Of what `bytes` takes, which says it for a number of nodes of the proxy in contact at each point.
+    /// Evaluates `bytes`, a function of the number of proxy nodes in contact at each point, at its two ends.
     pub(super) fn of(proxy_nodes: usize, bytes: impl Fn(usize) -> usize) -> Self {
         Self { least: bytes(0), most: bytes(proxy_nodes) }
     }

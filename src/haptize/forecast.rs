@@ -26,7 +26,7 @@ const FEWEST_POINTS: usize = 2 * PORTION * PORTIONS;
 /// Seed of the sample.
 const SEED: u64 = 0x2545_f491_4f6c_dd1d;
 
-/// What a sweep is expected to take.
+/// Expected cost of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Forecast {
     /// Fraction of the points in contact [1].

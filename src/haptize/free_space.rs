@@ -52,7 +52,7 @@ pub struct FreeSpace<'a> {
     most: usize,
 }
 
-/// What is known of some grid points' gaps before anything is solved.
+/// Bounds on the gaps of some grid points, known before anything is solved.
 pub struct FreeGaps {
     first: usize,
     /// Bits of a positive lower bound of the gap [m]; of NaN where the point is to be solved.
@@ -69,7 +69,7 @@ struct Block {
 /// A place on or between grid points, in steps from the first along each axis.
 type Place = [f64; MAX_JOINTS];
 
-/// What is known of a block.
+/// State of a block.
 enum Found {
     /// It is skipped.
     Free,

@@ -12,7 +12,7 @@ use serde::Serialize;
 pub struct Inspection {
     /// Configuration [rad or m].
     pub q: Vec<f64>,
-    /// What became of it, in lower case.
+    /// Status, in lower case.
     pub status: String,
     /// Iterations of the contact solver.
     pub iterations: u32,
@@ -39,7 +39,7 @@ pub struct ProxyNode {
     pub position: DVec3,
     /// Columns of J_i, one per joint [m/rad, or 1].
     pub jacobian: Vec<DVec3>,
-    /// What it touches: nothing, one feature of the surface, or all that its radius involves.
+    /// Contacts: none, one feature of the surface, or every feature within its radius.
     pub contacts: Vec<Contact>,
 }
 
@@ -66,7 +66,7 @@ pub struct ObjectNode {
 }
 
 impl Inspection {
-    /// Solves the configuration `q` and tells all of it.
+    /// Solves the configuration `q` and returns every detail.
     #[must_use]
     pub fn new(model: &Model<'_>, q: &[f64]) -> Self {
         let mut solver = Solver::new(model);
@@ -112,7 +112,7 @@ impl Inspection {
         }
     }
 
-    /// tau once more, as the sum of J_i^T (force on x_i) over the contacts told [N m or N].
+    /// tau once more, as the sum of J_i^T (force on x_i) over the listed contacts [N m or N].
     #[must_use]
     pub fn torque_of_contacts(&self) -> JointVector {
         let mut torque = JointVector::zeros(self.q.len());

@@ -37,12 +37,12 @@ use std::{
 /// Points that are looked at together [1]: enough for all threads, few enough that what is known of them takes little memory.
 const STRETCH: usize = 1 << 14;
 
-/// What the correction did.
+/// Report of the correction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Lowered {
     /// Points with a new equilibrium, lower than that from rest.
     pub points: usize,
-    /// Of these, those that had not converged from rest.
+    /// Points among them that had not converged from rest.
     pub converged: usize,
     /// Greatest decrease of U at a point that had converged, over U [1].
     pub greatest: f64,

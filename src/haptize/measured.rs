@@ -30,7 +30,7 @@ use std::{
 /// limits. An rms over the fewest is good to a tenth, over the most to a thirtieth.
 const CONFIGURATIONS: Range<usize> = 100..1000;
 
-/// What draws the configurations: another seed than the pilot's.
+/// Seed of the random configurations; differs from the pilot's.
 const SEED: u64 = 0x94d0_49bb_1331_11eb;
 
 /// Most grid points of which an interpolation is formed as a whole [1]: some 50 MB.
@@ -120,7 +120,7 @@ impl ErrorCheck<'_> {
     }
 }
 
-/// What an interpolation of the grid, with its threshold and slope, gives at each place; formed as a whole of at most `whole` points.
+/// Evaluates an interpolation of the grid, with its threshold and slope, at each place; grids of at most `whole` points are formed as a whole.
 fn interpolated(
     grid: &Grid,
     table: &Table<'_>,

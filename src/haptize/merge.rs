@@ -92,7 +92,7 @@ pub enum MergeError {
         "{path}: holds no shards (files ending in .{EXTENSION}); name the folder that `haptize bake --shard` wrote to"
     )]
     NoShards {
-        /// What was to be read.
+        /// File that was read.
         path: PathBuf,
     },
     /// A folder or file cannot be read.
@@ -100,7 +100,7 @@ pub enum MergeError {
     Unreadable {
         /// Its path.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// A file that is no shard.
@@ -108,10 +108,10 @@ pub enum MergeError {
     NoShard {
         /// Its path.
         path: PathBuf,
-        /// What gave it away.
+        /// Evidence of the damage, in words.
         reason: String,
     },
-    /// What another bake or merge has left is in the way.
+    /// The output is in the way: it was left by another bake or merge.
     #[error(
         "{path}: holds what an unfinished bake or a merge of other shards has left; delete it, or choose another output"
     )]
@@ -129,7 +129,7 @@ pub enum MergeError {
         path: PathBuf,
         /// Another one.
         other: PathBuf,
-        /// What is different.
+        /// Difference, in words.
         difference: &'static str,
     },
     /// Not all shards are there.
@@ -291,7 +291,7 @@ impl Merge {
         Ok(())
     }
 
-    /// What provenance will tell: shards that another backend than that of the first one solved, then the shards' own notices.
+    /// Returns the notices of the merged dataset: shards solved by another backend than the first one, then the shards' own notices.
     fn notices(&self) -> Vec<String> {
         let mut solved_by = BTreeMap::<_, Vec<usize>>::new();
         for (&index, shard) in &self.shards {

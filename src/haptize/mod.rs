@@ -54,7 +54,7 @@ pub use sweep::{Progress, Run, Sweep};
 
 use crate::{JointVector, contact::Equilibrium};
 
-/// What solves equation (2) for many configurations: the CPU on all cores, or a GPU.
+/// Solver of equation (2) for many configurations: the CPU on all cores, or a GPU.
 ///
 /// The result for a configuration depends on nothing else: not on the others of its batch, nor on earlier batches.
 pub trait Backend {
@@ -67,13 +67,13 @@ pub trait Backend {
     /// When the device fails; nothing of the batch is returned then.
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Self::Error>;
 
-    /// What happened since the last call that whoever uses the results should know, a sentence without its full stop each. It
+    /// Returns what a user of the results should know of the time since the last call, each a sentence without its full stop. It
     /// holds from the first configuration of the last batch on, and goes into the dataset's provenance.
     fn notices(&mut self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Of all configurations so far, how many the device left to the CPU because its precision or room did not decide them.
+    /// Returns the number of configurations so far that the device left to the CPU, for want of precision or room.
     fn left_to_cpu(&self) -> usize {
         0
     }

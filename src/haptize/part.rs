@@ -76,7 +76,7 @@ impl Binding {
         Width::new(self.grid.joints(), self.with_tangent, self.with_touches)
     }
 
-    /// What differs from `other` so that its numbers cannot be continued; the date may differ.
+    /// Returns the first difference from `other` that forbids to continue it; the date may differ.
     fn difference(&self, other: &Self) -> Option<&'static str> {
         let (mine, its) = (&self.provenance, &other.provenance);
         let differences = [
@@ -88,7 +88,7 @@ impl Binding {
         self.other_sweep(other).or(different)
     }
 
-    /// What differs from `other` so that the two are not of one dataset, whatever solves them and whichever points they are to hold.
+    /// Returns the first difference from `other` that makes them parts of different datasets, whatever solves them and whichever points they hold.
     pub fn other_sweep(&self, other: &Self) -> Option<&'static str> {
         let (mine, its) = (&self.provenance, &other.provenance);
         let differences = [
@@ -346,7 +346,7 @@ impl Part {
     }
 }
 
-/// What a frame holds.
+/// Contents of a frame.
 pub(super) enum Frame {
     /// Results of consecutive points.
     Block,

@@ -35,7 +35,7 @@ const COARSER: [f64; 4] = [1.0, std::f64::consts::SQRT_2, 2.0, 2.0 * std::f64::c
 /// Configurations in contact that the pilot asks for: an rms over so many is good to a tenth.
 const CONTACTS: usize = 200;
 
-/// What draws the configurations: others than those at which a bake measures its error.
+/// Seed of the random configurations; differs from that of the configurations at which a bake measures its error.
 const SEED: u64 = 0xbf58_476d_1ce4_e5b9;
 
 /// Tolerances of the solver that are tried, roughest first [1].
@@ -85,7 +85,7 @@ pub struct Trial {
     pub worst: f64,
 }
 
-/// What the pilot says of one interpolation.
+/// Forecast of the pilot for one interpolation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Prospect {
     /// As the scene names it.
@@ -98,7 +98,7 @@ pub struct Prospect {
     pub points: f64,
 }
 
-/// What a pilot found.
+/// Result of a pilot.
 #[derive(Clone, Debug, Serialize)]
 pub struct Pilot {
     /// Rms error to stay below [N m].
@@ -111,9 +111,9 @@ pub struct Pilot {
     pub configurations: usize,
     /// See `configurations`.
     pub in_contact: usize,
-    /// What was tried.
+    /// Trials.
     pub trials: Vec<Trial>,
-    /// What follows, fewest points first; without interpolations whose error does not fall.
+    /// Forecasts, fewest points first; without interpolations whose error does not fall.
     pub prospects: Vec<Prospect>,
     /// Tolerance of the solver that is good enough [1].
     pub tolerance: f64,
@@ -123,7 +123,7 @@ pub struct Pilot {
     pub bytes_per_point: f64,
 }
 
-/// What an error takes.
+/// Cost of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Cost {
     /// Rms error over the rms torque [1].
@@ -140,7 +140,7 @@ pub struct Cost {
     pub is_known: bool,
 }
 
-/// What is going to be baked.
+/// Choice of the grid to bake.
 #[derive(Clone, Debug, Serialize)]
 pub struct Choice {
     /// The scene, whose text says the same.
@@ -252,7 +252,7 @@ impl Pilot {
         })
     }
 
-    /// What an rms error of `relative` of the rms torque takes with the interpolation of `scene`, which was tried; `None` where its error does
+    /// Returns the cost of an rms error of `relative` of the rms torque with the interpolation of `scene`, which was tried; `None` if its error does
     /// not fall.
     #[must_use]
     pub fn cost(&self, scene: &Scene, relative: f64) -> Option<Cost> {
@@ -271,7 +271,7 @@ impl Pilot {
         spacing::spaced(scene, |steps| (steps / coarser).ceil())
     }
 
-    /// What to bake: the fewest points with which the measured order keeps the aim, of at most `limit`.
+    /// Chooses the fewest points, at most `limit`, with which the measured order keeps the aim.
     ///
     /// # Errors
     /// [`PilotError::OutOfReach`] where there are none; it says what the pilot measured, and what would help.
@@ -331,7 +331,7 @@ fn percent(share: f64) -> impl fmt::Display {
     if percent < 1.0 { format!("{percent:.2}") } else { format!("{percent:.1}") }
 }
 
-/// What each interpolation needs for the error `aim`, fewest points first; no coarser grid than the coarsest that was tried.
+/// Returns the cost of the error `aim` for each interpolation, fewest points first; no coarser grid than the coarsest that was tried.
 fn prospects(trials: &[Trial], aim: f64, joints: usize) -> Vec<Prospect> {
     let of = |interpolation: Interpolation| {
         let rows = || trials.iter().filter(move |trial| trial.interpolation == interpolation.name());
@@ -371,7 +371,7 @@ fn errors(
     Ok(reference.errors(|q| field.sample(q).torque))
 }
 
-/// What baking `scene` into a file takes up.
+/// Returns the memory and disk space that baking `scene` into a file takes.
 fn footprint(scene: &Scene, backend: BackendChoice) -> Result<Footprint, PilotError> {
     let ground = Ground::new(scene)?;
     let model = ground.model(scene)?;

@@ -14,13 +14,13 @@ const MEMORY_MARGIN: f64 = 1.25;
 /// Points that are solved to know the time of one, at most [1].
 const SAMPLE: usize = 512;
 
-/// Of them, points that are solved at once [1].
+/// Points among them that are solved at once [1].
 const PORTION: usize = 64;
 
 /// Time after which no more of them are solved [s].
 const LONGEST: f64 = 1.0;
 
-/// What a shard is going to take.
+/// Expected cost of a shard.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ShardCost {
     /// From 0.
@@ -35,18 +35,18 @@ pub struct ShardCost {
     pub bytes: usize,
 }
 
-/// What a bake in shards is going to take.
+/// Expected cost of a bake in shards.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     /// Grid points.
     pub points: usize,
-    /// Of these, points that are solved.
+    /// Points among them that are solved.
     pub solved: usize,
     /// Threads that solved the sample.
     pub threads: usize,
     /// `cpu` or `gpu`.
     pub backend: &'static str,
-    /// Setting up, which each shard does anew: object, compliance, and proving points free [s].
+    /// Setting up, which each shard repeats: object, compliance, and proving points free [s].
     pub setup: f64,
     /// The sample; absent where the grid is too small.
     pub forecast: Option<Forecast>,

@@ -27,7 +27,7 @@ const ROUNDS: usize = 16;
 /// Shallow contacts that are asked for: those at the edges of a range lie within a hundredth of it.
 const CONTACTS: usize = 4000;
 
-/// What draws the configurations.
+/// Seed of the random configurations.
 const SEED: u64 = 0xd1b5_4a32_d192_ed03;
 
 /// Depth up to which contact counts as shallow, over the body's size [1]: from about a fifth on a soft body has several equilibria, between
@@ -38,7 +38,7 @@ const SHALLOW: f64 = 0.2;
 /// outermost ones there are.
 const MARGIN: f64 = 0.02;
 
-/// Parts of a joint's limits for which contact is told apart [1].
+/// Parts of a joint's limits for which contact is listed separately [1].
 const PARTS: usize = 10;
 
 /// Points of the grid over the ranges from which a pilot begins [1]: more than the pilot's own.
@@ -56,7 +56,7 @@ const LEAST_WAY: f64 = 1e-3;
 /// To what ends of ranges are rounded, outwards [rad or m].
 const ROUNDED_TO: f64 = 1e-4;
 
-/// Depths for which the share of contact is told, over the body's size [1].
+/// Depths for which the share of contact is listed, over the body's size [1].
 const DEPTHS: [f64; 6] = [0.02, 0.05, 0.1, 0.2, 0.3, 0.5];
 
 /// Contact along one joint.
@@ -79,7 +79,7 @@ pub struct JointReach {
 pub struct DepthShare {
     /// [m]
     pub depth: f64,
-    /// Of all contact within the joint limits, the share that is at most so deep [1].
+    /// Share of all contact within the joint limits that is at most this deep [1].
     pub share: f64,
 }
 
@@ -120,7 +120,7 @@ pub enum ReachError {
     NoContact {
         /// Configurations measured.
         configurations: usize,
-        /// What was asked for, where there is deeper contact.
+        /// Requested depth, if there is deeper contact.
         depth: String,
     },
     /// The scene cannot take the grid.
@@ -131,7 +131,7 @@ pub enum ReachError {
     Stopped,
 }
 
-/// What was met at a configuration.
+/// Depth and status at a configuration.
 #[derive(Clone, Copy)]
 struct Met {
     q: JointVector,

@@ -7,16 +7,16 @@ use crate::object::Skin;
 use serde::Serialize;
 use std::time::Duration;
 
-/// What a sweep did. Serialises to the object that `bake --json` prints.
+/// Report of a sweep. Serialises to the object that `bake --json` prints.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SweepReport {
     /// Grid points.
     pub points: usize,
     /// Points in contact, converged or not.
     pub contact_points: usize,
-    /// Of these, not converged.
+    /// Points among them that did not converge.
     pub unconverged: usize,
-    /// Of these, with more contacts than the solver has room for.
+    /// Points among them with more contacts than the solver has room for.
     pub overflowed: usize,
     /// Greatest relative residual of a converged point [1].
     pub max_residual: f64,
@@ -28,7 +28,7 @@ pub struct SweepReport {
     pub resumed_points: usize,
     /// Points that this run's GPU left to the CPU, because its precision or room did not decide them.
     pub left_to_cpu: usize,
-    /// What the search for lower equilibria found; absent where there was none.
+    /// Result of the search for lower equilibria; absent if there was none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lowered: Option<Lowered>,
     /// Error of the dataset; absent where it was not measured.
@@ -36,7 +36,7 @@ pub struct SweepReport {
     pub error: Option<MeasuredError>,
     /// Wall time of this run [s].
     pub seconds: f64,
-    /// Of this, solving the points from rest [s].
+    /// Part of it spent on solving the points from rest [s].
     pub solving_seconds: f64,
     /// Points solved by this run, over its wall time [1/s].
     pub configurations_per_second: f64,
@@ -48,7 +48,7 @@ pub struct SweepReport {
     pub algorithm: String,
     /// Memory and disk, as they were stated before the sweep.
     pub footprint: Footprint,
-    /// What was expected before the sweep, from a sample of its points; absent where the grid was too small to be sampled.
+    /// Cost expected before the sweep, from a sample of its points; absent if the grid was too small to be sampled.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub forecast: Option<Forecast>,
     /// The object's skin beside its mesh; absent where it has none.
@@ -57,7 +57,7 @@ pub struct SweepReport {
     /// How much a contact point feels the mesh; absent where that was not looked at.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh_ripple: Option<MeshRipple>,
-    /// What was noticed about the object while it was built, and what happened on the way.
+    /// Warnings about the object, then notices of the run.
     pub warnings: Vec<String>,
 }
 
@@ -107,7 +107,7 @@ impl SweepReport {
     }
 }
 
-/// What is known of a run beside its results.
+/// Facts about a run beside its results.
 pub(super) struct RunFacts {
     pub footprint: Footprint,
     pub skipped_points: usize,
@@ -117,7 +117,7 @@ pub(super) struct RunFacts {
     /// By the backend.
     pub left_to_cpu: usize,
     pub lowered: Option<Lowered>,
-    /// Of `time`, solving from rest.
+    /// Part of `time` spent on solving from rest.
     pub solving: Duration,
     pub time: Duration,
 }

@@ -1,7 +1,7 @@
 //! A shard: every n-th stretch of a grid's points, solved by a process of its own, on whatever machine.
 //!
 //! The grid's points are cut into stretches of equal length, and n consecutive stretches make a round. A shard has one stretch of each
-//! round. Its place within the round is drawn anew from round to round: contact is clustered in C-space, and a fixed place could fall on
+//! round. Its place within the round is drawn again from round to round: contact is clustered in C-space, and a fixed place could fall on
 //! the same lines of the grid every time. The cut depends on the grid and on n alone.
 //!
 //! A shard's file is a part (`part.rs`) of its points. It is called `.part` until it is whole, so that whoever finds the name without it
@@ -23,7 +23,7 @@ const STRETCHES: usize = 64;
 /// Fewest points of a stretch [1]: enough for the threads of a machine to share them.
 const SHORTEST: usize = 64;
 
-/// What draws a sample of points.
+/// Seed of the sample of points.
 const SEED: u64 = 0x2545_f491_4f6c_dd1d;
 
 /// Most shards of a sweep [1]: more than any cluster has tasks.
@@ -48,7 +48,7 @@ impl Shard {
     /// Checks that there is such a shard.
     ///
     /// # Errors
-    /// What is wrong.
+    /// Problem, in words.
     pub fn check(self) -> Result<(), String> {
         let Self { index, count } = self;
         if index < count && count <= MOST {
@@ -67,7 +67,7 @@ impl Shard {
         last * length + self.of_round(points, last).len()
     }
 
-    /// What is left of the stretch at hand when the first `done` points of the shard are done; empty at the end.
+    /// Returns the rest of the current stretch once the first `done` points of the shard are done; empty at the end.
     pub(super) fn rest(self, points: usize, done: usize) -> Range<usize> {
         let length = self.stretch(points);
         let stretch = self.of_round(points, done / length);
@@ -175,7 +175,7 @@ impl Sweep<'_> {
             if Contents::read(&file)?.is_whole_of(&binding)? {
                 return Ok((file, None));
             }
-            // Damaged: what is whole of it is kept, unless it is being solved anew already.
+            // Damaged: what is whole of it is kept, unless it is being solved again already.
             let removed = if part_path.exists() { fs::remove_file(&file) } else { fs::rename(&file, &part_path) };
             removed.map_err(failed)?;
         }

@@ -44,7 +44,7 @@ pub struct Progress {
     pub rate: f64,
     /// Memory and disk that the sweep takes, at least and at most.
     pub footprint: Footprint,
-    /// What the sweep is expected to take, where its points were sampled.
+    /// Expected cost of the sweep, if its points were sampled.
     pub forecast: Option<Forecast>,
     /// How much a contact point feels the mesh, where that was looked at.
     pub mesh_ripple: Option<MeshRipple>,
@@ -54,7 +54,7 @@ pub struct Progress {
 pub struct Run<'a> {
     /// Configurations handed to the backend at once, at least 1.
     pub chunk: usize,
-    /// When this becomes true the sweep stops after the chunk at hand, or while the file is put together.
+    /// When this becomes true the sweep stops after the current chunk, or while the file is put together.
     pub stop: &'a AtomicBool,
     /// Called at the start and after every chunk.
     pub progress: &'a mut dyn FnMut(Progress),
@@ -71,13 +71,13 @@ pub struct Sweep<'a> {
     scene: String,
     scene_path: String,
     provenance: Provenance,
-    /// What is kept of each point until the dataset is whole.
+    /// Columns that are kept for each point until the dataset is whole.
     pub(super) shape: Shape,
     /// Whether the dataset holds contact forces.
     pub(super) with_forces: bool,
     /// The object's skin.
     skin: Option<Skin>,
-    /// What was noticed about the object.
+    /// Warnings about the object.
     pub(super) warnings: Vec<String>,
     /// By which free space is found; `None` where all points are solved.
     model: Option<&'a Model<'a>>,
@@ -228,7 +228,7 @@ impl<'a> Sweep<'a> {
         &self.grid
     }
 
-    /// What a sweep in memory, or else into a file, takes up with chunks of `chunk` configurations.
+    /// Returns the memory and disk space of a sweep in memory, or else into a file, with chunks of `chunk` configurations.
     #[must_use]
     pub fn footprint(&self, chunk: usize, in_memory: bool) -> Footprint {
         let points = self.points();
@@ -346,7 +346,7 @@ impl<'a> Sweep<'a> {
         Ok(report)
     }
 
-    /// What its numbers depend on.
+    /// Returns everything on which its results depend.
     pub(super) fn binding(&self) -> Binding {
         Binding {
             grid: self.grid.clone(),

@@ -13,7 +13,7 @@ pub(super) struct Tally {
     pub statuses: StatusCounts,
     /// Greatest residual of a converged point [1].
     pub max_residual: f32,
-    /// Of the points in contact.
+    /// Iterations, summed over the points in contact.
     pub iterations: u64,
     pub max_iterations: u32,
 }

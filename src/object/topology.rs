@@ -6,7 +6,7 @@
 //!
 //! A part inside another is the wall of a cavity, and faces into it; one inside a cavity is a body again, and so on: outward is
 //! away from the material, of which a point is part when an odd number of shells surround it. Parts that cross or touch are refused
-//! (see [`super::crossing`]), so one node of a part tells for all of them which others surround it.
+//! (see [`super::crossing`]), so one node decides for a whole part which others surround it.
 
 use super::{SurfaceDefect, crossing};
 use crate::tolerances::MIN_TRIANGLE_ASPECT;
@@ -62,7 +62,7 @@ pub(super) fn close(nodes: &[DVec3], triangles: &mut [[u32; 3]]) -> Result<Close
     crossing::check(nodes, triangles)?;
     let mut warnings = Vec::new();
     turn_outward(nodes, triangles, &parts, &mut warnings)?;
-    // Turning a triangle renumbers its edges, so the neighbours are found anew.
+    // Turning a triangle renumbers its edges, so the neighbours are found again.
     let (_, across) = pair_edges(triangles)?;
     let topology = Topology { across, around_offsets, around };
     check_fans(&topology, triangles)?;

@@ -49,7 +49,7 @@ pub struct Accounts {
     pub control_dissipation: f64,
     /// Energy U stored in the object, interpolated; zero for datasets without it.
     pub stored: f64,
-    /// What the object had stored at the first tick. Where the dataset does not tell: zero when the loop began out of
+    /// Energy stored in the object at the first tick. If the dataset does not hold it: zero if the loop began out of
     /// contact; else nothing is known until contact first ends, and what was given by then is taken for it.
     pub first_stored: Option<f64>,
     /// Energy that the contact torque gave beyond what the object had stored, field_work + U - U_0; zero for datasets
@@ -63,7 +63,7 @@ pub struct Accounts {
     pub turnover: f64,
 }
 
-/// What acted on the proxy during a step beside coupling, contact torque and stops; zero where the scene names no such
+/// Loads on the proxy during a step beside coupling, contact torque and stops; zero if the scene names no such
 /// effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Extra {
@@ -148,7 +148,7 @@ impl Accounts {
         self.first_stored.map_or(0.0, |first| self.field_work + self.stored - first)
     }
 
-    /// Books the state at a tick: what the object has stored, if the dataset tells, and whether it is touched.
+    /// Books the state at a tick: what the object has stored, if the dataset holds it, and whether it is touched.
     pub(super) fn at_tick(&mut self, kinetic: f64, spring: f64, stored: Option<f64>, touched: bool) {
         self.kinetic = kinetic;
         self.spring = spring;

@@ -89,7 +89,7 @@ mod system {
         (wanted.size, wanted.sched_runtime) = (size_of::<libc::sched_attr>() as u32, TURN);
         // SAFETY: the call takes no pointers.
         wanted.sched_nice = unsafe { libc::getpriority(libc::PRIO_PROCESS, 0) };
-        // SAFETY: `wanted` is valid for reading and tells its own size; the thread is the calling one. The policy is the
+        // SAFETY: `wanted` is valid for reading and holds its own size; the thread is the calling one. The policy is the
         // ordinary one, number zero.
         unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const wanted, 0) };
     }

@@ -3,7 +3,7 @@
 //! Device position y_k is read at t_k; `w_k = (y_k - y_{k-1})/T_{k-1}`. With `v_hat_{k-1} = (x_k - x_{k-1})/T_{k-1}`,
 //! `tau(t) = -bd ydot - Bvc (w_k - v_hat_{k-1}) - Kvc (y_k - x_k)`        on the device, held until t_{k+1};
 //! `tau_k  = -bv v_hat_k - Bvc (v_hat_k - w_k) - Kvc (x_hat_k - y_k)`     on the proxy, implicit in v_hat_k, x_hat_k.
-//! `bd ydot` is the damping that the device has of itself: it is no part of what the motors are told. The alternative,
+//! `bd ydot` is the damping that the device has of itself: it is no part of the motor command. The alternative,
 //! four channels, adds to these torques (`channels.rs`).
 
 use super::npmi::Load;

@@ -209,7 +209,7 @@ impl Haptics {
         Ok(state)
     }
 
-    /// Ends a fault: begins anew at `position` as [`Haptics::start`] does, accounts included, but from the torque that the
+    /// Ends a fault: starts again at `position` as [`Haptics::start`] does, accounts included, but from the torque that the
     /// device is under, so that there is no jump. Never allocates.
     ///
     /// # Errors
@@ -281,7 +281,7 @@ impl Haptics {
         Output { torque, device: state.device, proxy, sample, flags: sample.flags | limited | stopped, fault, accounts }
     }
 
-    /// What the device should be told, moving at `velocity`: coupling, channels, controller [N m or N].
+    /// Returns the torque to command to the device, which moves at `velocity`: coupling, channels, controller [N m or N].
     fn device_torque(
         &self,
         state: &mut State,

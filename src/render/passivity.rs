@@ -8,7 +8,7 @@
 //! - Device, per joint, against its own damping: Colgate's wall, `bd > K T/2 + |Bvc|`, with `K = Kvc`, and `Kvc + c2 Ks` where
 //!   four channels hand the object's stiffness to the device. It does without the hand; a hand that holds the device adds
 //!   its damping to bd.
-//! - Encoder, per joint, where its step Delta is told: `K <= 2 fc / Delta`, fc the device's dry friction (Diolaiti,
+//! - Encoder, per joint, if its step Delta is given: `K <= 2 fc / Delta`, fc the device's dry friction (Diolaiti,
 //!   Niemeyer, Barbagli and Salisbury 2006; Abbott and Okamura 2005).
 
 use super::trace::JointLabel;
@@ -71,7 +71,7 @@ fn wall_bound(spec: &HapticsSpec, joint: usize) -> f64 {
     (2.0 * (spec.device_damping[joint] - spec.coupling_damping[joint]) * spec.rate).max(0.0)
 }
 
-/// 2 fc / Delta [N m/rad], for an encoder whose step is told.
+/// 2 fc / Delta [N m/rad], for an encoder whose step is given.
 fn encoder_bound(spec: &HapticsSpec, joint: usize) -> f64 {
     2.0 * spec.device_friction[joint] / spec.encoder_step[joint]
 }

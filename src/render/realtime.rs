@@ -71,7 +71,7 @@ pub struct Ends {
     pub clear: ClearFault,
 }
 
-/// A way to clear the haptic loop's fault from any thread: its next tick begins anew where the device is, unless the
+/// A way to clear the haptic loop's fault from any thread: its next tick starts again where the device is, unless the
 /// device still fails.
 #[derive(Clone, Debug)]
 pub struct ClearFault(Arc<AtomicBool>);

@@ -1,4 +1,4 @@
-//! A session's recording: all that the haptic loop was told and what it answered, tick by tick. A file of it, read back,
+//! A session's recording: all that the haptic loop received and what it answered, tick by tick. A file of it, read back,
 //! replays the session bit for bit, whether it ran against the clock or not, and finds the first tick that differs.
 //!
 //! CSV: comments (#), one of them with the device's first position and one with the instants of the frames that were kept; a

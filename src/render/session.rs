@@ -96,7 +96,7 @@ impl<'session> Driver<'session> {
         Ok(Self { haptics, device, state, time: 0.0, ticks: 0, restart: false, start: position })
     }
 
-    /// Asks for a fault to be cleared at the next tick: the loop then begins anew where the device is. Nothing happens
+    /// Asks for a fault to be cleared at the next tick: the loop then starts again where the device is. Nothing happens
     /// where there is no fault, or the device still reports no position.
     pub fn clear_fault(&mut self) {
         self.restart = true;

@@ -5,7 +5,7 @@ use hdrhistogram::Histogram;
 use serde::Serialize;
 use std::time::Duration;
 
-/// Longest time that is told apart [ns]: ten seconds; longer ones count as this.
+/// Longest time that is resolved [ns]: ten seconds; longer ones count as this.
 const GREATEST: u64 = 10_000_000_000;
 
 /// Decimal digits kept of each time.
@@ -78,7 +78,7 @@ impl Durations {
         self.0.saturating_record(u64::try_from(duration.as_nanos()).unwrap_or(GREATEST));
     }
 
-    /// What was counted, ten bins a decade from 0.1 us to the longest; the first holds all that was shorter. None
+    /// Returns the histogram, ten bins a decade from 0.1 us to the longest; the first holds all that was shorter. None
     /// where nothing was counted.
     #[must_use]
     pub fn bins(&self) -> Vec<Bin> {

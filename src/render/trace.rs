@@ -31,7 +31,7 @@ pub struct Tick {
     pub proxy: JointVector,
     /// Torque commanded to the device [N m or N].
     pub device_torque: JointVector,
-    /// What the device held of it, and why not all.
+    /// Part of it that the device applied, and why not all.
     pub applied: Applied,
     /// Contact torque tau_bar on the proxy, after the boundary layer [N m or N].
     pub contact_torque: JointVector,

@@ -1,4 +1,4 @@
-//! The watchdog of the haptic loop: what a tick may be told, and what must bring the torque to zero.
+//! The watchdog of the haptic loop: what a tick may receive, and what must bring the torque to zero.
 //!
 //! A tick's inputs are good if the position is one (as many joints as the dataset has, finite, within reach), is fresh,
 //! comes in time, and can have been reached: `|y_k - y_{k-1}| <= speed_limit max(T_{k-1}, T)` at each joint. The nominal T

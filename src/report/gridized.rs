@@ -20,7 +20,7 @@ const HEIGHT: f64 = 420.0;
 const PANEL: f64 = 330.0;
 /// Radius of a disc, in points.
 const DISC: f64 = 3.2;
-/// Most discs of a panel: more cannot be told apart.
+/// Most discs of a panel: more cannot be distinguished.
 const MOST_DISCS: usize = 20_000;
 
 /// A point to be drawn: coordinates of the shown joints, size of the torque.

@@ -10,7 +10,7 @@ pub fn jitter(timing: &Timing) -> Canvas {
     let quantiles =
         [("median", lateness.p50), ("99 %", lateness.p99), ("99.9 %", lateness.p999), ("latest", lateness.max)];
     let mark = |(name, microseconds): (&str, f64)| match timing.lateness_bins.first() {
-        // The first bin holds all that is shorter, too: what lies in it is not told apart.
+        // The first bin holds all that is shorter, too: its times are not distinguished.
         Some(first) if microseconds < first.to => {
             (first.from, format!("{name} under {} µs", ticks::number(first.to, 1)))
         }

@@ -35,7 +35,7 @@ pub(super) struct Messages {
 /// A message: topic, log time [ns], bytes.
 type Logged = (String, u64, Vec<u8>);
 
-/// What records so far have said of later ones.
+/// Topics that the records so far have declared.
 #[derive(Default)]
 struct Topics {
     /// Schemas of the type.
@@ -154,7 +154,7 @@ impl Topics {
     }
 }
 
-/// What is left of a record: numbers are little-endian, a text is preceded by its length.
+/// Rest of a record: numbers are little-endian, a text is preceded by its length.
 struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {

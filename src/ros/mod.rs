@@ -31,7 +31,7 @@ pub enum RosError {
     File {
         /// The file.
         file: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file is not MCAP, or damaged.
@@ -39,7 +39,7 @@ pub enum RosError {
     Mcap {
         /// The file.
         file: PathBuf,
-        /// What is wrong, and the remedy.
+        /// Problem and remedy, in words.
         what: String,
     },
     /// The topic is not there, or several are.
@@ -47,7 +47,7 @@ pub enum RosError {
     Topic {
         /// The file.
         file: PathBuf,
-        /// What is wrong, and the remedy.
+        /// Problem and remedy, in words.
         what: String,
         /// Topics of joint states, with their numbers of messages.
         topics: String,
@@ -61,7 +61,7 @@ pub enum RosError {
         topic: String,
         /// From 1, among the messages of its topic.
         number: u64,
-        /// What is wrong.
+        /// Problem, in words.
         what: String,
     },
 }

@@ -30,7 +30,7 @@ impl PartialEq for Effect {
 
 impl Eq for Effect {}
 
-/// The settings that loops can be given anew without haptizing again.
+/// The settings that loops can be given again without haptizing again.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tuning {
     /// Gains and effects of a tick.

@@ -74,7 +74,7 @@ pub struct ScanControl {
     /// Time over which position and torque are averaged [s].
     pub average: f64,
     /// Norm of the torque above which a configuration counts as contact, epsilon of section 3.1: above the device's own dry
-    /// friction, which no force sensor tells from contact [N m].
+    /// friction, which no force sensor can distinguish from contact [N m].
     pub epsilon: f64,
 }
 

@@ -255,7 +255,7 @@ pub struct ContactSpec {
     pub tolerance: f64,
     /// After as many a configuration that has not converged is flagged.
     pub max_iterations: u32,
-    /// How often linearised contact takes its geometry anew, at the displacement found.
+    /// How often linearised contact updates its geometry, at the displacement found.
     pub updates: u32,
     /// Which surface the proxy feels.
     pub surface: ContactSurface,
@@ -366,9 +366,9 @@ pub struct HapticsSpec {
     pub torque_rate_limit: JointVector,
     /// Greatest speed of each joint of the device; what moves faster is taken for a fault of the device [rad/s].
     pub speed_limit: JointVector,
-    /// Resolution of each joint's encoder; zero where it is not told [rad].
+    /// Resolution of each joint's encoder; zero if not given [rad].
     pub encoder_step: JointVector,
-    /// Dry friction of each joint of the device; zero where it is not told [N m].
+    /// Dry friction of each joint of the device; zero if not given [N m].
     pub device_friction: JointVector,
     /// Effects of the tick beyond the paper's, if any.
     pub effects: HapticEffects,

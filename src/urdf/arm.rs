@@ -30,11 +30,11 @@ pub struct Arm {
     pub base: Vec<String>,
     /// From the base outwards.
     pub joints: Vec<ArmJoint>,
-    /// What was left out or assumed.
+    /// Parts left out or assumed.
     pub notes: Vec<Note>,
 }
 
-/// What was left out of a robot file or assumed beyond it, for the user to read.
+/// A part that was left out of a robot file or assumed beyond it, for the user to read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
     /// Line of the file, from 1.
@@ -62,7 +62,7 @@ pub struct ArmJoint {
     pub velocity: Option<f64>,
     /// Links that move with it.
     pub links: Vec<String>,
-    /// Of all of these together, in the joint's frame.
+    /// Inertia of all of these together, in the joint's frame.
     pub inertial: Inertial,
     /// Their shapes, in the joint's frame.
     pub shapes: Vec<Placed>,

@@ -18,12 +18,12 @@ pub enum UrdfError {
     /// The text is not XML or not URDF, or has something that a scene cannot hold.
     #[error(transparent)]
     Invalid(Box<Diagnostic>),
-    /// What is asked for is not in the file, or does not fit a scene.
+    /// The request does not fit the file or a scene.
     #[error("{}: {message}", .path.display())]
     Request {
         /// The robot file.
         path: PathBuf,
-        /// What is wrong and what to do.
+        /// Problem and remedy, in words.
         message: String,
     },
     /// The scene that was written is not valid: a fault of this program.

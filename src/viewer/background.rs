@@ -50,7 +50,7 @@ impl<T: Send + 'static> Pending<T> {
     }
 }
 
-/// Something that is made anew in the background whenever something else is wanted of it; what there is stays in use until then.
+/// Something that is made again in the background whenever something else is wanted of it; what there is stays in use until then.
 pub struct Following<W, T> {
     /// The result, or why there is none; absent before the first.
     last: Option<W>,

@@ -35,7 +35,7 @@ const ELEVATION: f32 = 0.42;
 /// Turn for a pointer's way of the picture's height [rad]: about half round.
 const TURN: f32 = 3.0;
 /// Nearest and farthest that is drawn, over the distance to the target [1]: there, depth in f32 (6e-8) over the nearest
-/// tells 6e-6 of the distance apart.
+/// resolves 6e-6 of the distance.
 const NEAR: f32 = 0.01;
 const FAR: f32 = 100.0;
 /// Nearest and farthest that one can zoom [m].

@@ -85,7 +85,7 @@ impl Column {
     }
 }
 
-/// Colour of a status wherever statuses are told by colour.
+/// Colour of a status wherever colour stands for a status.
 #[must_use]
 pub fn status_colour(status: Status, palette: &Palette) -> Color32 {
     match status {

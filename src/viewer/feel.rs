@@ -2,7 +2,7 @@
 //! ticks and costs cross through wait-free buffers; a second, ordinary thread moves the hand's goal at 500 Hz, so that a
 //! motion does not depend on the window's frame rate.
 //!
-//! A picture without a window has no time of its own: there the same loop runs by steps that are told
+//! A picture without a window has no time of its own: there the same loop runs by steps of given length
 //! ([`TickSource::Steps`]), and gives the same numbers on every machine.
 
 use super::{background::spawn, gamepad::Gamepad, guide::Guide};
@@ -124,7 +124,7 @@ impl Feel {
         }
     }
 
-    /// Lets the loop begin anew after a fault.
+    /// Lets the loop start again after a fault.
     pub fn clear_fault(&self) {
         if let Some(clear) = &self.clear {
             clear.ask();

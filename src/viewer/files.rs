@@ -62,7 +62,7 @@ impl Files {
         self.recent.truncate(RECENT);
     }
 
-    /// Opens or closes the chooser; what lies in the folder is read anew.
+    /// Opens or closes the chooser; what lies in the folder is read again.
     pub fn toggle(&mut self) {
         self.open = !self.open;
         self.enter(self.folder.clone());

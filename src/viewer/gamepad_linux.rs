@@ -1,4 +1,4 @@
-//! Gamepads as Linux tells of them: the kernel's list, which everybody may read, says which devices are gamepads, and
+//! Gamepads as Linux lists them: the kernel's list, which everybody may read, says which devices are gamepads, and
 //! /dev/input what they report (kernel's documentation: input/event-codes, input/gamepad).
 
 use super::{

@@ -4,7 +4,7 @@ use super::{gamepad::Wish, loaded::Loaded, pad::JOINTS};
 use crate::{JointVector, device::Motion, scene::Waypoint};
 use eframe::egui;
 
-/// The hand's leader. Time is told to it: it has no clock.
+/// The target that the simulated hand follows. The caller passes the time; this type reads no clock.
 #[derive(Clone, Debug)]
 pub struct Guide {
     motions: Vec<(&'static str, Motion)>,

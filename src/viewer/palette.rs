@@ -224,7 +224,7 @@ mod tests {
         }
     }
 
-    /// Least contrast of text (WCAG 2.2, level AA, 1.4.3), and of what tells something without being text (1.4.11).
+    /// Least contrast of text (WCAG 2.2, level AA, 1.4.3), and of graphics that carry meaning (1.4.11).
     const TEXT: f32 = 4.5;
     const GRAPHICS: f32 = 3.0;
 

@@ -4,7 +4,7 @@
 //! the window's device, and waited for after some frames. Both are timed in short blocks, again and again, in the background,
 //! and of each block the fastest time counts, because everything else that a machine does only adds to it. The price of an
 //! effect is the difference in cost with it and without it, which take turns. All of that is done [`REPEATS`] times: the
-//! median is told with its spread, and a difference that has not the same sign every time is told to be below the noise.
+//! median is shown with its spread, and a difference whose sign varies is shown as below the noise.
 
 use super::{background::spawn, body::Nodes, loaded::Loaded};
 use crate::{
@@ -38,11 +38,11 @@ pub struct Estimate {
     greatest: f64,
 }
 
-/// Times that everything is measured. What costs nothing has the same sign every time, and so is told to have a price, once in
+/// Times that everything is measured. What costs nothing has the same sign every time, and so is shown with a price, once in
 /// 64.
 const REPEATS: usize = 7;
 
-/// Time from which on it is told without decimals [us].
+/// Time from which on it is shown without decimals [us].
 const WHOLE: f64 = 10.0;
 
 impl Estimate {

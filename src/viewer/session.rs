@@ -66,7 +66,7 @@ impl Session {
         Ok(Self { loaded, feel, history, gamepad, pace, retuning, slices, cloud, controls, advice, cloud_first: false })
     }
 
-    /// Makes anew what belongs to a window and a device that are gone; the loop goes on. `context` is the new one, `wake` is called
+    /// Makes again what belongs to a window and a device that are gone; the loop goes on. `context` is the new one, `wake` is called
     /// when there is news.
     pub fn move_to(&mut self, context: &Arc<Context>, wake: impl Fn() + Send + 'static) {
         self.slices.forget_picture();
@@ -190,7 +190,7 @@ mod tests {
         // Its time goes on where the last one's ended.
         let ticks: Vec<f64> = session.history.recent(1.0, 100).map(|tick| tick.time).collect();
         assert!(ticks.len() == 40 && ticks.windows(2).all(|pair| (pair[1] - pair[0] - 1e-3).abs() < 1e-9), "{ticks:?}");
-        // What does not make a loop is told once, and the last one goes on.
+        // What does not make a loop is reported once, and the last one goes on.
         session.controls.tuning.haptics.boundary_slope[0] = -1.0;
         session.controls.tuning.haptics.interpolation = Interpolation::Linear;
         assert!(session.wait().unwrap_err().contains("slope"));

@@ -66,7 +66,7 @@ impl Slices {
         Self { column: Column::Torque(axes[0]), axes, follow: true, lines, drawn: None }
     }
 
-    /// Draws its picture anew: the window that had it is gone.
+    /// Draws its picture again: the window that had it is gone.
     pub fn forget_picture(&mut self) {
         self.drawn = None;
     }
@@ -158,7 +158,7 @@ impl Slices {
         }
     }
 
-    /// Makes the picture anew where something has changed.
+    /// Redraws the picture if something has changed.
     fn refresh(&mut self, ui: &Ui, dataset: &std::sync::Arc<Dataset>) -> ColourMap {
         let mut lines = self.lines.clone();
         self.axes.iter().for_each(|&axis| lines[axis] = 0);

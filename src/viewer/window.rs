@@ -22,14 +22,14 @@ const FRAME: Duration = Duration::from_micros(16_667);
 /// is left is a fault of the loop or a late tick.
 const AT_REST: Duration = Duration::from_secs(10);
 
-/// Least time that a window lasts which was opened anew, for another one to be opened when its device is lost, too [s]: one that
+/// Least time that a window lasts which was opened again, for another one to be opened when its device is lost, too [s]: one that
 /// is lost again and again is no use.
 const LEAST_LIFE: Duration = Duration::from_secs(30);
 
 /// Longest wait for the last frame of a window that is closed.
 const LAST_WORK: Duration = Duration::from_secs(1);
 
-/// Opens a window on `start` and returns when it is closed. A file that cannot be read is told before there is a window;
+/// Opens a window on `start` and returns when it is closed. A file that cannot be read is reported before there is a window;
 /// what is wrong within it, in the window, where another one can be opened. A window whose device is lost cannot draw any
 /// more: it is closed, and another one opened on a new device.
 ///

@@ -1,7 +1,7 @@
 //! The energy form: the minimum of `E(u; q) = 1/2 u^T K u + 1/2 kc sum_i depth_i(u, q)^2` over the displacement u.
 //!
 //! State: the surface forces f on the support A, with u = C f, so that the elastic energy is 1/2 f . u_A. A damped
-//! Newton step ([`super::newton`]) is tried, contact is detected anew at the trial, and the step is taken if E
+//! Newton step ([`super::newton`]) is tried, contact is detected again at the trial, and the step is taken if E
 //! decreases by a fair share of what the model promised: E never increases. Converged when the contact forces c(u)
 //! balance f: sqrt(r . C r) <= tolerance sqrt(c . C c), r = c - f.
 //!
@@ -10,7 +10,7 @@
 //! state in E at the final kc: E_s(u_s) <= E_s(0) bounds both its elastic energy and its depths by those at rest.
 //!
 //! With the geometry frozen at rest (`linearised`) the same steps minimise the convex
-//! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`; each of its updates freezes the geometry anew at the
+//! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`; each of its updates freezes the geometry again at the
 //! displacement found and solves again.
 
 use super::newton::{Damping, Newton, Step};
@@ -36,7 +36,7 @@ use glam::DVec3;
 /// Where depth comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Geometry {
-    /// The closest point of the deformed surface, found anew at every displacement.
+    /// The closest point of the deformed surface, found again at every displacement.
     Deformed,
     /// The closest points at rest, or at the last update.
     Frozen,
@@ -64,7 +64,7 @@ pub struct StoppingCriteria {
     pub iterations: u32,
 }
 
-/// What became of a search.
+/// Convergence, iterations and residual of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct SolverStats {
     /// Whether forces are balanced to the tolerance, or to what depths are rounded by.
@@ -252,7 +252,7 @@ impl EnergySearch {
         step
     }
 
-    /// Freezes the geometry anew, as it is at the current displacement: an update of linearised contact.
+    /// Freezes the geometry again, as it is at the current displacement: an update of linearised contact.
     fn freeze_here(&mut self, model: &Model, detection: &mut Detection) {
         self.displace(model, detection, &self.state.forces, self.state.elastic);
         let Self { state, frozen, .. } = self;
@@ -412,7 +412,7 @@ impl EnergySearch {
         self.trial.energy = self.trial.elastic + contact_energy(contacts, self.kc);
     }
 
-    /// What E is rounded by: each depth is rounded by a few eps of the coordinates, E's part by lambda times that [J].
+    /// Returns the rounding error of E [J]: each depth is rounded by a few eps of the coordinates, E's part by lambda times that.
     fn energy_rounding(&self, nodes: &[DVec3]) -> f64 {
         let mut size = self.state.energy;
         for contact in &self.state.contacts {

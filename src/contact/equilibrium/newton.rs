@@ -34,7 +34,7 @@ use crate::tolerances::{
 pub struct Damping {
     /// mu, zero or [`LEAST_DAMPING`] and more [1].
     pub multiple: f64,
-    /// What the next refusal multiplies it by.
+    /// Factor by which the next refused step multiplies it.
     growth: f64,
 }
 
@@ -63,7 +63,7 @@ impl Damping {
     }
 }
 
-/// What a step promises.
+/// Predicted effect of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     /// Decrease of the energy by the model without damping; not a number where no damping was enough [J].

@@ -57,7 +57,7 @@ pub struct PaperIteration {
     pub displacement: Vec<f64>,
     positions: Vec<DVec3>,
     contacts: Vec<Contact>,
-    /// Of step 2: how many ties each node of A has, the matrix [m/N], and the right-hand side [m], which becomes the forces [N].
+    /// Step 2: number of ties of each node of A, matrix [m/N], right-hand side [m], which becomes the forces [N].
     tie_counts: Vec<f64>,
     matrix: Vec<f64>,
     tied_forces: Vec<f64>,

@@ -25,7 +25,7 @@ pub struct Woodbury {
     taken: Vec<usize>,
     /// C g_a on the support for each of them, filled up with zeros to whole blocks [m/N].
     columns: Vec<f64>,
-    /// Of an isotropic object, the size of a column at each node, along the row's normal [m/N].
+    /// Column at each node of an isotropic object, along the row's normal [m/N].
     scalars: Vec<f64>,
     order: usize,
     /// 1 + mu [1].
@@ -118,7 +118,7 @@ mod tests {
     use crate::random::sequence;
     use crate::scene::SpringKind;
 
-    /// What is relieved, resisted by the object and straight springs, is what it was before.
+    /// Applying object and springs to the result of the inverse gives the input.
     #[test]
     fn woodbury_is_the_inverse_of_object_and_springs() {
         for kind in [SpringKind::Isotropic, SpringKind::Axial] {

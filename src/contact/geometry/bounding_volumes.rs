@@ -91,7 +91,7 @@ impl Kernel for DistancesSquared<'_> {
     }
 }
 
-/// What a leaf holds.
+/// A leaf of the tree.
 pub struct Leaf {
     /// Box at rest.
     pub volume: Volume,
@@ -156,7 +156,7 @@ impl BoundingVolumes {
         self.volume.map_or(f64::MAX, |volume| volume.distance_squared(x))
     }
 
-    /// What squared lower bounds must exceed a squared distance by before they rule a triangle out, for a point `x` [m^2].
+    /// Returns the margin [m^2] by which a squared lower bound must exceed a squared distance to rule a triangle out, for a point `x`.
     #[must_use]
     pub fn slack(&self, x: DVec3) -> f64 {
         self.slack + CULLING_SLACK * x.length_squared()

@@ -28,7 +28,7 @@ pub struct RestSurface<'a> {
     pub topology: &'a Topology,
     /// The triangles, for closest-point queries.
     pub bounds: BoundingVolumes,
-    /// What is known of distances to the flat triangles without such a query.
+    /// Bounds on the distance to the flat triangles, without such a query.
     distance_bounds: DistanceBounds,
     /// The smooth surface, where contact is with that.
     pub smooth: Option<SmoothSurface>,

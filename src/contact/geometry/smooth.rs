@@ -29,7 +29,7 @@ const CORRECTIONS: usize = 3;
 
 /// The facets' nodes, and how each hangs on them.
 pub struct SmoothSurface {
-    /// Of all triangles, one after the other: see [`Shape`].
+    /// Nodes of all triangles, one triangle after the other: see [`Shape`].
     nodes: Vec<u32>,
     /// Where those of each triangle begin, and where the last ends.
     starts: Vec<u32>,
@@ -49,7 +49,7 @@ pub struct SmoothSurface {
 pub struct Shape {
     /// Number of nodes.
     count: usize,
-    /// Of each control point: nodes and their weights.
+    /// Nodes and weights of each control point.
     masks: [Vec<(u8, f64)>; CONTROLS],
 }
 

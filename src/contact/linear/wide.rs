@@ -3,9 +3,9 @@
 //! Products and sums are not fused, and nothing is summed in another order for the width: results are the same on all machines.
 
 /// Work that loops over numbers side by side. Its `run`, and what that calls, is to be `#[inline(always)]`: only so is it compiled
-/// anew for each width.
+again for each width.
 pub trait Kernel {
-    /// What it gives.
+    /// Type of the result.
     type Output;
 
     /// Does the work.

@@ -8,7 +8,7 @@ use crate::MAX_JOINTS;
 
 /// Interpolation of scattered values, asked point after point along a path.
 pub(super) trait Interpolant: Sync {
-    /// What one worker remembers from point to point.
+    /// State of one worker between points.
     type Walk<'a>
     where
         Self: 'a;
@@ -25,7 +25,7 @@ pub(super) type Simplex = [u32; MAX_JOINTS + 1];
 
 /// A Delaunay triangulation that can be asked where a position lies.
 pub(super) trait Triangulation: Sync {
-    /// What one worker remembers from point to point.
+    /// State of one worker between points.
     type Walk;
 
     /// A walk that knows nothing yet.

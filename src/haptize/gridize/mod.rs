@@ -42,7 +42,7 @@ pub enum Interpolation {
     Natural,
 }
 
-/// What the grid shall be.
+/// Options of the grid.
 #[derive(Clone, Debug)]
 pub struct GridizeOptions {
     /// Grid step of each joint [rad or m]; one number serves all joints.
@@ -56,7 +56,7 @@ pub struct GridizeOptions {
     pub smooth: bool,
 }
 
-/// What gridization did.
+/// Report of a gridization.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct GridizeReport {
     /// Samples given.

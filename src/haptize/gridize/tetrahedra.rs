@@ -25,7 +25,7 @@ pub(super) struct Tetrahedra {
     last: u32,
 }
 
-/// What insertion needs beside the mesh, kept from point to point.
+/// Scratch memory of the insertion, reused from point to point.
 struct Work {
     /// Stamp of the last point that tested a tetrahedron, twice, plus one when it lay in the cavity.
     marks: Vec<u64>,

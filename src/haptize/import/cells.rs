@@ -75,7 +75,7 @@ pub(super) struct Cells {
     visit: Option<Visit>,
 }
 
-/// What the cells tell beside the samples.
+/// Facts from the cells beside the samples.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct CellReport {
     /// Cells that were visited.

@@ -12,7 +12,7 @@ use toml::{
 pub(super) struct Refusal {
     /// Keys and, of arrays, numbers from 0, with points between: `joint.0.position.scale`.
     key: String,
-    /// What is wrong, and what it must be.
+    /// Problem, and the values that are allowed, in words.
     pub message: String,
 }
 
@@ -82,7 +82,7 @@ pub(super) fn check(mapping: &Mapping) -> Result<(), Refusal> {
     refuse(torque.keep != Keep::All && !cells, "torque.cell", message)
 }
 
-/// Of joint `number`, with those before it.
+/// Checks joint `number` against those before it.
 fn check_joint(before: &[Joint], number: usize, joint: &Joint) -> Result<(), Refusal> {
     let name = &joint.name;
     let twin = before.iter().any(|other| other.name == *name);

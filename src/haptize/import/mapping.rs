@@ -21,7 +21,7 @@ pub struct Mapping {
     /// One entry a joint, in the order of the dataset.
     #[serde(rename = "joint")]
     pub joints: Vec<Joint>,
-    /// What is removed or averaged row by row.
+    /// Filter of the rows.
     #[serde(default)]
     pub filter: Filter,
     /// Which torque is kept where the mechanism has friction.
@@ -43,14 +43,14 @@ pub struct Table {
     pub header: bool,
     /// Columns that every row must have; absent: as many as the first row.
     pub columns: Option<usize>,
-    /// What happens to a row with a wrong number of columns, or with a field that is missing or not a finite number.
+    /// Treatment of a row with a wrong number of columns, or with a field that is missing or not a finite number.
     pub bad_rows: BadRows,
     /// The topic of joint states that is read of an MCAP file, whose columns are `time`, and `position`, `velocity` and `effort` with
     /// each joint's name; absent: its only one. The other keys of the layout are not used then.
     pub topic: Option<String>,
 }
 
-/// What happens to a row that cannot be used.
+/// Treatment of a row that cannot be used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BadRows {

@@ -42,7 +42,7 @@ pub enum ImportError {
     Read {
         /// The file.
         file: String,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A line that cannot be used.
@@ -52,7 +52,7 @@ pub enum ImportError {
         file: String,
         /// From 1.
         line: u64,
-        /// What is wrong, and what to do.
+        /// Problem and remedy, in words.
         message: String,
     },
     /// Every row would be a sample.
@@ -102,7 +102,7 @@ pub struct Dropped {
     pub first: String,
 }
 
-/// What an import did.
+/// Report of an import.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct ImportReport {
     /// Rows read, comments and header not counted.
@@ -117,14 +117,14 @@ pub struct ImportReport {
     pub cells: Option<CellReport>,
 }
 
-/// What was read from logs.
+/// Data read from logs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Imported {
     /// The torque that the mapping keeps.
     pub samples: Samples,
     /// Both branches, moving forward and backward, where rows were averaged by direction.
     pub branches: Option<[Samples; 2]>,
-    /// What the import did.
+    /// Report of the import.
     pub report: ImportReport,
 }
 

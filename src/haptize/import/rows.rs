@@ -47,7 +47,7 @@ struct Layout {
     torques: Vec<usize>,
 }
 
-/// What became of a line.
+/// Result of reading a line.
 pub(super) enum ReadRowResult {
     Row(Row),
     /// Left out, and why.
@@ -123,7 +123,7 @@ impl<'a, R: BufRead> Rows<'a, R> {
         ImportError::Line { file: self.file.clone(), line: self.line, message }
     }
 
-    /// What a line that is no comment means; `None` for the header.
+    /// Parses a line that is no comment; `None` for the header.
     fn line_outcome(&mut self, text: &[u8]) -> Result<Option<ReadRowResult>, ImportError> {
         let delimiter = self.mapping.table.delimiter;
         let Ok(text) = std::str::from_utf8(text) else {

@@ -23,7 +23,7 @@ pub struct PdControl {
     history: VecDeque<JointVector>,
 }
 
-/// What the controller did at a tick.
+/// Output of the controller at a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PdOutput {
     /// Control torque without gravity [N m].

@@ -27,7 +27,7 @@ const GUIDED: &str = "led by hand";
 const LONGEST_LINE: u64 = 1 << 16;
 const MOST_ROWS: usize = 5_000_000;
 
-/// What became of a point.
+/// How a point ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RowStatus {
     /// Measured in steady contact.
@@ -66,11 +66,11 @@ pub struct ScanRow {
     pub deviation: JointVector,
     /// Ticks averaged.
     pub ticks: u32,
-    /// What became of the point.
+    /// How the point ended.
     pub status: RowStatus,
 }
 
-/// What a log says before its rows.
+/// Header of a log.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LogHeader {
     /// The rig's own words.
@@ -88,7 +88,7 @@ pub struct LogHeader {
 /// A log that was read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ScanLog {
-    /// What it says before its rows.
+    /// Header of the log.
     pub header: LogHeader,
     /// In the order of measurement.
     pub rows: Vec<ScanRow>,
@@ -109,7 +109,7 @@ pub enum LogError {
     File {
         /// The log.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The log is there already.
@@ -128,7 +128,7 @@ pub enum LogError {
         path: PathBuf,
         /// From 1.
         line: u64,
-        /// What is wrong.
+        /// Problem, in words.
         message: String,
     },
 }

@@ -75,7 +75,7 @@ pub struct ScanProgress {
     pub time: f64,
 }
 
-/// What a scan did.
+/// Report of a scan.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct ScanReport {
     /// Points of the plan; where a hand led, those logged.
@@ -133,7 +133,7 @@ pub struct Session<'a> {
     pub rig: &'a mut dyn Rig,
     /// Where rows go.
     pub log: &'a mut LogWriter,
-    /// Ends the scan after the point at hand.
+    /// Ends the scan after the current point.
     pub stop: &'a AtomicBool,
     /// Called after every point.
     pub progress: &'a mut dyn FnMut(ScanProgress),
@@ -299,7 +299,7 @@ impl<'a> Driver<'a> {
         Ok(())
     }
 
-    /// What exceeds its limit, if anything does.
+    /// Returns a message if a quantity exceeds its limit.
     fn check(&mut self, output: &PdOutput) -> Result<(), String> {
         let limits = &self.spec.limits;
         let joints = &self.chain.joints;

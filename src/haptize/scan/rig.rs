@@ -11,14 +11,14 @@ pub trait Rig {
     /// When the device does not answer or refuses; the scan then stops.
     fn hold(&mut self, torque: &JointVector, period: f64) -> Result<RigReading, RigError>;
 
-    /// What it is, for logs: one line. Simulated rigs say so.
+    /// Returns a description for logs, one line. Simulated rigs say so.
     fn description(&self) -> String;
 
     /// True where no real object is touched.
     fn is_simulated(&self) -> bool;
 }
 
-/// What a rig reads.
+/// Measurement of a rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigReading {
     /// Time since the rig was started [s].
@@ -34,6 +34,6 @@ pub struct RigReading {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the rig failed: {0}")]
 pub struct RigError(
-    /// What it says.
+    /// Message.
     pub String,
 );

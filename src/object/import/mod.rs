@@ -23,7 +23,7 @@ type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
 /// Longest mesh file that is read [B]: an object whose compliance fits in memory has less than a hundredth of that.
 const MAX_BYTES: u64 = 1 << 28;
 
-/// Reads the surface in `file`; what is merged on the way is told in `warnings`.
+/// Reads the surface in `file`; merged nodes are reported in `warnings`.
 pub(crate) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<String>) -> Result<Surface, ObjectError> {
     if !(scale > 0.0 && scale.is_finite()) {
         return Err(ObjectError::Parameter { name: "scale", value: scale, range: "positive and finite" });

@@ -259,7 +259,7 @@ impl Npmi {
 }
 
 impl MidpointInertia {
-    /// Of `chain` at the predicted midpoint of a step of `interval` T [s] from `motion`.
+    /// Evaluates `chain` at the predicted midpoint of a step of `interval` T [s] from `motion`.
     fn of(chain: &Chain, motion: &Motion, interval: f64) -> Self {
         let joints = motion.position.len();
         let mut middle = motion.position;

@@ -151,7 +151,7 @@ pub(super) fn loops(accuracy: &Accuracy) -> Canvas {
             curves.push(Series { name: entry.series.clone(), points: Vec::new(), dashed: false, colour: curves.len() });
             curves.len() - 1
         });
-        // Zero has no logarithm: the least that f64 tells from it, relative to the energy, stands for it.
+        // Zero has no logarithm: the least that f64 can distinguish from it, relative to the energy, stands for it.
         let floor = f64::EPSILON * accuracy.greatest_energy;
         curves[at].points.push((entry.side, entry.work.max(floor)));
     }

@@ -4,7 +4,7 @@
 //! [`REFERENCE_TOLERANCE`](crate::tolerances::REFERENCE_TOLERANCE) at random configurations of the scene's grid that no dataset holds. Its own error is how much it
 //! moves when it is asked for a hundredth of that. Errors are Euclidean norms over the joints; a prismatic joint counts with
 //! the lever arm of 0.1 m, so that all are N m. `rms` is over all configurations, in contact or not, and is set beside the
-//! rms of the reference torque itself. Accuracy is deterministic. Time is told as the ratio to one row of the same study:
+//! rms of the reference torque itself. Accuracy is deterministic. Time is given as the ratio to one row of the same study:
 //! the least of some runs, because the work is the same in each and a busy machine only adds to it; median and
 //! greatest show by how much.
 
@@ -165,7 +165,7 @@ pub struct Extent {
     pub configurations: usize,
     /// Grids with more points than this are left out.
     pub points: usize,
-    /// Runs that are timed, at least 1: of five, one is hardly ever without interruption, and the median tells how usual that is.
+    /// Runs that are timed, at least 1: of five, one is hardly ever without interruption, and the median shows how usual that is.
     pub rounds: usize,
 }
 
@@ -207,7 +207,7 @@ pub enum AccuracyError {
     Reference(#[from] ReferenceError),
 }
 
-/// Measures `scene`. `progress` is told what comes next.
+/// Measures `scene`. `progress` receives the name of the next step.
 ///
 /// # Errors
 /// Any [`AccuracyError`].

@@ -15,7 +15,7 @@ use crate::{
 /// Relative residuals that are asked for.
 const TOLERANCES: [f64; 6] = [0.3, 0.1, 1e-2, 1e-3, 1e-5, 1e-8];
 
-/// How often linearised contact takes its geometry anew.
+/// How often linearised contact updates its geometry.
 const UPDATES: [u32; 5] = [0, 1, 2, 4, 8];
 
 /// Configurations on the GPU: as many as a software adapter solves in some seconds.

@@ -39,8 +39,8 @@ pub fn write_all(folder: &Path, outcomes: &[(&str, CaseResult)], adapter: &str) 
     Ok(files)
 }
 
-/// Of its bound, how much a figure takes: above one it is broken, and so it is where it is no number. Of a share that must reach
-/// some part of one, what it lacks over what it may lack.
+/// Returns the ratio of a figure to its bound: above one, or NaN, the bound is broken. For a share that must reach
+/// some part of one, it is the ratio of what is lacking to what may be lacking.
 fn share(outcome: &CaseResult) -> f64 {
     let share = match outcome.bound {
         Bound::AtMost(bound) => outcome.worst / bound,

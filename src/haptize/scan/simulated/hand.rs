@@ -13,7 +13,7 @@ const INTERVAL: f64 = 2.0;
 const SHARES: [f64; 5] = [0.0, 0.14, 0.30, 0.44, 0.50];
 /// Time in which the fingers close or open [s].
 const CLOSING: f64 = 0.15;
-/// Of the grip [N m/rad or N/m, N m s/rad or N s/m]: a hand's is a few hundred N/m (Kuchenbecker, Park and Niemeyer 2003),
+/// Stiffness and damping of the grip [N m/rad or N/m, N m s/rad or N s/m]: a hand's is a few hundred N/m (Kuchenbecker, Park and Niemeyer 2003),
 /// at a tenth of a metre.
 const STIFFNESS: f64 = 10.0;
 const DAMPING: f64 = 0.3;

@@ -33,7 +33,7 @@ struct Variant {
 /// Seconds of each variant in each round; none where the variant does not do the work.
 type Times = Vec<Option<Vec<f64>>>;
 
-/// Prices the effects of `scene` in so many rounds. `progress` is told what comes next.
+/// Prices the effects of `scene` in so many rounds. `progress` receives the name of the next step.
 ///
 /// # Errors
 /// When a variant cannot be haptized, felt or drawn. A machine without a GPU is none: a note says so.
