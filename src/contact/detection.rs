@@ -5,8 +5,8 @@
 //! - a node outside at rest, farther than m from the surface, is outside still;
 //! - where some triangle is at a distance d, one that was farther than d + m at rest is not the closest one.
 //!
-//! A smooth surface is searched by its flat triangles: where a facet is at a distance d, one whose triangle is farther than d plus the
-//! bulge is not the closest one.
+//! A smooth surface is searched by its flat triangles: where a facet is at a distance d, one whose triangle is farther
+//! than d plus the bulge is not the closest one.
 //!
 //! Ties go to the lower triangle number.
 
@@ -55,8 +55,8 @@ pub enum Facets {
     Felt,
 }
 
-/// Distance within which a ball knows facets whose closest is at the distance `least`: those that may take force, and those that may be
-/// the next that do [m].
+/// Distance within which a ball knows facets whose closest is at the distance `least`: those that may take force, and
+/// those that may be the next that do [m].
 fn known_distance(radius: f64, least: f64) -> f64 {
     least + FACET_COMPLIANCE * (radius - least).max(0.0) + KNOWN_FACETS * radius
 }
@@ -92,13 +92,14 @@ impl Detection {
         &self.nodes
     }
 
-    /// A lower bound of the signed distance of each proxy node to the surface at rest, in the configuration taken up [m].
+    /// A lower bound of the signed distance of each proxy node to the surface at rest, in the configuration taken up
+    /// [m].
     pub fn distances(&self) -> impl Iterator<Item = f64> {
         self.at_rest.iter().map(RestDistance::signed)
     }
 
-    /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns the smallest signed distance of a
-    /// proxy node to the surface at rest, less its radius [m].
+    /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns the smallest signed distance
+    /// of a proxy node to the surface at rest, less its radius [m].
     pub fn set_configuration(&mut self, model: &Model, nodes: &[DVec3]) -> f64 {
         // The node that is most likely the nearest rules out most others.
         let first = self.place(model, nodes);
@@ -117,16 +118,16 @@ impl Detection {
         gap
     }
 
-    /// Places the proxy nodes at `nodes` [m] in the world, with lower bounds for distances that may be negative, and returns the
-    /// one whose bound, less its radius, is least.
+    /// Places the proxy nodes at `nodes` [m] in the world, with lower bounds for distances that may be negative, and
+    /// returns the one whose bound, less its radius, is least.
     pub fn place(&mut self, model: &Model, nodes: &[DVec3]) -> usize {
         let (mut first, mut least) = (0, f64::INFINITY);
         for (i, &node) in nodes.iter().enumerate() {
             let x = node - model.surface.centre;
             let known = &mut self.at_rest[i];
             known.watched = false;
-            // Of a node that stands where it stood in the configuration before, as all do that hang on joints which have not moved, all
-            // is known.
+            // Of a node that stands where it stood in the configuration before, as all do that hang on joints which
+            // have not moved, all is known.
             if !(known.exact && self.nodes[i] == x) {
                 self.nodes[i] = x;
                 known.exact = false;
@@ -153,8 +154,9 @@ impl Detection {
         self.deformation.displacement(model, node)
     }
 
-    /// Contacts with the surface as displaced, in ascending order of proxy nodes. Nodes that touched before in this configuration are
-    /// included with a depth below zero when they do not touch now, because they are the ones that may touch again.
+    /// Contacts with the surface as displaced, in ascending order of proxy nodes. Nodes that touched before in this
+    /// configuration are included with a depth below zero when they do not touch now, because they are the ones that
+    /// may touch again.
     pub fn deformed(&mut self, model: &Model, facets: Facets, contacts: &mut Vec<Contact>) {
         contacts.clear();
         let MotionBound { moved, .. } = self.deformation.bound;
@@ -195,15 +197,16 @@ impl Detection {
         distribute_all(contacts, &mut self.parts);
     }
 
-    /// The closest feature of the deformed surface to node `i`, if it is near enough to matter; with `feels`, the facets that the node
-    /// may feel are left in `facets`.
+    /// The closest feature of the deformed surface to node `i`, if it is near enough to matter; with `feels`, the
+    /// facets that the node may feel are left in `facets`.
     fn closest(&mut self, model: &Model, i: usize, feels: bool) -> Option<Closest> {
         let Self { deformation, facets, .. } = self;
         let x = self.nodes[i];
         let radius = model.chain.nodes[i].radius;
         let known = self.at_rest[i];
         let MotionBound { moved, bulge } = deformation.bound;
-        // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than that.
+        // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than
+        // that.
         let matters = if known.inside || known.watched { f64::MAX } else { radius.max(moved - known.distance) };
         let mut closest = Closest::none();
         let likely = if moved == 0.0 { known.closest } else { known.last };
@@ -240,8 +243,8 @@ impl Detection {
         contact_with(model, i, self.nodes[i], &closest, facet, pseudonormal)
     }
 
-    /// Rows of the problem with geometry frozen at rest: every proxy node within `reach` of the surface, with its depth at
-    /// rest (negative outside) and no curvature.
+    /// Rows of the problem with geometry frozen at rest: every proxy node within `reach` of the surface, with its depth
+    /// at rest (negative outside) and no curvature.
     pub fn frozen(&mut self, model: &Model, reach: f64, rows: &mut Vec<Contact>) {
         rows.clear();
         for i in 0..self.nodes.len() {
@@ -277,8 +280,8 @@ fn find_at_rest(surface: &RestSurface, x: DVec3, known: &mut RestDistance) -> Cl
     closest
 }
 
-/// The contact (or near miss, with depth <= 0) of proxy node `i` at `x` with the closest point of `facet`, on the side that
-/// `pseudonormal` decides.
+/// The contact (or near miss, with depth <= 0) of proxy node `i` at `x` with the closest point of `facet`, on the side
+/// that `pseudonormal` decides.
 #[inline(always)]
 fn contact_with(model: &Model, i: usize, x: DVec3, closest: &Closest, facet: &Facet, pseudonormal: DVec3) -> Contact {
     let radius = model.chain.nodes[i].radius;

@@ -1,9 +1,10 @@
 //! How much a contact point feels the mesh, from the compliance alone.
 //!
-//! A point pressed to a constant depth d takes the force d / (1/kc + c), c(w) = sum_ij w_i w_j N . C_ij N being the compliance of the surface
-//! under a force shared by the corners of a facet with barycentric weights w. Of a smooth body c hardly changes over a facet. On
-//! springs or a membrane without bending stiffness a single node gives way more than the middle of a facet, however fine the mesh: the
-//! force ripples as the point slides from facet to facet, and so does the torque.
+//! A point pressed to a constant depth d takes the force d / (1/kc + c), c(w) = sum_ij w_i w_j N . C_ij N being the
+//! compliance of the surface under a force shared by the corners of a facet with barycentric weights w. Of a smooth
+//! body c hardly changes over a facet. On springs or a membrane without bending stiffness a single node gives way more
+//! than the middle of a facet, however fine the mesh: the force ripples as the point slides from facet to facet, and so
+//! does the torque.
 
 use super::geometry::closest_point::{ClosestPoint, Feature};
 use super::law::depth::Carriers;
@@ -12,7 +13,8 @@ use crate::tolerances::RIPPLE_WARNING;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// By how much the force on a contact point changes while it slides over a facet at constant depth, relative to its mean [1].
+/// By how much the force on a contact point changes while it slides over a facet at constant depth, relative to its
+/// mean [1].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeshRipple {
     /// Median over the facets that can be reached.
@@ -95,8 +97,8 @@ mod tests {
         MeshRipple::new(&Model::new(object, &chain, contact(1e4))).unwrap()
     }
 
-    /// The ripple of a body with a skin falls like h^2 ln(1/h) with the mesh's edges h, as the deflection of a plate within h of
-    /// a force does; of one of springs it does not fall at all.
+    /// The ripple of a body with a skin falls like h^2 ln(1/h) with the mesh's edges h, as the deflection of a plate
+    /// within h of a force does; of one of springs it does not fall at all.
     #[test]
     fn a_skin_smooths_what_springs_do_not() {
         let [coarse, fine] = [4, 8].map(|divisions| ripple(&skinned(divisions).unwrap()));

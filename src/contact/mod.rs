@@ -2,8 +2,8 @@
 //!
 //! Prepare a [`Model`] once, give each thread a [`Solver`], and solve configuration after configuration.
 //!
-//! Each room uses those before it: `linear` (algebra), `geometry` (the surface), `law` (depth, springs), `detection` (which proxy nodes
-//! touch), `equilibrium` (the searches), and the solver.
+//! Each room uses those before it: `linear` (algebra), `geometry` (the surface), `law` (depth, springs), `detection`
+//! (which proxy nodes touch), `equilibrium` (the searches), and the solver.
 
 use crate::{JointMatrix, JointVector};
 use glam::DVec3;
@@ -70,8 +70,8 @@ pub struct Equilibrium {
     pub status: Status,
     /// Steps tried (`energy`, `linearised`) or passes (`paper`).
     pub iterations: u32,
-    /// Relative residual of the force balance, in the energy norm; one where nothing could be computed [1]. In contact so stiff that forces
-    /// follow the rounding of depths it may exceed the tolerance of a converged equilibrium.
+    /// Relative residual of the force balance, in the energy norm; one where nothing could be computed [1]. In contact
+    /// so stiff that forces follow the rounding of depths it may exceed the tolerance of a converged equilibrium.
     pub residual: f64,
     /// Stored energy U: elastic and contact springs [J].
     pub energy: f64,
@@ -79,8 +79,8 @@ pub struct Equilibrium {
     pub gap: f64,
     /// Contact torque on the proxy, tau = sum_i J_i^T (force on x_i) [N m].
     pub torque: JointVector,
-    /// Tangent d tau/d q [N m/rad], where the model asks for it ([`Model::with_tangent`]), the algorithm is `energy`, and the
-    /// equilibrium is a converged, strict minimum.
+    /// Tangent d tau/d q [N m/rad], where the model asks for it ([`Model::with_tangent`]), the algorithm is `energy`,
+    /// and the equilibrium is a converged, strict minimum.
     pub tangent: Option<JointMatrix>,
     /// Contact forces on the object's nodes, ascending by node, each node once [N].
     pub forces: Vec<NodeForce>,
@@ -97,15 +97,17 @@ pub struct NodeForce {
     pub force: DVec3,
 }
 
-/// One proxy node in contact with one feature of the surface: pushed by `force` at x_i, pushing back on the object's nodes.
+/// One proxy node in contact with one feature of the surface: pushed by `force` at x_i, pushing back on the object's
+/// nodes.
 ///
-/// A point has at most one; a node with a radius has one for each facet that takes force (`law/series.rs`), whose sum is its force.
+/// A point has at most one; a node with a radius has one for each facet that takes force (`law/series.rs`), whose sum
+/// is its force.
 #[derive(Clone, Debug)]
 pub struct Touch {
     /// Number of the proxy's node.
     pub proxy_node: u32,
-    /// The object's nodes of the touched facet, and the share of the reaction that each carries, in sum one: the three corners of a flat
-    /// facet, or the nodes on which a smooth one depends: its corners and all their neighbours.
+    /// The object's nodes of the touched facet, and the share of the reaction that each carries, in sum one: the three
+    /// corners of a flat facet, or the nodes on which a smooth one depends: its corners and all their neighbours.
     pub carriers: Vec<(u32, f64)>,
     /// Force on the proxy node [N].
     pub force: DVec3,

@@ -22,21 +22,22 @@ pub struct Model<'a> {
     pub compliance: Arc<Compliance>,
     /// How equation (2) is solved; its stiffness is finite.
     pub contact: ContactSpec,
-    /// Stiffness kc = 3 Kc at a contact point of the energy form: three springs Kc on the nodes of a triangle act along the
-    /// normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
+    /// Stiffness kc = 3 Kc at a contact point of the energy form: three springs Kc on the nodes of a triangle act along
+    /// the normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
     /// [`RIGID_STIFFNESS`] [N/m].
     pub kc: f64,
-    /// Stiffness of each proxy node's spring over kc, in the algorithms but `paper`, whose springs are all alike: more than one where the
-    /// node stands for more than the mean length of link, see [`ContactSpec::node_stiffness`] [1].
+    /// Stiffness of each proxy node's spring over kc, in the algorithms but `paper`, whose springs are all alike: more
+    /// than one where the node stands for more than the mean length of link, see [`ContactSpec::node_stiffness`] [1].
     pub shares: Vec<f64>,
     /// Whether each equilibrium comes with its tangent d tau/d q.
     pub with_tangent: bool,
     /// The surface at rest.
     pub surface: Arc<RestSurface<'a>>,
-    /// Largest trace of a covered node's own block C_jj: no node moves farther than sqrt(max_nodal_compliance) times |u| in the energy norm [m/N].
+    /// Largest trace of a covered node's own block C_jj: no node moves farther than sqrt(max_nodal_compliance) times
+    /// |u| in the energy norm [m/N].
     pub max_nodal_compliance: f64,
-    /// Largest eigenvalue of a covered node's own block C_jj, or a bound of it: no node moves farther than sqrt(mobility) times |u| in
-    /// the energy norm [m/N].
+    /// Largest eigenvalue of a covered node's own block C_jj, or a bound of it: no node moves farther than
+    /// sqrt(mobility) times |u| in the energy norm [m/N].
     pub mobility: f64,
     /// The same for what facets stand off the flat triangles by, where contact is with a smooth surface [m/N].
     bulge_mobility: f64,
@@ -60,8 +61,8 @@ impl<'a> Model<'a> {
         Self::with_compliance(object, chain, contact, Compliance::new(object))
     }
 
-    /// The same for contact at or near `configurations`: of an object with more than [`Model::WHOLE`] surface nodes, only the
-    /// compliance of those within the proxy's reach is formed. A configuration that reaches farther is flagged
+    /// The same for contact at or near `configurations`: of an object with more than [`Model::WHOLE`] surface nodes,
+    /// only the compliance of those within the proxy's reach is formed. A configuration that reaches farther is flagged
     /// [`super::Status::Overflow`].
     ///
     /// # Errors
@@ -137,8 +138,8 @@ impl<'a> Model<'a> {
         self.kc = 3.0 * self.contact.stiffness;
     }
 
-    /// How far the surface can be from where it rests when the object stores the energy `elastic` [J]: for any sum g of the nodes'
-    /// displacements |g . u|^2 <= |g . C g| |u|^2, the last in the energy norm.
+    /// How far the surface can be from where it rests when the object stores the energy `elastic` [J]: for any sum g of
+    /// the nodes' displacements |g . u|^2 <= |g . C g| |u|^2, the last in the energy norm.
     #[must_use]
     pub fn motion_bound(&self, elastic: f64) -> MotionBound {
         let norm = (2.0 * elastic.max(0.0)).sqrt() * (1.0 + LENGTH_ROUNDING);
@@ -147,8 +148,8 @@ impl<'a> Model<'a> {
     }
 }
 
-/// The greatest g . C g over what facets stand off their flat triangles by, as a sum g of nodes' displacements: a bound of its largest
-/// eigenvalue. Nodes that are not covered do not move [m/N].
+/// The greatest g . C g over what facets stand off their flat triangles by, as a sum g of nodes' displacements: a bound
+/// of its largest eigenvalue. Nodes that are not covered do not move [m/N].
 fn bulge_mobility(smooth: &SmoothSurface, compliance: &Compliance) -> f64 {
     smooth.bulge_squared(|terms| {
         let places = terms
@@ -168,8 +169,8 @@ fn bulge_mobility(smooth: &SmoothSurface, compliance: &Compliance) -> f64 {
     })
 }
 
-/// Largest trace of a node's own block, and a bound of its largest eigenvalue: that of an isotropic object's block is a third of its
-/// trace [m/N].
+/// Largest trace of a node's own block, and a bound of its largest eigenvalue: that of an isotropic object's block is a
+/// third of its trace [m/N].
 fn max_nodal_compliance(compliance: &Compliance) -> (f64, f64) {
     let trace = |j: usize| {
         let own = compliance.block(j, j);

@@ -18,14 +18,15 @@ impl<'a> Proximity<'a> {
         Self { model, pose: model.chain.new_pose(), detection: Detection::new(model) }
     }
 
-    /// Places the proxy at the joint coordinates `q` without a search: [`Proximity::clearances`] are then bounds that may be negative
-    /// though nothing touches. Returns the node whose bound is least.
+    /// Places the proxy at the joint coordinates `q` without a search: [`Proximity::clearances`] are then bounds that
+    /// may be negative though nothing touches. Returns the node whose bound is least.
     pub fn place(&mut self, q: &[f64]) -> usize {
         self.model.chain.pose(q, &mut self.pose);
         self.detection.place(self.model, &self.pose.nodes)
     }
 
-    /// The gap at the joint coordinates `q`, [`super::Equilibrium::gap`], which no proxy node changes by more than it moves [m].
+    /// The gap at the joint coordinates `q`, [`super::Equilibrium::gap`], which no proxy node changes by more than it
+    /// moves [m].
     pub fn gap(&mut self, q: &[f64]) -> f64 {
         self.model.chain.pose(q, &mut self.pose);
         self.detection.set_configuration(self.model, &self.pose.nodes)

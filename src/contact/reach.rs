@@ -1,9 +1,10 @@
 //! Which surface nodes the proxy can reach, and whether a result stays within them.
 //!
-//! With |u| <= m everywhere, the closest triangle of the deformed surface to a proxy node that is D from it at rest lies within
-//! D + 2 m of the node at rest (see `detection`). So a result is the same, whatever the compliance leaves out, if it covers all
-//! facets so near to each touching node. Beforehand m is not known; a surface that gives way to a proxy whose deepest node
-//! is d below it moves by about d, hardly by more than [`EXPECTED_MOTION`] d. Results that need more are found and flagged.
+//! With |u| <= m everywhere, the closest triangle of the deformed surface to a proxy node that is D from it at rest
+//! lies within D + 2 m of the node at rest (see `detection`). So a result is the same, whatever the compliance leaves
+//! out, if it covers all facets so near to each touching node. Beforehand m is not known; a surface that gives way to a
+//! proxy whose deepest node is d below it moves by about d, hardly by more than [`EXPECTED_MOTION`] d. Results that
+//! need more are found and flagged.
 
 use super::detection::Detection;
 use super::geometry::RestSurface;
@@ -71,7 +72,8 @@ pub(super) fn covered_leaves(surface: &RestSurface<'_>, compliance: &Compliance)
     surface.bounds.leaves.iter().map(|leaf| leaf.triangles.iter().all(covered)).collect()
 }
 
-/// Whether the compliance covers all that the result depends on, where no point of the surface has moved by more than `moved` [m].
+/// Whether the compliance covers all that the result depends on, where no point of the surface has moved by more than
+/// `moved` [m].
 pub(super) fn covers(model: &Model<'_>, detection: &Detection, equilibrium: &Equilibrium, moved: f64) -> bool {
     let covered = |node: u32| model.compliance.place(node).is_some();
     let mut within = equilibrium.forces.iter().all(|force| covered(force.node));

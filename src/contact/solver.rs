@@ -61,8 +61,8 @@ impl<'a> Solver<'a> {
 
     /// Equilibrium at the joint coordinates `q`, one per joint [rad or m].
     ///
-    /// Numbers that are not finite, or fewer than there are joints, give [`Status::Unconverged`] with zeros and a residual of
-    /// one: nothing is balanced.
+    /// Numbers that are not finite, or fewer than there are joints, give [`Status::Unconverged`] with zeros and a
+    /// residual of one: nothing is balanced.
     #[must_use]
     pub fn solve(&mut self, q: &[f64]) -> Equilibrium {
         self.find(q, |solver, equilibrium| match solver.model.contact.algorithm {
@@ -72,8 +72,8 @@ impl<'a> Solver<'a> {
         })
     }
 
-    /// The same by the energy form, from near the solution on: where `forces` on the object's nodes hold it with contact stiffness
-    /// `kc` [N/m].
+    /// The same by the energy form, from near the solution on: where `forces` on the object's nodes hold it with
+    /// contact stiffness `kc` [N/m].
     #[must_use]
     pub(crate) fn solve_with_guess(
         &mut self,
@@ -89,7 +89,8 @@ impl<'a> Solver<'a> {
         self.find(q, |solver, equilibrium| solver.minimise(geometry, Some(((forces, kc), limits)), equilibrium))
     }
 
-    /// The same by the energy form, from where `forces` on the object's nodes hold it, with the scene's tolerance and iterations.
+    /// The same by the energy form, from where `forces` on the object's nodes hold it, with the scene's tolerance and
+    /// iterations.
     #[must_use]
     pub(crate) fn solve_from(&mut self, q: &[f64], forces: &[NodeForce]) -> Equilibrium {
         let limits =
@@ -151,8 +152,8 @@ impl<'a> Solver<'a> {
             }
     }
 
-    /// Smallest signed distance of the proxy's nodes to the surface at rest, less their radius, at the joint coordinates `q`,
-    /// without solving; NaN where those are not finite or not one per joint [m].
+    /// Smallest signed distance of the proxy's nodes to the surface at rest, less their radius, at the joint
+    /// coordinates `q`, without solving; NaN where those are not finite or not one per joint [m].
     #[must_use]
     pub fn gap(&mut self, q: &[f64]) -> f64 {
         if q.len() != self.model.chain.joints.len() || !q.iter().all(|x| x.is_finite()) {
@@ -190,8 +191,8 @@ impl<'a> Solver<'a> {
         &self.pose
     }
 
-    /// Energy at the start of the last stage of the energy form's last search, where contact has taken its full stiffness, and
-    /// after each step taken since: it never rises [J].
+    /// Energy at the start of the last stage of the energy form's last search, where contact has taken its full
+    /// stiffness, and after each step taken since: it never rises [J].
     #[must_use]
     pub fn energy_history(&self) -> &[f64] {
         &self.energy.history
@@ -229,7 +230,8 @@ impl<'a> Solver<'a> {
 
     /// The paper's iteration: touches, displacement and U.
     ///
-    /// Its three forces on the nodes of a tie need not be parallel; the weights of a touch are their shares along the whole.
+    /// Its three forces on the nodes of a tie need not be parallel; the weights of a touch are their shares along the
+    /// whole.
     fn iterate(&mut self, equilibrium: &mut Equilibrium) -> SolverStats {
         let outcome = self.paper.iterate(self.model, &mut self.detection);
         self.held_by = HeldBy::Paper;

@@ -4,8 +4,8 @@ use super::{Model, Solver};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
-/// Items that one thread takes at a time: enough that sharing them out costs nothing, few enough that no thread waits long
-/// for the last.
+/// Items that one thread takes at a time: enough that sharing them out costs nothing, few enough that no thread waits
+/// long for the last.
 pub(crate) const SHARE: usize = 8;
 
 /// Solvers of one model, one a thread of a pool.
@@ -26,7 +26,8 @@ impl<'a> Solvers<'a> {
         self.solvers.len()
     }
 
-    /// Applies `solve` to each item and returns the results in the same order. Runs on the thread pool of the caller, else on the program's.
+    /// Applies `solve` to each item and returns the results in the same order. Runs on the thread pool of the caller,
+    /// else on the program's.
     pub fn map<T: Sync, R: Send>(&self, items: &[T], solve: impl Fn(&mut Solver<'a>, &T) -> R + Sync) -> Vec<R> {
         items
             .par_iter()

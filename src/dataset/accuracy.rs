@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Errors of the torque at random configurations in the cells of the grid that have a corner in contact, against the lowest equilibrium
-/// that is found there directly. Torques are Euclidean norms over the joints; a prismatic joint's force counts with an arm of 0.1 m.
+/// Errors of the torque at random configurations in the cells of the grid that have a corner in contact, against the
+/// lowest equilibrium that is found there directly. Torques are Euclidean norms over the joints; a prismatic joint's
+/// force counts with an arm of 0.1 m.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredError {
     /// Random configurations, solved directly.

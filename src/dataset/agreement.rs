@@ -1,18 +1,19 @@
 //! Whether the scene that a dataset holds describes what else it holds.
 //!
-//! A checksum finds damage, not a file that was put together of two. Joints, units and the size of a sphere are in both parts, so that
-//! they can be compared.
+//! A checksum finds damage, not a file that was put together of two. Joints, units and the size of a sphere are in both
+//! parts, so that they can be compared.
 
 use super::{Dataset, Surface};
 use crate::scene::{JointKind, Rendering, Shape};
 use glam::DVec3;
 
-/// Greatest share of its radius by which a node of a sphere is off it: what rounding leaves of coordinates far from the origin [1].
+/// Greatest share of its radius by which a node of a sphere is off it: what rounding leaves of coordinates far from the
+/// origin [1].
 const OFF_SPHERE: f64 = 1e-6;
 
 impl Dataset {
-    /// Checks that the scene in the dataset is one that this version reads, and that it has the joints of the grid, in their units,
-    /// and the sphere whose surface is stored. A dataset without a scene has nothing to contradict.
+    /// Checks that the scene in the dataset is one that this version reads, and that it has the joints of the grid, in
+    /// their units, and the sphere whose surface is stored. A dataset without a scene has nothing to contradict.
     ///
     /// # Errors
     /// Says what contradicts what.

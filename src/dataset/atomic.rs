@@ -1,9 +1,10 @@
 //! Files that appear whole or not at all.
 //!
-//! The contents go to a temporary file in the same folder, are flushed to the disk, and take the name in one rename:
-//! a crash, a full disk or a killed process leaves the old file or the new one, never a half. Who ends the process on purpose removes
-//! the temporary files by [`discard_unfinished`]; what a killed process leaves, the next one to write in that folder removes. A temporary
-//! file is locked as long as it is written, and the system unlocks it however a process ends.
+//! The contents go to a temporary file in the same folder, are flushed to the disk, and take the name in one rename: a
+//! crash, a full disk or a killed process leaves the old file or the new one, never a half. Who ends the process on
+//! purpose removes the temporary files by [`discard_unfinished`]; what a killed process leaves, the next one to write
+//! in that folder removes. A temporary file is locked as long as it is written, and the system unlocks it however a
+//! process ends.
 
 use std::{
     collections::BTreeSet,
@@ -31,8 +32,8 @@ impl<'a, P: AsRef<Path> + ?Sized> From<&'a P> for Target<'a> {
 }
 
 impl<'a> Target<'a> {
-    /// The file is called `growing` until it is whole. Nobody else may write there meanwhile; a regular file that a killed process has
-    /// left there is removed.
+    /// The file is called `growing` until it is whole. Nobody else may write there meanwhile; a regular file that a
+    /// killed process has left there is removed.
     #[must_use]
     pub fn growing(path: &'a Path, growing: &'a Path) -> Self {
         Self { path, growing: Some(growing) }
@@ -96,7 +97,8 @@ pub fn resolved(path: &Path) -> io::Result<PathBuf> {
     }
 }
 
-/// Replaces the file `target` by what `write` writes. Unless the target says otherwise, it grows under a name that no other file has.
+/// Replaces the file `target` by what `write` writes. Unless the target says otherwise, it grows under a name that no
+/// other file has.
 ///
 /// # Errors
 /// Returns the error of `write` or of the system; then the old file is untouched and the temporary one is gone.
@@ -127,8 +129,8 @@ pub fn replace_file<'a>(
     drop(writer);
     temporary.as_file().sync_all()?;
     temporary.persist(path).map_err(|error| error.error)?;
-    // The new name is to survive a power cut, too. The file is in its place by now, so that a folder that may not be read or cannot be
-    // flushed is no failure: the system then flushes it in its own time.
+    // The new name is to survive a power cut, too. The file is in its place by now, so that a folder that may not be
+    // read or cannot be flushed is no failure: the system then flushes it in its own time.
     #[cfg(unix)]
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
     Ok(())

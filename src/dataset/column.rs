@@ -22,13 +22,14 @@ impl<T: Pod> Column<T> {
         Some(Self(Storage::Mapped { map, bytes }))
     }
 
-    /// Gives the memory of the whole mapped file back to the system, where that takes such advice: pages are read again from the file, or
-    /// its cache, once they are looked at. The columns must lie in a file, not in a copy of one, which would be lost.
+    /// Gives the memory of the whole mapped file back to the system, where that takes such advice: pages are read again
+    /// from the file, or its cache, once they are looked at. The columns must lie in a file, not in a copy of one,
+    /// which would be lost.
     pub(super) fn release(&self) {
         #[cfg(unix)]
         if let Storage::Mapped { map, .. } = &self.0 {
-            // SAFETY: the map is a read-only one of a file, so that its pages come again with the same bytes. Advice that is not taken
-            // changes nothing.
+            // SAFETY: the map is a read-only one of a file, so that its pages come again with the same bytes. Advice
+            // that is not taken changes nothing.
             let _ = unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) };
         }
     }

@@ -1,4 +1,5 @@
-//! The dataset file, its layout and its writer: a safetensors file whose header carries grid, provenance, scene and a checksum.
+//! The dataset file, its layout and its writer: a safetensors file whose header carries grid, provenance, scene and a
+//! checksum.
 //!
 //! ```text
 //! 8 bytes   n, length of the header, little-endian
@@ -216,7 +217,8 @@ pub(crate) struct Kind<'a> {
     pub(crate) store: Option<&'a str>,
 }
 
-/// Writes a dataset's file, replacing the one that is `target` whole or not at all. The tensors are as in the table above, in any order.
+/// Writes a dataset's file, replacing the one that is `target` whole or not at all. The tensors are as in the table
+/// above, in any order.
 pub(crate) fn write_file<C: Contents>(
     target: Target<'_>,
     heading: Heading<'_>,

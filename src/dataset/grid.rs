@@ -65,8 +65,8 @@ impl Grid {
         self.axes.iter().map(|axis| axis.count).collect()
     }
 
-    /// Number of points of a sound grid: 1 to [`MAX_JOINTS`] axes of ascending, finite, distinct grid lines, and no more
-    /// points than can be counted.
+    /// Number of points of a sound grid: 1 to [`MAX_JOINTS`] axes of ascending, finite, distinct grid lines, and no
+    /// more points than can be counted.
     ///
     /// # Errors
     /// Problem, in words.

@@ -4,7 +4,8 @@ use super::{Dataset, Grid, Provenance};
 use crate::{JointVector, contact::Status};
 
 impl Dataset {
-    /// `field(q) = (tau [N m], U [J], status)` at every point of `grid`, and nothing else: no contacts, no surface, no scene.
+    /// `field(q) = (tau [N m], U [J], status)` at every point of `grid`, and nothing else: no contacts, no surface, no
+    /// scene.
     #[must_use]
     pub fn of_field(grid: Grid, field: impl Fn(&JointVector) -> (JointVector, f64, Status)) -> Self {
         let (mut torque, mut energy, mut status) = (Vec::new(), Vec::new(), Vec::new());
@@ -31,8 +32,8 @@ impl Dataset {
         }
     }
 
-    /// A half space `n . q > 0` of C-space that pushes back with `U = 1/2 k (n . q)^2`, n the unit vector `normal` and k the
-    /// `stiffness` [N m/rad].
+    /// A half space `n . q > 0` of C-space that pushes back with `U = 1/2 k (n . q)^2`, n the unit vector `normal` and
+    /// k the `stiffness` [N m/rad].
     #[must_use]
     pub fn of_half_space(grid: Grid, normal: &JointVector, stiffness: f64) -> Self {
         Self::of_field(grid, |q| {

@@ -43,11 +43,12 @@ pub struct Dataset {
     pub torque: Column<f64>,
     /// U [J]; absent in scanned datasets.
     pub energy: Option<Column<f64>>,
-    /// Lower triangle of the tangent d tau/d q, row by row: (0, 0), (1, 0), (1, 1) and so on, a point's entries side by side; zeros where
-    /// nothing touches or there is no derivative. Absent where the interpolation does not use it, and in scanned datasets [N m/rad].
+    /// Lower triangle of the tangent d tau/d q, row by row: (0, 0), (1, 0), (1, 1) and so on, a point's entries side by
+    /// side; zeros where nothing touches or there is no derivative. Absent where the interpolation does not use it, and
+    /// in scanned datasets [N m/rad].
     pub tangent: Option<Column<f32>>,
-    /// Smallest signed distance of the proxy to the surface at rest [m]; more than two grid steps away from every point in
-    /// contact it may be a positive lower bound of that, where nothing was solved. Absent in scanned datasets.
+    /// Smallest signed distance of the proxy to the surface at rest [m]; more than two grid steps away from every point
+    /// in contact it may be a positive lower bound of that, where nothing was solved. Absent in scanned datasets.
     pub gap: Option<Column<f32>>,
     /// [`Status`] as its number.
     pub status: Column<u8>,

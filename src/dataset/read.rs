@@ -19,15 +19,16 @@ use std::{
 };
 
 impl Dataset {
-    /// Maps the file at `path` and checks all of it. The columns are read where they lie in the file; its pages count as this process's
-    /// memory only once they are looked at after the check.
+    /// Maps the file at `path` and checks all of it. The columns are read where they lie in the file; its pages count
+    /// as this process's memory only once they are looked at after the check.
     ///
     /// # Errors
     /// Missing, foreign, of another version, cut short, or altered in any bit.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let read = |source| Error::Read { path: path.into(), source };
         let file = regular_file(path).map_err(read)?;
-        // SAFETY: the map is read-only and private to this process; what changing the file meanwhile does is said in `file.rs`.
+        // SAFETY: the map is read-only and private to this process; what changing the file meanwhile does is said in
+        // `file.rs`.
         let map = unsafe { Mmap::map(&file) }.map_err(|source| match source.kind() {
             io::ErrorKind::OutOfMemory => no_room(path, &file),
             _ => read(source),

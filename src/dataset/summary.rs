@@ -109,7 +109,8 @@ impl Dataset {
         }
     }
 
-    /// Returns the quantities that the dataset does not hold, in words. A measured one holds none of these: a device feels torque alone.
+    /// Returns the quantities that the dataset does not hold, in words. A measured one holds none of these: a device
+    /// feels torque alone.
     #[must_use]
     pub fn absent(&self) -> Vec<&'static str> {
         [

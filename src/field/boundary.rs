@@ -7,30 +7,31 @@
 //!
 //! *Depth.* Every grid point has a depth, positive below the object's boundary, and between them it is interpolated
 //! linearly: s(q). It grows by no more than the distance travelled, `|s(q) - s(q')| <= |q - q'|_K`, across cell faces
-//! too. Away from the boundary it follows the eikonal equation `|grad s| = 1` on the grid, by fast marching (Sethian 1996):
-//! exact behind flat boundaries in any direction, and without the steps of distances from point to point. The
+//! too. Away from the boundary it follows the eikonal equation `|grad s| = 1` on the grid, by fast marching (Sethian
+//! 1996): exact behind flat boundaries in any direction, and without the steps of distances from point to point. The
 //! interpolated depth is then up to sqrt(d) times as steep where distances meet (1.0 to 1.4 behind flat boundaries); G,
 //! its greatest steepness, is computed and divided out.
 //!
 //! *Boundary of the contact index* (the paper). Contact is where the index I, 1 in contact and 0 free, exceeds Ith when
 //! interpolated linearly; there the torque jumps from zero to about `Ith |tau|`. Depth is `(level - Ith) / g`,
 //! `g = sqrt(sum_a 1/(Ks_a h_a^2))`, with levels 0 where free, 1 within a king's move (one step along any axes at once)
-//! of a free point, `1 + g E / G` beyond, E the distance to the points of level 0 or 1. In a cell with a free corner the
-//! level is I_bar, in all others at least 1: the region `s > 0` is exactly the paper's.
+//! of a free point, `1 + g E / G` beyond, E the distance to the points of level 0 or 1. In a cell with a free corner
+//! the level is I_bar, in all others at least 1: the region `s > 0` is exactly the paper's.
 //!
 //! *Boundary of the gap field.* Contact is where the interpolated gap is negative. Points within a king's move of the
 //! boundary are `-gap / |grad gap|` deep, the others follow by marching; all are divided by G.
 //!
-//! *Torque.* The interpolated torque is shortened, in its own direction, to at most s: `tau_bar = tau min(1, s / |tau|_K)`,
-//! the projection of tau onto the ball of radius s. Projections onto a ball move two points no further apart, nor by
-//! more than the change of radius. Where the torque is shortened these changes are at right angles, so that
-//! `|tau_bar(q) - tau_bar(q')|_K <= sqrt(L^2 + 1) |q - q'|_K`, L the Lipschitz bound of tau in these measures. The layer's own slope is Ks / G and never above Ks; within the first cell it is less, Ks / d
-//! at worst. Where the object is softer than that, the dataset's torque is untouched.
+//! *Torque.* The interpolated torque is shortened, in its own direction, to at most s:
+//! `tau_bar = tau min(1, s / |tau|_K)`, the projection of tau onto the ball of radius s. Projections onto a ball move
+//! two points no further apart, nor by more than the change of radius. Where the torque is shortened these changes are
+//! at right angles, so that `|tau_bar(q) - tau_bar(q')|_K <= sqrt(L^2 + 1) |q - q'|_K`, L the Lipschitz bound of tau in
+//! these measures. The layer's own slope is Ks / G and never above Ks; within the first cell it is less, Ks / d at
+//! worst. Where the object is softer than that, the dataset's torque is untouched.
 //!
 //! *An object stiffer than Ks* is rendered with slope Ks to all depths, and not only where it begins. It is the paper's
 //! linear slope drawn until it meets the torque, which here is nowhere; and it is what is passive, since
-//! `Ks <= mu bv / T` bounds every slope that the loop renders, that of a jump and that of a stiff object alike. To feel it
-//! stiffer, raise Ks to the bound, and the bound by bv.
+//! `Ks <= mu bv / T` bounds every slope that the loop renders, that of a jump and that of a stiff object alike. To feel
+//! it stiffer, raise Ks to the bound, and the bound by bv.
 
 use super::stencil::Lattice;
 use crate::{JointVector, MAX_JOINTS, tolerances::LEAST_GAP};
@@ -114,7 +115,8 @@ impl BoundaryLayer {
         depths
     }
 
-    /// Distance of `point` from the zero of `gap` by its gradient there [sqrt(J)]; the steeper side of each axis counts.
+    /// Distance of `point` from the zero of `gap` by its gradient there [sqrt(J)]; the steeper side of each axis
+    /// counts.
     fn distance_to_zero(&self, lattice: &Lattice, gap: &[f64], point: usize) -> f64 {
         let along = |((count, step, stride), compliance): ((usize, f64, usize), &f64)| {
             let neighbours = Lattice::neighbours(point, count, stride).into_iter().flatten();

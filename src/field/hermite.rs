@@ -1,14 +1,14 @@
 //! The tensor product of cubic Hermite polynomials over a grid: C1, exact in values and gradients at the grid points.
 //!
 //! In one dimension, with f and its derivative g at both ends of a cell of length h and x the fraction of the cell,
-//! `f(x) = f_0 (1 - 3x^2 + 2x^3) + g_0 h (x - 2x^2 + x^3) + f_1 (3x^2 - 2x^3) + g_1 h (x^3 - x^2)`.
-//! In d dimensions the product of these, axis by axis: each grid point has 2^d numbers, the derivatives once or not at all
-//! along each axis, numbered by the set of axes (bit a for axis a), and each cell 4^d. Lengths are in steps of the grid, so
-//! that all of them have the unit of f.
+//! `f(x) = f_0 (1 - 3x^2 + 2x^3) + g_0 h (x - 2x^2 + x^3) + f_1 (3x^2 - 2x^3) + g_1 h (x^3 - x^2)`. In d dimensions the
+//! product of these, axis by axis: each grid point has 2^d numbers, the derivatives once or not at all along each axis,
+//! numbered by the set of axes (bit a for axis a), and each cell 4^d. Lengths are in steps of the grid, so that all of
+//! them have the unit of f.
 //!
-//! A cell is evaluated axis by axis, the last first: each contraction leaves a quarter of the numbers. Beside the value, one
-//! gradient entry an axis joins the contraction where its axis is the one contracted: about 4^d sums of four products in all.
-//! Nothing allocates, nothing branches.
+//! A cell is evaluated axis by axis, the last first: each contraction leaves a quarter of the numbers. Beside the
+//! value, one gradient entry an axis joins the contraction where its axis is the one contracted: about 4^d sums of four
+//! products in all. Nothing allocates, nothing branches.
 
 use super::stencil::{Lattice, Stencil};
 use crate::{JointVector, MAX_JOINTS, proxy::JointMatrix};
@@ -38,11 +38,11 @@ impl Hermite {
         lattice.points().saturating_mul(size_of::<f64>() << lattice.joints())
     }
 
-    /// The function with `values` and gradients `slopes` at the points of `lattice`, and the second derivative along axes a and b
-    /// that `mixed` gives for (point, a, b), where it gives one.
+    /// The function with `values` and gradients `slopes` at the points of `lattice`, and the second derivative along
+    /// axes a and b that `mixed` gives for (point, a, b), where it gives one.
     ///
-    /// All other mixed derivatives are differences of those of one order less: central ones, one-sided at the rim, and the mean
-    /// over the axis that comes last.
+    /// All other mixed derivatives are differences of those of one order less: central ones, one-sided at the rim, and
+    /// the mean over the axis that comes last.
     pub fn new(
         lattice: &Lattice,
         values: &[f64],
@@ -88,11 +88,11 @@ impl Hermite {
         self.derivatives[point << self.joints]
     }
 
-    /// Bounds on the function and its derivatives over the cell whose first corner is `point`, `None` where no cell begins there.
-    /// `work` is resized and overwritten.
+    /// Bounds on the function and its derivatives over the cell whose first corner is `point`, `None` where no cell
+    /// begins there. `work` is resized and overwritten.
     ///
-    /// In Bernstein form a polynomial lies between its least and greatest coefficient, and the coefficients of its derivatives are
-    /// differences of its own (Farin 2002, Curves and Surfaces for CAGD, sections 5.3 and 6.3).
+    /// In Bernstein form a polynomial lies between its least and greatest coefficient, and the coefficients of its
+    /// derivatives are differences of its own (Farin 2002, Curves and Surfaces for CAGD, sections 5.3 and 6.3).
     pub fn bounds(&self, lattice: &Lattice, point: usize, work: &mut Vec<f64>) -> Option<CellBounds> {
         let joints = self.joints;
         // An axis of one point has no extent: the cell is flat there.
@@ -179,8 +179,8 @@ impl Hermite {
     }
 }
 
-/// Differences of neighbouring coefficients along `axis`, in an array of the same shape; those of the last along any axis, which
-/// has no neighbour, are not a number and count for nothing.
+/// Differences of neighbouring coefficients along `axis`, in an array of the same shape; those of the last along any
+/// axis, which has no neighbour, are not a number and count for nothing.
 fn differences(coefficients: &[f64], axis: usize) -> Vec<f64> {
     let stride = 1 << (2 * axis);
     let mut result = vec![f64::NAN; coefficients.len()];

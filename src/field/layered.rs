@@ -1,20 +1,21 @@
-//! Multilinear torque behind a boundary layer: the paper's interpolation, and the same with the boundary of the gap field.
+//! Multilinear torque behind a boundary layer: the paper's interpolation, and the same with the boundary of the gap
+//! field.
 //!
 //! `tau(q) = sum_c w_c tau_c` over the 2^d corners of the cell around q, shortened to the depth below the boundary
 //! (`boundary.rs`). Component by component it is not the gradient of anything: it makes or takes energy around a loop.
 //!
-//! *`linear`* (section 3.1): tau_c = 0 at free points, the boundary where the contact index passes its threshold. Both the
-//! boundary and the torque beside it err with the spacing h.
+//! *`linear`* (section 3.1): tau_c = 0 at free points, the boundary where the contact index passes its threshold. Both
+//! the boundary and the torque beside it err with the spacing h.
 //!
-//! *`gap-field`*: the boundary is where the interpolated gap (smallest signed distance of the proxy's nodes to the surface
-//! at rest) is zero, which errs with h^2. There the torque of an object of finite stiffness begins at zero and grows in
-//! proportion to the depth, so that free points beside the boundary take the torque that the contact would have with
-//! their negative depth: `tau_c = s_c gap_c`, s the ratio tau / gap of the nearest points in contact [N]. The interpolated
-//! torque then passes zero at the boundary, where the layer cuts it off, and errs with h^2 in cells that the boundary
-//! crosses, too.
+//! *`gap-field`*: the boundary is where the interpolated gap (smallest signed distance of the proxy's nodes to the
+//! surface at rest) is zero, which errs with h^2. There the torque of an object of finite stiffness begins at zero and
+//! grows in proportion to the depth, so that free points beside the boundary take the torque that the contact would
+//! have with their negative depth: `tau_c = s_c gap_c`, s the ratio tau / gap of the nearest points in contact [N]. The
+//! interpolated torque then passes zero at the boundary, where the layer cuts it off, and errs with h^2 in cells that
+//! the boundary crosses, too.
 //!
-//! Points that were not computed carry the torque of the nearest one that was. So the torque does not end inside the object where the
-//! measurements do: it keeps the value that it has there.
+//! Points that were not computed carry the torque of the nearest one that was. So the torque does not end inside the
+//! object where the measurements do: it keeps the value that it has there.
 
 use super::{
     FieldError,
@@ -113,9 +114,9 @@ impl Layered {
         Interpolated { torque, depth, energy, held }
     }
 
-    /// Greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), before the layer. The gradient is affine
-    /// in each coordinate of a cell, so that its norm is greatest at a corner, where its columns are the differences along
-    /// the edges that meet there.
+    /// Greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), before the layer. The gradient is
+    /// affine in each coordinate of a cell, so that its norm is greatest at a corner, where its columns are the
+    /// differences along the edges that meet there.
     pub fn relative_stiffness(&self, lattice: &Lattice, slopes: &JointVector) -> f64 {
         let joints = lattice.joints();
         let torque = |point: usize| &self.records[point * (joints + 2)..point * (joints + 2) + joints];

@@ -1,13 +1,13 @@
 //! The contact torque as a function of configuration: interpolation over the dataset's grid (section 3.1).
 //!
-//! Three ways, chosen by the scene ([`Interpolation`]): `linear` and `gap-field` (`layered.rs`) interpolate the torque and
-//! hold it behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient. All are
-//! continuous and without memory. What they share is here: the cell around q, the fade outside the grid (`stencil.rs`),
-//! what is said of points that were not computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`,
-//! I_c = 1 where a torque is stored (contact, unconverged, overflowed) and 0 at free points.
+//! Three ways, chosen by the scene ([`Interpolation`]): `linear` and `gap-field` (`layered.rs`) interpolate the torque
+//! and hold it behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient.
+//! All are continuous and without memory. What they share is here: the cell around q, the fade outside the grid
+//! (`stencil.rs`), what is said of points that were not computed or did not converge, and the contact index
+//! `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored (contact, unconverged, overflowed) and 0 at free points.
 //!
-//! A field owns a copy of what it needs, interleaved point by point. The real-time thread thus never touches a mapped file,
-//! which would end the process when somebody else truncates it.
+//! A field owns a copy of what it needs, interleaved point by point. The real-time thread thus never touches a mapped
+//! file, which would end the process when somebody else truncates it.
 
 mod batch;
 pub mod boundary;
@@ -53,8 +53,8 @@ pub struct Sample {
     pub torque: JointVector,
     /// Interpolated contact index, 0 to 1.
     pub index: f64,
-    /// Whether the proxy is beyond the object's boundary; beside points that were not computed, as far as the nearest ones that
-    /// were say.
+    /// Whether the proxy is beyond the object's boundary; beside points that were not computed, as far as the nearest
+    /// ones that were say.
     pub contact: bool,
     /// Object nodes in contact at the heaviest corner in contact; 0 out of contact.
     pub contact_nodes: u32,
@@ -67,8 +67,8 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Returns the status of the configuration: [`Status::Outside`] outside the grid or beside a grid point that was not computed,
-    /// [`Status::Unconverged`] beside one that did not converge; else whether there is contact.
+    /// Returns the status of the configuration: [`Status::Outside`] outside the grid or beside a grid point that was
+    /// not computed, [`Status::Unconverged`] beside one that did not converge; else whether there is contact.
     #[must_use]
     pub fn status(&self) -> Status {
         if self.flags.intersects(Flags::OUTSIDE | Flags::ABSENT) {
@@ -101,8 +101,8 @@ impl TorqueField {
         Self::interpolated(dataset, Interpolation::Linear, threshold, slope)
     }
 
-    /// Any interpolation over `dataset`. `threshold` counts for `linear` alone, `slope` for all but `potential`, which takes its mixed
-    /// derivatives from the dataset's tangents where it has them.
+    /// Any interpolation over `dataset`. `threshold` counts for `linear` alone, `slope` for all but `potential`, which
+    /// takes its mixed derivatives from the dataset's tangents where it has them.
     ///
     /// # Errors
     /// As [`TorqueField::new`]; also when the dataset lacks the column that `interpolation` needs.
@@ -154,8 +154,8 @@ impl TorqueField {
     }
 
     /// Upper bound of the stiffness of the interpolated torque inside the grid, before any boundary layer, relative to
-    /// `slopes`, one per joint [N m/rad]: no Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), is greater. One
-    /// or less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
+    /// `slopes`, one per joint [N m/rad]: no Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), is
+    /// greater. One or less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
     #[must_use]
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
         match &self.interpolant {

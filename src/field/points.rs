@@ -1,4 +1,5 @@
-//! What a field knows of each grid point beside numbers that are interpolated, and what is known where nothing was computed.
+//! What a field knows of each grid point beside numbers that are interpolated, and what is known where nothing was
+//! computed.
 
 use super::{FieldError, Flags, stencil::Lattice};
 use crate::{JointMatrix, contact::Status, dataset::Dataset, tolerances::GREATEST_INPUT};
@@ -12,8 +13,8 @@ pub(super) struct Point {
     pub flags: Flags,
     /// A torque is stored: contact, unconverged or overflowed.
     pub in_contact: bool,
-    /// Contact index Ic: that of the nearest point that was computed, lest a missing measurement be taken for a boundary
-    /// of the object.
+    /// Contact index Ic: that of the nearest point that was computed, lest a missing measurement be taken for a
+    /// boundary of the object.
     pub touching: bool,
 }
 
@@ -113,7 +114,8 @@ pub(super) fn plausible(column: &'static str, point: usize, value: f64) -> Resul
     if value.abs() <= GREATEST_INPUT { Ok(()) } else { Err(FieldError::Value { column, point, value }) }
 }
 
-/// For each grid point the nearest one that was computed, in steps along the axes; itself if it was. `None` if none was.
+/// For each grid point the nearest one that was computed, in steps along the axes; itself if it was. `None` if none
+/// was.
 fn nearest_present(lattice: &Lattice, points: &[Point]) -> Option<Vec<usize>> {
     let mut nearest: Vec<Option<usize>> = vec![None; points.len()];
     let mut queue = VecDeque::new();
@@ -167,8 +169,8 @@ impl Generations {
         Self { steps, outwards }
     }
 
-    /// The neighbours of `point` that are one step nearer to what is known: axis, distance of `point` from them along it
-    /// (with its sign), and point.
+    /// The neighbours of `point` that are one step nearer to what is known: axis, distance of `point` from them along
+    /// it (with its sign), and point.
     pub fn nearer<'a>(&'a self, lattice: &'a Lattice, point: usize) -> impl Iterator<Item = (usize, f64, usize)> + 'a {
         lattice.lines().enumerate().flat_map(move |(axis, (count, step, stride))| {
             let [before, after] = Lattice::neighbours(point, count, stride);

@@ -1,28 +1,30 @@
-//! The potential: a torque field that is minus the gradient of one smooth energy, and so makes no energy around any loop.
+//! The potential: a torque field that is minus the gradient of one smooth energy, and so makes no energy around any
+//! loop.
 //!
-//! An object of finite stiffness stores `U = 1/2 k depth^2` where contact begins: U and its gradient vanish at the boundary,
-//! its curvature jumps there. So not U is interpolated but its signed root,
-//! `w = sqrt(2 (U - U_free))`, `dw/dq = -tau / w`, continued to negative values on the free side, which is smooth through the
-//! boundary and, for a linear object, linear. Then
+//! An object of finite stiffness stores `U = 1/2 k depth^2` where contact begins: U and its gradient vanish at the
+//! boundary, its curvature jumps there. So not U is interpolated but its signed root, `w = sqrt(2 (U - U_free))`,
+//! `dw/dq = -tau / w`, continued to negative values on the free side, which is smooth through the boundary and, for a
+//! linear object, linear. Then
 //!
 //! `U_bar = U_free + 1/2 max(0, w_bar)^2`,  `tau_bar = -dU_bar/dq = -max(0, w_bar) dw_bar/dq`.
 //!
-//! w_bar is the C1 tensor product of cubic Hermite polynomials (`hermite.rs`): U_bar is C1, tau_bar continuous, equal to the
-//! dataset's tau at its points, and errs with h^3 where the field is smooth. It begins at zero at the boundary
+//! w_bar is the C1 tensor product of cubic Hermite polynomials (`hermite.rs`): U_bar is C1, tau_bar continuous, equal
+//! to the dataset's tau at its points, and errs with h^3 where the field is smooth. It begins at zero at the boundary
 //! w_bar = 0, without a jump and so without a boundary layer, which would break the gradient.
 //!
-//! *Mixed derivatives* of w, which a tensor product needs beside w and its gradient: the second ones follow from the tangent
-//! d tau/d q where it is known, `w_ab = -(d tau_a/d q_b + w_a w_b) / w`. All others are differences between neighbouring points of the
-//! derivatives of one order less, the mean over the orders of differentiation. Each grid point has one number for each, so that w_bar
-//! is C1 whatever they are. On a smooth field tangents leave a fifth to a half of the error of differences; zeros instead of
-//! differences for the third ones add 1 to 10 % to it.
+//! *Mixed derivatives* of w, which a tensor product needs beside w and its gradient: the second ones follow from the
+//! tangent d tau/d q where it is known, `w_ab = -(d tau_a/d q_b + w_a w_b) / w`. All others are differences between
+//! neighbouring points of the derivatives of one order less, the mean over the orders of differentiation. Each grid
+//! point has one number for each, so that w_bar is C1 whatever they are. On a smooth field tangents leave a fifth to a
+//! half of the error of differences; zeros instead of differences for the third ones add 1 to 10 % to it.
 //!
-//! *Free points* take w and its gradient from the nearest points in contact by Taylor's formula, at most zero. Points that
-//! were not computed do so, too, but there w may be positive: the torque goes on where the data end. *Unconverged points* have an energy and a torque that do not
-//! belong together: the energy is taken, the gradient from differences of w.
+//! *Free points* take w and its gradient from the nearest points in contact by Taylor's formula, at most zero. Points
+//! that were not computed do so, too, but there w may be positive: the torque goes on where the data end. *Unconverged
+//! points* have an energy and a torque that do not belong together: the energy is taken, the gradient from differences
+//! of w.
 //!
-//! Where equilibria change abruptly (the object snaps from one to another), U jumps between two grid points. The field then
-//! goes from one to the other within the cell, smoothly, with a torque of about the jump over h.
+//! Where equilibria change abruptly (the object snaps from one to another), U jumps between two grid points. The field
+//! then goes from one to the other within the cell, smoothly, with a torque of about the jump over h.
 
 use super::{
     FieldError,

@@ -1,22 +1,22 @@
 //! The haptized range: where the contact torque is known, and so where the proxy may go.
 //!
-//! Beyond the grid nothing was solved. Were the proxy to leave the grid in contact, its torque would fall to zero in the middle of
-//! the object. So the range ends at the grid like a joint at its limit: the proxy is stopped there, and the virtual coupling holds
-//! the device with its stiffness Kvc, to which the passivity bounds of the coupling apply.
+//! Beyond the grid nothing was solved. Were the proxy to leave the grid in contact, its torque would fall to zero in
+//! the middle of the object. So the range ends at the grid like a joint at its limit: the proxy is stopped there, and
+//! the virtual coupling holds the device with its stiffness Kvc, to which the passivity bounds of the coupling apply.
 //!
-//! *Free space beyond the grid* belongs to the range where it is proven free. The clearance c(x) [m] is a lower bound of the distance
-//! between proxy and object, the greater of
-//! - `gap_p - sum_a r_a |x_a - q_pa|`, the greatest over all grid points p: no node moves by more than r_a for a unit of joint a
-//!   (the greatest of [`Chain::jacobian_bounds`]);
+//! *Free space beyond the grid* belongs to the range where it is proven free. The clearance c(x) [m] is a lower bound
+//! of the distance between proxy and object, the greater of
+//! - `gap_p - sum_a r_a |x_a - q_pa|`, the greatest over all grid points p: no node moves by more than r_a for a unit
+//!   of joint a (the greatest of [`Chain::jacobian_bounds`]);
 //! - the distance of the proxy's nodes at x from the box around the object at rest.
 //!
-//! A dataset of a real object has no gaps. There a free border is taken to be free beyond, and c counts grid steps from the nearest
-//! point in contact to the border beside x, with r_a one over the spacing.
+//! A dataset of a real object has no gaps. There a free border is taken to be free beyond, and c counts grid steps from
+//! the nearest point in contact to the border beside x, with r_a one over the spacing.
 //!
-//! *Stops.* c changes by no more than `sum_a r_a |dx_a|`. In one step the proxy may go by `c / (2 d r_a)` along each of the d joints,
-//! which leaves half of c: outside the grid it never reaches what is not known to be free. In the grid it may instead go anywhere
-//! in the grid, and does so where that is farther at its speed. x lies within its stops, which is what keeps the step passive
-//! (`render/npmi/stops.rs`).
+//! *Stops.* c changes by no more than `sum_a r_a |dx_a|`. In one step the proxy may go by `c / (2 d r_a)` along each of
+//! the d joints, which leaves half of c: outside the grid it never reaches what is not known to be free. In the grid it
+//! may instead go anywhere in the grid, and does so where that is farther at its speed. x lies within its stops, which
+//! is what keeps the step passive (`render/npmi/stops.rs`).
 
 use super::{
     FieldError,
@@ -54,8 +54,8 @@ struct Beyond {
     object: Option<Surroundings>,
 }
 
-/// Raises `clearances` at the points of `lattice` to the greatest `clearance_p - sum_a r_a |q_a - q_pa|` over all points p, r in
-/// `levers`: axis by axis, there and back.
+/// Raises `clearances` at the points of `lattice` to the greatest `clearance_p - sum_a r_a |q_a - q_pa|` over all
+/// points p, r in `levers`: axis by axis, there and back.
 fn spread(lattice: &Lattice, levers: &JointVector, clearances: &mut [f32]) {
     for ((count, step, stride), lever) in lattice.lines().zip(levers.iter()) {
         let loss = (step * lever) as f32;
@@ -131,7 +131,8 @@ impl HaptizedRange {
         Ok(range)
     }
 
-    /// The stops of a step of `interval` T [s] from `x` at `velocity`, within `limits`, between which x lies. Never allocates.
+    /// The stops of a step of `interval` T [s] from `x` at `velocity`, within `limits`, between which x lies. Never
+    /// allocates.
     #[must_use]
     pub fn stops(&self, x: &JointVector, velocity: &JointVector, interval: f64, limits: &Stops) -> Stops {
         let mut reach = JointVector::zeros(x.len());

@@ -4,9 +4,9 @@ use super::{TorqueField, stencil::Lattice};
 use crate::{MAX_JOINTS, tolerances::GRADIENT_STEP};
 
 impl TorqueField {
-    /// The slope d tau/d q at `q`, row by row: entry `k d + l` of `slope` is the change of tau_k with q_l [N m/rad, or what follows of
-    /// prismatic joints]. Central differences of the interpolated torque; on a face of a cell, where that has a kink, the mean of both
-    /// sides. `slope` has d^2 entries. Never allocates.
+    /// The slope d tau/d q at `q`, row by row: entry `k d + l` of `slope` is the change of tau_k with q_l
+    /// [N m/rad, or what follows of prismatic joints]. Central differences of the interpolated torque; on a face of a
+    /// cell, where that has a kink, the mean of both sides. `slope` has d^2 entries. Never allocates.
     pub fn slope(&self, q: &[f64], slope: &mut [f64]) {
         let joints = self.joints();
         let mut place = [0.0; MAX_JOINTS];
@@ -26,7 +26,8 @@ impl TorqueField {
 }
 
 impl Lattice {
-    /// Multilinear interpolation of `column`, one entry a grid point, at `q`; not a number outside the grid, where nothing is known.
+    /// Multilinear interpolation of `column`, one entry a grid point, at `q`; not a number outside the grid, where
+    /// nothing is known.
     #[must_use]
     pub fn interpolate(&self, column: &[f32], q: &[f64]) -> f64 {
         let stencil = self.locate(q);

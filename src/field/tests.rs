@@ -428,7 +428,8 @@ fn stiffness_of_a_potential_is_that_of_its_object() {
     }
 }
 
-/// Root w, its gradient and its second derivatives at `q`, of the energy `1/2 max(0, w)^2`: curved along every joint and every pair.
+/// Root w, its gradient and its second derivatives at `q`, of the energy `1/2 max(0, w)^2`: curved along every joint
+/// and every pair.
 fn wavy_root(q: &[f64]) -> (f64, JointVector, JointMatrix) {
     let (mut w, mut slope, mut second) = (0.1, JointVector::zeros(q.len()), JointMatrix::zeros(q.len()));
     for wave in 0..3 {

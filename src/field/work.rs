@@ -1,8 +1,10 @@
-//! The work that the contact torque does along a path through C-space: zero around a loop if and only if it is a gradient.
+//! The work that the contact torque does along a path through C-space: zero around a loop if and only if it is a
+//! gradient.
 //!
-//! `W = int tau_bar . dq` along a straight line, cut at the faces of the grid. Between two faces a potential's torque is a
-//! polynomial of degree 6d - 1 at most, which Lobatto's formula of ten points integrates exactly up to three joints; where
-//! the formula and its two halves differ (a boundary crossed within the cell, more joints) the stretch is halved.
+//! `W = int tau_bar . dq` along a straight line, cut at the faces of the grid. Between two faces a potential's torque
+//! is a polynomial of degree 6d - 1 at most, which Lobatto's formula of ten points integrates exactly up to three
+//! joints; where the formula and its two halves differ (a boundary crossed within the cell, more joints) the stretch is
+//! halved.
 
 use super::TorqueField;
 use crate::{
@@ -10,8 +12,8 @@ use crate::{
     tolerances::{WORK_HALVINGS, WORK_ROUNDING, WORK_STRETCHES},
 };
 
-/// Nodes in (0, 1] and weights of Lobatto's formula of ten points on [-1, 1]. It looks at the ends, too: where the torque
-/// begins or ends within a stretch, the whole and its halves cannot agree by not seeing it.
+/// Nodes in (0, 1] and weights of Lobatto's formula of ten points on [-1, 1]. It looks at the ends, too: where the
+/// torque begins or ends within a stretch, the whole and its halves cannot agree by not seeing it.
 const LOBATTO: [(f64, f64); 5] = [
     (0.165_278_957_666_387_02, 0.327_539_761_183_897_6),
     (0.477_924_949_810_444_5, 0.292_042_683_679_683_8),
@@ -67,8 +69,8 @@ impl TorqueField {
         work
     }
 
-    /// Integral of the power, and of the size of its summands, from `start` to `end` of the line. The summands' size, not
-    /// the power's: where torque and path are nearly perpendicular, rounding is as large as what cancels.
+    /// Integral of the power, and of the size of its summands, from `start` to `end` of the line. The summands' size,
+    /// not the power's: where torque and path are nearly perpendicular, rounding is as large as what cancels.
     fn lobatto(&self, from: &JointVector, to: &JointVector, start: f64, end: f64) -> (f64, f64) {
         let (middle, half) = (start.midpoint(end), 0.5 * (end - start));
         let mut sums = (0.0, 0.0);

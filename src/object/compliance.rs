@@ -1,11 +1,11 @@
 //! The compliance C = K^-1 on surface nodes.
 //!
-//! Contact acts on surface nodes only, and only on those that the proxy can reach, so the rows and columns of K^-1 at these
-//! nodes are all that it needs: leaving out the others is exact static condensation, not an approximation. K is fixed per
-//! object: one factorisation, then one solve a column, in blocks of columns on all cores.
+//! Contact acts on surface nodes only, and only on those that the proxy can reach, so the rows and columns of K^-1 at
+//! these nodes are all that it needs: leaving out the others is exact static condensation, not an approximation. K is
+//! fixed per object: one factorisation, then one solve a column, in blocks of columns on all cores.
 //!
-//! Where springs and ground are isotropic C = c (x) I: a force moves every node along itself, and one number a pair of nodes is all
-//! there is to store and to multiply with, instead of nine.
+//! Where springs and ground are isotropic C = c (x) I: a force moves every node along itself, and one number a pair of
+//! nodes is all there is to store and to multiply with, instead of nine.
 
 use super::{Factor, Object, ObjectError};
 use crate::memory;
@@ -21,8 +21,8 @@ pub struct Compliance {
     places: Vec<u32>,
     /// Rows and columns per node: 3, or 1 where the object is isotropic and each stands for all three coordinates.
     pub rows_per_node: usize,
-    /// Row-major, `rows_per_node` R numbers a row: entry (3i + a, 3j + b) is for coordinates a and b of the nodes in places i and j, or
-    /// (i, j) for each coordinate of both [m/N].
+    /// Row-major, `rows_per_node` R numbers a row: entry (3i + a, 3j + b) is for coordinates a and b of the nodes in
+    /// places i and j, or (i, j) for each coordinate of both [m/N].
     pub entries: Vec<f64>,
 }
 
@@ -33,7 +33,8 @@ const ABSENT: u32 = u32::MAX;
 /// columns stays in cache.
 const COLUMNS_PER_SOLVE: usize = 32;
 
-/// Most memory that the dense compliance may take, where so much is left [B]: it is what a laptop can hold beside everything else.
+/// Most memory that the dense compliance may take, where so much is left [B]: it is what a laptop can hold beside
+/// everything else.
 const MAX_BYTES: usize = 4 << 30;
 
 impl Compliance {

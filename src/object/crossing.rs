@@ -1,9 +1,10 @@
 //! Does a closed surface cross or touch itself?
 //!
-//! Where two sheets of a surface cross, "inside" has no meaning for contact: the signed distance changes its sign in the middle of the
-//! material. Two triangles cross exactly where an edge of one meets the other, so all pairs of an edge and a triangle that share no
-//! node are tested with exact predicates (Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric
-//! predicates, 1997). A surface without such a pair has each of its connected parts wholly inside or wholly outside every other.
+//! Where two sheets of a surface cross, "inside" has no meaning for contact: the signed distance changes its sign in
+//! the middle of the material. Two triangles cross exactly where an edge of one meets the other, so all pairs of an
+//! edge and a triangle that share no node are tested with exact predicates (Shewchuk, Adaptive precision floating-point
+//! arithmetic and fast robust geometric predicates, 1997). A surface without such a pair has each of its connected
+//! parts wholly inside or wholly outside every other.
 //!
 //! Pairs of triangles whose boxes overlap are found by a sweep along the longest axis of the surface.
 
@@ -58,8 +59,8 @@ fn meeting(nodes: &[DVec3], one: [u32; 3], other: [u32; 3]) -> Option<DVec3> {
     )
 }
 
-/// Whether the segment between `ends`, neither of them left out, meets the triangle `facet`, its border included. A segment in the
-/// plane of the triangle does not: the edges that leave that plane tell.
+/// Whether the segment between `ends`, neither of them left out, meets the triangle `facet`, its border included. A
+/// segment in the plane of the triangle does not: the edges that leave that plane tell.
 fn meets(ends: [DVec3; 2], facet: [DVec3; 3]) -> bool {
     let [a, b] = ends;
     let [p, q, r] = facet;
@@ -108,7 +109,8 @@ mod tests {
         }
     }
 
-    /// Two balls of radius 1 at many distances: they cross between nested and apart, also where nodes and edges meet exactly.
+    /// Two balls of radius 1 at many distances: they cross between nested and apart, also where nodes and edges meet
+    /// exactly.
     #[test]
     fn parts_that_overlap_are_found_and_parts_apart_or_nested_are_not() {
         for step in 1..40 {

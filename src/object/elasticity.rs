@@ -7,8 +7,9 @@
 //! K_ab = V ( lambda g_a g_b^T + mu g_b g_a^T + mu (g_a . g_b) I ),     g_a = grad N_a
 //! ```
 //!
-//! (Hughes, The Finite Element Method, 1987, section 2.8). A uniform strain is met exactly, whatever the mesh. Bending is not:
-//! such elements are too stiff in it by a share that falls with the square of their size, and more so near nu = 1/2.
+//! (Hughes, The Finite Element Method, 1987, section 2.8). A uniform strain is met exactly, whatever the mesh. Bending
+//! is not: such elements are too stiff in it by a share that falls with the square of their size, and more so near nu =
+//! 1/2.
 
 use super::{ObjectError, Stiffness, inclusion};
 use crate::scene::ElasticSpec;

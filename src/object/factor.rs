@@ -1,13 +1,13 @@
 //! Sparse Cholesky factor of alpha K + diag(d), and the proof that K is positive definite.
 //!
 //! The sum covers what the engine solves: K itself for the compliance, and the matrix 2M/T + B + (T/2) K of the passive
-//! integrator of the nodes. Where springs and ground are isotropic K = A (x) I: the three coordinates are alike and independent, and
-//! the N x N matrix alpha A + diag(d) is factorised in the place of the 3N x 3N one, for three right-hand sides at a time: a
-//! ninth of the memory and a third of the work of a solve.
+//! integrator of the nodes. Where springs and ground are isotropic K = A (x) I: the three coordinates are alike and
+//! independent, and the N x N matrix alpha A + diag(d) is factorised in the place of the 3N x 3N one, for three
+//! right-hand sides at a time: a ninth of the memory and a third of the work of a solve.
 //!
-//! That the factorisation exists shows the matrix positive definite up to rounding; a few steps
-//! of inverse iteration then bound its smallest eigenvalue, so that a mechanism which rounding has made barely positive is
-//! found as well, and named by the node that it moves most.
+//! That the factorisation exists shows the matrix positive definite up to rounding; a few steps of inverse iteration
+//! then bound its smallest eigenvalue, so that a mechanism which rounding has made barely positive is found as well,
+//! and named by the node that it moves most.
 
 use super::{
     ObjectError, Stiffness,
@@ -173,8 +173,8 @@ impl Factor {
     }
 }
 
-/// Compressed columns of the lower half, with the first `rows_per_node` coordinates of each node. K is symmetric, so column c is
-/// row c from the diagonal on.
+/// Compressed columns of the lower half, with the first `rows_per_node` coordinates of each node. K is symmetric, so
+/// column c is row c from the diagonal on.
 fn lower_half(stiffness: &Stiffness, alpha: f64, diagonal: &[f64], rows_per_node: usize) -> SparseColMat<usize, f64> {
     let order = rows_per_node * stiffness.nodes();
     let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
@@ -218,8 +218,8 @@ pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, O
     }
 }
 
-/// Steps of inverse iteration. Each multiplies what is not in the softest mode by the ratio of eigenvalues; a mechanism's
-/// is below 1e-8, so that three are plenty.
+/// Steps of inverse iteration. Each multiplies what is not in the softest mode by the ratio of eigenvalues; a
+/// mechanism's is below 1e-8, so that three are plenty.
 const INVERSE_ITERATIONS: usize = 3;
 
 /// An upper bound on the smallest eigenvalue, close to it where one is far below the rest, and its mode.
@@ -257,7 +257,8 @@ mod tests {
     use super::*;
     use glam::DMat3;
 
-    /// A closed chain of 60 nodes with springs to the next and the seventh next, each isotropic, all held by the ground.
+    /// A closed chain of 60 nodes with springs to the next and the seventh next, each isotropic, all held by the
+    /// ground.
     fn isotropic() -> Stiffness {
         let edges: Vec<[u32; 2]> = (0..60).flat_map(|a| [[a, (a + 1) % 60], [a, (a + 7) % 60]]).collect();
         let mut stiffness = Stiffness::with_pattern(60, &edges);

@@ -1,13 +1,14 @@
 //! A lattice of tetrahedra in a closed surface: a solid without a mesher.
 //!
-//! Cubes of the size that the scene names cover the surface; each is cut into six tetrahedra along one diagonal (Kuhn), alike in
-//! all of them, so that neighbours fit. A cube counts by the share of it that lies inside, sampled at 4 x 4 x 4 points
-//! (fictitious domain method: Parvizian, Düster & Rank 2007), and not at all where neither a sample nor a surface node lies in
-//! it. The surface keeps its own nodes, each tied to the point of the lattice that it lies at by a spring a hundred times as stiff
-//! as a cube: the surface moves with the solid, and a force on it goes into the four nodes around.
+//! Cubes of the size that the scene names cover the surface; each is cut into six tetrahedra along one diagonal (Kuhn),
+//! alike in all of them, so that neighbours fit. A cube counts by the share of it that lies inside, sampled at 4 x 4 x
+//! 4 points (fictitious domain method: Parvizian, Düster & Rank 2007), and not at all where neither a sample nor a
+//! surface node lies in it. The surface keeps its own nodes, each tied to the point of the lattice that it lies at by a
+//! spring a hundred times as stiff as a cube: the surface moves with the solid, and a force on it goes into the four
+//! nodes around.
 //!
-//! So the surface may be finer or coarser than the lattice. A box that the lattice fits is represented exactly; a curved surface to
-//! the order of the cubes' size, and a wall thinner than a cube only by its volume.
+//! So the surface may be finer or coarser than the lattice. A box that the lattice fits is represented exactly; a
+//! curved surface to the order of the cubes' size, and a wall thinner than a cube only by its volume.
 
 use super::ObjectError;
 use super::elasticity::Solid;
@@ -18,11 +19,12 @@ use std::collections::HashMap;
 /// Points along each edge of a cube at which inside is sampled.
 const SAMPLES: i32 = 4;
 
-/// Least share of a cube that is taken as filled, so that a cube that the surface hardly enters gives the nodes on it a hold [1].
+/// Least share of a cube that is taken as filled, so that a cube that the surface hardly enters gives the nodes on it a
+/// hold [1].
 const LEAST_FILLED: f64 = 1.0 / 64.0;
 
-/// Stiffness of a tie in units of Young's modulus times the cubes' size [1]: a cube's own is about one of these, so that ties add
-/// one percent to what gives way under a force on one node.
+/// Stiffness of a tie in units of Young's modulus times the cubes' size [1]: a cube's own is about one of these, so
+/// that ties add one percent to what gives way under a force on one node.
 const TIE: f64 = 100.0;
 
 /// Most cubes of a lattice: its factor takes some GB then.
@@ -111,8 +113,8 @@ impl Lattice {
         (cube, (at - cube.as_dvec3()).clamp(DVec3::ZERO, DVec3::ONE))
     }
 
-    /// Share of each cube that lies inside the surface, of those where it is not zero: lines along z cross it an odd number of
-    /// times below a point inside.
+    /// Share of each cube that lies inside the surface, of those where it is not zero: lines along z cross it an odd
+    /// number of times below a point inside.
     fn sample(&self, nodes: &[DVec3], triangles: &[[u32; 3]]) -> HashMap<IVec3, f64> {
         let step = self.cell / f64::from(SAMPLES);
         let lines = SAMPLES * self.counts;

@@ -27,8 +27,8 @@ pub(super) fn select(ground: &GroundSpec, nodes: &[DVec3]) -> Result<Vec<bool>, 
     }
 }
 
-/// Refuses an object of which a connected part has no grounded node. `components`: nodes of each part; `grounded`: per node,
-/// empty where there is no ground.
+/// Refuses an object of which a connected part has no grounded node. `components`: nodes of each part; `grounded`: per
+/// node, empty where there is no ground.
 pub(super) fn check_components(components: &[Vec<u32>], grounded: &[bool]) -> Result<(), ObjectError> {
     for part in components {
         if !part.iter().any(|&node| grounded.get(node as usize) == Some(&true)) {

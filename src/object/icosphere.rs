@@ -1,9 +1,9 @@
 //! A sphere of nearly equal triangles: an icosahedron whose faces are divided.
 //!
 //! Every edge of the icosahedron is divided into n equal arcs, every face into n^2 triangles. A point with barycentric
-//! weights w on a face with the corners v is the direction of `sum_k sin(w_k theta) v_k`, theta the angle of an edge: on an edge this
-//! is the point at equal arcs. The longest edge is then 1.2 times the shortest, on every mesh. There are 10 n^2 + 2 nodes and 20 n^2
-//! triangles.
+//! weights w on a face with the corners v is the direction of `sum_k sin(w_k theta) v_k`, theta the angle of an edge:
+//! on an edge this is the point at equal arcs. The longest edge is then 1.2 times the shortest, on every mesh. There
+//! are 10 n^2 + 2 nodes and 20 n^2 triangles.
 
 use super::ObjectError;
 use glam::DVec3;

@@ -1,8 +1,9 @@
 //! Parts of an elastic solid with a stiffness of their own: a nodule in tissue.
 //!
-//! A tetrahedron has the mean of the Lamé parameters in it, weighted by volume. Of a region of the mesh this is exact. What part of a
-//! tetrahedron lies in a sphere is sampled at 56 points (fictitious domain method: Parvizian, Düster & Rank 2007), so that the sphere
-//! needs no mesh of its own; a mesh that is not fine against it makes it too soft or too stiff by the order of its share of cut cells.
+//! A tetrahedron has the mean of the Lamé parameters in it, weighted by volume. Of a region of the mesh this is exact.
+//! What part of a tetrahedron lies in a sphere is sampled at 56 points (fictitious domain method: Parvizian, Düster &
+//! Rank 2007), so that the sphere needs no mesh of its own; a mesh that is not fine against it makes it too soft or too
+//! stiff by the order of its share of cut cells.
 
 use super::ObjectError;
 use super::elasticity::{Solid, volume};

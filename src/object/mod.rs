@@ -1,9 +1,9 @@
 //! The deformable virtual object: surface, springs, and the stiffness K with its factor.
 //!
-//! [`Object::build`] makes the surface that the scene names, checks it, joins its nodes by springs or fills it with an elastic
-//! solid, adds its skin, and proves K = Kn + Kg symmetric positive definite by factorising it (section 2.1, equation (2)). An object that the ground does not
-//! hold, or a surface that is not closed, is refused with the reason. The [`Compliance`] C = K^-1 is for contact alone, which
-//! forms it from the factor; graphics never does.
+//! [`Object::build`] makes the surface that the scene names, checks it, joins its nodes by springs or fills it with an
+//! elastic solid, adds its skin, and proves K = Kn + Kg symmetric positive definite by factorising it (section 2.1,
+//! equation (2)). An object that the ground does not hold, or a surface that is not closed, is refused with the reason.
+//! The [`Compliance`] C = K^-1 is for contact alone, which forms it from the factor; graphics never does.
 
 mod body;
 mod compliance;
@@ -122,8 +122,9 @@ impl Object {
     /// Builds the object of `spec` on the geometry that a dataset holds of it; no file is read.
     ///
     /// # Errors
-    /// As for [`Object::build`], except for files; [`ObjectError::OtherTetrahedra`] if one of `spec` and `body` has tetrahedra and the
-    /// other none; [`ObjectError::TetrahedronNode`] and [`ObjectError::SurfaceNodes`] if `body` names nodes that it lacks.
+    /// As for [`Object::build`], except for files; [`ObjectError::OtherTetrahedra`] if one of `spec` and `body` has
+    /// tetrahedra and the other none; [`ObjectError::TetrahedronNode`] and [`ObjectError::SurfaceNodes`] if `body`
+    /// names nodes that it lacks.
     pub fn from_body(spec: &ObjectSpec, body: Body) -> Result<Self, ObjectError> {
         if matches!(spec.shape, Shape::Tetrahedra { .. }) == body.tetrahedra.is_empty() {
             return Err(ObjectError::OtherTetrahedra);
@@ -207,8 +208,8 @@ fn check_count(nodes: usize) -> Result<(), ObjectError> {
     enough.map_err(|shortage| ObjectError::Memory { nodes, shortage })
 }
 
-/// Least memory that a node takes [bytes]: nine numbers for the node and for half of the six neighbours that it has on a surface. The factor
-/// takes more, which is known once its pattern is.
+/// Least memory that a node takes [bytes]: nine numbers for the node and for half of the six neighbours that it has on
+/// a surface. The factor takes more, which is known once its pattern is.
 const LEAST_BYTES_PER_NODE: usize = 4 * 9 * size_of::<f64>();
 
 /// Numbers that a scene file has had checked already, and a specification made in code has not.

@@ -1,16 +1,17 @@
 //! Smooth refinement of a closed triangle mesh to a target edge length.
 //!
-//! Each step divides every triangle into four. Nodes stay where they are; those in the middle of edges are placed by the modified
-//! butterfly scheme (Zorin, Schröder & Sweldens, Interpolating subdivision for meshes with arbitrary topology, 1996), whose limit has
-//! a continuous tangent plane. It interpolates: the refined surface passes through all nodes of the mesh, encloses about
-//! the same volume, and sharp edges become round over about the length of the triangles beside them.
+//! Each step divides every triangle into four. Nodes stay where they are; those in the middle of edges are placed by
+//! the modified butterfly scheme (Zorin, Schröder & Sweldens, Interpolating subdivision for meshes with arbitrary
+//! topology, 1996), whose limit has a continuous tangent plane. It interpolates: the refined surface passes through all
+//! nodes of the mesh, encloses about the same volume, and sharp edges become round over about the length of the
+//! triangles beside them.
 
 use super::{ObjectError, Shell, SurfaceDefect, Topology, check_count, topology};
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// Refines a closed surface until the mean length of its edges is at most `edge` [m]. What is repaired is told in `warnings`; `refuse`
-/// makes the error of a defect.
+/// Refines a closed surface until the mean length of its edges is at most `edge` [m]. What is repaired is told in
+/// `warnings`; `refuse` makes the error of a defect.
 ///
 /// # Errors
 /// When the surface is not closed, crosses itself, at the first or after a step, or would have too many nodes.

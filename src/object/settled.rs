@@ -4,12 +4,13 @@ use super::{Factor, FactorError, Object, Stiffening};
 use crate::tolerances::SETTLED;
 use glam::DVec3;
 
-/// Steps after which an equilibrium of stiffening springs is as good as it gets: each leaves at most 1 - 1/kappa of the error,
-/// and kappa is at most 100.
+/// Steps after which an equilibrium of stiffening springs is as good as it gets: each leaves at most 1 - 1/kappa of the
+/// error, and kappa is at most 100.
 const STEPS: usize = 5000;
 
-/// Displacements at which the springs of `object` carry `loads`, one per node [N]; springs stiffen as `stiffening` says. For
-/// these the energy is lowered by steps u += K1^-1 (loads - grad W(u)), each of which cannot fail to lower it.
+/// Displacements at which the springs of `object` carry `loads`, one per node [N]; springs stiffen as `stiffening`
+/// says. For these the energy is lowered by steps u += K1^-1 (loads - grad W(u)), each of which cannot fail to lower
+/// it.
 ///
 /// # Errors
 /// When there is no memory for the factor of K1.

@@ -1,12 +1,12 @@
 //! The skin of a surface: membrane tension, bending stiffness and a foundation, all per area.
 //!
-//! `K = (T L + b L M^-1 L + k M) (x) I3`, with L the cotangent Laplacian of the surface at rest (the stiffness matrix of
-//! linear elements for the Laplace operator; Pinkall & Polthier 1993) and M its areas, a third of each triangle at each
-//! corner. L is positive semidefinite on every mesh, obtuse triangles included, M is positive, and so each term is positive
-//! semidefinite. The first two cost nothing in a translation.
+//! `K = (T L + b L M^-1 L + k M) (x) I3`, with L the cotangent Laplacian of the surface at rest (the stiffness matrix
+//! of linear elements for the Laplace operator; Pinkall & Polthier 1993) and M its areas, a third of each triangle at
+//! each corner. L is positive semidefinite on every mesh, obtuse triangles included, M is positive, and so each term is
+//! positive semidefinite. The first two cost nothing in a translation.
 //!
-//! T, b and k belong to the body, not to the mesh: a finer mesh is the same body. Under a point force the displacement stays
-//! finite only because of b. Without it the dent is a cusp that deepens as the mesh is refined.
+//! T, b and k belong to the body, not to the mesh: a finer mesh is the same body. Under a point force the displacement
+//! stays finite only because of b. Without it the dent is a cusp that deepens as the mesh is refined.
 
 use super::{Stiffness, topology::mean_edge};
 use crate::scene::SkinSpec;
@@ -25,8 +25,8 @@ pub struct Skin {
     pub foundation: f64,
     /// Length sqrt(b / T) over which the dent of a point is rounded; none without tension or without bending [m].
     pub rounding: Option<f64>,
-    /// Length over which the foundation takes up a dent: (b / k)^(1/4), or sqrt(T / k) where that is longer; none without a
-    /// foundation [m].
+    /// Length over which the foundation takes up a dent: (b / k)^(1/4), or sqrt(T / k) where that is longer; none
+    /// without a foundation [m].
     pub spreading: Option<f64>,
     /// Mean length of the mesh's edges at rest [m].
     pub mean_edge: f64,

@@ -1,8 +1,8 @@
 //! The sphere of section 4.1: two poles and rings of nodes at equal steps of the polar angle.
 //!
 //! Node 0 is the upper pole; ring i = 1..=rings lies at the polar angle pi i / (rings + 1), its nodes at equal steps of
-//! the azimuth, every other ring turned by half a step so that the triangles are nearly isosceles and favour no sense of
-//! rotation; the last node is the lower pole. Ten rings of ten make the paper's 102 nodes, and 200 triangles.
+//! the azimuth, every other ring turned by half a step so that the triangles are nearly isosceles and favour no sense
+//! of rotation; the last node is the lower pole. Ten rings of ten make the paper's 102 nodes, and 200 triangles.
 
 use super::ObjectError;
 use glam::DVec3;

@@ -1,9 +1,9 @@
 //! Springs along the edges of the surface and to the ground: K = Kn + Kg of equation (2).
 //!
-//! A spring of stiffness k between nodes a and b adds B to the blocks (a, a) and (b, b), and -B to (a, b) and (b, a):
-//! B = k I for an isotropic spring, B = k e e^T for an axial one, e its direction at rest. A ground spring adds kg I to
-//! the diagonal block. Kn and Kg are positive semidefinite by construction, so K is singular only where a rigid motion or
-//! a mechanism is left free.
+//! A spring of stiffness k between nodes a and b adds B to the blocks (a, a) and (b, b), and -B to (a, b) and (b, a): B
+//! = k I for an isotropic spring, B = k e e^T for an axial one, e its direction at rest. A ground spring adds kg I to
+//! the diagonal block. Kn and Kg are positive semidefinite by construction, so K is singular only where a rigid motion
+//! or a mechanism is left free.
 
 use super::{ObjectError, Stiffness, SurfaceDefect};
 use crate::scene::{ObjectSpec, SpringKind, SpringSpec};

@@ -1,14 +1,15 @@
 //! Strain stiffening: springs that grow stiffer as they are strained, up to a bound, as tissue does.
 //!
 //! A spring of stiffness k and rest length L that is strained by r stores, beside its linear energy,
-//! `k L^2 (kappa - 1) G(r)` with `G' = g(r) = sqrt(r^2 + eps^2) - eps`: its stiffness rises from k at rest towards kappa k,
-//! and is k + 0.71 (kappa - 1) k at r = eps. Its force is the linear one times `sigma(r) = 1 + (kappa - 1) g(r)/r`,
-//! `g(r)/r = r / (sqrt(r^2 + eps^2) + eps)`. No root or quotient can fail, on the GPU either.
+//! `k L^2 (kappa - 1) G(r)` with `G' = g(r) = sqrt(r^2 + eps^2) - eps`: its stiffness rises from k at rest towards
+//! kappa k, and is k + 0.71 (kappa - 1) k at r = eps. Its force is the linear one times
+//! `sigma(r) = 1 + (kappa - 1) g(r)/r`, `g(r)/r = r / (sqrt(r^2 + eps^2) + eps)`. No root or quotient can fail, on the
+//! GPU either.
 //!
-//! *Passive for any time step.* Both curvatures of the spring's energy, along (1 + (kappa - 1) g') k and across sigma k, lie
-//! between k and kappa k. So the whole energy W obeys `W(u + d) <= W(u) + grad W(u) . d + 1/2 d^T K1 d`, K1 being K with
-//! springs kappa times as stiff: a step with K1 on the left and grad W(u) on the right takes at least what W gains. The
-//! matrix stays constant and positive definite; what it takes beyond that is numerical damping.
+//! *Passive for any time step.* Both curvatures of the spring's energy, along (1 + (kappa - 1) g') k and across sigma
+//! k, lie between k and kappa k. So the whole energy W obeys `W(u + d) <= W(u) + grad W(u) . d + 1/2 d^T K1 d`, K1
+//! being K with springs kappa times as stiff: a step with K1 on the left and grad W(u) on the right takes at least what
+//! W gains. The matrix stays constant and positive definite; what it takes beyond that is numerical damping.
 
 use super::{Object, Stiffness};
 use glam::{DMat3, DVec3};
@@ -27,7 +28,8 @@ pub struct Stiffening {
 }
 
 impl Stiffening {
-    /// Stiffening of the springs of `object` to `factor` kappa > 1 times their stiffness, at strains beyond `strain` eps > 0.
+    /// Stiffening of the springs of `object` to `factor` kappa > 1 times their stiffness, at strains beyond `strain`
+    /// eps > 0.
     #[must_use]
     pub fn new(object: &Object, factor: f64, strain: f64) -> Self {
         let mut bound = object.stiffness.clone();

@@ -16,7 +16,8 @@ pub struct Stiffness {
 }
 
 impl Stiffness {
-    /// Zero blocks on the diagonal and at both halves of every edge. `edges`: ends in range; what is repeated counts once.
+    /// Zero blocks on the diagonal and at both halves of every edge. `edges`: ends in range; what is repeated counts
+    /// once.
     pub(super) fn with_pattern(nodes: usize, edges: &[[u32; 2]]) -> Self {
         let mut rows: Vec<Vec<u32>> = (0..nodes as u32).map(|node| vec![node]).collect();
         for &[a, b] in edges {
@@ -47,7 +48,8 @@ impl Stiffness {
         self.blocks.iter().all(|block| *block == DMat3::from_diagonal(DVec3::splat(block.x_axis.x)))
     }
 
-    /// Factor of the identity in each block, if every block is a multiple of it: a ninth of the numbers, for products frame after frame [N/m].
+    /// Factor of the identity in each block, if every block is a multiple of it: a ninth of the numbers, for products
+    /// frame after frame [N/m].
     #[must_use]
     pub fn scales(&self) -> Option<Vec<f64>> {
         self.is_isotropic().then(|| self.blocks.iter().map(|block| block.x_axis.x).collect())

@@ -1,13 +1,15 @@
 //! Forward and backward substitution with a supernodal Cholesky factor, for one right-hand side at a time.
 //!
-//! L is stored by supernodes: columns that share their rows, as one dense trapezoid each (Ng & Peyton, Block sparse Cholesky
-//! algorithms, 1993). Those of a surface are a few columns wide, and a frame has one right-hand side: routines for dense blocks
-//! then spend most of their time on being called. Plain loops over the columns read L once in each direction and do little else.
-//! A right-hand side is of numbers, or of vectors where one matrix stands for all three coordinates.
+//! L is stored by supernodes: columns that share their rows, as one dense trapezoid each (Ng & Peyton, Block sparse
+//! Cholesky algorithms, 1993). Those of a surface are a few columns wide, and a frame has one right-hand side: routines
+//! for dense blocks then spend most of their time on being called. Plain loops over the columns read L once in each
+//! direction and do little else. A right-hand side is of numbers, or of vectors where one matrix stands for all three
+//! coordinates.
 //!
-//! Reading L from memory takes most of the time. So subtrees of the elimination tree, which do not touch each other's rows, are solved
-//! side by side, before the rest forward and after it backward; what they leave in the rest's rows is added up in their order, so
-//! that the result is the same for any number of threads (Liu, The role of elimination trees in sparse factorization, 1990).
+//! Reading L from memory takes most of the time. So subtrees of the elimination tree, which do not touch each other's
+//! rows, are solved side by side, before the rest forward and after it backward; what they leave in the rest's rows is
+//! added up in their order, so that the result is the same for any number of threads (Liu, The role of elimination
+//! trees in sparse factorization, 1990).
 
 use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
 use rayon::prelude::*;
@@ -18,12 +20,12 @@ pub(super) trait Entry: Copy + Default + Send + Sync + AddAssign + SubAssign + M
 
 impl<T: Copy + Default + Send + Sync + AddAssign + SubAssign + Mul<f64, Output = T>> Entry for T {}
 
-/// Entries of a factor from which on a substitution is shared out among threads: 8 MB, beyond what one core's caches hold, take
-/// some milliseconds to read; waking threads takes hundredths of one.
+/// Entries of a factor from which on a substitution is shared out among threads: 8 MB, beyond what one core's caches
+/// hold, take some milliseconds to read; waking threads takes hundredths of one.
 const LEAST_FACTOR_TO_SHARE: usize = 1 << 20;
 
-/// A subtree that one thread solves has at most one in so many of the factor's entries. What is left to the rest, which one thread
-/// solves, grows with it: of a surface of 100,000 nodes a quarter.
+/// A subtree that one thread solves has at most one in so many of the factor's entries. What is left to the rest, which
+/// one thread solves, grows with it: of a surface of 100,000 nodes a quarter.
 const LEAST_SUBTREES: usize = 8;
 
 /// Which supernodes are solved side by side.
@@ -129,7 +131,8 @@ impl Subtree {
     }
 }
 
-/// Solves `L L^T x = right` in place, both in the order of elimination; on rayon's threads where the partition shares it out.
+/// Solves `L L^T x = right` in place, both in the order of elimination; on rayon's threads where the partition shares
+/// it out.
 pub(super) fn substitute<T: Entry>(factor: SupernodalLltRef<'_, usize, f64>, partition: &Partition, right: &mut [T]) {
     let (symbolic, values) = (factor.symbolic(), factor.values());
     let Partition { subtrees, rest } = partition;
@@ -192,7 +195,8 @@ fn apart<'a, T>(subtrees: &'a [Subtree], mut right: &'a mut [T]) -> Vec<(&'a Sub
 }
 
 impl Supernode<'_> {
-    /// Solves for its rows of `right`, of which the first is row `first`; `below` takes what they leave in the rows of its pattern.
+    /// Solves for its rows of `right`, of which the first is row `first`; `below` takes what they leave in the rows of
+    /// its pattern.
     fn forward<T: Entry>(&self, first: usize, right: &mut [T], below: &mut Vec<T>) {
         let width = self.columns.len();
         let own = &mut right[self.columns.start - first..self.columns.end - first];

@@ -1,12 +1,12 @@
 //! Is the surface closed, and who touches whom on it?
 //!
-//! Contact needs an inside: every edge must have exactly two triangles that run along it in opposite senses, the triangles
-//! around a node must form one fan, and every connected part must enclose a positive volume. A surface whose triangles
-//! merely point the wrong way is turned, with a warning; anything else is refused with the reason.
+//! Contact needs an inside: every edge must have exactly two triangles that run along it in opposite senses, the
+//! triangles around a node must form one fan, and every connected part must enclose a positive volume. A surface whose
+//! triangles merely point the wrong way is turned, with a warning; anything else is refused with the reason.
 //!
-//! A part inside another is the wall of a cavity, and faces into it; one inside a cavity is a body again, and so on: outward is
-//! away from the material, of which a point is part when an odd number of shells surround it. Parts that cross or touch are refused
-//! (see [`super::crossing`]), so one node decides for a whole part which others surround it.
+//! A part inside another is the wall of a cavity, and faces into it; one inside a cavity is a body again, and so on:
+//! outward is away from the material, of which a point is part when an odd number of shells surround it. Parts that
+//! cross or touch are refused (see [`super::crossing`]), so one node decides for a whole part which others surround it.
 
 use super::{SurfaceDefect, crossing};
 use crate::tolerances::MIN_TRIANGLE_ASPECT;
@@ -278,8 +278,8 @@ fn turn_outward(
     Ok(())
 }
 
-/// Whether the closed surface `part` winds around `point`: the solid angles of its triangles seen from there add up to 4 pi
-/// inside and to 0 outside (van Oosterom & Strackee, The solid angle of a plane triangle, 1983).
+/// Whether the closed surface `part` winds around `point`: the solid angles of its triangles seen from there add up to
+/// 4 pi inside and to 0 outside (van Oosterom & Strackee, The solid angle of a plane triangle, 1983).
 fn surrounds(nodes: &[DVec3], triangles: &[[u32; 3]], part: &Part, point: DVec3) -> bool {
     let half_angle = |triangle: u32| {
         let [a, b, c] = triangles[triangle as usize].map(|node| nodes[node as usize] - point);

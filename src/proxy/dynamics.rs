@@ -1,8 +1,8 @@
 //! Inertia M(q) and how it changes along the motion, in one pass and without allocation: what an integrator with
 //! configuration-dependent inertia needs each tick.
 //!
-//! With spatial vectors about the world's origin (Featherstone, Rigid Body Dynamics Algorithms, 2008): joint j moves all
-//! links from j on with twist s_j, and I_j is the inertia of those links together. Then for i <= j
+//! With spatial vectors about the world's origin (Featherstone, Rigid Body Dynamics Algorithms, 2008): joint j moves
+//! all links from j on with twist s_j, and I_j is the inertia of those links together. Then for i <= j
 //!
 //! `M_ij = s_i . I_j s_j` (composite rigid body algorithm), and by how twists and inertias move with joint k
 //! `dM_ij/dq_k = 0` for k <= i, `(s_i x s_k) . I_j s_j` for i < k <= j,

@@ -1,8 +1,9 @@
 //! Inertia M(q) of the chain: kinetic energy is 1/2 qdot^T M qdot.
 //!
-//! M = sum over links of m Jv^T Jv + Jw^T I Jw, plus the actuators' reflected inertia on the diagonal: Jv is the Jacobian
-//! of the link's centre of mass, Jw that of its rotation, I its inertia turned into the world. Every reflected inertia is
-//! positive in a validated scene, so that M is positive definite in every configuration, singular arms included.
+//! M = sum over links of m Jv^T Jv + Jw^T I Jw, plus the actuators' reflected inertia on the diagonal: Jv is the
+//! Jacobian of the link's centre of mass, Jw that of its rotation, I its inertia turned into the world. Every reflected
+//! inertia is positive in a validated scene, so that M is positive definite in every configuration, singular arms
+//! included.
 
 use super::{Chain, Pose};
 use crate::scene::JointKind;
@@ -13,8 +14,8 @@ use glam::DVec3;
 pub type JointMatrix = [[f64; MAX_JOINTS]; MAX_JOINTS];
 
 impl Chain {
-    /// Inertia M at `pose`, symmetric positive definite [kg m^2; kg m or kg where prismatic joints take part]. Allocates
-    /// nothing.
+    /// Inertia M at `pose`, symmetric positive definite [kg m^2; kg m or kg where prismatic joints take part].
+    /// Allocates nothing.
     #[must_use]
     pub fn inertia(&self, pose: &Pose) -> JointMatrix {
         let mut inertia = [[0.0; MAX_JOINTS]; MAX_JOINTS];
@@ -49,8 +50,8 @@ impl Chain {
     }
 }
 
-/// Solves `M x = b` in place by Cholesky's method. M must be positive definite, as every inertia with positive rotor inertias is.
-/// Allocates nothing.
+/// Solves `M x = b` in place by Cholesky's method. M must be positive definite, as every inertia with positive rotor
+/// inertias is. Allocates nothing.
 pub fn solve_positive(matrix: &JointMatrix, b: &mut JointVector) {
     let mut l = *matrix;
     let count = b.len();
@@ -89,7 +90,8 @@ mod tests {
             let [before, pose, after] = [-STEP, 0.0, STEP].map(|t| random::at(&chain, &q, &rate, t));
             let mut energy = 0.0;
             for (link, joint) in chain.joints.iter().enumerate() {
-                // Velocities by central differences of the link's placement, and the spin from R^T dR/dt = [w] in its frame.
+                // Velocities by central differences of the link's placement, and the spin from R^T dR/dt = [w] in its
+                // frame.
                 let centre = |pose: &Pose| pose.origins[link] + pose.rotations[link] * joint.centre_of_mass;
                 let velocity = (centre(&after) - centre(&before)) / (2.0 * STEP);
                 let turning = (after.rotations[link] - before.rotations[link]) * (0.5 / STEP);

@@ -1,7 +1,7 @@
 //! Jacobians J_i of the contact nodes, column by column.
 //!
-//! Column j of J_i is the velocity of node i for a unit rate of joint j: a_j x (x_i - o_j) for a revolute joint with axis
-//! a_j through o_j, a_j for a prismatic one, and zero where joint j lies beyond the node's link.
+//! Column j of J_i is the velocity of node i for a unit rate of joint j: a_j x (x_i - o_j) for a revolute joint with
+//! axis a_j through o_j, a_j for a prismatic one, and zero where joint j lies beyond the node's link.
 
 use super::{Chain, Pose};
 use crate::JointVector;
@@ -25,8 +25,8 @@ impl Chain {
         }
     }
 
-    /// Upper bounds r_ij of `|J_ij|` for each contact node i, at all configurations whose prismatic joints are within `ranges`
-    /// [m/rad, or 1 for a prismatic joint]: the lengths of the links between joint j and the node, added up.
+    /// Upper bounds r_ij of `|J_ij|` for each contact node i, at all configurations whose prismatic joints are within
+    /// `ranges` [m/rad, or 1 for a prismatic joint]: the lengths of the links between joint j and the node, added up.
     #[must_use]
     pub fn jacobian_bounds(&self, ranges: &[[f64; 2]]) -> Vec<JointVector> {
         let bounds = self.nodes.iter().map(|node| {

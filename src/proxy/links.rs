@@ -1,4 +1,5 @@
-//! The link frames at one configuration, in arrays: the real-time loop places the chain without a [`Pose`](super::Pose).
+//! The link frames at one configuration, in arrays: the real-time loop places the chain without a
+//! [`Pose`](super::Pose).
 
 use super::Chain;
 use crate::MAX_JOINTS;

@@ -1,8 +1,8 @@
 //! The virtual proxy: a serial chain of revolute and prismatic joints with contact nodes on its links.
 //!
-//! Link i's frame sits at joint i and is parallel to the world at q = 0. Frame i follows from frame i - 1 (the world for
-//! the first) by o_i = o_(i-1) + R_(i-1) origin_i, and R_i = R_(i-1) Rot(axis_i, q_i) for a revolute joint, or
-//! o_i += q_i R_(i-1) axis_i for a prismatic one. Nothing here allocates once a [`Pose`] has its size.
+//! Link i's frame sits at joint i and is parallel to the world at q = 0. Frame i follows from frame i - 1 (the world
+//! for the first) by o_i = o_(i-1) + R_(i-1) origin_i, and R_i = R_(i-1) Rot(axis_i, q_i) for a revolute joint, or o_i
+//! += q_i R_(i-1) axis_i for a prismatic one. Nothing here allocates once a [`Pose`] has its size.
 
 mod chain;
 mod dynamics;

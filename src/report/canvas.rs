@@ -1,7 +1,7 @@
 //! A sheet to draw on: marks in, SVG and PNG out.
 //!
-//! Coordinates are points from the top left corner, x to the right, y down. The SVG holds its fonts; the PNG is the same
-//! SVG rasterised (resvg) over the sheet's pictures, so both always show the same marks. Nothing depends on fonts,
+//! Coordinates are points from the top left corner, x to the right, y down. The SVG holds its fonts; the PNG is the
+//! same SVG rasterised (resvg) over the sheet's pictures, so both always show the same marks. Nothing depends on fonts,
 //! display or time of the machine: equal marks give equal bytes.
 
 use super::{

@@ -1,5 +1,5 @@
-//! The one typeface of all figures, shipped with the crate: Roboto (Apache-2.0, `fonts/LICENSE-Roboto.txt`), cut down to
-//! Latin, Greek and mathematical signs, 20 kB a weight, so that a machine without any font draws the same bytes.
+//! The one typeface of all figures, shipped with the crate: Roboto (Apache-2.0, `fonts/LICENSE-Roboto.txt`), cut down
+//! to Latin, Greek and mathematical signs, 20 kB a weight, so that a machine without any font draws the same bytes.
 
 use skrifa::{
     FontRef, MetadataProvider,

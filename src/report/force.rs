@@ -1,8 +1,8 @@
 //! Force at the proxy's end and its configuration against time (paper's Fig. 8): what a hand feels as it moves over an
 //! object.
 //!
-//! A chain of three joints turns torque into force without ambiguity: tau = J^T F, so F = J^-T tau with J the Jacobian of the
-//! last contact node.
+//! A chain of three joints turns torque into force without ambiguity: tau = J^T F, so F = J^-T tau with J the Jacobian
+//! of the last contact node.
 
 use super::{
     canvas::Canvas,
@@ -17,8 +17,8 @@ use crate::{
 };
 use glam::{DMat3, DVec3};
 
-/// Force at the chain's last contact node that has the joint torques `torque` at `q` [N]; `None` where the chain has not
-/// three joints, or is singular there.
+/// Force at the chain's last contact node that has the joint torques `torque` at `q` [N]; `None` where the chain has
+/// not three joints, or is singular there.
 #[must_use]
 pub fn end_force(chain: &Chain, q: &JointVector, torque: &JointVector) -> Option<DVec3> {
     let node = chain.nodes.len().checked_sub(1)?;
@@ -55,7 +55,8 @@ pub struct SteadyForce {
 }
 
 impl EndForce {
-    /// The force of `trace`; `None` where the chain has not three joints, or contact nodes elsewhere than on its last link.
+    /// The force of `trace`; `None` where the chain has not three joints, or contact nodes elsewhere than on its last
+    /// link.
     #[must_use]
     pub fn new(name: &str, chain: &Chain, trace: &Trace) -> Option<Self> {
         let at_the_end = chain.nodes.iter().all(|node| node.link + 1 == chain.joints.len());
@@ -88,8 +89,8 @@ impl EndForce {
     }
 }
 
-/// Force at the end of the proxy and the configuration of `trace`, that of the first (Fig. 8): of one dataset along x, y and
-/// z; of several side by side.
+/// Force at the end of the proxy and the configuration of `trace`, that of the first (Fig. 8): of one dataset along x,
+/// y and z; of several side by side.
 #[must_use]
 pub fn force(felt: &[EndForce], trace: &Trace) -> Canvas {
     const AXES: [&str; 3] = ["x", "y", "z"];

@@ -1,5 +1,5 @@
-//! Torque in C-space before and after uniform gridization (paper's Fig. 4): the size of the torque at every sample and at
-//! every grid point, side by side.
+//! Torque in C-space before and after uniform gridization (paper's Fig. 4): the size of the torque at every sample and
+//! at every grid point, side by side.
 //!
 //! Two joints span the sheet. Of further joints a slab is shown, half a grid step to either side of a grid line: that
 //! in which most grid points are in contact. Points outside the measured region are left out, as in the dataset.

@@ -89,8 +89,8 @@ const INSTANTS: usize = 6;
 /// Writes all figures that the data allow into `folder`, which is made if it is missing, and returns their paths.
 ///
 /// `cspace.png` (Fig. 3) and `torque.{svg,png}` show the dataset; with a recording of the proxy `chain` also
-/// `motion.{svg,png}` (Fig. 5), `energy.{svg,png}`, with three joints of which the last link alone touches `force.{svg,png}` (Fig. 8) and,
-/// where it has frames and the dataset a surface, `object.png` (Fig. 6).
+/// `motion.{svg,png}` (Fig. 5), `energy.{svg,png}`, with three joints of which the last link alone touches
+/// `force.{svg,png}` (Fig. 8) and, where it has frames and the dataset a surface, `object.png` (Fig. 6).
 ///
 /// # Errors
 /// [`ReportError::Write`] when a file cannot be written, [`ReportError::Data`] when recording, chain and dataset do not

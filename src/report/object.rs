@@ -186,9 +186,11 @@ impl<'a> Scene<'a> {
         scene
     }
 
-    /// Returns tail and tip of the arrow of each force on the arm, as it is felt and as the window draws it: away from the node that pushes.
+    /// Returns tail and tip of the arrow of each force on the arm, as it is felt and as the window draws it: away from
+    /// the node that pushes.
     fn arrows(&self, instant: &Instant) -> Vec<(DVec3, DVec3)> {
-        // The greatest force is a little shorter than the object's radius; those under a fiftieth of it would be specks.
+        // The greatest force is a little shorter than the object's radius; those under a fiftieth of it would be
+        // specks.
         let scale = 0.7 * self.radius / self.greatest_force.max(f64::MIN_POSITIVE);
         let visible = instant.forces.iter().filter(|force| force.force.length() > 0.02 * self.greatest_force);
         visible

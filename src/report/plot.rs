@@ -245,8 +245,8 @@ pub(super) fn legend(canvas: &mut Canvas, right: (f64, f64), entries: &[Entry]) 
     }
 }
 
-/// A vertical colour bar in `area`, ticks on its right, its title above: beginning with the bar, or ending with the tick
-/// labels.
+/// A vertical colour bar in `area`, ticks on its right, its title above: beginning with the bar, or ending with the
+/// tick labels.
 pub(super) fn colour_bar(canvas: &mut Canvas, area: Area, map: ColourMap, title: &str, anchor: Anchor) {
     const STEPS: usize = 96;
     let [low, high] = map.range();
@@ -277,8 +277,8 @@ fn titled(title: &str, ticks: &Ticks) -> String {
     }
 }
 
-/// The same curve with fewer points: of those within a point of the sheet, half the width of a stroke, the first, lowest,
-/// highest and last.
+/// The same curve with fewer points: of those within a point of the sheet, half the width of a stroke, the first,
+/// lowest, highest and last.
 fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let column = |point: &(f64, f64)| point.0.floor();
     let mut kept = Vec::new();
@@ -355,7 +355,8 @@ mod tests {
 
     #[test]
     fn a_saddle_is_cut_according_to_its_mean() {
-        // Corners (0,0) and (1,1) high: with a high centre the low corners (1,0) and (0,1) are cut off, else the high ones.
+        // Corners (0,0) and (1,1) high: with a high centre the low corners (1,0) and (0,1) are cut off, else the high
+        // ones.
         for (high, near_low_corners) in [(3.0, true), (0.5, false)] {
             let segments = level_lines(&[high, -1.0, -1.0, high], 2, 0.0);
             assert_eq!(segments.len(), 2);

@@ -1,9 +1,10 @@
 //! How well a gridized dataset predicts measurements that it was not made of.
 //!
-//! The torque of each is looked up as rendering does, multilinearly between grid points, and compared: with other logs of
-//! the same object, or with a share of the samples, chosen by chance (the same ones in every run), that was left out. What
-//! remains is the error of interpolation and grid together with the noise of the measurement itself: no dataset can
-//! predict a measurement better than measuring again does. Samples beside grid points outside the hull are not predicted.
+//! The torque of each is looked up as rendering does, multilinearly between grid points, and compared: with other logs
+//! of the same object, or with a share of the samples, chosen by chance (the same ones in every run), that was left
+//! out. What remains is the error of interpolation and grid together with the noise of the measurement itself: no
+//! dataset can predict a measurement better than measuring again does. Samples beside grid points outside the hull are
+//! not predicted.
 
 use crate::{
     contact::Status,

@@ -14,7 +14,8 @@ use crate::{
     },
 };
 
-/// Draws joint contact torque, change of configuration and number of contacting object nodes against time, contact shaded (Fig. 5).
+/// Draws joint contact torque, change of configuration and number of contacting object nodes against time, contact
+/// shaded (Fig. 5).
 #[must_use]
 pub fn press(trace: &Trace) -> Canvas {
     titled("Multi-point contact felt through the 1 kHz loop", trace)
@@ -99,8 +100,8 @@ fn stack(headline: &str, trace: &Trace, lanes: Vec<Lane>) -> Canvas {
     .draw()
 }
 
-/// A panel for each unit that occurs among the joints, with a curve for each joint of that unit; `names` are those of the
-/// quantity for joints in radians and in metres.
+/// A panel for each unit that occurs among the joints, with a curve for each joint of that unit; `names` are those of
+/// the quantity for joints in radians and in metres.
 fn per_joint(trace: &Trace, names: [&str; 2], torque: bool, value: impl Fn(&Tick, usize) -> Option<f64>) -> Vec<Lane> {
     let occurs = |unit: &str| trace.joints.iter().any(|joint| joint.unit == unit);
     let units = ["rad", "m"].into_iter().zip(names).filter(|(unit, _)| occurs(unit));

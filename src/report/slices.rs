@@ -1,8 +1,8 @@
 //! The torque field on a plane of C-space: one heat map a joint, with the contact boundary.
 //!
-//! The plane shown is the one with the largest torques of all planes along two joints that cross the contact boundary; the other
-//! joints stay at that plane's values. The boundary is the zero line of the gap, or, where no gap is stored, the line on which the
-//! contact index, interpolated, is one half (section 3.1).
+//! The plane shown is the one with the largest torques of all planes along two joints that cross the contact boundary;
+//! the other joints stay at that plane's values. The boundary is the zero line of the gap, or, where no gap is stored,
+//! the line on which the contact index, interpolated, is one half (section 3.1).
 
 use super::{
     canvas::{Anchor, Area, Canvas},
@@ -43,7 +43,8 @@ pub fn slices(dataset: &Dataset) -> Canvas {
     canvas
 }
 
-/// Least range of a colour map over the greatest torque of any joint of the same unit [1]: noise of a hundredth of what is felt stays pale.
+/// Least range of a colour map over the greatest torque of any joint of the same unit [1]: noise of a hundredth of what
+/// is felt stays pale.
 const LEAST_SHARE: f64 = 0.05;
 
 const WIDTH: f64 = 860.0;

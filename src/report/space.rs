@@ -2,9 +2,9 @@
 //! colour and size by the size of the torque, over the first three joints.
 //!
 //! With more than three joints the others stay where most configurations are in contact. Free configurations are not
-//! drawn: they would hide the others. Newtons and newton metres do not add up: where a chain has joints of both kinds the
-//! size of the torque is that of its revolute joints. The view is from the corner of the box to which the torque grows, so that the
-//! deep configurations are not hidden behind the boundary.
+//! drawn: they would hide the others. Newtons and newton metres do not add up: where a chain has joints of both kinds
+//! the size of the torque is that of its revolute joints. The view is from the corner of the box to which the torque
+//! grows, so that the deep configurations are not hidden behind the boundary.
 
 use super::{
     canvas::{Anchor, Area, Canvas},

@@ -72,8 +72,8 @@ pub(super) fn ticks(range: [f64; 2], intervals: usize) -> Ticks {
 /// Powers of ten below which numbers between them are marked, too.
 const FEW_DECADES: usize = 4;
 
-/// Marks of a logarithmic axis, both ends positive, at most `intervals` of them and one: powers of ten, every so many; of few
-/// decades also the numbers between, 2 and 5 or 3, or round ones where the ends are close to each other.
+/// Marks of a logarithmic axis, both ends positive, at most `intervals` of them and one: powers of ten, every so many;
+/// of few decades also the numbers between, 2 and 5 or 3, or round ones where the ends are close to each other.
 pub(super) fn decades(range: [f64; 2], intervals: usize) -> Ticks {
     let powers = multiples(range, &[1]);
     let few = || [&[1, 2, 5][..], &[1, 3]].map(|digits| multiples(range, digits)).into_iter();

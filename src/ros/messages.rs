@@ -1,8 +1,8 @@
 //! Messages of joint states in an MCAP file, record by record.
 //!
-//! Records and chunks are taken apart here and not by `mcap` (0.26): its `parse_record` sets aside as many bytes as a text's length says,
-//! up to 4 GB, before it looks whether they are there, and its reader takes a record that is longer than its chunk for one that is not.
-//! Memory is that of the longest record or chunk.
+//! Records and chunks are taken apart here and not by `mcap` (0.26): its `parse_record` sets aside as many bytes as a
+//! text's length says, up to 4 GB, before it looks whether they are there, and its reader takes a record that is longer
+//! than its chunk for one that is not. Memory is that of the longest record or chunk.
 
 use super::{MESSAGE_ENCODING, RosError, TYPE, is_mcap};
 use mcap::{
@@ -126,7 +126,8 @@ impl Iterator for Messages {
 }
 
 impl Topics {
-    /// Takes note of a record, and returns the message of joint states that it is, if it is one. `None` if it is shorter than it says.
+    /// Takes note of a record, and returns the message of joint states that it is, if it is one. `None` if it is
+    /// shorter than it says.
     fn take(&mut self, opcode: u8, mut record: Fields<'_>) -> Option<Option<Logged>> {
         match opcode {
             op::SCHEMA => {

@@ -9,8 +9,8 @@ use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
 
-/// Largest size of any number: far beyond every physical quantity in SI units that a scene may hold, and its powers that
-/// the engine forms are still finite.
+/// Largest size of any number: far beyond every physical quantity in SI units that a scene may hold, and its powers
+/// that the engine forms are still finite.
 const LARGEST: f64 = 1e12;
 
 /// The text that is being checked.
@@ -92,8 +92,8 @@ impl Checker<'_> {
         Err(self.error(value.span(), format!("{key} is {count}: it must be at least {least} and at most {greatest}")))
     }
 
-    /// One number per joint, zero or positive, or positive if `strictly`; from `default`, by kind of joint, where the key
-    /// is not given. Where the chain mixes kinds of joint a single number has no one unit and is refused.
+    /// One number per joint, zero or positive, or positive if `strictly`; from `default`, by kind of joint, where the
+    /// key is not given. Where the chain mixes kinds of joint a single number has no one unit and is refused.
     pub fn per_joint(
         &self,
         key: &str,

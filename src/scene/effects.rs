@@ -1,5 +1,6 @@
-//! The effects that a scene may name: what they are called, what they do, and how to put them into a scene or leave them out,
-//! for pricing them, for turning them on and off while one feels, and for proving that what is not named is not there.
+//! The effects that a scene may name: what they are called, what they do, and how to put them into a scene or leave
+//! them out, for pricing them, for turning them on and off while one feels, and for proving that what is not named is
+//! not there.
 
 use super::{GraphicsEffects, HapticEffects, HapticsSpec, ProxyInertia, Scene, SceneError};
 use toml::{Table, Value};
@@ -178,8 +179,8 @@ impl Effect {
 }
 
 impl Scene {
-    /// The same scene with `effects` and no others, and with or without its graphics loop, which effects on what is drawn
-    /// bring with them. Its text says so, without the comments.
+    /// The same scene with `effects` and no others, and with or without its graphics loop, which effects on what is
+    /// drawn bring with them. Its text says so, without the comments.
     ///
     /// # Errors
     /// When the effects cannot act here, or not together.

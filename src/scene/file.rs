@@ -1,6 +1,7 @@
 //! The layout of a scene file: one struct per table, one field per key, values with their place in the text.
 //!
-//! Unknown keys are refused with the list of the known ones. Nothing is checked here beyond types; see [`super::convert`].
+//! Unknown keys are refused with the list of the known ones. Nothing is checked here beyond types; see
+//! [`super::convert`].
 
 use super::{Algorithm, ContactSurface, Cover, Interpolation, JointKind, ProxyInertia, SpringKind};
 use serde::Deserialize;
@@ -149,7 +150,8 @@ pub(super) struct JointTable {
     pub nodes: Vec<Spanned<NodesTable>>,
 }
 
-/// One node `at` a point, or nodes on the line `from` .. `to`, both ends included: `count` of them, or at most `spacing` apart.
+/// One node `at` a point, or nodes on the line `from` .. `to`, both ends included: `count` of them, or at most
+/// `spacing` apart.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NodesTable {

@@ -1,4 +1,5 @@
-//! Gains of the loop in the place of a scene's: what a program that drives its own device may change without a new scene.
+//! Gains of the loop in the place of a scene's: what a program that drives its own device may change without a new
+//! scene.
 
 use super::HapticsSpec;
 use crate::JointVector;

@@ -3,7 +3,8 @@
 use crate::tolerances::INERTIA_ROUNDING;
 use glam::DMat3;
 
-/// Returns whether `inertia` is symmetric and positive semidefinite up to the rounding of its numbers, by its principal minors.
+/// Returns whether `inertia` is symmetric and positive semidefinite up to the rounding of its numbers, by its principal
+/// minors.
 pub(crate) fn is_positive_semidefinite(inertia: &DMat3) -> bool {
     let trace = inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z;
     if *inertia == DMat3::ZERO {

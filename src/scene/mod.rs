@@ -59,8 +59,8 @@ pub struct Scene {
     pub motion: MotionSpec,
 }
 
-/// A scene with a real object, to be haptized by scanning (section 2.2): its file has `[scan]` in the place of `[object]`,
-/// `[contact]` and `[grid]`.
+/// A scene with a real object, to be haptized by scanning (section 2.2): its file has `[scan]` in the place of
+/// `[object]`, `[contact]` and `[grid]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanScene {
     /// The text itself: stored in the scan's log.
@@ -125,8 +125,8 @@ impl Scene {
         self.haptics.interpolation == Interpolation::Potential && self.contact.algorithm == Algorithm::Energy
     }
 
-    /// Validates the text of a scene. `path` is where it came from: messages name it, and relative paths in the scene are
-    /// relative to its folder. No file is opened.
+    /// Validates the text of a scene. `path` is where it came from: messages name it, and relative paths in the scene
+    /// are relative to its folder. No file is opened.
     ///
     /// # Errors
     /// When the scene is not valid; the message names the line and the remedy.

@@ -5,8 +5,8 @@ use clap::ValueEnum;
 use toml::{Table, Value};
 
 impl Scene {
-    /// The same scene with a text that gives its grid, its interpolation, and algorithm and tolerance of its contact as they are
-    /// now, whatever they were read as. Comments are lost.
+    /// The same scene with a text that gives its grid, its interpolation, and algorithm and tolerance of its contact as
+    /// they are now, whatever they were read as. Comments are lost.
     ///
     /// # Errors
     /// When that makes no scene.

@@ -1,4 +1,5 @@
-//! The content of `[scan]`: how a real object is haptized (section 2.2), and the simulated specimen that stands in for it.
+//! The content of `[scan]`: how a real object is haptized (section 2.2), and the simulated specimen that stands in for
+//! it.
 
 use super::GridSpec;
 use crate::JointVector;
@@ -73,8 +74,8 @@ pub struct ScanControl {
     pub timeout: f64,
     /// Time over which position and torque are averaged [s].
     pub average: f64,
-    /// Norm of the torque above which a configuration counts as contact, epsilon of section 3.1: above the device's own dry
-    /// friction, which no force sensor can distinguish from contact [N m].
+    /// Norm of the torque above which a configuration counts as contact, epsilon of section 3.1: above the device's own
+    /// dry friction, which no force sensor can distinguish from contact [N m].
     pub epsilon: f64,
 }
 

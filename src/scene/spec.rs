@@ -83,7 +83,8 @@ pub enum Material {
     Hollow,
 }
 
-/// A skin on the surface, per area: the same body on every mesh. At least one of the three is positive, none is negative.
+/// A skin on the surface, per area: the same body on every mesh. At least one of the three is positive, none is
+/// negative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SkinSpec {
     /// Membrane tension T: resists a gradient of the displacement, in all directions alike [N/m].
@@ -244,8 +245,9 @@ pub struct ProxyNodeSpec {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSpec {
     /// Contact stiffness: of one spring Kc between a proxy node and an object node; the energy form's stiffness at a
-    /// contact point is kc = 3 Kc (three nodes of a triangle). Infinity is rigid contact. Where the scene gives a stiffness per length
-    /// instead, that of a node that stands for the mean length; [`ContactSpec::node_stiffness`] gives each node's own [N/m].
+    /// contact point is kc = 3 Kc (three nodes of a triangle). Infinity is rigid contact. Where the scene gives a
+    /// stiffness per length instead, that of a node that stands for the mean length; [`ContactSpec::node_stiffness`]
+    /// gives each node's own [N/m].
     pub stiffness: f64,
     /// Contact stiffness of a link per length of it, in the energy form, where the scene gives that [N/m^2].
     pub stiffness_per_length: Option<f64>,
@@ -279,9 +281,9 @@ impl ContactSpec {
         if self.algorithm == Algorithm::Paper { ContactSurface::Facets } else { self.surface }
     }
 
-    /// Returns Kc of a node that stands for `length` of a link [m], in [N/m]: with a stiffness per length k' the third part of
-    /// k' times the length, so that the contact point's kc = 3 Kc is k' times the length, and the whole link's does not depend on the
-    /// number of its nodes.
+    /// Returns Kc of a node that stands for `length` of a link [m], in [N/m]: with a stiffness per length k' the third
+    /// part of k' times the length, so that the contact point's kc = 3 Kc is k' times the length, and the whole link's
+    /// does not depend on the number of its nodes.
     #[must_use]
     pub fn node_stiffness(&self, length: f64) -> f64 {
         match self.stiffness_per_length {

@@ -1,9 +1,9 @@
 //! The chain from the root to a tip link, in the frames that scenes use.
 //!
-//! At q = 0 a scene's link frames are parallel to the world, each with its origin at its joint. So with the pose (R, p) of joint
-//! frame i in the root's frame at q = 0, the scene has origin_i = p_i - p_(i-1), axis_i = R_i axis, and a point x of a link that is
-//! placed at (S, s) is at s + S x - p_i. What fixed and locked joints carry belongs to the last moving joint before them, branches
-//! beside the chain included.
+//! At q = 0 a scene's link frames are parallel to the world, each with its origin at its joint. So with the pose (R, p)
+//! of joint frame i in the root's frame at q = 0, the scene has origin_i = p_i - p_(i-1), axis_i = R_i axis, and a
+//! point x of a link that is placed at (S, s) is at s + S x - p_i. What fixed and locked joints carry belongs to the
+//! last moving joint before them, branches beside the chain included.
 
 use super::group::Group;
 use super::robot::{Joint, JointType, Robot};
@@ -72,8 +72,8 @@ impl Arm {
     /// Returns the chain of `robot` to the link `tip`, joints of `locks` held.
     ///
     /// # Errors
-    /// [`UrdfError::Request`] if `tip` or a lock names nothing, a lock is outside its limits, or there are more than six joints or none;
-    /// [`UrdfError::Invalid`] if a joint on the way is one that a scene does not have.
+    /// [`UrdfError::Request`] if `tip` or a lock names nothing, a lock is outside its limits, or there are more than
+    /// six joints or none; [`UrdfError::Invalid`] if a joint on the way is one that a scene does not have.
     pub fn new(robot: &Robot, tip: &str, locks: &[Lock]) -> Result<Self, UrdfError> {
         let held = held(robot, locks)?;
         let way = way(robot, tip)?;

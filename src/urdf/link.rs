@@ -84,7 +84,8 @@ pub(super) fn read(source: &Source<'_>, node: Node<'_, '_>) -> Result<Link, Urdf
     })
 }
 
-/// Reads the `<origin>` of an element: turned by roll, pitch and yaw about the fixed axes x, y, z, then moved. Identity if there is none.
+/// Reads the `<origin>` of an element: turned by roll, pitch and yaw about the fixed axes x, y, z, then moved. Identity
+/// if there is none.
 pub(super) fn origin(source: &Source<'_>, node: Node<'_, '_>) -> Result<DAffine3, UrdfError> {
     let Some(origin) = child(node, "origin") else { return Ok(DAffine3::IDENTITY) };
     let translation = source.vector(origin, "xyz")?.unwrap_or(DVec3::ZERO);

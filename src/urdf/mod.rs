@@ -1,8 +1,8 @@
 //! Arms from URDF, the robot description of ROS (<http://wiki.ros.org/urdf/XML>): a robot's file becomes a scene.
 //!
-//! [`Robot::load`] reads links and joints, [`Arm::new`] takes the chain from the root to a tip link, [`sample`] puts contact nodes on
-//! the links' shapes, and [`write_scene`] writes the scene file that a person would have written. Every error names the file, the line
-//! and the remedy; what is left out is said in [`Arm::notes`].
+//! [`Robot::load`] reads links and joints, [`Arm::new`] takes the chain from the root to a tip link, [`sample`] puts
+//! contact nodes on the links' shapes, and [`write_scene`] writes the scene file that a person would have written.
+//! Every error names the file, the line and the remedy; what is left out is said in [`Arm::notes`].
 //!
 //! | file | subject |
 //! |---|---|

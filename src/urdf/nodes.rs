@@ -1,9 +1,9 @@
 //! Contact nodes on the links' surfaces: Poisson-disc sampling.
 //!
-//! Candidates are the corners of the triangles and then random points, uniform over the area; one is taken if no other that was taken
-//! is nearer than the spacing (dart throwing: Cook, Stochastic sampling in computer graphics, 1986). So edges and tips carry nodes,
-//! no two nodes are nearer than the spacing, and hardly a place of the surface is farther than that from all of them. The same file
-//! gives the same nodes.
+//! Candidates are the corners of the triangles and then random points, uniform over the area; one is taken if no other
+//! that was taken is nearer than the spacing (dart throwing: Cook, Stochastic sampling in computer graphics, 1986). So
+//! edges and tips carry nodes, no two nodes are nearer than the spacing, and hardly a place of the surface is farther
+//! than that from all of them. The same file gives the same nodes.
 
 use super::{Arm, Robot, UrdfError, surface::Surface};
 use crate::random::Random;
@@ -12,10 +12,12 @@ use glam::{DVec3, IVec3};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Random candidates per node: with 30 times as many as nodes fit, less than 2 % of the area is left farther than the spacing from all.
+/// Random candidates per node: with 30 times as many as nodes fit, less than 2 % of the area is left farther than the
+/// spacing from all.
 const CANDIDATES: f64 = 30.0;
 
-/// Nodes on an area of the square of the spacing, about, if dart throwing leaves no gap: 0.70 discs of that diameter [1].
+/// Nodes on an area of the square of the spacing, about, if dart throwing leaves no gap: 0.70 discs of that diameter
+/// [1].
 const DENSITY: f64 = 0.7;
 
 /// Least spacing [m]: ten times the digits with which a scene shows its nodes.
@@ -33,10 +35,12 @@ pub struct ContactNodes {
     pub of_joints: Vec<Vec<DVec3>>,
 }
 
-/// Puts contact nodes on the shapes of `arm` at a `spacing` [m]. `packages`: folder in which ROS packages are looked for.
+/// Puts contact nodes on the shapes of `arm` at a `spacing` [m]. `packages`: folder in which ROS packages are looked
+/// for.
 ///
 /// # Errors
-/// [`UrdfError::Invalid`] if a mesh cannot be read, [`UrdfError::Request`] if there are no nodes or more than a scene takes.
+/// [`UrdfError::Invalid`] if a mesh cannot be read, [`UrdfError::Request`] if there are no nodes or more than a scene
+/// takes.
 pub fn sample(robot: &Robot, arm: &Arm, spacing: f64, packages: Option<&Path>) -> Result<ContactNodes, UrdfError> {
     let refuse = |message: String| UrdfError::Request { path: robot.path.clone(), message };
     if !(spacing >= LEAST_SPACING && spacing.is_finite()) {

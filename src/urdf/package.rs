@@ -1,7 +1,8 @@
 //! Where a robot file's meshes are.
 //!
-//! A plain path is relative to the robot file. `package://name/path` is a path in the ROS package `name`: a folder of that name that
-//! holds the robot file or lies beside one that does, or is in the folder that the user names. No program is asked for it.
+//! A plain path is relative to the robot file. `package://name/path` is a path in the ROS package `name`: a folder of
+//! that name that holds the robot file or lies beside one that does, or is in the folder that the user names. No
+//! program is asked for it.
 
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,9 @@
 //! A soft ball within reach of an arm, a grid around it and a motion that presses it: what completes a scene.
 //!
-//! The arm starts in the middle of its limits. There, the contact node of its last link that the joints move most goes fastest along n,
-//! the eigenvector of J J^T of the largest eigenvalue. The ball lies on that side of the link, tangent to the plane across n through
-//! the link's foremost node but for a small gap. The joints move along J^T n, by which the node moves along n, into the ball.
+//! The arm starts in the middle of its limits. There, the contact node of its last link that the joints move most goes
+//! fastest along n, the eigenvector of J J^T of the largest eigenvalue. The ball lies on that side of the link, tangent
+//! to the plane across n through the link's foremost node but for a small gap. The joints move along J^T n, by which
+//! the node moves along n, into the ball.
 
 use crate::JointVector;
 use crate::proxy::{Chain, Pose};
@@ -34,7 +35,8 @@ const ITERATIONS: usize = 100;
 /// Least margin [rad or m]: ten times the digits that are written.
 const LEAST_MARGIN: f64 = 1e-4;
 
-/// Shortest lever for which gains are given, over the longest [1]: a joint that hardly moves the node needs some stiffness, too.
+/// Shortest lever for which gains are given, over the longest [1]: a joint that hardly moves the node needs some
+/// stiffness, too.
 const SHORTEST_LEVER: f64 = 0.2;
 
 /// Range of the levers [m]: from a fingertip to the longest arm.

@@ -1,5 +1,5 @@
-//! The deformed surface, for searches near a point. Nodes are displaced, and packets of triangles placed, when a search first comes
-//! to them, so that what a search costs does not grow with the size of the mesh.
+//! The deformed surface, for searches near a point. Nodes are displaced, and packets of triangles placed, when a search
+//! first comes to them, so that what a search costs does not grow with the size of the mesh.
 
 use crate::contact::geometry::bounding_volumes::{Leaf, Volume};
 use crate::contact::geometry::closest_point::{ClosestPoint, Feature};
@@ -145,8 +145,9 @@ impl Deformation {
         &self.formed[at].facet
     }
 
-    /// Calls `visit` with each facet of the surface whose flat triangle is nearer to `x` than the squared radius that `visit` returned last;
-    /// `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among them.
+    /// Calls `visit` with each facet of the surface whose flat triangle is nearer to `x` than the squared radius that
+    /// `visit` returned last; `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among
+    /// them.
     pub fn search(&mut self, model: &Model, x: DVec3, radius_squared: f64, mut visit: impl FnMut(u32, &Facet) -> f64) {
         let slack = model.surface.bounds.slack(x);
         let moved = self.bound.moved;

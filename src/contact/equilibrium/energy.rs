@@ -5,13 +5,13 @@
 //! decreases by a fair share of what the model promised: E never increases. Converged when the contact forces c(u)
 //! balance f: sqrt(r . C r) <= tolerance sqrt(c . C c), r = c - f.
 //!
-//! Stiff contact is reached in stages of growing kc, each from the state before: E has then the shape of a steep and bent
-//! valley, whose floor soft contact finds and stiffer contact only corrects. A stage's end never lies above the rest
-//! state in E at the final kc: E_s(u_s) <= E_s(0) bounds both its elastic energy and its depths by those at rest.
+//! Stiff contact is reached in stages of growing kc, each from the state before: E has then the shape of a steep and
+//! bent valley, whose floor soft contact finds and stiffer contact only corrects. A stage's end never lies above the
+//! rest state in E at the final kc: E_s(u_s) <= E_s(0) bounds both its elastic energy and its depths by those at rest.
 //!
 //! With the geometry frozen at rest (`linearised`) the same steps minimise the convex
-//! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`; each of its updates freezes the geometry again at the
-//! displacement found and solves again.
+//! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`; each of its updates freezes the geometry
+//! again at the displacement found and solves again.
 
 use super::newton::{Damping, Newton, Step};
 use super::tangent;
@@ -147,8 +147,8 @@ impl EnergySearch {
         SolverStats { residual: self.imbalance, ..outcome }
     }
 
-    /// Searches from where `forces` on the object's nodes hold it, which should be near the minimum with contact stiffness `kc` [N/m], for
-    /// the configuration that `detection` has taken up.
+    /// Searches from where `forces` on the object's nodes hold it, which should be near the minimum with contact
+    /// stiffness `kc` [N/m], for the configuration that `detection` has taken up.
     pub fn solve_with_guess(
         &mut self,
         model: &Model,
@@ -270,8 +270,8 @@ impl EnergySearch {
         detection.displace(model, self.support.nodes(), forces, model.motion_bound(elastic));
     }
 
-    /// Takes a step from a balanced state that is no minimum but a saddle of E, along a direction of negative curvature, to a state of
-    /// less energy; false where there is none.
+    /// Takes a step from a balanced state that is no minimum but a saddle of E, along a direction of negative
+    /// curvature, to a state of less energy; false where there is none.
     fn leave_saddle(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> bool {
         if geometry == Geometry::Frozen {
             // A convex problem has no saddle.
@@ -322,8 +322,8 @@ impl EnergySearch {
         tangent::tangent(model, pose, springs, support, newton)
     }
 
-    /// Takes up a new contact stiffness at the current state; returns how far from rest any iterate can be in the energy norm:
-    /// 1/2 |u|^2 never exceeds E.
+    /// Takes up a new contact stiffness at the current state; returns how far from rest any iterate can be in the
+    /// energy norm: 1/2 |u|^2 never exceeds E.
     fn begin_stage(&mut self, model: &Model, outcome: &mut SolverStats) -> f64 {
         self.state.energy = self.state.elastic + contact_energy(&self.state.contacts, self.kc);
         self.history.clear();
@@ -351,9 +351,9 @@ impl EnergySearch {
         }
     }
 
-    /// Brings the support, the contact forces and the residual force r = c - f up to date with the current state; returns
-    /// the relative residual sqrt(r . C r) / sqrt(c . C c), where forces of depths that are known to less than the tolerance count as those of
-    /// the least depth that is.
+    /// Brings the support, the contact forces and the residual force r = c - f up to date with the current state;
+    /// returns the relative residual sqrt(r . C r) / sqrt(c . C c), where forces of depths that are known to less than
+    /// the tolerance count as those of the least depth that is.
     fn update_residual(&mut self, model: &Model) -> f64 {
         let Self { state, support, slots, contact_forces, residual, product, kc, .. } = self;
         slots.clear();
@@ -412,7 +412,8 @@ impl EnergySearch {
         self.trial.energy = self.trial.elastic + contact_energy(contacts, self.kc);
     }
 
-    /// Returns the rounding error of E [J]: each depth is rounded by a few eps of the coordinates, E's part by lambda times that.
+    /// Returns the rounding error of E [J]: each depth is rounded by a few eps of the coordinates, E's part by lambda
+    /// times that.
     fn energy_rounding(&self, nodes: &[DVec3]) -> f64 {
         let mut size = self.state.energy;
         for contact in &self.state.contacts {
@@ -422,9 +423,9 @@ impl EnergySearch {
     }
 }
 
-/// Sets the multipliers of `contacts` to the forces that `force` predicts for the rows `before`, by their place: each row takes that
-/// of the row of its proxy node that faces most nearly the same way, zero where the node had none. Both lists ascend by proxy
-/// node [N].
+/// Sets the multipliers of `contacts` to the forces that `force` predicts for the rows `before`, by their place: each
+/// row takes that of the row of its proxy node that faces most nearly the same way, zero where the node had none. Both
+/// lists ascend by proxy node [N].
 fn predict_multipliers(contacts: &mut [Contact], before: &[Contact], force: impl Fn(usize) -> f64) {
     let mut first = 0;
     for contact in contacts {

@@ -1,4 +1,5 @@
-//! Searches for the equilibrium: the minimum of the energy by damped Newton steps, with its tangent, and the paper's iteration.
+//! Searches for the equilibrium: the minimum of the energy by damped Newton steps, with its tangent, and the paper's
+//! iteration.
 
 pub mod energy;
 mod newton;

@@ -1,20 +1,22 @@
 //! One damped Newton step of the energy form (Levenberg 1944, Marquardt 1963), by conjugate gradients.
 //!
 //! The energy along a displacement du = C df of the object, f being the forces that hold the displacement u = C f:
-//! `m(df) = u . df + 1/2 (1 + mu) df . C df + 1/2 sum_i kc_i max(0, depth_i + g_i . du)^2 + 1/2 sum_i lambda_i d2s_i(du, du)`,
-//! with g_i the depth's gradient and mu the damping, a multiple of the object's own stiffness: so stiff springs are met first, however
-//! short the step. Two things make it a better model than the plain second derivative of the energy, and neither costs a detection:
-//! - the maximum is kept, so contacts may come and go within a step: a pass of conjugate gradients for the contacts that
-//!   touch is followed by another where the step has changed which do;
-//! - curvature is weighted by the multiplier lambda_i that the step before predicted, not by kc depth_i, which at stiff contact
-//!   is far too large until the depth has settled (as in sequential quadratic programming). Both agree in the end,
-//!   so convergence stays quadratic.
+//! `m(df) = u . df + 1/2 (1 + mu) df . C df + 1/2 sum_i kc_i max(0, depth_i + g_i . du)^2 + 1/2 sum_i lambda_i
+//! d2s_i(du, du)`, with g_i the depth's gradient and mu the damping, a multiple of the object's own stiffness: so stiff
+//! springs are met first, however short the step. Two things make it a better model than the plain second derivative of
+//! the energy, and neither costs a detection:
+//! - the maximum is kept, so contacts may come and go within a step: a pass of conjugate gradients for the contacts
+//!   that touch is followed by another where the step has changed which do;
+//! - curvature is weighted by the multiplier lambda_i that the step before predicted, not by kc depth_i, which at stiff
+//!   contact is far too large until the depth has settled (as in sequential quadratic programming). Both agree in the
+//!   end, so convergence stays quadratic.
 //!
-//! Conjugate gradients on H = (1 + mu) K + B, B the Hessian of the contact terms, preconditioned by Woodbury's identity for the springs
-//! ([`super::woodbury`]), keep each search direction twice, as a force pi and as the displacement p = C pi, so that
-//! H p = (1 + mu) pi + B p needs no K. One product with C_AA is spent per iteration, that of the preconditioner. What it does not know
-//! of B, how contacts bend, has a rank of at most four per contact, so few iterations are needed whatever the object's size and the
-//! springs' stiffness. Negative curvature asks for more damping.
+//! Conjugate gradients on H = (1 + mu) K + B, B the Hessian of the contact terms, preconditioned by Woodbury's identity
+//! for the springs ([`super::woodbury`]), keep each search direction twice, as a force pi and as the displacement p = C
+//! pi, so that H p = (1 + mu) pi + B p needs no K. One product with C_AA is spent per iteration, that of the
+//! preconditioner. What it does not know of B, how contacts bend, has a rank of at most four per contact, so few
+//! iterations are needed whatever the object's size and the springs' stiffness. Negative curvature asks for more
+//! damping.
 
 // Indexed loops as in shaders/trust_region.wgsl.
 #![allow(clippy::needless_range_loop)]
@@ -29,7 +31,8 @@ use crate::tolerances::{
     MODEL_PASSES,
 };
 
-/// How much the model is damped: more from step to step where E refuses them, less where it keeps what they promise (Nielsen 1999).
+/// How much the model is damped: more from step to step where E refuses them, less where it keeps what they promise
+/// (Nielsen 1999).
 #[derive(Clone, Copy, Debug)]
 pub struct Damping {
     /// mu, zero or [`LEAST_DAMPING`] and more [1].
@@ -105,9 +108,9 @@ pub struct Newton {
 }
 
 impl Newton {
-    /// Step for the residual force r = c(u) - f, given with C r, damped by `damping` or as much more as makes the model convex, and
-    /// solved to `tolerance` relative to the residual, in the norm of the preconditioner. The step is left in `self.force`, the forces
-    /// of the rows after it in `self.forces_over_kc`.
+    /// Step for the residual force r = c(u) - f, given with C r, damped by `damping` or as much more as makes the model
+    /// convex, and solved to `tolerance` relative to the residual, in the norm of the preconditioner. The step is left
+    /// in `self.force`, the forces of the rows after it in `self.forces_over_kc`.
     pub fn step(
         &mut self,
         support: &Support,
@@ -136,9 +139,10 @@ impl Newton {
         self.woodbury.set_up(support, springs, &self.active, self.stiffening);
     }
 
-    /// The displacement du on the support with which (K + B) du is the force `load` on the support to `tolerance`, B the Hessian of the
-    /// contacts given to [`Newton::factorise`], and what it leaves of the load; `None` where K + B is found not to be positive definite, and then
-    /// [`Newton::descent`] is a direction in which the energy curves downwards [m].
+    /// The displacement du on the support with which (K + B) du is the force `load` on the support to `tolerance`, B
+    /// the Hessian of the contacts given to [`Newton::factorise`], and what it leaves of the load; `None` where K + B
+    /// is found not to be positive definite, and then [`Newton::descent`] is a direction in which the energy curves
+    /// downwards [m].
     pub fn respond(
         &mut self,
         support: &Support,
@@ -162,7 +166,8 @@ impl Newton {
         (&self.direction_force, root(dot(&self.direction, &self.direction_force)))
     }
 
-    /// The least of the damped model, and by how much it is less than at the start [J]; or what damping lacks where it is not convex.
+    /// The least of the damped model, and by how much it is less than at the start [J]; or what damping lacks where it
+    /// is not convex.
     fn minimise(
         &mut self,
         support: &Support,
@@ -230,8 +235,9 @@ impl Newton {
         self.forces_over_kc.resize(contacts.len(), 0.0);
     }
 
-    /// Goes on from the current step for the contacts that touch, until the preconditioned residual's square is at most `stop` or no
-    /// iterations are `left`; where the model is not convex, ends with what damping lacks, by the direction that shows it.
+    /// Goes on from the current step for the contacts that touch, until the preconditioned residual's square is at most
+    /// `stop` or no iterations are `left`; where the model is not convex, ends with what damping lacks, by the
+    /// direction that shows it.
     fn conjugate_gradients(
         &mut self,
         support: &Support,
@@ -273,8 +279,8 @@ impl Newton {
         woodbury.apply(springs, (residual, product), preconditioned_force, preconditioned);
     }
 
-    /// Notes by how much the step deepens each row, g_i . du, and the rows' forces after it; returns m(0) - m(df), in differences that
-    /// do not cancel near the solution [J].
+    /// Notes by how much the step deepens each row, g_i . du, and the rows' forces after it; returns m(0) - m(df), in
+    /// differences that do not cancel near the solution [J].
     fn model_decrease(&mut self, springs: Springs, residual: &[f64]) -> f64 {
         let own = 0.5 * self.stiffening * dot(&self.displacement, &self.force);
         let mut decrease = dot(&self.displacement, residual) - own;

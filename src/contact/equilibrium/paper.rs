@@ -9,11 +9,11 @@
 //!
 //! Then tau = sum_i J_i^T (-sum_j f_j^i).
 //!
-//! The iteration is faithful, and so is its failure: at stiff contact step 4 pushes the surface past the proxy node, and the
-//! next pass finds nothing inside. A configuration that started in contact and lost it is not converged, never free. One
-//! that cycles would run into the cap: a pass depends on nothing but the pass before, so it is given up as soon as a pass
-//! repeats an earlier one to the last bit (Brent 1980: compared with the pass of the last power of two). A node with a radius, which the paper does not have, acts through its deepest
-//! point x_i - r_i N_i.
+//! The iteration is faithful, and so is its failure: at stiff contact step 4 pushes the surface past the proxy node,
+//! and the next pass finds nothing inside. A configuration that started in contact and lost it is not converged, never
+//! free. One that cycles would run into the cap: a pass depends on nothing but the pass before, so it is given up as
+//! soon as a pass repeats an earlier one to the last bit (Brent 1980: compared with the pass of the last power of two).
+//! A node with a radius, which the paper does not have, acts through its deepest point x_i - r_i N_i.
 
 use super::energy::SolverStats;
 use crate::contact::detection::{Detection, Facets};
@@ -204,7 +204,8 @@ impl PaperIteration {
         self.support.displace(&model.compliance, &self.forces, &mut self.displacement);
     }
 
-    /// Relative change of the forces (and so of n = n0 + C f) since the last pass, in the energy norm; one when S changed [1].
+    /// Relative change of the forces (and so of n = n0 + C f) since the last pass, in the energy norm; one when S
+    /// changed [1].
     fn relative_change(&mut self) -> f64 {
         if !same_selection(&self.ties, &self.previous_ties) {
             return 1.0;

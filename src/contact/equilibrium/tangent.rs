@@ -1,12 +1,12 @@
 //! The tangent d tau/d q of the contact torque at an equilibrium.
 //!
 //! The equilibrium u(q) minimises E(u; q), so that U(q) = E(u(q); q), tau = -dU/dq, and by implicit differentiation
-//! `d tau/d q = -(E_qq - E_qu E_uu^-1 E_uq)`:
-//! minus the Hessian of U, symmetric. E_uu = K + B is what a Newton step is made with, B being the Hessian of the contact springs.
+//! `d tau/d q = -(E_qq - E_qu E_uu^-1 E_uq)`: minus the Hessian of U, symmetric. E_uu = K + B is what a Newton step is
+//! made with, B being the Hessian of the contact springs.
 //!
-//! A depth depends on the difference of its proxy node and the surface alone. To move the proxy node by J_i dq is therefore to move
-//! the nodes of its contact by v = -J_i dq, and B gives the other derivatives as well: E_uq dq = B v, and
-//! `dq . E_qq dq' = v . B v' - lambda_i N_i . x_i''(dq, dq')`, with the second derivative of the forward kinematics
+//! A depth depends on the difference of its proxy node and the surface alone. To move the proxy node by J_i dq is
+//! therefore to move the nodes of its contact by v = -J_i dq, and B gives the other derivatives as well: E_uq dq = B v,
+//! and `dq . E_qq dq' = v . B v' - lambda_i N_i . x_i''(dq, dq')`, with the second derivative of the forward kinematics
 //! `d^2 x_i / dq_k dq_l = a_k x J_il` for k <= l where joint k is revolute, and zero where it is prismatic.
 
 use super::newton::Newton;
@@ -20,8 +20,9 @@ use crate::scene::JointKind;
 use crate::tolerances::RESPONSE_TOLERANCE;
 use glam::DVec3;
 
-/// The tangent at the equilibrium that `springs` and `support` describe, multipliers being the forces of the contacts, with the proxy in `pose`; `None` where the equilibrium is no
-/// strict minimum, so that there is no derivative [N m/rad].
+/// The tangent at the equilibrium that `springs` and `support` describe, multipliers being the forces of the contacts,
+/// with the proxy in `pose`; `None` where the equilibrium is no strict minimum, so that there is no derivative
+/// [N m/rad].
 pub(super) fn tangent(
     model: &Model,
     pose: &Pose,
@@ -105,7 +106,8 @@ mod tests {
         nodes = [{ from = [0.01, -0.01, -0.02], to = [0.012, 0.01, -0.022], count = 4 }]
     "#;
 
-    /// Step of central differences of the torque [rad or m]: small beside the facets, large beside what the solver leaves of 1e-11.
+    /// Step of central differences of the torque [rad or m]: small beside the facets, large beside what the solver
+    /// leaves of 1e-11.
     const STEP: f64 = 1e-7;
 
     #[test]

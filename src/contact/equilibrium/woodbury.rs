@@ -1,13 +1,14 @@
 //! What the contact springs that touch leave of a force: the preconditioner of a Newton step.
 //!
-//! Stiff springs are what conjugate gradients take longest for. With g_a the gradient of the depth of spring a, W the stiffness of the
-//! springs and the object stiffened by 1 + mu, Woodbury's identity
-//! `P = ((1 + mu) K + G^T W G)^-1 = (C - C G^T ((1 + mu) W^-1 + G C G^T)^-1 G C) / (1 + mu)`
-//! takes them out, at the price of a dense system with as many unknowns as springs touch. What is left to the iterations is how contacts
-//! bend. P r is kept twice like all directions: as the force (r - G^T y) / (1 + mu), y being the push of the springs, and as the
-//! displacement C of it.
+//! Stiff springs are what conjugate gradients take longest for. With g_a the gradient of the depth of spring a, W the
+//! stiffness of the springs and the object stiffened by 1 + mu, Woodbury's identity
+//! `P = ((1 + mu) K + G^T W G)^-1 = (C - C G^T ((1 + mu) W^-1 + G C G^T)^-1 G C) / (1 + mu)` takes them out, at the
+//! price of a dense system with as many unknowns as springs touch. What is left to the iterations is how contacts bend.
+//! P r is kept twice like all directions: as the force (r - G^T y) / (1 + mu), y being the push of the springs, and as
+//! the displacement C of it.
 //!
-//! Each row of a ball's spring is a spring here. In series ([`crate::contact::law::series`]) they share the compliance (1 - e) / kc, and have e / kc each.
+//! Each row of a ball's spring is a spring here. In series ([`crate::contact::law::series`]) they share the compliance
+//! (1 - e) / kc, and have e / kc each.
 
 use crate::contact::law::springs::Springs;
 use crate::contact::linear::cholesky;

@@ -1,8 +1,9 @@
 //! A tree of axis-aligned boxes over the triangles of the surface at rest, for searches near a point.
 //!
-//! Every leaf holds a packet of triangles, of which searches visit those near enough; every branch the boxes of eight leaves or
-//! branches, which are measured at once (as in the ray tracers' trees: Wald, Benthin & Boulos 2008). Bounds carry a slack for
-//! rounding ([`CULLING_SLACK`]), and ties go to the lower triangle number, so that no result depends on the order of visits.
+//! Every leaf holds a packet of triangles, of which searches visit those near enough; every branch the boxes of eight
+//! leaves or branches, which are measured at once (as in the ray tracers' trees: Wald, Benthin & Boulos 2008). Bounds
+//! carry a slack for rounding ([`CULLING_SLACK`]), and ties go to the lower triangle number, so that no result depends
+//! on the order of visits.
 
 use super::packet::{LANES, Packet, greatest};
 use crate::contact::linear::wide::{Kernel, widest};
@@ -48,7 +49,8 @@ impl Volume {
     }
 }
 
-/// Up to eight boxes side by side: low and high corner, and of each the coordinates [m]; those beyond the last are nowhere.
+/// Up to eight boxes side by side: low and high corner, and of each the coordinates [m]; those beyond the last are
+/// nowhere.
 struct Branch {
     low: [[f64; LANES]; 3],
     high: [[f64; LANES]; 3],
@@ -156,14 +158,15 @@ impl BoundingVolumes {
         self.volume.map_or(f64::MAX, |volume| volume.distance_squared(x))
     }
 
-    /// Returns the margin [m^2] by which a squared lower bound must exceed a squared distance to rule a triangle out, for a point `x`.
+    /// Returns the margin [m^2] by which a squared lower bound must exceed a squared distance to rule a triangle out,
+    /// for a point `x`.
     #[must_use]
     pub fn slack(&self, x: DVec3) -> f64 {
         self.slack + CULLING_SLACK * x.length_squared()
     }
 
-    /// Calls `visit` with the number of each leaf whose box is nearer to `x` than the squared radius that `visit` returned last;
-    /// `bound` is the first [m^2].
+    /// Calls `visit` with the number of each leaf whose box is nearer to `x` than the squared radius that `visit`
+    /// returned last; `bound` is the first [m^2].
     #[inline]
     pub fn walk(&self, x: DVec3, mut bound: f64, mut visit: impl FnMut(usize) -> f64) {
         if let Some(root) = self.branches.last() {
@@ -185,8 +188,8 @@ impl BoundingVolumes {
         }
     }
 
-    /// Calls `visit` with each triangle that at rest is nearer to `x` than the squared radius that `visit` returned last;
-    /// `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among them.
+    /// Calls `visit` with each triangle that at rest is nearer to `x` than the squared radius that `visit` returned
+    /// last; `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among them.
     pub fn search(&self, x: DVec3, radius_squared: f64, mut visit: impl FnMut(u32) -> f64) {
         let slack = self.slack(x);
         let mut bound = radius_squared + slack;
@@ -202,7 +205,8 @@ impl BoundingVolumes {
     }
 }
 
-/// Appends the leaves over the triangles `order`, split along the longest axis so that all leaves and branches but the last are full.
+/// Appends the leaves over the triangles `order`, split along the longest axis so that all leaves and branches but the
+/// last are full.
 fn build(positions: &[DVec3], triangles: &[[u32; 3]], order: &mut [u32], leaves: &mut Vec<Leaf>) {
     let corners = |t: u32| super::normals::corners(positions, triangles[t as usize]);
     let volume = |t: u32| {
@@ -240,8 +244,8 @@ mod tests {
     use crate::contact::geometry::normals;
     use crate::random::sequence;
 
-    /// Trees of every height up to four, full and not: against all triangles tried one by one, for spheres of fixed size and for one
-    /// that shrinks to the nearest triangle.
+    /// Trees of every height up to four, full and not: against all triangles tried one by one, for spheres of fixed
+    /// size and for one that shrinks to the nearest triangle.
     #[test]
     fn searches_visit_all_that_is_near_and_each_once() {
         let mut next = sequence(11);

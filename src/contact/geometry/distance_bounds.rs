@@ -1,12 +1,13 @@
 //! Lower bounds of the signed distance to the surface at rest, looked up in a lattice of cubes around it.
 //!
-//! The distance d_t to a triangle is a convex function: nowhere below its tangent plane at a cube's middle c, and in the cube
-//! nowhere above what it is at the corners, less any linear function. With s the signed distance, h half a cube's side and g
-//! the direction from the closest triangle to c,
-//! - in a cube outside, `s = min_t d_t >= e + g . (x - c)` with `e = min_t ( d_t(c) - h |g - g_t|_1 )`, g_t = grad d_t(c),
+//! The distance d_t to a triangle is a convex function: nowhere below its tangent plane at a cube's middle c, and in
+//! the cube nowhere above what it is at the corners, less any linear function. With s the signed distance, h half a
+//! cube's side and g the direction from the closest triangle to c,
+//! - in a cube outside, `s = min_t d_t >= e + g . (x - c)` with `e = min_t ( d_t(c) - h |g - g_t|_1 )`, g_t = grad
+//!   d_t(c),
 //!   |.|_1 the sum of a vector's sizes along the axes;
-//! - in a cube inside, `s >= -d_t >= e - g . (x - c)` for the closest triangle t, with `e = -max ( d_t(v) - g . (v - c) )`
-//!   over the corners v;
+//! - in a cube inside, `s >= -d_t >= e - g . (x - c)` for the closest triangle t, with
+//!   `e = -max ( d_t(v) - g . (v - c) )` over the corners v;
 //! - in a cube that the surface may pass through, `s >= s(c) - sqrt(3) h`, as s changes by no more than x moves.
 //!
 //! So away from the surface bounds are sharp to second order in h.
@@ -20,8 +21,8 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::SQRT_2;
 
-/// Cubes for each triangle, about: their sides are not much longer than a triangle's where the lattice is twice as wide as the
-/// object.
+/// Cubes for each triangle, about: their sides are not much longer than a triangle's where the lattice is twice as wide
+/// as the object.
 const CUBES_PER_TRIANGLE: usize = 16;
 
 /// Least number of cubes: about twenty-five along each axis.
@@ -87,7 +88,8 @@ impl DistanceBounds {
         Self { low, inverse_side: side.recip(), counts, cubes: cubes.collect() }
     }
 
-    /// A lower bound of the signed distance of `x` to the surface [m], and a triangle near by; `None` where there are no cubes.
+    /// A lower bound of the signed distance of `x` to the surface [m], and a triangle near by; `None` where there are
+    /// no cubes.
     #[inline]
     #[must_use]
     pub(super) fn at(&self, x: DVec3) -> Option<(f64, u32)> {
@@ -159,8 +161,8 @@ mod tests {
     use crate::{object::Object, random::Random, scene::Scene};
     use std::path::Path;
 
-    /// Distances by trial of every triangle, sides by solid angles: on a convex surface and on one with a hollow. Bounds hold,
-    /// and are idle only near the surface.
+    /// Distances by trial of every triangle, sides by solid angles: on a convex surface and on one with a hollow.
+    /// Bounds hold, and are idle only near the surface.
     #[test]
     fn bounds_hold_and_are_sharp_away_from_the_surface() {
         for name in ["tests/scenes/sphere.toml", "datasets/mesh.toml"] {

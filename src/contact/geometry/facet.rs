@@ -1,7 +1,7 @@
 //! One facet of the contact surface: a flat triangle, or a triangle of degree four that joins its neighbours smoothly.
 //!
-//! Its points belong to barycentric weights. A point closest to x is found by Newton's method from the closest point of the flat triangle
-//! between the corners.
+//! Its points belong to barycentric weights. A point closest to x is found by Newton's method from the closest point of
+//! the flat triangle between the corners.
 
 use super::closest_point::{ClosestPoint, Feature, closest_point};
 use super::normals::{area_vector, unit_or_zero};
@@ -27,7 +27,8 @@ const FACE: [Direction; 2] = [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]];
 /// The direction in which a point moves along each edge.
 const EDGES: [[Direction; 1]; 3] = [[[-1.0, 1.0, 0.0]], [[0.0, -1.0, 1.0]], [[1.0, 0.0, -1.0]]];
 
-/// Returns the directions in which a point that lies on `feature` may move on it: two on a face, one on an edge, none on a vertex.
+/// Returns the directions in which a point that lies on `feature` may move on it: two on a face, one on an edge, none
+/// on a vertex.
 #[must_use]
 pub fn directions(feature: Feature) -> &'static [Direction] {
     match feature {
@@ -96,7 +97,8 @@ impl Facet {
     pub fn closest(&self, x: DVec3, within: f64) -> Option<ClosestPoint> {
         let flat = closest_point(x, self.corners);
         let Some(net) = &self.net else { return Some(flat) };
-        // All of it lies between its control points, so no point of it is nearer than the nearest of these along any direction.
+        // All of it lies between its control points, so no point of it is nearer than the nearest of these along any
+        // direction.
         let towards = (x - Jet::flat(&self.corners, flat.weights).point).normalize_or_zero();
         let farthest = net.iter().map(|control| towards.dot(*control)).fold(f64::MIN, f64::max);
         let least = towards.dot(x) - farthest;
@@ -121,8 +123,8 @@ impl Facet {
         best.map_or(ClosestPoint { weights: start, feature: Feature::Face }, |(_, point)| point)
     }
 
-    /// Finds the weights at which the distance to `x` is least, on the facet continued beyond its edges. Far outside it stops, since Newton's
-    /// method would not come back.
+    /// Finds the weights at which the distance to `x` is least, on the facet continued beyond its edges. Far outside it
+    /// stops, since Newton's method would not come back.
     fn stationary(&self, x: DVec3, start: [f64; 3]) -> [f64; 3] {
         let mut w = start;
         for _ in 0..FACET_ITERATIONS {

@@ -1,9 +1,10 @@
 //! Normals of the deformed faceted surface.
 //!
 //! Inside or outside is decided by the angle-weighted pseudonormal of the closest feature (Baerentzen & Aanaes, Signed
-//! distance computation using the angle weighted pseudonormal, 2005): the face's normal, the sum of the two faces' normals
-//! at an edge, and the sum over the faces around a vertex weighted by their angles there. The sign of its inner product
-//! with x - p is right for every closed surface, sharp edges included, where any single face's normal would fail.
+//! distance computation using the angle weighted pseudonormal, 2005): the face's normal, the sum of the two faces'
+//! normals at an edge, and the sum over the faces around a vertex weighted by their angles there. The sign of its inner
+//! product with x - p is right for every closed surface, sharp edges included, where any single face's normal would
+//! fail.
 
 use super::closest_point::Feature;
 use crate::object::Topology;
@@ -63,7 +64,8 @@ pub fn pseudonormal(
     }
 }
 
-/// Outward unit normal of the surface at `node`: mean of the normals of the triangles around it, weighted by their areas.
+/// Outward unit normal of the surface at `node`: mean of the normals of the triangles around it, weighted by their
+/// areas.
 #[must_use]
 pub fn vertex_normal(positions: &[DVec3], triangles: &[[u32; 3]], topology: &Topology, node: u32) -> DVec3 {
     let mut sum = DVec3::ZERO;
@@ -73,8 +75,9 @@ pub fn vertex_normal(positions: &[DVec3], triangles: &[[u32; 3]], topology: &Top
     unit_or_zero(sum)
 }
 
-/// How often the surface winds around `x`: the solid angles of all triangles over 4 pi (Van Oosterom & Strackee 1983). One
-/// inside, zero outside; it changes nowhere but on the surface, also where deformation has folded that over itself [1].
+/// How often the surface winds around `x`: the solid angles of all triangles over 4 pi (Van Oosterom & Strackee 1983).
+/// One inside, zero outside; it changes nowhere but on the surface, also where deformation has folded that over itself
+/// [1].
 #[cfg(test)]
 #[must_use]
 pub fn winding_number(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3) -> f64 {

@@ -1,8 +1,8 @@
 //! Distances to eight triangles at once, without a branch: what a search needs of the many that are not the closest.
 //!
-//! A triangle's distance is the least of those to its edges and, over its inside, to its plane. It may be too small where a
-//! triangle has no area, and is nowhere too great by more than rounding: in the plane's place an edge is taken by mistake only
-//! where it is as near as rounding can tell.
+//! A triangle's distance is the least of those to its edges and, over its inside, to its plane. It may be too small
+//! where a triangle has no area, and is nowhere too great by more than rounding: in the plane's place an edge is taken
+//! by mistake only where it is as near as rounding can tell.
 
 use crate::contact::linear::wide::{Kernel, widest};
 use crate::tolerances::MINIMUM_SQUARE;
@@ -103,7 +103,8 @@ impl Kernel for DistancesSquared<'_> {
     }
 }
 
-/// Squared distance to an edge e from a point that is `square` from its start squared, `along` = e . (x - start), `length` = e . e.
+/// Squared distance to an edge e from a point that is `square` from its start squared, `along` = e . (x - start),
+/// `length` = e . e.
 #[inline(always)]
 fn to_edge(square: f64, along: f64, length: f64) -> f64 {
     let share = greatest(least(along / greatest(length, MINIMUM_SQUARE), 1.0), 0.0);

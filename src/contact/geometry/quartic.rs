@@ -1,7 +1,8 @@
 //! Triangles of degree four in Bernstein form.
 //!
-//! `p(w) = sum_ijk B_ijk(w) b_ijk`, i + j + k = n, `B_ijk(w) = n! / (i! j! k!) w_0^i w_1^j w_2^k`. Control points of every degree are in one order: by
-//! j + k, then by k. So that of b_ijk does not depend on i, and one step of de Casteljau's algorithm runs along the lists.
+//! `p(w) = sum_ijk B_ijk(w) b_ijk`, i + j + k = n, `B_ijk(w) = n! / (i! j! k!) w_0^i w_1^j w_2^k`. Control points of
+//! every degree are in one order: by j + k, then by k. So that of b_ijk does not depend on i, and one step of de
+//! Casteljau's algorithm runs along the lists.
 
 use glam::DVec3;
 use std::ops::{Add, Mul};
@@ -147,7 +148,8 @@ mod tests {
         basis.iter().zip(net).map(|(count, control)| *control * *count).sum()
     }
 
-    /// The basis is that of the definition, and the jet is the product of basis and net, with the derivatives that differences give.
+    /// The basis is that of the definition, and the jet is the product of basis and net, with the derivatives that
+    /// differences give.
     #[test]
     fn points_and_derivatives_are_those_of_the_definition() {
         let mut random = Random::new(4);

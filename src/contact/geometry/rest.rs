@@ -12,11 +12,11 @@ use glam::DVec3;
 
 /// A closed surface of triangles at rest, prepared for searches.
 ///
-/// Contact is with the triangles themselves, or with the smooth surface that they span. Searches go through the flat triangles; a
-/// smooth facet is nowhere farther from its triangle than the bulge.
+/// Contact is with the triangles themselves, or with the smooth surface that they span. Searches go through the flat
+/// triangles; a smooth facet is nowhere farther from its triangle than the bulge.
 pub struct RestSurface<'a> {
-    /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's origin
-    /// loses no digits.
+    /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's
+    /// origin loses no digits.
     pub centre: DVec3,
     /// Distance of the farthest node from the centre [m].
     pub extent: f64,
@@ -222,7 +222,8 @@ mod tests {
         if surface.is_inside(x, &closest) { -distance } else { distance }
     }
 
-    /// The error of the distance to a sphere near its surface, and the angle between normals on either side of an edge, both rms [m, rad].
+    /// The error of the distance to a sphere near its surface, and the angle between normals on either side of an edge,
+    /// both rms [m, rad].
     fn errors(divisions: u32, felt: ContactSurface) -> (f64, f64) {
         let object = sphere(divisions);
         let surface = RestSurface::new(&object, felt);
@@ -245,7 +246,8 @@ mod tests {
         ((distance / 2000.0).sqrt(), (angle / (3 * object.triangles.len()) as f64).sqrt())
     }
 
-    /// Flat facets are second order in the distance and first in the normal; smooth ones are third and second, and much nearer already.
+    /// Flat facets are second order in the distance and first in the normal; smooth ones are third and second, and much
+    /// nearer already.
     #[test]
     fn a_smooth_surface_is_nearer_to_what_the_mesh_samples() {
         let [coarse, fine] = [2, 3].map(|divisions| errors(divisions, ContactSurface::Smooth));
@@ -255,8 +257,8 @@ mod tests {
         assert!(coarse.0 > 6.0 * fine.0 && coarse.1 > 2.2 * fine.1, "{coarse:?} {fine:?}");
     }
 
-    /// On a surface with a hollow: no point of a dense sample is closer, distances are bounded from below, and sides are those of the
-    /// triangles wherever the bulge leaves no doubt.
+    /// On a surface with a hollow: no point of a dense sample is closer, distances are bounded from below, and sides
+    /// are those of the triangles wherever the bulge leaves no doubt.
     #[test]
     fn the_closest_point_of_a_smooth_surface_is_found_and_its_side() {
         let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/mesh.toml")).unwrap();

@@ -1,13 +1,14 @@
 //! The smooth contact surface: the limit of Loop's subdivision of a control net that moves with the object's nodes.
 //!
-//! Where all corners of a facet have six neighbours the limit is a box spline, a triangle of degree four whose control points are sums of the
-//! facet's twelve nodes (C. Loop, Smooth subdivision surfaces based on triangles, 1987; M. J. Lai, Fortran subroutines for B-nets of box
-//! splines, 1992). It is twice continuously differentiable from facet to facet. At a corner with another number of neighbours the
-//! control points next to it are chosen so that the surface goes through Loop's limit point with Loop's limit tangents: it
-//! is continuous, and its normal is continuous at the corner and nearly so along the edges that leave it.
+//! Where all corners of a facet have six neighbours the limit is a box spline, a triangle of degree four whose control
+//! points are sums of the facet's twelve nodes (C. Loop, Smooth subdivision surfaces based on triangles, 1987; M. J.
+//! Lai, Fortran subroutines for B-nets of box splines, 1992). It is twice continuously differentiable from facet to
+//! facet. At a corner with another number of neighbours the control points next to it are chosen so that the surface
+//! goes through Loop's limit point with Loop's limit tangents: it is continuous, and its normal is continuous at the
+//! corner and nearly so along the edges that leave it.
 //!
-//! At rest the control net is the mesh plus an offset for which the surface passes through the mesh's nodes. Displacements of nodes
-//! move the control net, so every point of the surface is a linear function of them.
+//! At rest the control net is the mesh plus an offset for which the surface passes through the mesh's nodes.
+//! Displacements of nodes move the control net, so every point of the surface is a linear function of them.
 
 use super::facet::{Direction, Facet};
 use super::quartic::{CONTROLS, EXPONENTS, basis, basis_slopes, place};
@@ -16,15 +17,15 @@ use glam::DVec3;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
-/// Neighbours of a node up to which the surface is smooth there. At others, which no mesh has that is fit for mechanics, it keeps the
-/// corner.
+/// Neighbours of a node up to which the surface is smooth there. At others, which no mesh has that is fit for
+/// mechanics, it keeps the corner.
 const MOST_NEIGHBOURS: usize = 10;
 
 /// Nodes on which a facet depends at most: its corners and all their neighbours.
 pub const CARRIERS: usize = 3 * MOST_NEIGHBOURS - 6;
 
-/// Corrections of the control net at rest. Each multiplies the square of edge length over radius of curvature by which the surface misses the
-/// nodes, so that the third is beyond the sixth order.
+/// Corrections of the control net at rest. Each multiplies the square of edge length over radius of curvature by which
+/// the surface misses the nodes, so that the third is beyond the sixth order.
 const CORRECTIONS: usize = 3;
 
 /// The facets' nodes, and how each hangs on them.
@@ -44,8 +45,8 @@ pub struct SmoothSurface {
 
 /// How the control points of a facet hang on its nodes.
 ///
-/// Nodes 0 to 2 are its corners, 3 + k is that across edge k. Those between, of which a corner with n neighbours has n - 4, follow corner by
-/// corner, anticlockwise.
+/// Nodes 0 to 2 are its corners, 3 + k is that across edge k. Those between, of which a corner with n neighbours has n
+/// - 4, follow corner by corner, anticlockwise.
 pub struct Shape {
     /// Number of nodes.
     count: usize,
@@ -149,8 +150,8 @@ fn limit(corner: usize, around: &[usize]) -> impl Iterator<Item = (u8, f64)> {
     std::iter::once(own).chain(around.iter().map(move |&node| (node as u8, weight)))
 }
 
-/// The mask of the control point next to `corner` towards its neighbour number `towards`, which is the node `end`: a quarter of the limit
-/// tangent further.
+/// The mask of the control point next to `corner` towards its neighbour number `towards`, which is the node `end`: a
+/// quarter of the limit tangent further.
 fn beside(corner: usize, around: &[usize], towards: usize, end: usize) -> Vec<(u8, f64)> {
     if around.is_empty() {
         return vec![(corner as u8, 0.75), (end as u8, 0.25)];
@@ -221,7 +222,8 @@ impl SmoothSurface {
         self.shape(t).facet(|j| positions[nodes[j] as usize] + self.offsets[nodes[j] as usize])
     }
 
-    /// By how much the facets at rest stand off the flat triangles of the mesh at most, whose nodes are at `positions` [m].
+    /// By how much the facets at rest stand off the flat triangles of the mesh at most, whose nodes are at `positions`
+    /// [m].
     #[must_use]
     pub fn bulge(&self, positions: &[DVec3]) -> f64 {
         let farthest = |(t, facet): (usize, &Facet)| {
@@ -231,8 +233,9 @@ impl SmoothSurface {
         self.at_rest.iter().enumerate().map(farthest).fold(0.0, f64::max)
     }
 
-    /// Returns a bound of the square of what displacements move the facets off the flat triangles by, where `square` bounds that of a sum of nodes'
-    /// displacements, given as nodes and their weights. No point of a facet moves off more than all its control points do.
+    /// Returns a bound of the square of what displacements move the facets off the flat triangles by, where `square`
+    /// bounds that of a sum of nodes' displacements, given as nodes and their weights. No point of a facet moves off
+    /// more than all its control points do.
     pub fn bulge_squared(&self, square: impl Fn(&[(u32, f64)]) -> f64) -> f64 {
         let mut most = 0.0_f64;
         let mut terms = Vec::new();
@@ -304,7 +307,8 @@ mod tests {
     use crate::random::Random;
     use glam::DVec2;
 
-    /// A closed mesh with nodes of 3, 6, 8 and 16 neighbours: a bipyramid over an octagon, its upper faces raised about their middles.
+    /// A closed mesh with nodes of 3, 6, 8 and 16 neighbours: a bipyramid over an octagon, its upper faces raised about
+    /// their middles.
     fn mixed() -> (Vec<DVec3>, Vec<[u32; 3]>, Topology) {
         const SIDES: u32 = 8;
         let corner = |i: u32| DVec3::from((DVec2::from_angle(TAU * f64::from(i) / f64::from(SIDES)), 0.0));
@@ -321,8 +325,8 @@ mod tests {
         (positions, triangles, topology)
     }
 
-    /// A point of the limit surface of a regular net by brute force: Loop's subdivision over and over of a patch of the triangular
-    /// lattice with heights `height`, at barycentric weights `w` of the triangle (0, 0), (1, 0), (0, 1).
+    /// A point of the limit surface of a regular net by brute force: Loop's subdivision over and over of a patch of the
+    /// triangular lattice with heights `height`, at barycentric weights `w` of the triangle (0, 0), (1, 0), (0, 1).
     fn subdivided(height: impl Fn(i64, i64) -> f64, w: [f64; 3]) -> f64 {
         let mut net: HashMap<(i64, i64), f64> = HashMap::new();
         for i in -3..=4 {
@@ -392,8 +396,8 @@ mod tests {
         }
     }
 
-    /// On a mesh of all kinds of nodes: the surface is continuous, passes close to the nodes, its normal is continuous at the nodes whose
-    /// neighbours are few enough, and moving all nodes moves it as much.
+    /// On a mesh of all kinds of nodes: the surface is continuous, passes close to the nodes, its normal is continuous
+    /// at the nodes whose neighbours are few enough, and moving all nodes moves it as much.
     #[test]
     fn facets_join_on_any_mesh() {
         let (positions, triangles, topology) = mixed();

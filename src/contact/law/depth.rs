@@ -1,19 +1,19 @@
 //! Depth of a proxy node below the deformed surface, with its first and second derivative in the object's nodes.
 //!
 //! `depth = r + s`, `s = N . (p - x)`: x the proxy node, r its radius, p the closest surface point, N the outward unit
-//! direction, s positive inside. p = sum_j w_j n_j over the nodes that carry the touched feature, and p moves on the feature by
-//! parameters t_a: two on a face, one along an edge, none at a vertex.
+//! direction, s positive inside. p = sum_j w_j n_j over the nodes that carry the touched feature, and p moves on the
+//! feature by parameters t_a: two on a face, one along an edge, none at a vertex.
 //!
 //! First derivative, by the envelope theorem (p is a minimiser, so its sliding along the feature has no effect):
 //! `d depth / d n_j = w_j N`, `d depth / d x = -N`. With the energy 1/2 kc depth^2 the proxy node is pushed by lambda N
 //! and object node j by -lambda w_j N, lambda = kc depth.
 //!
-//! Second derivative along node displacements v_j. They move the point by dp = sum_j w_j v_j, and turn the feature: its tangents
-//! T_a = dp/dt_a change by dT_a = sum_j (dw_j/dt_a) v_j. With the metric I_ab = T_a . T_b, the curvature B_ab = N . d2p/dt_a dt_b, H = I + s B,
-//! tau_a = T_a . dp and mu_a = N . dT_a, implicit differentiation of the closest point gives
-//! `d2s = tau . (I^-1 B H^-1) tau - 2 tau . H^-1 mu - s mu . H^-1 mu + (1/s) |P dp|^2`,
-//! P taking out of dp what is along N and along the feature: zero on faces. One form for flat and bent facets, faces, edges and
-//! vertices, so that a product needs no branch. It is needed because contact points creep over the surface when it is left out.
+//! Second derivative along node displacements v_j. They move the point by dp = sum_j w_j v_j, and turn the feature: its
+//! tangents T_a = dp/dt_a change by dT_a = sum_j (dw_j/dt_a) v_j. With the metric I_ab = T_a . T_b, the curvature B_ab
+//! = N . d2p/dt_a dt_b, H = I + s B, tau_a = T_a . dp and mu_a = N . dT_a, implicit differentiation of the closest
+//! point gives `d2s = tau . (I^-1 B H^-1) tau - 2 tau . H^-1 mu - s mu . H^-1 mu + (1/s) |P dp|^2`, P taking out of dp
+//! what is along N and along the feature: zero on faces. One form for flat and bent facets, faces, edges and vertices,
+//! so that a product needs no branch. It is needed because contact points creep over the surface when it is left out.
 
 use crate::contact::geometry::closest_point::ClosestPoint;
 use crate::contact::geometry::closest_point::Feature;
@@ -23,8 +23,8 @@ use crate::tolerances::{LEAST_CONVEXITY, MINIMUM_CURVATURE_RADIUS, MINIMUM_SQUAR
 use glam::DVec3;
 use std::ops::Neg;
 
-/// One proxy node and a surface feature that it feels: a row of the contact problem. A point has one row, a ball one for each facet
-/// that it feels (see [`super::series`]).
+/// One proxy node and a surface feature that it feels: a row of the contact problem. A point has one row, a ball one
+/// for each facet that it feels (see [`super::series`]).
 #[derive(Clone, Copy, Debug)]
 pub struct Contact {
     /// Number of the proxy node.
@@ -59,7 +59,8 @@ pub struct Carriers {
 }
 
 impl Carriers {
-    /// Notes how `point` hangs on these nodes: the corners of a flat facet, or all nodes of a smooth one with their shape.
+    /// Notes how `point` hangs on these nodes: the corners of a flat facet, or all nodes of a smooth one with their
+    /// shape.
     #[inline]
     #[must_use]
     pub fn new((nodes, shape): (&[u32], Option<&Shape>), point: &ClosestPoint) -> Self {
@@ -210,7 +211,8 @@ impl Curvature {
                 }
                 let bends = [normal.dot(jet.bend(d, d)), normal.dot(jet.bend(d, e)), normal.dot(jet.bend(e, e))];
                 let full = [metric[0] + s * bends[0], metric[1] + s * bends[1], metric[2] + s * bends[2]];
-                // Where the distance is hardly convex the closest point is about to leave, and no derivative holds for long.
+                // Where the distance is hardly convex the closest point is about to leave, and no derivative holds for
+                // long.
                 let area = metric[0] * metric[2] - metric[1] * metric[1];
                 if full[0] > 0.0 && full[0] * full[2] - full[1] * full[1] > LEAST_CONVEXITY * area {
                     self.turning = self::inverse(full, MINIMUM_SQUARE);
@@ -235,7 +237,8 @@ impl Curvature {
     }
 }
 
-/// The inverse of a symmetric matrix of two rows, its entries 00, 01, 11; its determinant counts as no less than `least`.
+/// The inverse of a symmetric matrix of two rows, its entries 00, 01, 11; its determinant counts as no less than
+/// `least`.
 #[inline]
 fn inverse([a, b, c]: [f64; 3], least: f64) -> [f64; 3] {
     let determinant = (a * c - b * b).max(least);
@@ -286,7 +289,8 @@ impl Contact {
         sum
     }
 
-    /// Returns how displacements `v` of its nodes move its closest point, and turn the surface there, where that matters.
+    /// Returns how displacements `v` of its nodes move its closest point, and turn the surface there, where that
+    /// matters.
     #[inline]
     #[must_use]
     pub fn variation(&self, v: impl Fn(usize) -> DVec3) -> Variation {
@@ -323,7 +327,8 @@ impl Contact {
         reaction.point * weights[j] + reaction.tangents[0] * first[j] + reaction.tangents[1] * second[j]
     }
 
-    /// Returns the second variation of the depth along `variation`: the reaction whose work along another variation is d2s of both.
+    /// Returns the second variation of the depth along `variation`: the reaction whose work along another variation is
+    /// d2s of both.
     #[inline]
     #[must_use]
     pub fn second_variation(&self, variation: &Variation) -> Variation {
@@ -388,8 +393,9 @@ mod tests {
         stretch + contact.multiplier * contact.second_variation(&v).dot(&w)
     }
 
-    /// Random facets, flat and bent, points on either side, all features: gradient and Hessian of 1/2 kc depth^2 against central
-    /// differences. Errors are of order h^2 times the fourth derivative; points close to a feature are left out.
+    /// Random facets, flat and bent, points on either side, all features: gradient and Hessian of 1/2 kc depth^2
+    /// against central differences. Errors are of order h^2 times the fourth derivative; points close to a feature are
+    /// left out.
     #[test]
     fn derivatives_agree_with_finite_differences() {
         let mut next = sequence(7);

@@ -1,13 +1,13 @@
 //! How one proxy node's spring acts on the facets that the node feels.
 //!
-//! A point feels the closest facet alone, so that `E = 1/2 kc max(0, s)^2` with its depth s. A ball in a dent touches several facets,
-//! and the closest changes with a kink, on which nothing balances. So the spring of a ball acts on all facets about as near as the
-//! closest: of its compliance 1/kc the part e = [`FACET_COMPLIANCE`] is each facet's own, in series with the rest, which they share.
-//! With s_j the depths and t the shared part,
-//! `E = 1/2 kc min_t (t^2 / (1 - e) + sum_j max(0, s_j - t)^2 / e)`.
-//! A facet takes the force `kc p_j` with `p_j = max(0, s_j - t) / e`, and `E = 1/2 kc sum_j p_j s_j`. One facet alone is the spring kc
-//! of a point; n of the same depth, as on an edge of two, are stiffer by `1 / (1 - e + e / n)`, at most 1 / (1 - e). Facets less deep
-//! than 1 - e of the deepest take no force. E is convex in the depths, and its gradient is continuous.
+//! A point feels the closest facet alone, so that `E = 1/2 kc max(0, s)^2` with its depth s. A ball in a dent touches
+//! several facets, and the closest changes with a kink, on which nothing balances. So the spring of a ball acts on all
+//! facets about as near as the closest: of its compliance 1/kc the part e = [`FACET_COMPLIANCE`] is each facet's own,
+//! in series with the rest, which they share. With s_j the depths and t the shared part,
+//! `E = 1/2 kc min_t (t^2 / (1 - e) + sum_j max(0, s_j - t)^2 / e)`. A facet takes the force `kc p_j` with
+//! `p_j = max(0, s_j - t) / e`, and `E = 1/2 kc sum_j p_j s_j`. One facet alone is the spring kc of a point; n of the
+//! same depth, as on an edge of two, are stiffer by `1 / (1 - e + e / n)`, at most 1 / (1 - e). Facets less deep than 1
+//! - e of the deepest take no force. E is convex in the depths, and its gradient is continuous.
 
 use super::depth::Contact;
 use crate::tolerances::FACET_COMPLIANCE;
@@ -21,8 +21,8 @@ pub fn distribute(depth: impl Fn(usize) -> f64, parts: &mut [f64]) {
         *part = depth(0).max(0.0);
         return;
     }
-    // t = sum s / (n + e / (1 - e)) over the facets deeper than t. It rises from zero to the solution, as facets that are less deep
-    // are left out one after the other.
+    // t = sum s / (n + e / (1 - e)) over the facets deeper than t. It rises from zero to the solution, as facets that
+    // are less deep are left out one after the other.
     let mut t = 0.0;
     loop {
         let (mut sum, mut count) = (0.0, SHARED);

@@ -30,8 +30,8 @@ impl<'a> Springs<'a> {
         }
     }
 
-    /// Calls `add` with each row of the spring `rows` and the reaction with which it resists the variation `v` of the row: the Hessian of
-    /// its energy, with the rows that are `active` and the multipliers as they are [N].
+    /// Calls `add` with each row of the spring `rows` and the reaction with which it resists the variation `v` of the
+    /// row: the Hessian of its energy, with the rows that are `active` and the multipliers as they are [N].
     pub fn resist(
         self,
         rows: &[Contact],

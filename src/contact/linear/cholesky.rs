@@ -1,10 +1,10 @@
-//! Small dense systems: the lower Cholesky factor of a symmetric positive definite matrix, row after row, of whose diagonal the
-//! reciprocal is kept.
+//! Small dense systems: the lower Cholesky factor of a symmetric positive definite matrix, row after row, of whose
+//! diagonal the reciprocal is kept.
 
 use super::support::dot;
 
-/// Puts the factor of `matrix`, of so many rows, into its lower triangle. What rounding leaves of a pivot is not believed below its own
-/// rounding.
+/// Puts the factor of `matrix`, of so many rows, into its lower triangle. What rounding leaves of a pivot is not
+/// believed below its own rounding.
 pub fn factorize(matrix: &mut [f64], order: usize) {
     for i in 0..order {
         let (above, below) = matrix.split_at_mut(i * order);

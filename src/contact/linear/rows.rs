@@ -2,7 +2,8 @@
 
 use super::wide::{Kernel, widest};
 
-/// Adds to `sums` three rows for each of `blocks`, which lie one after the other and are as long as it, times the three numbers.
+/// Adds to `sums` three rows for each of `blocks`, which lie one after the other and are as long as it, times the three
+/// numbers.
 pub fn add_rows<'a>(blocks: impl Iterator<Item = (&'a [f64], [f64; 3])>, sums: &mut [f64]) {
     widest(AddRows { blocks, sums });
 }
@@ -28,8 +29,8 @@ impl<'a, B: Iterator<Item = (&'a [f64], [f64; 3])>> Kernel for AddRows<'_, B> {
     }
 }
 
-/// Sets `sums`, three numbers a node, to the sum of `loads`: of rows that begin at a place in `entries` and have a number for each node,
-/// times a vector.
+/// Sets `sums`, three numbers a node, to the sum of `loads`: of rows that begin at a place in `entries` and have a
+/// number for each node, times a vector.
 pub fn weigh(entries: &[f64], loads: impl Iterator<Item = (usize, [f64; 3])> + Clone, sums: &mut [f64]) {
     widest(Weigh { entries, loads, sums });
 }

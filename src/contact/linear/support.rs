@@ -72,8 +72,8 @@ impl Support {
         3 * self.nodes.len()
     }
 
-    /// Brings C_AA up to date with the nodes. A node that the compliance does not cover does not give way: what touches it is
-    /// flagged at the end.
+    /// Brings C_AA up to date with the nodes. A node that the compliance does not cover does not give way: what touches
+    /// it is flagged at the end.
     pub fn gather(&mut self, compliance: &Compliance) {
         if self.gathered == self.nodes {
             return;
@@ -113,8 +113,9 @@ impl Support {
         }
     }
 
-    /// Sets `displacement` to that of the support under a force of one newton along `direction`, shared among slots by their weights [m]. An
-    /// isotropic object, for which it returns true, moves along the direction everywhere, by the `scalars` [m].
+    /// Sets `displacement` to that of the support under a force of one newton along `direction`, shared among slots by
+    /// their weights [m]. An isotropic object, for which it returns true, moves along the direction everywhere, by the
+    /// `scalars` [m].
     pub fn respond_along(
         &self,
         direction: DVec3,

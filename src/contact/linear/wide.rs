@@ -1,9 +1,10 @@
 //! The same work in the widest registers that the processor has.
 //!
-//! Products and sums are not fused, and nothing is summed in another order for the width: results are the same on all machines.
+//! Products and sums are not fused, and nothing is summed in another order for the width: results are the same on all
+//! machines.
 
-/// Work that loops over numbers side by side. Its `run`, and what that calls, is to be `#[inline(always)]`: only so is it compiled
-again for each width.
+/// Work that loops over numbers side by side. Its `run`, and what that calls, is to be `#[inline(always)]`: only so is
+/// it compiled again for each width.
 pub trait Kernel {
     /// Type of the result.
     type Output;

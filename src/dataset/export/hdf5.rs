@@ -1,10 +1,13 @@
-//! HDF5: every tensor of the file under its own name, with its unit as the attribute `units` and its axes as dimension labels.
+//! HDF5: every tensor of the file under its own name, with its unit as the attribute `units` and its axes as dimension
+//! labels.
 //!
-//! `q1` .. `qd` are the grid lines of each axis; they are dimension scales, attached to every array over the grid, so that h5py, xarray and
-//! MATLAB know the coordinates. `joint_names` and `joint_units` are texts, and so are `scene` and `provenance`, datasets of their own because
-//! an attribute holds 64 KiB at most. Nothing is compressed: numbers of a smooth field hardly are.
+//! `q1` .. `qd` are the grid lines of each axis; they are dimension scales, attached to every array over the grid, so
+//! that h5py, xarray and MATLAB know the coordinates. `joint_names` and `joint_units` are texts, and so are `scene` and
+//! `provenance`, datasets of their own because an attribute holds 64 KiB at most. Nothing is compressed: numbers of a
+//! smooth field hardly are.
 //!
-//! The writer puts the file together in memory, which takes three times the size of the dataset; [`super::npz`] streams.
+//! The writer puts the file together in memory, which takes three times the size of the dataset; [`super::npz`]
+//! streams.
 
 use super::{
     super::{Dataset, Error, Grid, file, replace_file},

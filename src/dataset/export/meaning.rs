@@ -4,7 +4,8 @@ use super::super::{Axis, Grid};
 
 /// Unit and axes of an array.
 pub(super) struct Meaning {
-    /// As SI writes it; `1` for numbers without a unit. Where joints are of both kinds, one unit for each kind: `N m, N`.
+    /// As SI writes it; `1` for numbers without a unit. Where joints are of both kinds, one unit for each kind:
+    /// `N m, N`.
     pub(super) unit: String,
     /// The axes, slowest first. Those of the grid come first and are called as its joints.
     pub(super) axes: Vec<String>,
@@ -12,7 +13,8 @@ pub(super) struct Meaning {
     pub(super) of_grid: usize,
 }
 
-/// Returns what the tensor `name` of a dataset over `grid` means, as [`super::super::file`] lists them; `q`, the configurations.
+/// Returns what the tensor `name` of a dataset over `grid` means, as [`super::super::file`] lists them; `q`, the
+/// configurations.
 pub(super) fn meaning(grid: &Grid, name: &str) -> Meaning {
     let over_grid = |unit: String, more: &[&str]| {
         let joints = grid.axes.iter().map(|axis| axis.name.as_str());

@@ -1,8 +1,9 @@
 //! NumPy archive: every tensor of the file under its own name, and what the file has in its header as arrays.
 //!
-//! `q` (n1, .., nd, d) are the configurations, `q1` .. `qd` the grid lines of each axis, `joint_names` and `joint_units`
-//! their names, `scene` and `provenance` texts. `units` and `axes` have a row for each array of numbers, its name and then its unit, or what
-//! its axes are: `dict(archive["units"])["energy"]` is `J`. Arrays are streamed, not compressed: numbers of a smooth field hardly are.
+//! `q` (n1, .., nd, d) are the configurations, `q1` .. `qd` the grid lines of each axis, `joint_names` and
+//! `joint_units` their names, `scene` and `provenance` texts. `units` and `axes` have a row for each array of numbers,
+//! its name and then its unit, or what its axes are: `dict(archive["units"])["energy"]` is `J`. Arrays are streamed,
+//! not compressed: numbers of a smooth field hardly are.
 
 use super::{
     super::{Dataset, Error, file, replace_file},

@@ -7,7 +7,8 @@ use std::collections::HashMap;
 /// Faces of a tetrahedron of positive volume, counter-clockwise seen from outside.
 const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
 
-/// Orders nodes and tetrahedra; nodes of no tetrahedron are dropped. Also the number of tetrahedra that had to be turned.
+/// Orders nodes and tetrahedra; nodes of no tetrahedron are dropped. Also the number of tetrahedra that had to be
+/// turned.
 pub(super) fn order(nodes: &[DVec3], mut tetrahedra: Vec<[u32; 4]>) -> (Body, usize) {
     let mut turned = 0;
     for corners in &mut tetrahedra {

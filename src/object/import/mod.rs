@@ -1,9 +1,9 @@
 //! Surfaces from mesh files (OBJ, STL and PLY, chosen by the file's extension), and tetrahedra from Gmsh files.
 //!
-//! Polygons are cut into triangle fans. Nodes at exactly the same point become one node (an STL file has no others), and faces that
-//! are left with fewer than three are dropped. Nodes keep the order of a PLY file; in OBJ and STL files they are
-//! numbered in the order in which triangles first name them, and nodes that no triangle names are dropped. Coordinates
-//! become `scale * coordinate + centre`.
+//! Polygons are cut into triangle fans. Nodes at exactly the same point become one node (an STL file has no others),
+//! and faces that are left with fewer than three are dropped. Nodes keep the order of a PLY file; in OBJ and STL files
+//! they are numbered in the order in which triangles first name them, and nodes that no triangle names are dropped.
+//! Coordinates become `scale * coordinate + centre`.
 
 mod boundary;
 mod msh;

@@ -1,9 +1,9 @@
 //! Tetrahedra from Gmsh files, ASCII of versions 2.2 and 4.1.
 //!
-//! Read are `$MeshFormat`, `$Nodes`, the physical volumes in `$Entities` (4.1) and the elements of type 4 (tetrahedra of four nodes) in `$Elements`; points, lines and
-//! triangles, which Gmsh writes for boundaries, and all other sections are read past. The surface is what it always is: the
-//! faces that belong to one tetrahedron only. Every error names the line. Nothing is reserved for what a file announces
-//! before it is there.
+//! Read are `$MeshFormat`, `$Nodes`, the physical volumes in `$Entities` (4.1) and the elements of type 4 (tetrahedra
+//! of four nodes) in `$Elements`; points, lines and triangles, which Gmsh writes for boundaries, and all other sections
+//! are read past. The surface is what it always is: the faces that belong to one tetrahedron only. Every error names
+//! the line. Nothing is reserved for what a file announces before it is there.
 
 use glam::DVec3;
 use std::collections::HashMap;
@@ -184,8 +184,8 @@ fn skip(lines: &mut Lines<'_, impl BufRead>) -> Result<(), String> {
     }
 }
 
-/// `points curves surfaces volumes`, then one line for each; that of a volume has its tag, six bounds, the number of its physical volumes
-/// and these, of which the first counts.
+/// `points curves surfaces volumes`, then one line for each; that of a volume has its tag, six bounds, the number of
+/// its physical volumes and these, of which the first counts.
 fn entities(lines: &mut Lines<'_, impl BufRead>, volumes: &mut HashMap<i64, u32>) -> Result<(), String> {
     lines.require()?;
     let ([points, curves, surfaces, count], _) = lines.numbers::<u64, 4>()?;
@@ -259,7 +259,8 @@ fn elements_2(lines: &mut Lines<'_, impl BufRead>, nodes: &Nodes, tetrahedra: &m
     lines.end("$EndElements")
 }
 
-/// `blocks elements least greatest`, then blocks: `dimension entity type elements`, and lines of a number and the nodes.
+/// `blocks elements least greatest`, then blocks: `dimension entity type elements`, and lines of a number and the
+/// nodes.
 fn elements_4(lines: &mut Lines<'_, impl BufRead>, nodes: &Nodes, tetrahedra: &mut Tetrahedra) -> Result<(), String> {
     lines.require()?;
     let ([blocks], _) = lines.numbers::<u64, 1>()?;

@@ -1,7 +1,7 @@
 //! Surfaces from Wavefront OBJ files: lines `v x y z` and `f a b c ..`. All other lines are read past.
 //!
-//! A corner of a face is the number of a vertex, from 1, or counted back from the last one so far, from -1. What follows it behind a
-//! slash (texture and normal) has no meaning here.
+//! A corner of a face is the number of a vertex, from 1, or counted back from the last one so far, from -1. What
+//! follows it behind a slash (texture and normal) has no meaning here.
 
 use super::{Surface, node_number};
 use glam::DVec3;

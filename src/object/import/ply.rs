@@ -1,8 +1,8 @@
 //! PLY files, by `ply-rs-bw`.
 //!
-//! That reader panics on a number in the header that is no `u64`, and reserves memory for as many entries as a file announces. So what is
-//! announced is held against what can be there before it is called: element counts against the file's length, list lengths
-//! against the line (text) or by the type of their count (binary).
+//! That reader panics on a number in the header that is no `u64`, and reserves memory for as many entries as a file
+//! announces. So what is announced is held against what can be there before it is called: element counts against the
+//! file's length, list lengths against the line (text) or by the type of their count (binary).
 
 use super::{Surface, node_number};
 use glam::DVec3;

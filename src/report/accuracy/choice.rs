@@ -69,8 +69,9 @@ pub struct Limit {
     pub order: Option<f64>,
 }
 
-/// Errors of the scene's own grid, mesh and contact nodes, greatest first. That of the grid is measured with the scene's interpolation; those of mesh
-/// and nodes follow from what halving them changes, `d / (1 - 2^-p)`, or are that change where no order is observed.
+/// Errors of the scene's own grid, mesh and contact nodes, greatest first. That of the grid is measured with the
+/// scene's interpolation; those of mesh and nodes follow from what halving them changes, `d / (1 - 2^-p)`, or are that
+/// change where no order is observed.
 #[must_use]
 pub fn limits(accuracy: &Accuracy) -> Vec<Limit> {
     let own_grid = |row: &&Row| row.series == accuracy.interpolation && row.points == accuracy.points;
@@ -90,8 +91,9 @@ pub fn limits(accuracy: &Accuracy) -> Vec<Limit> {
     limits
 }
 
-/// The cheapest way to each target: measured where a measured grid reaches it, else from the finest grid by the measured
-/// order. No offer where errors do not fall, or where the grid would be more than four times as fine as any measured.
+/// The cheapest way to each target: measured where a measured grid reaches it, else from the finest grid by the
+/// measured order. No offer where errors do not fall, or where the grid would be more than four times as fine as any
+/// measured.
 #[must_use]
 pub fn offers(accuracy: &Accuracy) -> Vec<Offer> {
     let size = accuracy.torque.max(f64::MIN_POSITIVE);

@@ -1,10 +1,11 @@
-//! The graphics loop: how far the object's nodes and energy are from where a much finer frame step, or an exact solver, brings
-//! them.
+//! The graphics loop: how far the object's nodes and energy are from where a much finer frame step, or an exact solver,
+//! brings them.
 //!
-//! The forces of the dataset's deepest contact push on the object at rest for a tenth of a second, then let go for another.
-//! The error of positions is the distance of the nodes, over all nodes and all instants; that of energy the difference of
-//! kinetic, elastic and gravitational energy, over all instants. The frame step is seen at the instants that the coarsest
-//! visits; the solver at every frame of the scene's own rate, f32 iterations on the GPU against the CPU's factor in f64.
+//! The forces of the dataset's deepest contact push on the object at rest for a tenth of a second, then let go for
+//! another. The error of positions is the distance of the nodes, over all nodes and all instants; that of energy the
+//! difference of kinetic, elastic and gravitational energy, over all instants. The frame step is seen at the instants
+//! that the coarsest visits; the solver at every frame of the scene's own rate, f32 iterations on the GPU against the
+//! CPU's factor in f64.
 
 use super::{Accuracy, AccuracyError, Cost, Row, Study, timed};
 use crate::{

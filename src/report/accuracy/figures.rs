@@ -38,8 +38,8 @@ fn around(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low - spare, high + spare].map(|log| 10.0_f64.powf(log))
 }
 
-/// Widths of a curve and its marks: the first are the widest, so that a curve that coincides with a later one shows around it.
-/// A single mark is as large as any other.
+/// Widths of a curve and its marks: the first are the widest, so that a curve that coincides with a later one shows
+/// around it. A single mark is as large as any other.
 fn nested(curve: &Series, number: usize, count: usize) -> (f64, f64) {
     let around = if curve.points.len() > 1 { count.saturating_sub(number + 1).min(2) as f64 } else { 0.5 };
     (1.9 + 1.5 * around, 3.6 + 1.3 * around)
@@ -194,8 +194,8 @@ pub(super) fn solver(accuracy: &Accuracy) -> Canvas {
     canvas
 }
 
-/// Draws how refining the scene changes the torque: mesh and contact nodes, which must converge, beside skin and contact compliance, which
-/// describe the body.
+/// Draws how refining the scene changes the torque: mesh and contact nodes, which must converge, beside skin and
+/// contact compliance, which describe the body.
 #[must_use]
 pub(super) fn refinement(accuracy: &Accuracy) -> Canvas {
     let mut canvas = sheet(

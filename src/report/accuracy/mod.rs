@@ -1,12 +1,12 @@
 //! The cost of accuracy in time: work-precision diagrams of one scene against directly solved configurations.
 //!
 //! The reference is equation (2) in the energy form, in f64, with the geometry that follows the deformation, solved to
-//! [`REFERENCE_TOLERANCE`](crate::tolerances::REFERENCE_TOLERANCE) at random configurations of the scene's grid that no dataset holds. Its own error is how much it
-//! moves when it is asked for a hundredth of that. Errors are Euclidean norms over the joints; a prismatic joint counts with
-//! the lever arm of 0.1 m, so that all are N m. `rms` is over all configurations, in contact or not, and is set beside the
-//! rms of the reference torque itself. Accuracy is deterministic. Time is given as the ratio to one row of the same study:
-//! the least of some runs, because the work is the same in each and a busy machine only adds to it; median and
-//! greatest show by how much.
+//! [`REFERENCE_TOLERANCE`](crate::tolerances::REFERENCE_TOLERANCE) at random configurations of the scene's grid that no
+//! dataset holds. Its own error is how much it moves when it is asked for a hundredth of that. Errors are Euclidean
+//! norms over the joints; a prismatic joint counts with the lever arm of 0.1 m, so that all are N m. `rms` is over all
+//! configurations, in contact or not, and is set beside the rms of the reference torque itself. Accuracy is
+//! deterministic. Time is given as the ratio to one row of the same study: the least of some runs, because the work is
+//! the same in each and a busy machine only adds to it; median and greatest show by how much.
 
 mod choice;
 mod dynamics;
@@ -165,7 +165,8 @@ pub struct Extent {
     pub configurations: usize,
     /// Grids with more points than this are left out.
     pub points: usize,
-    /// Runs that are timed, at least 1: of five, one is hardly ever without interruption, and the median shows how usual that is.
+    /// Runs that are timed, at least 1: of five, one is hardly ever without interruption, and the median shows how
+    /// usual that is.
     pub rounds: usize,
 }
 

@@ -34,8 +34,8 @@ pub const FILES: [&str; 15] = [
     "effects.csv",
 ];
 
-/// Writes `accuracy-*.{svg,png}`, `accuracy.csv` and `accuracy.html` into `folder`, and returns their paths; where effects
-/// were priced, also `effects.{svg,png,csv}`.
+/// Writes `accuracy-*.{svg,png}`, `accuracy.csv` and `accuracy.html` into `folder`, and returns their paths; where
+/// effects were priced, also `effects.{svg,png,csv}`.
 ///
 /// # Errors
 /// [`ReportError::Write`] when a file cannot be written.
@@ -200,8 +200,8 @@ pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
     accuracy.effects.as_ref().map_or(Ok(()), |effects| effects::describe(text, effects))
 }
 
-/// The smallest error on offer, where smaller ones were asked for in vain; the greatest that was asked for, where there is
-/// no offer at all [1].
+/// The smallest error on offer, where smaller ones were asked for in vain; the greatest that was asked for, where there
+/// is no offer at all [1].
 fn unreached(accuracy: &Accuracy) -> Option<f64> {
     let offers = offers(accuracy);
     let least = offers.iter().map(|offer| offer.target).fold(TARGETS[0], f64::min);

@@ -1,11 +1,12 @@
-//! How far the torque depends on what the scene leaves to choose: the object's mesh, the contact nodes along links, the bending
-//! stiffness of the skin, the contact stiffness.
+//! How far the torque depends on what the scene leaves to choose: the object's mesh, the contact nodes along links, the
+//! bending stiffness of the skin, the contact stiffness.
 //!
-//! Each is varied alone, in steps of a factor, and all variants are solved at the same configurations. A row's error is the distance of
-//! its torque from that of the next variant: what one more step changes. If these distances fall as h^p, the torque converges, and
-//! its error is `d / (r^p - 1)` for steps of a factor r. Mesh and nodes have a limit that they approach as the spacing h falls. The skin approaches that
-//! of no bending stiffness, where torque does not converge with the mesh; contact that of rigid contact. Both are properties of the
-//! body: the rows say how much they matter, not how wrong they are.
+//! Each is varied alone, in steps of a factor, and all variants are solved at the same configurations. A row's error is
+//! the distance of its torque from that of the next variant: what one more step changes. If these distances fall as
+//! h^p, the torque converges, and its error is `d / (r^p - 1)` for steps of a factor r. Mesh and nodes have a limit
+//! that they approach as the spacing h falls. The skin approaches that of no bending stiffness, where torque does not
+//! converge with the mesh; contact that of rigid contact. Both are properties of the body: the rows say how much they
+//! matter, not how wrong they are.
 
 use super::{Accuracy, AccuracyError, Cost, Row, Study, timed};
 use crate::{
@@ -115,8 +116,8 @@ fn compare(
     Ok(())
 }
 
-/// Spheres of other mean edges. Springs keep the stiffness of a continuous shell: between nodes as they are, to the ground in proportion to
-/// the area of a node.
+/// Spheres of other mean edges. Springs keep the stiffness of a continuous shell: between nodes as they are, to the
+/// ground in proportion to the area of a node.
 fn meshes(scene: &Scene) -> Vec<Variant> {
     let mut variants: Vec<Variant> = Vec::new();
     for factor in EDGES {
@@ -154,7 +155,8 @@ fn skins(scene: &Scene) -> Vec<Variant> {
     BENDINGS.into_iter().map(variant).collect()
 }
 
-/// Other spacings of nodes along links. Contact stiffness is that of the link: where the scene gives it per node, it is scaled.
+/// Other spacings of nodes along links. Contact stiffness is that of the link: where the scene gives it per node, it is
+/// scaled.
 fn links(scene: &Scene) -> Result<Vec<Variant>, AccuracyError> {
     let text: Table = scene.text.parse().unwrap_or_default();
     let mut variants = Vec::new();

@@ -1,7 +1,9 @@
-//! The paper's results, remade: its procedure as a drawing (Fig. 2), the specimen (Fig. 7), and its numbers beside ours.
+//! The paper's results, remade: its procedure as a drawing (Fig. 2), the specimen (Fig. 7), and its numbers beside
+//! ours.
 //!
-//! The other figures are those of any dataset and session: [`space`](super::space) (Fig. 3), [`gridized`](super::gridized)
-//! (Fig. 4), [`press`](super::press) (Figs. 5 and 9), [`object`](super::object) (Fig. 6) and [`force`](super::force) (Fig. 8).
+//! The other figures are those of any dataset and session: [`space`](super::space) (Fig. 3),
+//! [`gridized`](super::gridized) (Fig. 4), [`press`](super::press) (Figs. 5 and 9), [`object`](super::object) (Fig. 6)
+//! and [`force`](super::force) (Fig. 8).
 
 mod comparison;
 mod procedure;

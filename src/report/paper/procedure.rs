@@ -1,5 +1,5 @@
-//! The procedure of C-space data-driven haptic rendering (the paper's Fig. 2): from virtual and real objects through the
-//! dataset to the haptic and the graphics loop, with the numbers of a run.
+//! The procedure of C-space data-driven haptic rendering (the paper's Fig. 2): from virtual and real objects through
+//! the dataset to the haptic and the graphics loop, with the numbers of a run.
 
 use super::{Scans, Sphere, comparison::inside};
 use crate::report::{

@@ -1,7 +1,7 @@
 //! The spongy block with the arm that scans it, from above and from the side (the paper's Fig. 7, there photographs).
 //!
-//! The block is drawn at rest: its deformation is not part of a scan. Dots are the measured positions of the visiting node
-//! that lie clear of it.
+//! The block is drawn at rest: its deformation is not part of a scan. Dots are the measured positions of the visiting
+//! node that lie clear of it.
 
 use super::{Scanned, Scans};
 use crate::{

@@ -8,8 +8,8 @@ use glam::DVec3;
 const FACETS: usize = 28;
 
 impl Raster {
-    /// A closed triangle mesh with normals averaged over the triangles around each node, weighted by area; `colours` has
-    /// one colour a node. Triangles that name nodes beyond either list are left out.
+    /// A closed triangle mesh with normals averaged over the triangles around each node, weighted by area; `colours`
+    /// has one colour a node. Triangles that name nodes beyond either list are left out.
     pub fn mesh(&mut self, nodes: &[DVec3], triangles: &[[u32; 3]], colours: &[Colour]) {
         let known =
             |triangle: &&[u32; 3]| triangle.iter().all(|&node| (node as usize) < nodes.len().min(colours.len()));
@@ -43,7 +43,8 @@ impl Raster {
         }
     }
 
-    /// A rod with round ends. It is made of short pieces: one that leads past the camera is cut off there, not left out.
+    /// A rod with round ends. It is made of short pieces: one that leads past the camera is cut off there, not left
+    /// out.
     pub fn capsule(&mut self, ends: [DVec3; 2], radius: f64, colour: Colour) {
         const PIECES: usize = 24;
         let at = |piece: usize| ends[0].lerp(ends[1], piece as f64 / PIECES as f64);

@@ -29,7 +29,8 @@ const SHARES: [f64; 2] = [1e-6, 10.0];
 /// Files that [`write_all`] writes.
 pub const FILES: [&str; 3] = ["stability.svg", "stability.png", "stability.md"];
 
-/// Writes `stability.md` and `stability.{svg,png}` into `folder`: the outcomes, each with its room, as found on `adapter`.
+/// Writes `stability.md` and `stability.{svg,png}` into `folder`: the outcomes, each with its room, as found on
+/// `adapter`.
 ///
 /// # Errors
 /// [`ReportError::Write`] when a file cannot be written.

@@ -1,7 +1,7 @@
 //! Hard cases of the object in motion: stiff springs, any time between frames, forces that chatter, solvers cut short.
 //!
-//! All keep one figure: the most that kinetic, elastic and gravitational energy rose in a frame beyond the work of the forces,
-//! over the most that was ever stored. In exact arithmetic it is never positive (`render/object_motion.rs`).
+//! All keep one figure: the most that kinetic, elastic and gravitational energy rose in a frame beyond the work of the
+//! forces, over the most that was ever stored. In exact arithmetic it is never positive (`render/object_motion.rs`).
 
 use super::{Bound, Case, CaseResult, Effort, Failure, Setting};
 use crate::{

@@ -1,7 +1,7 @@
 //! Hard cases of gridization: samples that break triangulations, units that mislead them, input that must be refused.
 //!
-//! A torque linear in q is reproduced exactly by linear interpolation on any triangulation, so that its error shows every
-//! sliver, inverted simplex and lost point. Its size is judged relative to the greatest torque.
+//! A torque linear in q is reproduced exactly by linear interpolation on any triangulation, so that its error shows
+//! every sliver, inverted simplex and lost point. Its size is judged relative to the greatest torque.
 
 use super::{Bound, Case, CaseResult, Effort, Failure, Setting};
 use crate::{

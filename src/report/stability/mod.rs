@@ -1,8 +1,8 @@
 //! Hard cases: that they stay numerically stable is run and printed, not claimed.
 //!
-//! A [`Case`] varies one thing that is known to break solvers, loops or grids, and returns an [`CaseResult`] for each figure
-//! that it measured: the worst one found, the bound that it must keep, and so whether it passed. One file a room holds
-//! its cases; tests run them at [`Effort::Sample`], the whole table takes [`Effort::Full`].
+//! A [`Case`] varies one thing that is known to break solvers, loops or grids, and returns an [`CaseResult`] for each
+//! figure that it measured: the worst one found, the bound that it must keep, and so whether it passed. One file a room
+//! holds its cases; tests run them at [`Effort::Sample`], the whole table takes [`Effort::Full`].
 
 pub mod contact;
 pub mod coupling;

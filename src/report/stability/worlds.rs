@@ -12,8 +12,8 @@ pub const BLOCK_STIFFNESS: f64 = 500.0;
 /// Stiffness of the half space [N m/rad].
 pub const HALF_SPACE_STIFFNESS: f64 = 5.0;
 
-/// The scene of a flat block under a fingertip that slides (x) and presses (z, positive down); `haptics` is the text of the
-/// table `[haptics]`, empty for its defaults.
+/// The scene of a flat block under a fingertip that slides (x) and presses (z, positive down); `haptics` is the text of
+/// the table `[haptics]`, empty for its defaults.
 #[must_use]
 pub fn block_scene(haptics: &str) -> String {
     format!(

@@ -1,7 +1,7 @@
 //! `[grid]`: the uniform grid over C-space.
 //!
-//! Without `axes`, every joint's range between its limits is cut into steps of `spacing`. An axis gives its start and two
-//! of step (default: `spacing`), stop and count.
+//! Without `axes`, every joint's range between its limits is cut into steps of `spacing`. An axis gives its start and
+//! two of step (default: `spacing`), stop and count.
 
 use super::super::check::Checker;
 use super::super::error::SceneError;

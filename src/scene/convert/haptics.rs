@@ -86,7 +86,8 @@ pub(super) fn convert(
 
 /// Highest rate of the loop [Hz]: a tick takes some microseconds.
 const HIGHEST_RATE: f64 = 1e5;
-/// Default stiffness of a bristle [N/m]: a friction of 1 N builds up over 2 mm, below what a fingertip takes for a slip.
+/// Default stiffness of a bristle [N/m]: a friction of 1 N builds up over 2 mm, below what a fingertip takes for a
+/// slip.
 const BRISTLE_STIFFNESS: f64 = 500.0;
 /// Default damping of a bristle [N s/m].
 const BRISTLE_DAMPING: f64 = 1.0;

@@ -16,9 +16,9 @@ use super::file::{ContactTable, GraphicsEntry, GraphicsTable, NumberOr, SceneTab
 use super::{Algorithm, ContactSpec, ContactSurface, GridSpec, Interpolation, ProxySpec, Rendering, ScanScene, Scene};
 use toml::Spanned;
 
-/// Default relative residual of the contact solver, in the energy norm [1]. Forces are promised to balance K u to 1e-6 of the
-/// largest, node by node, which a residual of 1e-6 misses by a third; the last steps converge fast, so two digits more cost
-/// 8 % more iterations on the sphere (5.1 to 5.5).
+/// Default relative residual of the contact solver, in the energy norm [1]. Forces are promised to balance K u to 1e-6
+/// of the largest, node by node, which a residual of 1e-6 misses by a third; the last steps converge fast, so two
+/// digits more cost 8 % more iterations on the sphere (5.1 to 5.5).
 const CONTACT_TOLERANCE: f64 = 1e-8;
 /// Default cap on the contact solver's iterations [1].
 const CONTACT_ITERATIONS: u32 = 400;
@@ -74,7 +74,8 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
         None if object.is_some() => Some(graphics::convert(checker, &GraphicsTable::default(), object.as_ref())?),
         None | Some(GraphicsEntry::Off) => None,
     };
-    // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no energy.
+    // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no
+    // energy.
     let solved = table.contact.as_ref().is_some_and(|own| own.get_ref().algorithm != Some(Algorithm::Paper));
     let interpolation = if object.is_some() && solved { Interpolation::Potential } else { Interpolation::Linear };
     let file_stem = checker.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());

@@ -24,8 +24,8 @@ const MAX_RINGS: usize = 1 << 15;
 /// Most halvings of an icosahedron's edges: more nodes than an object may have.
 const MAX_SUBDIVISIONS: usize = 9;
 
-/// Mean edge of an icosahedron on the unit sphere times the parts n that its edges are divided into: the edge of an equilateral
-/// triangle that has a share 1 / (20 n^2) of the sphere's area, sqrt(4 pi / (5 sqrt 3)) [1].
+/// Mean edge of an icosahedron on the unit sphere times the parts n that its edges are divided into: the edge of an
+/// equilateral triangle that has a share 1 / (20 n^2) of the sphere's area, sqrt(4 pi / (5 sqrt 3)) [1].
 const MEAN_EDGE: f64 = 1.2046;
 
 pub(super) fn convert(checker: &Checker<'_>, table: &Spanned<ObjectTable>) -> Result<ObjectSpec, SceneError> {

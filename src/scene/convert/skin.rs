@@ -1,14 +1,15 @@
 //! `[object.skin]`: from what a person knows of a skin to its tension, bending stiffness and foundation.
 //!
-//! Tension and bending stiffness may be given as such, or by the thickness t, Young's modulus E and Poisson's ratio nu of the
-//! skin. A plate then has b = E t^3 / (12 (1 - nu^2)) (Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells, 1959, section 2).
-//! Its membrane has two moduli, and an isotropic skin, which treats the three coordinates alike, has one number for them: the
-//! shear modulus T = E t / (2 (1 + nu)), the smaller of the two, which is exact in shear.
+//! Tension and bending stiffness may be given as such, or by the thickness t, Young's modulus E and Poisson's ratio nu
+//! of the skin. A plate then has b = E t^3 / (12 (1 - nu^2)) (Timoshenko & Woinowsky-Krieger, Theory of Plates and
+//! Shells, 1959, section 2). Its membrane has two moduli, and an isotropic skin, which treats the three coordinates
+//! alike, has one number for them: the shear modulus T = E t / (2 (1 + nu)), the smaller of the two, which is exact in
+//! shear.
 //!
-//! Bending stiffness may be given by the width w over which the dent of a point is rounded instead: b = T w^2 beside a tension,
-//! b = E w^3 / (2 (1 - nu^2)) on an elastic solid, b = k w^4 on a foundation. A ripple of wave number 1 / w is then resisted as much by
-//! the skin's bending, b / w^4, as by what is below it: T / w^2, E / (2 (1 - nu^2) w) (Johnson, Contact Mechanics, 1985,
-//! section 13.2) or k.
+//! Bending stiffness may be given by the width w over which the dent of a point is rounded instead: b = T w^2 beside a
+//! tension, b = E w^3 / (2 (1 - nu^2)) on an elastic solid, b = k w^4 on a foundation. A ripple of wave number 1 / w is
+//! then resisted as much by the skin's bending, b / w^4, as by what is below it: T / w^2, E / (2 (1 - nu^2) w)
+//! (Johnson, Contact Mechanics, 1985, section 13.2) or k.
 
 use super::super::check::Checker;
 use super::super::error::SceneError;
@@ -16,7 +17,8 @@ use super::super::file::{Number, SkinTable};
 use super::super::{ElasticSpec, Material, SkinSpec};
 use toml::Spanned;
 
-/// Default Poisson's ratio of a skin: rubber and living tissue hardly change their volume, and a plate's formulas hold up to 1/2.
+/// Default Poisson's ratio of a skin: rubber and living tissue hardly change their volume, and a plate's formulas hold
+/// up to 1/2.
 const POISSON: f64 = 0.5;
 
 /// Largest Poisson's ratio plus what lets a range without its ends include it.

@@ -26,8 +26,8 @@ pub fn ball(springs: SpringKind) -> Object {
     sphere(Ball { springs, ..PAPER }).unwrap()
 }
 
-/// Five points and two balls on three facets each, all pressed in, and a point that is near, of stiffness `kc`; bent by `bending` times
-/// their forces.
+/// Five points and two balls on three facets each, all pressed in, and a point that is near, of stiffness `kc`; bent by
+/// `bending` times their forces.
 pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
     let mut random = Random::new(5);
     let mut contacts = Vec::new();

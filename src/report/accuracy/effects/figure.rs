@@ -1,5 +1,5 @@
-//! One row a variant, one column a cost: a dot at the least of the rounds, a line from there to the greatest, and a ring
-//! at what the effect costs within the whole scene.
+//! One row a variant, one column a cost: a dot at the least of the rounds, a line from there to the greatest, and a
+//! ring at what the effect costs within the whole scene.
 
 use super::{super::Cost, Effects};
 use crate::report::{
@@ -61,8 +61,8 @@ fn base_line(top: f64) -> f64 {
     top + 0.5 * ROW + 0.36 * NOTE.size
 }
 
-/// One column: an axis of ratios that holds one, and all of `costs`. What costs more than its baseline usually does has the
-/// other colour.
+/// One column: an axis of ratios that holds one, and all of `costs`. What costs more than its baseline usually does has
+/// the other colour.
 fn draw(canvas: &mut Canvas, area: Area, costs: &[[Option<Cost>; 2]]) {
     // One round that was interrupted does not set the scale: its line is cut.
     let alone = costs.iter().filter_map(|[alone, _]| *alone);

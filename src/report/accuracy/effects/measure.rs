@@ -156,7 +156,8 @@ fn feel_all(
     Ok((times, faults))
 }
 
-/// Configuration and share of the forces in each frame of the session `felt`: those of the plain scene for all variants.
+/// Configuration and share of the forces in each frame of the session `felt`: those of the plain scene for all
+/// variants.
 fn places(setups: &[Setup], felt: &Trace, duration: f64) -> Vec<(JointVector, f64)> {
     let rate = setups.iter().find_map(|setup| setup.scene.graphics).map_or(0.0, |graphics| graphics.rate);
     let frames = (duration * rate) as usize;
@@ -191,8 +192,8 @@ fn draw_all(
 const PLAIN: usize = 0;
 const GRAPHICS: usize = 1;
 
-/// Plain, graphics, each effect that can act, and the whole; and how many of them are priced. After them the whole with each
-/// effect that it lacks, or without one that it has.
+/// Plain, graphics, each effect that can act, and the whole; and how many of them are priced. After them the whole with
+/// each effect that it lacks, or without one that it has.
 fn variants(scene: &Scene, notes: &mut Vec<String>) -> Result<(Vec<Variant>, usize), AccuracyError> {
     let variant = |name: &str, setting: String, scene| Variant { name: name.to_owned(), setting, scene, within: None };
     let mut variants = vec![
@@ -229,8 +230,8 @@ fn variants(scene: &Scene, notes: &mut Vec<String>) -> Result<(Vec<Variant>, usi
     Ok((variants, priced))
 }
 
-/// Whether the whole scene is drawn, and its effects: those that it names; where it names none, all of `can_act` that can act
-/// together.
+/// Whether the whole scene is drawn, and its effects: those that it names; where it names none, all of `can_act` that
+/// can act together.
 fn whole(scene: &Scene, can_act: &[Effect]) -> (bool, Vec<Effect>) {
     let named: Vec<Effect> = EFFECTS.into_iter().filter(|effect| effect.is_named(scene)).collect();
     if !named.is_empty() {
@@ -246,8 +247,8 @@ fn whole(scene: &Scene, can_act: &[Effect]) -> (bool, Vec<Effect>) {
     (true, together)
 }
 
-/// Runs of a loop in one round. Of each of its blocks the fastest counts: the work of a block is the same in every run, and
-/// whatever else a machine does only adds to it.
+/// Runs of a loop in one round. Of each of its blocks the fastest counts: the work of a block is the same in every run,
+/// and whatever else a machine does only adds to it.
 const TRIES: usize = 3;
 
 /// Ticks of a block: a tenth of a millisecond, which is mostly not interrupted, and long enough for any clock.

@@ -1,13 +1,13 @@
 //! The cost of each effect of a scene, alone and in the scene, beside the same scene without it in the same run.
 //!
-//! *Plain* is the scene without effects and without graphics: no contact force is stored, no frame drawn. `graphics` adds the
-//! graphics loop, each of the others one effect with the scene's own value, or a usual one where the scene does not name
-//! it. The *whole* scene has all effects that it names, or, where it names none, all that can act together; what an effect costs
-//! within it is the whole with the effect over the whole without. All of them are haptized, felt along the same motion, and drawn under
-//! the same forces, in rounds: what a busy machine
-//! does in between falls on all alike, and every second round goes backwards, so that what drifts does, too. A cost is the
-//! least time of the rounds over the least of the baseline; median and greatest show the spread. The
-//! baseline of bakes, ticks and size is the plain scene, that of frames and of device memory is `graphics`.
+//! *Plain* is the scene without effects and without graphics: no contact force is stored, no frame drawn. `graphics`
+//! adds the graphics loop, each of the others one effect with the scene's own value, or a usual one where the scene
+//! does not name it. The *whole* scene has all effects that it names, or, where it names none, all that can act
+//! together; what an effect costs within it is the whole with the effect over the whole without. All of them are
+//! haptized, felt along the same motion, and drawn under the same forces, in rounds: what a busy machine does in
+//! between falls on all alike, and every second round goes backwards, so that what drifts does, too. A cost is the
+//! least time of the rounds over the least of the baseline; median and greatest show the spread. The baseline of bakes,
+//! ticks and size is the plain scene, that of frames and of device memory is `graphics`.
 
 mod figure;
 mod measure;

@@ -1,8 +1,10 @@
-//! The stored energy of the sphere scene that ships: it does not jump along lines through C-space, and no other start finds less of it.
+//! The stored energy of the sphere scene that ships: it does not jump along lines through C-space, and no other start
+//! finds less of it.
 //!
-//! Where an equilibrium found from rest is the lowest one, U is continuous and its gradient field passive. Along a line, U changes between
-//! neighbouring configurations by the work of the torque; what is left is a jump. An independent search starts from forces that have
-//! nothing to do with the rest state: those that hold neighbours on the grid, weaker and stronger ones, and those of configurations elsewhere.
+//! Where an equilibrium found from rest is the lowest one, U is continuous and its gradient field passive. Along a
+//! line, U changes between neighbouring configurations by the work of the torque; what is left is a jump. An
+//! independent search starts from forces that have nothing to do with the rest state: those that hold neighbours on the
+//! grid, weaker and stronger ones, and those of configurations elsewhere.
 
 use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use crate::{
@@ -24,7 +26,8 @@ const FINE: usize = 256;
 /// Starts of the independent search, beside those from neighbours.
 const ELSEWHERE: usize = 5;
 
-/// Energy, relative, by which another equilibrium counts as lower [1]: the searches end at a residual of 1e-8, whose square it errs by.
+/// Energy, relative, by which another equilibrium counts as lower [1]: the searches end at a residual of 1e-8, whose
+/// square it errs by.
 const LOWER: f64 = 1e-6;
 
 /// Greatest jump of U over the work of one grid step [1].
@@ -155,8 +158,8 @@ impl Space<'_> {
     }
 }
 
-/// By how much U changes between two configurations beside the work of the torque, by the trapezoidal rule; where one is flagged there is no
-/// telling [J].
+/// By how much U changes between two configurations beside the work of the torque, by the trapezoidal rule; where one
+/// is flagged there is no telling [J].
 fn unexplained((from, before): &(Vec<f64>, Equilibrium), (to, after): &(Vec<f64>, Equilibrium)) -> f64 {
     if before.status.is_failed() || after.status.is_failed() {
         return 0.0;

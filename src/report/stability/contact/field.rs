@@ -1,8 +1,8 @@
 //! The torque as a field over C-space: continuous along paths, and minus the gradient of the stored energy.
 //!
-//! A path is solved in steps of two sizes. Where tau is continuous the largest change in a step shrinks with the step, where it
-//! jumps it does not. Balls see the surface round. A point that lies inside changes facets at the planes that bisect convex
-//! edges, where its normal turns at once: its tau jumps there, by no more than facets turn.
+//! A path is solved in steps of two sizes. Where tau is continuous the largest change in a step shrinks with the step,
+//! where it jumps it does not. Balls see the surface round. A point that lies inside changes facets at the planes that
+//! bisect convex edges, where its normal turns at once: its tau jumps there, by no more than facets turn.
 
 use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::{Processor, processors};
@@ -25,7 +25,8 @@ fn path(a: &JointVector, b: &JointVector, steps: usize) -> Vec<JointVector> {
     (0..=steps).map(between).collect()
 }
 
-/// Largest change of tau in a step of a path, and the largest tau [N m]; steps at flagged points are left out, and counted.
+/// Largest change of tau in a step of a path, and the largest tau [N m]; steps at flagged points are left out, and
+/// counted.
 fn largest_step(path: &[Equilibrium]) -> (f64, f64, usize) {
     let torque = |result: &Equilibrium| (result.status != Status::Unconverged).then_some(result.torque);
     let mut largest = 0.0f64;
@@ -117,8 +118,8 @@ pub fn curl(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
 /// Half the width of a stencil [m or rad].
 const STENCIL: f64 = 1e-6;
 
-/// How far a configuration's torque is from the slope of U, relative: of it, and of those a step before and after in each joint;
-/// `None` where one is flagged.
+/// How far a configuration's torque is from the slope of U, relative: of it, and of those a step before and after in
+/// each joint; `None` where one is flagged.
 fn stencil_error(results: &[Equilibrium]) -> Option<f64> {
     let (here, around) = results.split_first()?;
     if results.iter().any(|result| result.status != Status::Contact) {

@@ -1,5 +1,5 @@
-//! Exact places and awkward arrangements: nodes on faces, edges and vertices to the last bit, on each other, in the middle of
-//! the object, right through it, in hollows, and on two sides at once.
+//! Exact places and awkward arrangements: nodes on faces, edges and vertices to the last bit, on each other, in the
+//! middle of the object, right through it, in hollows, and on two sides at once.
 
 use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::{Processor, processors};
@@ -42,8 +42,8 @@ fn at(place: DVec3) -> JointVector {
     JointVector::from_slice(&place.to_array())
 }
 
-/// A node on a face, an edge, a vertex, and 1 nm off it to either side: contact just where the gap is below zero, and forces that
-/// vanish with the depth.
+/// A node on a face, an edge, a vertex, and 1 nm off it to either side: contact just where the gap is below zero, and
+/// forces that vanish with the depth.
 pub fn exact_places(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let object = sphere(PAPER)?;
     let chain = gantry(vec![ProxyNodeSpec { position: DVec3::ZERO, radius: 0.0, length: 0.0 }]);
@@ -201,8 +201,8 @@ pub fn concave(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     Ok(outcomes)
 }
 
-/// Two nodes on opposite poles of the sphere push it equally: the forces on the gantry's slide between them cancel. Sideways a point
-/// in a vertex leans on one of its facets.
+/// Two nodes on opposite poles of the sphere push it equally: the forces on the gantry's slide between them cancel.
+/// Sideways a point in a vertex leans on one of its facets.
 pub fn two_regions(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let object = sphere(PAPER)?;
     let mut outcomes = Vec::new();

@@ -1,4 +1,5 @@
-//! Arms in singular postures, at their limits, with axes that coincide: contact sees where the nodes are and nothing else.
+//! Arms in singular postures, at their limits, with axes that coincide: contact sees where the nodes are and nothing
+//! else.
 
 use super::super::{Bound, CaseResult, Failure, Setting};
 use super::processor::{Processor, processors};

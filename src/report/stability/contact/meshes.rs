@@ -1,5 +1,5 @@
-//! Broken surfaces: repaired with a warning that says what was done, and then of the same torque as the sound one; or refused
-//! with the reason. Slivers are sound, and their torque is that of the stored energy.
+//! Broken surfaces: repaired with a warning that says what was done, and then of the same torque as the sound one; or
+//! refused with the reason. Slivers are sound, and their torque is that of the stored energy.
 
 use super::super::{Bound, CaseResult, Failure, Setting};
 use super::processor::{Processor, processors};

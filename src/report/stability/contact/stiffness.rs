@@ -1,6 +1,7 @@
-//! Every combination of contact stiffness, node radius and body, on random configurations: bodies of springs, of all grounds, kinds
-//! and resolutions, and with a skin: what share converges, with how many iterations, in what time; that E never rises and no number breaks. Beside it the same on the GPU, of the
-//! fine surface a tenth, and a tenth of all by the paper's iteration.
+//! Every combination of contact stiffness, node radius and body, on random configurations: bodies of springs, of all
+//! grounds, kinds and resolutions, and with a skin: what share converges, with how many iterations, in what time; that
+//! E never rises and no number breaks. Beside it the same on the GPU, of the fine surface a tenth, and a tenth of all
+//! by the paper's iteration.
 
 use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::Processor;
@@ -19,9 +20,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Depth classes, in radii of the sphere: the paper's "relatively rigid", and down to half a radius; with the share that must
-/// converge in each, of bodies of springs alone and of those with a skin. Springs alone hold no surface smooth that is pressed
-/// by balls finer than its facets; what does not converge is flagged.
+/// Depth classes, in radii of the sphere: the paper's "relatively rigid", and down to half a radius; with the share
+/// that must converge in each, of bodies of springs alone and of those with a skin. Springs alone hold no surface
+/// smooth that is pressed by balls finer than its facets; what does not converge is flagged.
 const DEPTHS: [(f64, f64, [f64; 2]); 2] = [(0.0, 0.2, [0.95, 0.999]), (0.2, 0.5, [0.85, 0.999])];
 
 /// Materials of the bodies, in the order of their bounds.

@@ -20,8 +20,8 @@ fn outcome(case: &str, varied: &str, measure: &str, worst: f64, bound: f64, note
     CaseResult { case, varied, measure, worst, bound: Bound::AtMost(bound), note }
 }
 
-/// Largest difference of energies and torques, relative to the largest torque, each entry of `b` being times `energy` and `torque`
-/// joint by joint; infinite where the states differ.
+/// Largest difference of energies and torques, relative to the largest torque, each entry of `b` being times `energy`
+/// and `torque` joint by joint; infinite where the states differ.
 fn difference(a: &[Equilibrium], b: &[Equilibrium], energy: f64, torque: impl Fn(usize) -> f64) -> f64 {
     let mut worst = 0.0f64;
     for (a, b) in a.iter().zip(b) {
@@ -48,8 +48,8 @@ fn bar(radius: f64, scale: f64) -> Chain {
     chain
 }
 
-/// A world measured in other lengths: stiffness in newtons per that length, torque and energy in newtons times it. By a power
-/// of two every product rounds alike, and results agree to the last bit; by a thousand, to rounding.
+/// A world measured in other lengths: stiffness in newtons per that length, torque and energy in newtons times it. By a
+/// power of two every product rounds alike, and results agree to the last bit; by a thousand, to rounding.
 pub fn units(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let object = sphere(PAPER)?;
     let mut outcomes = Vec::new();
@@ -90,8 +90,8 @@ fn arm(base: DVec3, radius: f64) -> Chain {
     })
 }
 
-/// Object and arm a kilometre away from the origin: coordinates there are rounded at 1e-13 m in f64, and would be at 6e-5 m in
-/// f32, which is why contact is computed relative to the object.
+/// Object and arm a kilometre away from the origin: coordinates there are rounded at 1e-13 m in f64, and would be at
+/// 6e-5 m in f32, which is why contact is computed relative to the object.
 pub fn far_away(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let shift = DVec3::new(1000.0, -700.0, 300.0);
     let near = sphere(PAPER)?;

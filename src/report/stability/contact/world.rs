@@ -177,8 +177,8 @@ pub fn floating_bar(radius: f64) -> Chain {
     })
 }
 
-/// Random configurations of [`floating_bar`] whose deepest node lies between `least` and `most` below the surface of a sphere
-/// around the origin [m].
+/// Random configurations of [`floating_bar`] whose deepest node lies between `least` and `most` below the surface of a
+/// sphere around the origin [m].
 #[must_use]
 pub fn pressed(model: &Model<'_>, seed: u64, count: usize, least: f64, most: f64) -> Vec<JointVector> {
     let mut sequence = Sequence::new(seed);

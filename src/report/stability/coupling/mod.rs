@@ -1,8 +1,9 @@
 //! Hard cases of the haptic tick: time that jitters, devices that lie, gains beyond all bounds, long hours.
 //!
-//! Each case keeps the same three figures: the torque within its limit, the accounts closed to rounding, and the energy that
-//! the device's port gave from nowhere within what the guard allows ([`GREATEST_GIVEN_ENERGY`], and as much again while the
-//! torque falls to zero). Cases that must end without torque say so with a fourth. One file a kind of hardship.
+//! Each case keeps the same three figures: the torque within its limit, the accounts closed to rounding, and the energy
+//! that the device's port gave from nowhere within what the guard allows ([`GREATEST_GIVEN_ENERGY`], and as much again
+//! while the torque falls to zero). Cases that must end without torque say so with a fourth. One file a kind of
+//! hardship.
 
 mod devices;
 mod endurance;

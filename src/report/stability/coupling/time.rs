@@ -32,7 +32,8 @@ pub(super) fn dropped(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     Ok(watch.outcomes("dropped ticks", "10, 50 and 90 % dropped"))
 }
 
-/// The energy that a hold gives is seen when it is over: beyond the guard's energy there may be what one hold could give.
+/// The energy that a hold gives is seen when it is over: beyond the guard's energy there may be what one hold could
+/// give.
 pub(super) fn overruns(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 2.0, 20.0);
     let setup = open(3, DESKTOP)?;
