@@ -18,9 +18,14 @@ use super::geometry::facet::Facet;
 use super::law::depth::{Carriers, Contact, measure};
 use super::law::series::distribute_all;
 use super::model::{Model, MotionBound};
-use crate::tolerances::{FACET_COMPLIANCE, KNOWN_FACETS};
+use crate::tolerances::FACET_COMPLIANCE;
 use deformation::Deformation;
 use glam::DVec3;
+
+/// How far beyond the walls that may bear it a ball knows of others, in radii [1]: they may be the next that do.
+/// Without, a rigid ball rattles between facets: of 100 configurations on 102 nodes (axial springs, Kg 1e4 N/m on a
+/// patch, to half a radius deep) 96 converged, with 0.3 98, while every wall within the radius pushed by itself.
+const KNOWN_FACETS: f64 = 0.3;
 
 /// Where a proxy node stands at rest, and what is known of it since.
 #[derive(Clone, Copy, Default)]

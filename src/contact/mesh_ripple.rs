@@ -9,9 +9,11 @@
 use super::geometry::closest_point::{ClosestPoint, Feature};
 use super::law::depth::Carriers;
 use super::model::Model;
-use crate::tolerances::RIPPLE_WARNING;
 use serde::{Deserialize, Serialize};
 use std::fmt;
+
+/// Ripple of the force on a contact point over a facet above which a bake warns that the mesh shows through [1].
+const RIPPLE_WARNING: f64 = 0.1;
 
 /// By how much the force on a contact point changes while it slides over a facet at constant depth, relative to its
 /// mean [1].

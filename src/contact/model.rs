@@ -8,8 +8,12 @@ use crate::JointVector;
 use crate::object::{Compliance, Object, ObjectError};
 use crate::proxy::Chain;
 use crate::scene::ContactSpec;
-use crate::tolerances::{LENGTH_ROUNDING, RIGID_STIFFNESS};
+use crate::tolerances::LENGTH_ROUNDING;
 use std::sync::Arc;
+
+/// Stiffness of a rigid contact point, in units of the stiffness of the object's softest node (one over the trace of
+/// its compliance) [1]: force and torque differ from those of perfectly rigid contact by the inverse of this.
+const RIGID_STIFFNESS: f64 = 1e6;
 
 /// An object and a proxy, prepared for contact. A clone shares what is large.
 #[derive(Clone)]

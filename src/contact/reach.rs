@@ -12,8 +12,12 @@ use super::model::Model;
 use super::{Equilibrium, Proximity};
 use crate::JointVector;
 use crate::object::Compliance;
-use crate::tolerances::EXPECTED_MOTION;
 use rayon::prelude::*;
+
+/// How far the surface of an object is expected to move, in depths of the deepest proxy node below it at rest [1]: in
+/// stiff contact it moves by that depth along the normal, and as much again leaves room for what neighbouring nodes
+/// drag along.
+const EXPECTED_MOTION: f64 = 2.0;
 
 /// Configurations that one thread takes at a time.
 const SHARE: usize = 256;

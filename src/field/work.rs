@@ -7,10 +7,19 @@
 //! halved.
 
 use super::TorqueField;
-use crate::{
-    JointVector,
-    tolerances::{WORK_HALVINGS, WORK_ROUNDING, WORK_STRETCHES},
-};
+use crate::JointVector;
+
+/// Difference, relative to the integral of the power's size over the whole line, at which one stretch of a work
+/// integral is good enough [1]: fractions of a cell are rounded by some tens of eps, and the torque with them.
+const WORK_ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// Halvings of a stretch in a work integral at most: a kink of the torque within it then spoils 1e-9 of it, and, since
+/// the torque itself is continuous, 1e-18 of the work.
+const WORK_HALVINGS: u32 = 30;
+
+/// Most halvings of one stretch in all. A jump takes [`WORK_HALVINGS`] of them, and a cell is crossed by few
+/// boundaries; where rounding keeps more stretches from agreeing, further halves would only add to it.
+const WORK_STRETCHES: u32 = 32 * WORK_HALVINGS;
 
 /// Nodes in (0, 1] and weights of Lobatto's formula of ten points on [-1, 1]. It looks at the ends, too: where the
 /// torque begins or ends within a stretch, the whole and its halves cannot agree by not seeing it.

@@ -24,7 +24,6 @@ use crate::{
     dataset::{Axis, Grid},
     proxy::{Chain, Joint},
     scene::JointKind,
-    tolerances::FREE_SPACE_ROUNDING,
 };
 use rayon::prelude::*;
 use std::{
@@ -32,6 +31,11 @@ use std::{
     ops::Range,
     sync::atomic::{AtomicU32, Ordering},
 };
+
+/// Rounding error of a gap and of the motion it is held against, relative to the lengths of chain and object [1]: a
+/// pose is a product of at most seven rotations, a distance a difference of coordinates, each good to some ten eps of
+/// those lengths.
+const FREE_SPACE_ROUNDING: f64 = 1e-12;
 
 /// Blocks that threads take one after the other have at most as many points: many more blocks than threads, and far fewer than
 /// points.

@@ -21,10 +21,18 @@ use crate::{
     object::{Object, ObjectError},
     proxy::Chain,
     scene::{ContactSpec, Interpolation, Scene, SceneError},
-    tolerances::{FARTHEST_EXTRAPOLATION, SOLVER_SHARE, SPACING_SHARE},
+    tolerances::FARTHEST_EXTRAPOLATION,
 };
 use serde::Serialize;
 use std::{fmt, str::FromStr, sync::atomic::AtomicBool, time::Instant};
+
+/// Share of an error to stay below that the grid's spacing may have, as the measured order predicts it [1]; what the
+/// solver adds is independent of it and adds as squares, so that 0.6 is left for the solver and for the error of the
+/// order itself.
+const SPACING_SHARE: f64 = 0.8;
+
+/// Share of an error to stay below that the contact solver's tolerance may have [1]. See [`SPACING_SHARE`].
+const SOLVER_SHARE: f64 = 0.05;
 
 /// Grid points of the pilot's finest grid, at most: some seconds of solving.
 const PILOT_POINTS: f64 = 10_000.0;

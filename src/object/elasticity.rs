@@ -13,8 +13,10 @@
 
 use super::{ObjectError, Stiffness, inclusion};
 use crate::scene::ElasticSpec;
-use crate::tolerances::MIN_TETRAHEDRON_ASPECT;
 use glam::{DMat3, DVec3};
+
+/// Smallest volume of a tetrahedron over the cube of its longest edge [1]: for the same reason.
+const MIN_TETRAHEDRON_ASPECT: f64 = 1e-6;
 
 /// Tetrahedra on the nodes of an object.
 #[derive(Clone, Debug, Default)]

@@ -13,10 +13,7 @@ use super::{
     ObjectError, Stiffness,
     substitution::{Partition, substitute},
 };
-use crate::{
-    memory,
-    tolerances::{MECHANISM_SHIFT, MIN_RECIPROCAL_CONDITION},
-};
+use crate::memory;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::solvers::LltError;
 use faer::perm::PermRef;
@@ -28,6 +25,15 @@ use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Conj, Mat, MatMut, Par, Side};
 use glam::DVec3;
 use std::sync::Arc;
+
+/// Smallest accepted reciprocal condition number of K [1]. K (C f) equals f to about machine precision over this
+/// number, and the equilibria that are stored promise 1e-6.
+const MIN_RECIPROCAL_CONDITION: f64 = f64::EPSILON / 1e-6;
+
+/// Shift, relative to the norm of K, under which the free motion of a singular K is sought [1]: the square root of
+/// machine precision is far above the rounding of a factorisation and far below the stiffness of any spring that
+/// counts.
+const MECHANISM_SHIFT: f64 = 1.5e-8;
 
 /// A factorisation failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

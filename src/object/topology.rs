@@ -9,9 +9,13 @@
 //! cross or touch are refused (see [`super::crossing`]), so one node decides for a whole part which others surround it.
 
 use super::{SurfaceDefect, crossing};
-use crate::tolerances::MIN_TRIANGLE_ASPECT;
 use glam::DVec3;
 use std::{collections::HashMap, f64::consts::PI};
+
+/// Smallest height of a triangle over its longest edge, and of a closed surface's volume over its area times its extent
+/// [1]. Coordinates in single precision, as STL files and the GPU hold them, round at 6e-8 of their size: below this
+/// bound the triangle's normal would be uncertain by more than about 6 %, and its side a matter of luck.
+const MIN_TRIANGLE_ASPECT: f64 = 1e-6;
 
 /// Who touches whom on the surface.
 #[derive(Clone, Debug, PartialEq, Eq)]

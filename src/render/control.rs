@@ -11,7 +11,11 @@
 //! What is not taken in one tick is taken in the next ones.
 
 use super::{accounts::Accounts, npmi::Motion};
-use crate::{JointVector, scene::HapticsSpec, tolerances::LEAST_MOVING_ENERGY};
+use crate::{JointVector, scene::HapticsSpec};
+
+/// Least energy of motion that a passivity controller brakes [J]: a gram at a micrometre a second. Below, one tick's
+/// damping could not take anything that counts.
+const LEAST_MOVING_ENERGY: f64 = 1e-15;
 
 /// The controller's constants.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -16,8 +16,16 @@
 use super::{flags::Fault, haptic::Inputs};
 use crate::{
     JointVector,
-    tolerances::{GREATEST_INPUT, GREATEST_INTERVAL, GREATEST_POSITION_AGE, LEAST_INTERVAL, PACE_WINDOW},
+    tolerances::{GREATEST_INPUT, GREATEST_INTERVAL, GREATEST_POSITION_AGE},
 };
+
+/// Least time between two ticks [s]: a device's encoder steps, of 1e-5 rad or so, divided by less would give velocities
+/// of tens of rad/s to a device at rest.
+const LEAST_INTERVAL: f64 = 1e-6;
+
+/// Time over which the mean time between ticks is taken [s]: two of [`GREATEST_INTERVAL`], so that one such pause
+/// lengthens the mean by half only, while persistent overruns are found within a second.
+const PACE_WINDOW: f64 = 2.0 * GREATEST_INTERVAL;
 
 /// Limits of the inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,9 +13,12 @@ use crate::{
     JointVector,
     proxy::Chain,
     render::trace::{Tick, Trace},
-    tolerances,
 };
 use glam::{DMat3, DVec3};
+
+/// Determinant of a Jacobian relative to the product of its columns' lengths, below which an arm counts as singular: a
+/// force would be uncertain by a hundred times the torque's error.
+const REGULAR_JACOBIAN: f64 = 1e-2;
 
 /// Force at the chain's last contact node that has the joint torques `torque` at `q` [N]; `None` where the chain has
 /// not three joints, or is singular there.
@@ -28,7 +31,7 @@ pub fn end_force(chain: &Chain, q: &JointVector, torque: &JointVector) -> Option
     let column = |joint| chain.jacobian_column(&pose, node, joint);
     let jacobian = DMat3::from_cols(column(0), column(1), column(2));
     let scale: f64 = (0..3).map(|joint| column(joint).length()).product();
-    let regular = jacobian.determinant().abs() > tolerances::REGULAR_JACOBIAN * scale;
+    let regular = jacobian.determinant().abs() > REGULAR_JACOBIAN * scale;
     regular.then(|| jacobian.transpose().inverse() * DVec3::new(a, b, c))
 }
 

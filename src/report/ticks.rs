@@ -4,7 +4,13 @@
 //! Numbers below a hundredth or from ten thousand on are written with a common factor 10^(3k), which goes into the
 //! axis title; the rest as they are, all with the same number of decimals.
 
-use crate::tolerances::{AXIS_END, TICK_STEP};
+/// A number this fraction of a tick step beyond the end of an axis, or off a whole number of decimals, still counts as
+/// on it: a thousandth of what a pixel shows, and a million times the rounding of the step.
+const TICK_STEP: f64 = 1e-6;
+
+/// A recording that ends this fraction of its duration before a round number is drawn up to it: half of one percent is
+/// three points of a sheet, and a tick of a 1 kHz loop of one second is a fifth of it.
+const AXIS_END: f64 = 0.005;
 
 /// Ticks of one axis.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,10 @@
 //! Which matrices are inertias.
 
-use crate::tolerances::INERTIA_ROUNDING;
 use glam::DMat3;
+
+/// Least principal minor of an inertia over its trace, that many factors: scenes and robot files give five digits or
+/// more, and what is below zero by that much stays below the actuators' reflected inertia.
+const INERTIA_ROUNDING: f64 = 1e-5;
 
 /// Returns whether `inertia` is symmetric and positive semidefinite up to the rounding of its numbers, by its principal
 /// minors.

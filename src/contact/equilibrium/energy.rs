@@ -27,11 +27,26 @@ use crate::contact::model::{Model, MotionBound};
 use crate::proxy::Pose;
 use crate::random::Random;
 use crate::tolerances::{
-    ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GIVE_UP_LENGTH,
-    GOOD_SHARE, INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, NUDGE, NUDGE_HALVINGS, POOR_SHARE, PROBE_TOLERANCE,
-    RESIDUAL_FLOOR, STAGE_TOLERANCE, STALLED_LENGTH,
+    ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GOOD_SHARE,
+    INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, STAGE_TOLERANCE, STALLED_LENGTH,
 };
 use glam::DVec3;
+
+/// Length of a refused step, relative to the greatest there can be, at which a configuration is given up [1]: the
+/// energy of a step scales with its length, so below 1e-12 nothing measurable can be gained any more.
+const GIVE_UP_LENGTH: f64 = 1e-12;
+
+/// Relative residual of the linear solve that looks for negative curvature at an equilibrium [1]. Its random load has a
+/// share of one over the root of the number of unknowns, a tenth or so, in a direction of negative curvature, which
+/// conjugate gradients meet before the residual is as small as this.
+const PROBE_TOLERANCE: f64 = 1e-2;
+
+/// First length of the step away from a saddle, over the length of the displacement there, in the energy norm [1]; it
+/// is halved until the energy falls by more than its rounding, at most [`NUDGE_HALVINGS`] times.
+const NUDGE: f64 = 0.1;
+
+/// See [`NUDGE`]: after these, the fall of the energy, of second order, would be below rounding.
+const NUDGE_HALVINGS: u32 = 20;
 
 /// Where depth comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

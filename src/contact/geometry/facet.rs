@@ -6,8 +6,16 @@
 use super::closest_point::{ClosestPoint, Feature, closest_point};
 use super::normals::{area_vector, unit_or_zero};
 use super::quartic::{CONTROLS, Jet, place};
-use crate::tolerances::{FACET_ITERATIONS, FACET_STEP, MINIMUM_SQUARE};
+use crate::tolerances::MINIMUM_SQUARE;
 use glam::DVec3;
+
+/// Steps of Newton's method for the closest point of a bent facet at most: from the flat triangle's closest point three
+/// or four reach rounding, and where the distance is not convex more do not help.
+const FACET_ITERATIONS: usize = 16;
+
+/// Step of barycentric weights at which the search for that point ends [1]: the next step would be about its square,
+/// far below the rounding of a weight.
+const FACET_STEP: f64 = 1e-8;
 
 /// A triangle of the contact surface [m].
 #[derive(Clone, Copy, Debug)]

@@ -8,7 +8,11 @@
 //! points in a plane), so that a torque linear in q is reproduced exactly there too.
 
 use super::cloud::Position;
-use crate::{MAX_JOINTS, tolerances};
+use crate::MAX_JOINTS;
+
+/// Pivot below which the corners of a simplex span nothing in a direction, as a fraction of the extent: between the
+/// jitter (1e-7 and less), which makes slivers of points in a plane, and the thickness of honest simplices.
+const SLIVER_PIVOT: f64 = 1e-5;
 
 /// Weights of the vertices of a simplex, in their order; entries beyond d + 1 are zero.
 pub(super) type Weights = [f64; MAX_JOINTS + 1];
@@ -32,7 +36,7 @@ pub(super) fn corrected(mut weights: Weights, corners: &[&Position], at: &Positi
         let reproduced: f64 = corners.iter().zip(weights).map(|(corner, w)| corner[axis] * w).sum();
         missing[axis] += at[axis] - reproduced;
     }
-    let (change, rank) = eliminate(system(corners, &missing), joints, tolerances::SLIVER_PIVOT);
+    let (change, rank) = eliminate(system(corners, &missing), joints, SLIVER_PIVOT);
     for (weight, change) in weights.iter_mut().zip(change).take(joints) {
         *weight += change;
     }

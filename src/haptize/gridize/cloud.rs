@@ -12,6 +12,9 @@ use super::{GridizeError, samples::Samples};
 use crate::{MAX_JOINTS, tolerances};
 use std::collections::HashMap;
 
+/// Extent of the samples off the best line or plane below which they count as flat: less than an encoder resolves.
+const FLAT_CLOUD: f64 = 1e-6;
+
 /// A position in scaled C-space; entries beyond the number of joints are zero.
 pub(super) type Position = [f64; MAX_JOINTS];
 
@@ -159,7 +162,7 @@ fn spanning_simplex(positions: &[Position], joints: usize) -> Result<Vec<u32>, G
             .map(|(point, residual)| (point, length(residual)))
             .fold((0, 0.0), |best, next| if next.1 > best.1 { next } else { best });
         let distance = square.sqrt();
-        if distance < tolerances::FLAT_CLOUD {
+        if distance < FLAT_CLOUD {
             return Err(GridizeError::Flat { rank, joints, thickness: distance });
         }
         let direction = residuals[farthest].map(|x| x / distance);

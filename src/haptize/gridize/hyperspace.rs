@@ -20,8 +20,25 @@ use super::{
     cloud::{Cloud, Position, dot},
     interpolant::{Simplex, Triangulation},
 };
-use crate::{MAX_JOINTS, tolerances};
+use crate::MAX_JOINTS;
 use std::collections::HashMap;
+
+/// [`JITTER`] for 4 to 6 joints, where circumspheres are computed in floating point: on a cell of cospherical points
+/// squeezed to thickness t the centre is known to about 1e-16 / t, and must be known better than t.
+pub(super) const HYPER_JITTER: f64 = 1e-7;
+
+/// A point counts as beyond a facet from this height on: below the jitter, above the rounding of a height.
+const HYPER_FACET: f64 = 1e-12;
+
+/// A weight down to minus this counts as inside: the rounding of a weight in a cell of thickness `HYPER_JITTER`.
+const HYPER_WEIGHT: f64 = 1e-9;
+
+/// Steps after which a walk in 4 to 6 joints is given up. Walks cross about d n^(1/d) cells; 10^5 samples in 4 joints
+/// give 70.
+const HYPER_STEPS: usize = 10_000;
+
+/// Cells that one worker keeps in 4 to 6 joints before it starts again: about 500 bytes each.
+const HYPER_CELLS: usize = 200_000;
 
 /// Points that answer for their Delaunay simplices one at a time.
 pub(super) struct Hyperspace {
@@ -58,7 +75,7 @@ pub(super) struct HyperWalk {
 
 impl Hyperspace {
     pub fn new(cloud: &Cloud) -> Self {
-        Self { joints: cloud.joints, points: cloud.jittered(tolerances::HYPER_JITTER) }
+        Self { joints: cloud.joints, points: cloud.jittered(HYPER_JITTER) }
     }
 
     fn corners(&self) -> usize {
@@ -95,8 +112,7 @@ impl Hyperspace {
         for filled in 1..self.corners() {
             let parameter = |point: &Position| {
                 let (_, height) = off_span(point, &first, &basis);
-                (height > tolerances::HYPER_FACET)
-                    .then(|| (distance_squared(point, &centre) - square_radius) / (2.0 * height))
+                (height > HYPER_FACET).then(|| (distance_squared(point, &centre) - square_radius) / (2.0 * height))
             };
             let next = self.least(parameter, &vertices[..filled])?;
             let point = &self.points[next as usize];
@@ -120,7 +136,7 @@ impl Hyperspace {
         let on_facet = &self.points[cell.vertices[usize::from(slot == 0)] as usize];
         let parameter = |point: &Position| {
             let height = dot(&outward, point) - dot(&outward, on_facet);
-            (height > tolerances::HYPER_FACET)
+            (height > HYPER_FACET)
                 .then(|| (distance_squared(point, &cell.centre) - cell.square_radius) / (2.0 * height))
         };
         self.least(parameter, &cell.vertices[..self.corners()])
@@ -144,7 +160,7 @@ impl Hyperspace {
     /// Walks to the cell that holds `at`. Leaves through the facet with the most negative weight; a Delaunay walk never
     /// returns, so the bound on its steps only guards against rounding.
     fn walk_to(&self, walk: &mut HyperWalk, at: &Position) -> Option<Simplex> {
-        let steps = tolerances::HYPER_STEPS;
+        let steps = HYPER_STEPS;
         for _ in 0..steps {
             let cell = &walk.cells[walk.here as usize];
             let base = &self.points[cell.vertices[self.joints] as usize];
@@ -152,7 +168,7 @@ impl Hyperspace {
             let (slot, weight) = (0..self.corners())
                 .map(|slot| (slot, dot(&cell.gradients[slot], &offset) + f64::from(slot == self.joints)))
                 .fold((0, f64::INFINITY), |least, next| if next.1 < least.1 { next } else { least });
-            if weight >= -tolerances::HYPER_WEIGHT {
+            if weight >= -HYPER_WEIGHT {
                 return Some(cell.vertices);
             }
             if cell.across[slot] == Across::Unknown {
@@ -184,7 +200,7 @@ impl Triangulation for Hyperspace {
     }
 
     fn simplex(&self, walk: &mut HyperWalk, at: &Position) -> Option<Simplex> {
-        if walk.cells.len() > tolerances::HYPER_CELLS {
+        if walk.cells.len() > HYPER_CELLS {
             *walk = HyperWalk::default();
         }
         if walk.cells.is_empty() {

@@ -32,6 +32,18 @@ use cloud::Cloud;
 use interpolant::{Interpolant, Linear};
 use rayon::prelude::*;
 
+/// [`HULL_PULL`] for 4 to 6 joints.
+const HYPER_PULL: f64 = 100.0 * hyperspace::HYPER_JITTER;
+
+/// Most grid points of one gridization: 2.4 GB of torque for three joints.
+const GRID_POINTS: f64 = 1e8;
+
+/// Contact threshold in standard deviations of the samples: noise alone exceeds three once in 370 samples.
+const CONTACT_DEVIATIONS: f64 = 3.0;
+
+/// Contact threshold as a fraction of the greatest torque where no deviation was measured.
+const CONTACT_FRACTION: f64 = 0.01;
+
 /// How scattered torques are interpolated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Interpolation {
@@ -190,7 +202,7 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
         (Interpolation::Linear, 1) => fill_linear(line::Line::new(&cloud), linear(tolerances::HULL_PULL), &grid),
         (Interpolation::Linear, 2) => fill_linear(plane::Plane::new(&cloud)?, linear(tolerances::HULL_PULL), &grid),
         (Interpolation::Linear, 3) => fill_linear(space::Space::new(&cloud)?, linear(tolerances::HULL_PULL), &grid),
-        _ => fill_linear(hyperspace::Hyperspace::new(&cloud), linear(tolerances::HYPER_PULL), &grid),
+        _ => fill_linear(hyperspace::Hyperspace::new(&cloud), linear(HYPER_PULL), &grid),
     };
     let (torque, inside) = torque;
     let status: Vec<u8> = torque
@@ -240,10 +252,10 @@ fn default_epsilon(samples: &Samples) -> f64 {
     let joints = samples.joints.len();
     let mut deviations: Vec<f64> = samples.deviations.iter().flat_map(|column| norms(column, joints)).collect();
     if deviations.is_empty() {
-        return tolerances::CONTACT_FRACTION * norms(&samples.torques, joints).fold(0.0, f64::max);
+        return CONTACT_FRACTION * norms(&samples.torques, joints).fold(0.0, f64::max);
     }
     let middle = deviations.len() / 2;
-    tolerances::CONTACT_DEVIATIONS * *deviations.select_nth_unstable_by(middle, f64::total_cmp).1
+    CONTACT_DEVIATIONS * *deviations.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 fn norms(column: &[f64], joints: usize) -> impl Iterator<Item = f64> {
@@ -274,8 +286,8 @@ fn grid(samples: &Samples, steps: &[f64]) -> Result<Grid, GridizeError> {
             return Err(GridizeError::NoGridLine { joint: label.name.clone(), step });
         }
         points *= count;
-        if points > tolerances::GRID_POINTS {
-            return Err(GridizeError::TooManyPoints { points, limit: tolerances::GRID_POINTS });
+        if points > GRID_POINTS {
+            return Err(GridizeError::TooManyPoints { points, limit: GRID_POINTS });
         }
         axes.push(Axis {
             name: label.name.clone(),

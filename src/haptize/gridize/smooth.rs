@@ -12,9 +12,13 @@ use super::{
     GridizeError,
     cloud::{Cloud, Position},
 };
-use crate::{MAX_JOINTS, tolerances};
+use crate::MAX_JOINTS;
 use rayon::prelude::*;
 use std::collections::HashMap;
+
+/// Pivot below which the neighbours of a sample span no plane, relative to the greatest: their thickness squared, a
+/// thousandth of their reach.
+const PLANE_PIVOT: f64 = 1e-6;
 
 /// Neighbours a fitted coefficient.
 const NEIGHBOURS_A_COEFFICIENT: usize = 5;
@@ -137,7 +141,7 @@ fn smoothed(cloud: &Cloud, near: &[(f64, u32)], point: usize, joint: usize) -> f
 fn solve(mut rows: [[f64; MOST + 1]; MOST], count: usize) -> Option<[f64; MOST]> {
     let greatest = (0..count).map(|i| rows[i][i]).fold(0.0, f64::max);
     for step in 0..count {
-        if rows[step][step] <= tolerances::PLANE_PIVOT * greatest {
+        if rows[step][step] <= PLANE_PIVOT * greatest {
             return None;
         }
         let pivot = rows[step];

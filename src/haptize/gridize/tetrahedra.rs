@@ -7,8 +7,14 @@
 //! (`robust`), so the cavity is star-shaped and no tetrahedron is ever inverted.
 
 use super::{GridizeError, cloud::Position, order::insertion_order};
-use crate::tolerances;
 use robust::{Coord3D, insphere, orient3d};
+
+/// Simplices that may be created per point before an arrangement is called degenerate. Random points create about 27
+/// on the way to 6.8, scan lines up to 60.
+const SIMPLICES_PER_POINT: usize = 400;
+
+/// Simplices that any number of points may create.
+const FREE_SIMPLICES: usize = 1_000_000;
 
 /// The vertex at infinity.
 const INFINITE: u32 = u32::MAX;
@@ -48,7 +54,7 @@ impl Tetrahedra {
             first.swap(0, 1);
         }
         mesh.begin(first);
-        let limit = tolerances::SIMPLICES_PER_POINT * mesh.points.len() + tolerances::FREE_SIMPLICES;
+        let limit = SIMPLICES_PER_POINT * mesh.points.len() + FREE_SIMPLICES;
         let mut work = Work {
             marks: vec![0; mesh.vertices.len()],
             stamp: 0,

@@ -8,9 +8,11 @@ use super::{ImportError, mapping::Keep};
 use crate::{
     JointVector, MAX_JOINTS,
     haptize::gridize::{JointLabel, Samples},
-    tolerances,
 };
 use std::collections::BTreeMap;
+
+/// Cells of C-space that an import averages in: about 1 kB each.
+const IMPORT_CELLS: usize = 1_000_000;
 
 /// Cell number on each axis.
 type Key = [i64; MAX_JOINTS];
@@ -102,8 +104,8 @@ impl Cells {
         }
         if self.visit.as_ref().is_none_or(|visit| visit.key != key || visit.direction != direction) {
             self.end_visit();
-            if self.cells.len() > tolerances::IMPORT_CELLS {
-                return Err(ImportError::TooManyCells { limit: tolerances::IMPORT_CELLS });
+            if self.cells.len() > IMPORT_CELLS {
+                return Err(ImportError::TooManyCells { limit: IMPORT_CELLS });
             }
             let empty = Mean::new(self.joints);
             self.visit = Some(Visit { key, direction, q: empty, torque: empty });

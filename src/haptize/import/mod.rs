@@ -23,7 +23,6 @@ use crate::{
     JointVector,
     haptize::gridize::Samples,
     ros::{JointStateTable, RosError, is_mcap},
-    tolerances,
 };
 use cells::{Cells, Direction};
 use rows::{ReadRowResult, Row, Rows};
@@ -33,6 +32,9 @@ use std::{
     path::{Path, PathBuf},
 };
 use window::{Seen, Window};
+
+/// Samples that an import keeps when it averages none: 0.5 GB for six joints.
+const IMPORT_SAMPLES: usize = 5_000_000;
 
 /// Why a log was refused.
 #[derive(Debug, thiserror::Error)]
@@ -298,8 +300,8 @@ impl<'a> Import<'a> {
         let direction = if lead < 0.0 { Direction::Backward } else { Direction::Forward };
         match keep {
             Keep::All => {
-                if self.samples.len() >= tolerances::IMPORT_SAMPLES {
-                    return Err(ImportError::TooManySamples { limit: tolerances::IMPORT_SAMPLES });
+                if self.samples.len() >= IMPORT_SAMPLES {
+                    return Err(ImportError::TooManySamples { limit: IMPORT_SAMPLES });
                 }
                 self.samples.configurations.extend_from_slice(&block.q);
                 self.samples.torques.extend_from_slice(&block.torque);

@@ -36,6 +36,9 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
+/// Time for which a device is braked after a limit [s]: several time constants of damping against inertia.
+const BRAKE_TIME: f64 = 0.3;
+
 /// A scan failed or was stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum ScanError {
@@ -403,7 +406,7 @@ impl<'a> Driver<'a> {
         let joints = self.chain.degrees_of_freedom();
         let mut brake =
             PdControl::new(JointVector::zeros(joints), self.spec.control.damping, 0.0, self.reading.position);
-        for _ in 0..(tolerances::BRAKE_TIME * self.spec.control.rate) as usize {
+        for _ in 0..(BRAKE_TIME * self.spec.control.rate) as usize {
             let torque = brake.torque(&self.reading.position, self.period).torque;
             self.hold(&torque)?;
         }

@@ -9,9 +9,11 @@ use crate::{
     JointVector,
     proxy::Chain,
     scene::{PlanSpec, WorkspacePlan},
-    tolerances,
 };
 use glam::DVec3;
+
+/// Most points of a scan: at a second a point, eleven days.
+const SCAN_POINTS: usize = 1_000_000;
 
 /// One stop of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,9 +82,7 @@ impl Plan {
 
 fn checked_points(counts: &[usize]) -> Result<usize, ScanError> {
     let points = counts.iter().try_fold(1_usize, |product, &count| product.checked_mul(count));
-    points
-        .filter(|&points| points <= tolerances::SCAN_POINTS)
-        .ok_or(ScanError::TooManyPoints { limit: tolerances::SCAN_POINTS })
+    points.filter(|&points| points <= SCAN_POINTS).ok_or(ScanError::TooManyPoints { limit: SCAN_POINTS })
 }
 
 /// Places of a grid with the last axis fastest, every other row backwards, each with its number in plain order.

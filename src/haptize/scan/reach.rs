@@ -7,16 +7,24 @@
 use crate::{
     JointVector,
     proxy::{Chain, Pose},
-    tolerances,
 };
 use glam::{DMat3, DVec3};
 
-/// Configuration near `start` at which contact node `node` is at `target`, to [`tolerances::REACHED`]; `None` where
+/// Distance at which a position counts as reached by inverse kinematics [m]: a thousandth of an encoder step at 0.1 m.
+const REACHED: f64 = 1e-7;
+
+/// First damping of inverse kinematics [m]: a tenth of a link's length, so that a first step stays in the linear range.
+const REACH_DAMPING: f64 = 0.01;
+
+/// Steps of inverse kinematics: converging ones take about ten, the rest allows for joint limits on the way.
+const REACH_STEPS: usize = 200;
+
+/// Configuration near `start` at which contact node `node` is at `target`, to [`REACHED`]; `None` where
 /// the joints do not reach it.
 #[must_use]
 pub fn reach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) -> Option<JointVector> {
     let (q, distance) = approach(chain, node, target, start);
-    (distance < tolerances::REACHED).then_some(q)
+    (distance < REACHED).then_some(q)
 }
 
 /// Configuration near `start` at which contact node `node` is as near to `target` as the joints let it, and how near [m].
@@ -26,9 +34,9 @@ pub fn approach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) 
     let mut pose = chain.new_pose();
     chain.pose(&q, &mut pose);
     let mut distance = target.distance(pose.nodes[node]);
-    let mut damping = tolerances::REACH_DAMPING;
-    for _ in 0..tolerances::REACH_STEPS {
-        if distance < tolerances::REACHED {
+    let mut damping = REACH_DAMPING;
+    for _ in 0..REACH_STEPS {
+        if distance < REACHED {
             break;
         }
         let next = step(chain, &pose, node, target, &q, damping);

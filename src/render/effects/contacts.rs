@@ -6,9 +6,12 @@
 use crate::{
     dataset::Dataset,
     field::stencil::{Lattice, LatticeError},
-    tolerances::LEAST_CONTACT_FORCE,
 };
 use glam::DVec3;
+
+/// Least force that counts as a contact when friction or damping acts on it [N]: far below what is felt, and large
+/// enough that a normal is known to rounding.
+const LEAST_CONTACT_FORCE: f64 = 1e-9;
 
 /// Contact forces on the proxy's nodes, compressed rows over the grid points.
 pub struct Contacts {

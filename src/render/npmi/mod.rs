@@ -34,10 +34,14 @@ use crate::{
     JointVector, MAX_JOINTS,
     field::range::Stops,
     proxy::{Chain, JointMatrix},
-    tolerances::NEGLIGIBLE_STATE,
 };
 use linear::{cholesky, solve_held};
 use stops::{Side, solve_in_box};
+
+/// Size below which a decaying state of the haptic loop is set to zero, in its SI unit. It is far below anything that
+/// can be felt or changes a torque; what stays has squares that are normal numbers, and arithmetic on subnormal numbers
+/// takes tens of times as long.
+const NEGLIGIBLE_STATE: f64 = 1e-150;
 
 /// Inertia M and joint limits of the proxy.
 #[derive(Clone, Debug)]

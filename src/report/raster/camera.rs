@@ -1,7 +1,10 @@
 //! A perspective camera that frames what it is given.
 
-use crate::tolerances::NEAR_PLANE;
 use glam::DVec3;
+
+/// Depth, over the eye's distance from the origin, up to which a point counts as behind the eye: nearer ones would be
+/// projected beyond a million pixels. Nothing that a camera frames comes nearer than a tenth.
+const NEAR_PLANE: f64 = 1e-6;
 
 /// Tangent of half the vertical field of view: 12 degrees, a portrait lens, so that boxes keep their shape.
 const HALF_FIELD: f64 = 0.2126;

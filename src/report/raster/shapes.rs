@@ -1,8 +1,12 @@
 //! Bodies of revolution and meshes, made of triangles.
 
 use super::{Finish, Raster, Vertex};
-use crate::{report::colour::Colour, tolerances::EDGE_LIFT};
+use crate::report::colour::Colour;
 use glam::DVec3;
+
+/// How much nearer, as a fraction of its distance, the edges of a mesh are drawn than its surface: above the rounding
+/// of the depth buffer (single precision) at grazing views, below a twentieth of what a camera frames.
+const EDGE_LIFT: f64 = 5e-3;
 
 /// Facets around an axis: with interpolated normals the rim looks round.
 const FACETS: usize = 28;

@@ -11,10 +11,16 @@ use crate::{
     scene::{
         GraphicsEffects, GroundNodes, GroundSpec, Material, ObjectSpec, Shape, SpringKind, SpringSpec, StiffeningSpec,
     },
-    tolerances::{FRAME_ENERGY_ROUNDING, GPU_FRAME_ENERGY_ROUNDING},
 };
 use glam::DVec3;
 use std::sync::Arc;
+
+/// Energy that the object may seem to gain in a frame from nowhere, over the most that it stored [1]: sums over up to
+/// 1e5 coordinates, each rounded by eps, of terms that cancel.
+const FRAME_ENERGY_ROUNDING: f64 = 1e-10;
+
+/// The same where the state is f32 [1]: each displacement and velocity is rounded by 6e-8, and energy is their square.
+const GPU_FRAME_ENERGY_ROUNDING: f64 = 1e-6;
 
 /// The cases of this file.
 pub(super) const CASES: [Case; 3] = [
