@@ -75,37 +75,8 @@ fn write(
     practice: &Practice,
     command: &str,
 ) -> std::fmt::Result {
-    let file = robot.path.file_name().unwrap_or_default().to_string_lossy();
-    let count: usize = nodes.of_joints.iter().map(Vec::len).sum();
-    let joints = proxy.joints.len();
-    writeln!(
-        text,
-        "# {}",
-        comment(&format!("Arm of {joints} joints of the robot {:?}, taken from {file} by", robot.name))
-    )?;
-    writeln!(text, "#     {}", comment(command))?;
-    writeln!(text, "# against a soft ball, which is there for a start: put your own object in its place.\n#")?;
-    writeln!(text, "# All quantities are SI: m, rad, N, kg, s. Every key is explained in datasets/README.md.")?;
-    if !arm.notes.is_empty() {
-        writeln!(text, "#\n# Noticed in the robot's file:")?;
-        arm.notes.iter().try_for_each(|note| writeln!(text, "# - line {}: {}", note.line, comment(&note.message)))?;
-    }
-    let title: String = robot.name.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '_' | '-')).collect();
-    writeln!(text, "\nname = \"{}\"", if title.is_empty() { "robot" } else { &title })?;
-
-    heading(text, "The deformable virtual object")?;
-    let Practice { centre, radius, .. } = practice;
-    writeln!(text, "[object]")?;
-    entry(text, "node_mass", "5e-4", "kg")?;
-    entry(text, "node_damping", "0.05", "N s/m, against the ground")?;
-    writeln!(text, "\n[object.sphere]")?;
-    entry(text, "centre", &vector(*centre, 4), "m, in the frame of the robot's root link")?;
-    entry(text, "radius", &number(*radius, 4), "m")?;
-    entry(text, "edge", &number(0.2 * radius, 4), "m, of its triangles")?;
-    writeln!(text, "\n[object.skin]")?;
-    entry(text, "tension", "100.0", "N/m")?;
-    entry(text, "width", &number(0.35 * radius, 5), "m, over which the dent of a point is rounded")?;
-    entry(text, "foundation", "4e4", "N/m^3")?;
+    write_head(text, robot, arm, proxy.joints.len(), command)?;
+    write_object(text, practice)?;
 
     heading(text, "The multi-link virtual proxy")?;
     writeln!(
@@ -113,6 +84,7 @@ fn write(
         "# Link frames are parallel to the robot's root frame at q = 0. Links that do not move, and are not felt: {}.",
         comment(&arm.base.join(", "))
     )?;
+    let count: usize = nodes.of_joints.iter().map(Vec::len).sum();
     writeln!(
         text,
         "# {count} contact nodes on the shapes of the moving links, {} m apart or more.",
@@ -158,6 +130,40 @@ fn write(
         writeln!(text, "    {{ time = {time:?}, q = {q} }},")?;
     }
     writeln!(text, "]")
+}
+
+fn write_head(text: &mut String, robot: &Robot, arm: &Arm, joints: usize, command: &str) -> std::fmt::Result {
+    let file = robot.path.file_name().unwrap_or_default().to_string_lossy();
+    writeln!(
+        text,
+        "# {}",
+        comment(&format!("Arm of {joints} joints of the robot {:?}, taken from {file} by", robot.name))
+    )?;
+    writeln!(text, "#     {}", comment(command))?;
+    writeln!(text, "# against a soft ball, which is there for a start: put your own object in its place.\n#")?;
+    writeln!(text, "# All quantities are SI: m, rad, N, kg, s. Every key is explained in datasets/README.md.")?;
+    if !arm.notes.is_empty() {
+        writeln!(text, "#\n# Noticed in the robot's file:")?;
+        arm.notes.iter().try_for_each(|note| writeln!(text, "# - line {}: {}", note.line, comment(&note.message)))?;
+    }
+    let title: String = robot.name.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '_' | '-')).collect();
+    writeln!(text, "\nname = \"{}\"", if title.is_empty() { "robot" } else { &title })
+}
+
+fn write_object(text: &mut String, practice: &Practice) -> std::fmt::Result {
+    heading(text, "The deformable virtual object")?;
+    let Practice { centre, radius, .. } = practice;
+    writeln!(text, "[object]")?;
+    entry(text, "node_mass", "5e-4", "kg")?;
+    entry(text, "node_damping", "0.05", "N s/m, against the ground")?;
+    writeln!(text, "\n[object.sphere]")?;
+    entry(text, "centre", &vector(*centre, 4), "m, in the frame of the robot's root link")?;
+    entry(text, "radius", &number(*radius, 4), "m")?;
+    entry(text, "edge", &number(0.2 * radius, 4), "m, of its triangles")?;
+    writeln!(text, "\n[object.skin]")?;
+    entry(text, "tension", "100.0", "N/m")?;
+    entry(text, "width", &number(0.35 * radius, 5), "m, over which the dent of a point is rounded")?;
+    entry(text, "foundation", "4e4", "N/m^3")
 }
 
 fn write_joint(text: &mut String, joint: &ArmJoint, spec: &JointSpec) -> std::fmt::Result {
