@@ -161,21 +161,16 @@ fn scheduling() -> Finding {
 /// May this process lock a dataset's worth of memory?
 #[cfg(unix)]
 fn locking() -> Finding {
-    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
-    // SAFETY: `limit` is a valid place for one rlimit.
-    let known = unsafe { libc::getrlimit(libc::RLIMIT_MEMLOCK, &raw mut limit) == 0 };
-    // SAFETY: geteuid has no preconditions.
-    let privileged = unsafe { libc::geteuid() == 0 };
-    let unlimited = privileged || (known && limit.rlim_cur == libc::RLIM_INFINITY);
+    use rustix::process::{Resource, geteuid, getrlimit};
+    let limit = if geteuid().is_root() { None } else { getrlimit(Resource::Memlock).current };
     Finding {
         subject: "locked memory",
-        good: unlimited,
+        good: limit.is_none(),
         essential: false,
-        seen: if unlimited {
-            "unlimited".into()
-        } else {
-            format!("at most {} KiB: a page fault may delay a tick", limit.rlim_cur / 1024)
-        },
+        seen: limit.map_or_else(
+            || "unlimited".into(),
+            |bytes| format!("at most {} KiB: a page fault may delay a tick", bytes / 1024),
+        ),
         remedy: "add `@realtime - memlock unlimited` to /etc/security/limits.d/realtime.conf, join the group \
                  `realtime`, log in again",
     }

@@ -46,28 +46,27 @@ pub fn stolen() -> Vec<u64> {
 
 #[cfg(target_os = "linux")]
 mod system {
+    use rustix::{
+        mm::{MlockAllFlags, mlockall, munlockall},
+        param::clock_ticks_per_second,
+        process::getpriority_process,
+        thread::{clock_nanosleep_absolute, sched_getcpu},
+        time::{ClockId, Timespec, clock_gettime},
+    };
     use std::{io, time::Duration};
 
     /// Above ordinary real-time threads (50), below the kernel's own (99).
     const PRIORITY: libc::c_int = 80;
 
     pub fn now() -> Duration {
-        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-        // SAFETY: `time` is valid for writing. The monotonic clock always exists, so that the call cannot fail.
-        unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &raw mut time) };
+        let time = clock_gettime(ClockId::Monotonic);
         Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.unsigned_abs() as u32)
     }
 
     pub fn sleep_until(deadline: Duration) {
-        let time = libc::timespec {
-            tv_sec: deadline.as_secs() as libc::time_t,
-            tv_nsec: deadline.subsec_nanos() as libc::c_long,
-        };
+        let time = Timespec { tv_sec: deadline.as_secs().cast_signed(), tv_nsec: deadline.subsec_nanos().into() };
         // An interrupted sleep ends early; the caller spins for the rest.
-        // SAFETY: `time` is valid for reading, and a null pointer asks for no remaining time.
-        unsafe {
-            libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &raw const time, std::ptr::null_mut())
-        };
+        let _ = clock_nanosleep_absolute(ClockId::Monotonic, &time);
     }
 
     pub fn raise_priority() -> io::Result<()> {
@@ -87,8 +86,7 @@ mod system {
         // SAFETY: zero is valid for each of these numbers.
         let mut wanted: libc::sched_attr = unsafe { std::mem::zeroed() };
         (wanted.size, wanted.sched_runtime) = (size_of::<libc::sched_attr>() as u32, TURN);
-        // SAFETY: the call takes no pointers.
-        wanted.sched_nice = unsafe { libc::getpriority(libc::PRIO_PROCESS, 0) };
+        wanted.sched_nice = getpriority_process(None).unwrap_or(0);
         // SAFETY: `wanted` is valid for reading and holds its own size; the thread is the calling one. The policy is the
         // ordinary one, number zero.
         unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const wanted, 0) };
@@ -97,29 +95,20 @@ mod system {
     pub fn lock_memory() -> io::Result<()> {
         // Only what is mapped now: locking future mappings, too, would make allocations elsewhere in the process fail
         // once the limit is reached.
-        // SAFETY: the call takes no pointers.
-        match unsafe { libc::mlockall(libc::MCL_CURRENT) } {
-            0 => Ok(()),
-            _ => Err(io::Error::last_os_error()),
-        }
+        Ok(mlockall(MlockAllFlags::CURRENT)?)
     }
 
     pub fn processor() -> usize {
-        // SAFETY: the call takes no arguments.
-        usize::try_from(unsafe { libc::sched_getcpu() }).unwrap_or(0)
+        sched_getcpu()
     }
 
     pub fn counter_rate() -> f64 {
-        // SAFETY: the call takes a number.
-        match unsafe { libc::sysconf(libc::_SC_CLK_TCK) } {
-            rate if rate > 0 => rate as f64,
-            _ => 100.0,
-        }
+        clock_ticks_per_second() as f64
     }
 
     pub fn unlock_memory() {
-        // SAFETY: the call takes no arguments. It fails for nothing that one could mend.
-        unsafe { libc::munlockall() };
+        // It fails for nothing that one could mend.
+        let _ = munlockall();
     }
 }
 

@@ -5,7 +5,6 @@ use super::{
     ViewError,
     feel::TickSource,
     files::Files,
-    gamepad::Gamepad,
     job::{Job, JobResult, Solver, Task},
     plots::Plots,
     scene::{SceneView, Shown},
@@ -58,7 +57,6 @@ const SPHERE: &str = include_str!("../../datasets/sphere.toml");
 pub struct Viewer {
     pub(super) context: Arc<Context>,
     pub(super) pace: TickSource,
-    pub(super) gamepad: Gamepad,
     pub(super) session: Option<Session>,
     pub(super) scene: SceneView,
     pub(super) plots: Plots,
@@ -83,7 +81,6 @@ pub struct Viewer {
 pub struct Rescue {
     /// The open session, whose loop goes on.
     session: Option<Session>,
-    gamepad: Gamepad,
     /// The task that was under way.
     task: Option<Task>,
     solver: Solver,
@@ -125,7 +122,6 @@ impl Viewer {
             scene: SceneView::new(Arc::clone(&context), render, samples)?,
             context,
             pace,
-            gamepad: if pace == TickSource::Clock { Gamepad::new() } else { Gamepad::default() },
             session: None,
             plots: Plots::default(),
             files: Files::new(folder),
@@ -156,7 +152,6 @@ impl Viewer {
     pub fn rescue(&mut self, egui: &egui::Context) -> Rescue {
         Rescue {
             session: self.session.take(),
-            gamepad: self.gamepad.clone(),
             task: self.job.take().map(|job| job.task.clone()),
             solver: self.solver.clone(),
             shown: self.scene.shown,
@@ -168,7 +163,7 @@ impl Viewer {
     /// again.
     pub fn resume(&mut self, rescue: Rescue, why: &str, egui: &egui::Context) {
         egui.set_theme(rescue.theme);
-        (self.session, self.gamepad) = (rescue.session, rescue.gamepad);
+        self.session = rescue.session;
         (self.solver, self.scene.shown) = (rescue.solver, rescue.shown);
         if let Some(session) = &mut self.session {
             let egui = egui.clone();
@@ -230,7 +225,7 @@ impl Viewer {
             JobResult::Loaded(loaded) => {
                 let (loaded, body) = *loaded;
                 let egui = egui.clone();
-                match Session::new(loaded, &self.context, &self.gamepad, self.pace, move || egui.request_repaint()) {
+                match Session::new(loaded, &self.context, self.pace, move || egui.request_repaint()) {
                     Ok(mut session) => {
                         self.scene.open(&session.loaded, body);
                         if let Some(before) = &self.session {

@@ -5,7 +5,7 @@
 //! A picture without a window has no time of its own: there the same loop runs by steps of given length
 //! ([`TickSource::Steps`]), and gives the same numbers on every machine.
 
-use super::{background::spawn, gamepad::Gamepad, guide::Guide};
+use super::{background::spawn, guide::Guide};
 use crate::{
     JointVector,
     device::{Applied, Device, Pointer, PointerInput, Reading},
@@ -67,17 +67,11 @@ struct Body {
 type Seen = (rtrb::Consumer<Tick>, triple_buffer::Output<Latest>, Option<ClearFault>);
 
 impl Feel {
-    /// Starts the loop with the device where `guide` and `gamepad` lead it.
+    /// Starts the loop with the device where `guide` leads it.
     ///
     /// # Errors
     /// In words, when device and loop do not fit or the system gives no threads.
-    pub fn start(
-        haptics: Arc<Haptics>,
-        gains: &HapticsSpec,
-        guide: Guide,
-        gamepad: Gamepad,
-        pace: TickSource,
-    ) -> Result<Self, String> {
+    pub fn start(haptics: Arc<Haptics>, gains: &HapticsSpec, guide: Guide, pace: TickSource) -> Result<Self, String> {
         let (pointer, input) = Pointer::new(gains, &guide.goal()).map_err(|error| error.to_string())?;
         let guide = Arc::new(Mutex::new(guide));
         let stop = Arc::new(AtomicBool::new(false));
@@ -92,15 +86,13 @@ impl Feel {
         let steps = match pace {
             TickSource::Clock => {
                 let (leader, over) = (Arc::clone(&guide), Arc::clone(&stop));
-                threads.push(spawn("guide", move || lead(&leader, &gamepad, input, &over))?);
+                threads.push(spawn("guide", move || lead(&leader, input, &over))?);
                 threads.push(spawn("haptic", move || body.by_the_clock(&report, &refuse))?);
                 None
             }
             TickSource::Steps => {
                 let leader = Arc::clone(&guide);
-                threads.push(spawn("haptic", move || {
-                    body.by_steps(&leader, &gamepad, input, &report, &asked, &acknowledge)
-                })?);
+                threads.push(spawn("haptic", move || body.by_steps(&leader, input, &report, &asked, &acknowledge))?);
                 Some(steps)
             }
         };
@@ -170,11 +162,11 @@ fn lock(guide: &Mutex<Guide>) -> MutexGuard<'_, Guide> {
 }
 
 /// Moves the hand's goal until the loop is over.
-fn lead(guide: &Mutex<Guide>, gamepad: &Gamepad, mut input: PointerInput, over: &AtomicBool) {
+fn lead(guide: &Mutex<Guide>, mut input: PointerInput, over: &AtomicBool) {
     let mut last = Instant::now();
     while !over.load(Ordering::Acquire) {
         let now = Instant::now();
-        let goal = lock(guide).follow(&gamepad.wish(), (now - last).as_secs_f64());
+        let goal = lock(guide).follow((now - last).as_secs_f64());
         last = now;
         // A goal that is none is refused, and the hand stays.
         let _ = input.move_to(&goal);
@@ -199,7 +191,6 @@ impl Body {
     fn by_steps(
         mut self,
         guide: &Mutex<Guide>,
-        gamepad: &Gamepad,
         mut input: PointerInput,
         report: &mpsc::Sender<Result<Seen, String>>,
         asked: &mpsc::Receiver<usize>,
@@ -217,7 +208,7 @@ impl Body {
         let period = self.haptics.period();
         for count in asked {
             for _ in 0..count {
-                let goal = lock(guide).follow(&gamepad.wish(), period);
+                let goal = lock(guide).follow(period);
                 let _ = input.move_to(&goal);
                 let (tick, state) = driver.tick(period, period);
                 latest.write(state);

@@ -1,7 +1,7 @@
-//! Who leads the hand: the pointer, keys, a gamepad, or one of the scene's motions, which plays, pauses and can be scrubbed.
+//! Who leads the hand: the pointer, keys, or one of the scene's motions, which plays, pauses and can be scrubbed.
 
-use super::{gamepad::Wish, loaded::Loaded, pad::JOINTS};
-use crate::{JointVector, device::Motion, scene::Waypoint};
+use super::loaded::Loaded;
+use crate::{JointVector, MAX_JOINTS, device::Motion, scene::Waypoint};
 use eframe::egui;
 
 /// The target that the simulated hand follows. The caller passes the time; this type reads no clock.
@@ -24,8 +24,8 @@ pub struct Guide {
     home: JointVector,
     /// The way back there, and the time in it [s], while the hand takes it.
     way_home: Option<(Motion, f64)>,
-    /// Speeds that keys ask for, as in a [`Wish`]; none while the window has not the keyboard.
-    keys: Option<[f64; JOINTS]>,
+    /// Keys that are held; none while the window has not the keyboard.
+    keys: Option<Keys>,
     /// Since the window last said so [s].
     silence: f64,
     /// The window that shows the hand, which rests while nothing moves; none where there is no window.
@@ -34,10 +34,19 @@ pub struct Guide {
     unasked: f64,
 }
 
+/// Keys that are held.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Keys {
+    /// How fast each joint is to move, from -1 to 1, as a share of the speed of keys.
+    pub speeds: [f64; MAX_JOINTS],
+    /// Whether the hand is to go back to where it was at first.
+    pub home: bool,
+}
+
 /// Time in which the hand is led to the beginning of a motion [s].
 pub const LEAD_IN: f64 = 0.8;
 
-/// How far a key, or a stick pushed all the way, moves a joint in a second, as a share of its range [1/s]: all of it in four
+/// How far a key moves a joint in a second, as a share of its range [1/s]: all of it in four
 /// seconds, slowly enough to press with care.
 const SPEED: f64 = 0.25;
 
@@ -133,9 +142,8 @@ impl Guide {
         (self.playing, self.running, self.goal, self.way_home) = (None, false, goal, None);
     }
 
-    /// The window says which speeds keys ask for, until it says otherwise; none: it has not the keyboard, and neither keys nor
-    /// a gamepad are meant for it.
-    pub fn hear(&mut self, keys: Option<[f64; JOINTS]>) {
+    /// Sets the keys that are held, until the next call; none: the window has not the keyboard.
+    pub fn hear(&mut self, keys: Option<Keys>) {
         (self.keys, self.silence) = (keys, 0.0);
     }
 
@@ -163,22 +171,19 @@ impl Guide {
         self.way_home = Motion::through(&ends, self.goal.len()).ok().map(|way| (way, 0.0));
     }
 
-    /// Does what keys and the gamepad's `wish` ask for, and lets `elapsed` [s] go by; answers with where the hand is led now.
-    pub fn follow(&mut self, wish: &Wish, elapsed: f64) -> JointVector {
+    /// Moves the hand by the keys that are held and the motion that plays, over `elapsed` [s]. Returns where it is led now.
+    pub fn follow(&mut self, elapsed: f64) -> JointVector {
         let before = self.goal;
         self.silence += elapsed;
         self.unasked += elapsed;
         if let Some(keys) = self.keys.filter(|_| self.silence < LONGEST_SILENCE) {
-            if wish.reset {
+            if keys.home && self.way_home.is_none() && self.goal != self.home {
                 self.go_home();
             }
-            let speeds: [f64; JOINTS] =
-                std::array::from_fn(|joint| (keys[joint] + wish.speeds[joint]).clamp(-1.0, 1.0));
-            self.steer(&speeds, elapsed);
+            self.steer(&keys.speeds, elapsed);
         }
         let goal = self.advance(elapsed);
-        // A window at rest is silent: it has to speak again before a gamepad is heard.
-        if (goal != before || *wish != Wish::default()) && self.unasked >= BETWEEN_FRAMES {
+        if goal != before && self.unasked >= BETWEEN_FRAMES {
             self.unasked = 0.0;
             self.window.iter().for_each(egui::Context::request_repaint);
         }
@@ -236,86 +241,65 @@ mod tests {
             limits: vec![[-1.0, 1.0], [-0.2, 0.2]],
             home,
             way_home: None,
-            keys: Some([0.0; JOINTS]),
+            keys: Some(Keys::default()),
             silence: f64::NEG_INFINITY,
             window: None,
             unasked: 0.0,
         }
     }
 
-    fn speeds(first: [f64; 2]) -> [f64; JOINTS] {
-        std::array::from_fn(|joint| first.get(joint).copied().unwrap_or_default())
-    }
-
-    fn wish(first: [f64; 2]) -> Wish {
-        Wish { speeds: speeds(first), reset: false }
+    fn keys(first: [f64; 2]) -> Option<Keys> {
+        Some(Keys { speeds: std::array::from_fn(|joint| first.get(joint).copied().unwrap_or_default()), home: false })
     }
 
     #[test]
-    fn a_gamepad_moves_joints_by_time_and_range_up_to_their_limits_and_no_further_once_it_is_let_go() {
+    fn keys_move_joints_by_time_and_range_up_to_their_limits_and_no_further_once_they_are_let_go() {
         let mut guide = guide();
+        guide.keys = keys([1.0, -0.5]);
         for _ in 0..500 {
-            guide.follow(&wish([1.0, -0.5]), 2e-3);
+            guide.follow(2e-3);
         }
         let expected = [SPEED * 2.0, -0.5 * SPEED * 0.4];
         assert!(guide.goal().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{:?}", guide.goal());
         let held = guide.goal();
+        guide.keys = keys([0.0, 0.0]);
         for _ in 0..500 {
-            assert_eq!(guide.follow(&Wish::default(), 2e-3), held, "it moves without a wish");
+            assert_eq!(guide.follow(2e-3), held, "it moves without a key");
         }
+        guide.keys = keys([1.0, -1.0]);
         for _ in 0..5000 {
-            guide.follow(&wish([1.0, -1.0]), 2e-3);
+            guide.follow(2e-3);
         }
         assert_eq!(&guide.goal()[..], [1.0, -0.2]);
         // A thread that stood still does not throw the arm.
-        guide.follow(&wish([-1.0, 0.0]), 1e6);
+        guide.keys = keys([-1.0, 0.0]);
+        guide.follow(1e6);
         assert!((guide.goal()[0] - (1.0 - SPEED * 2.0 * LONGEST)).abs() < 1e-12, "{:?}", guide.goal());
     }
 
     #[test]
-    fn keys_move_joints_as_a_gamepad_does_however_seldom_a_frame_is_drawn() {
-        let [mut keys, mut gamepad] = [guide(), guide()];
-        keys.hear(Some(speeds([1.0, -1.0])));
-        for step in 0..100 {
-            let before = keys.goal();
-            let now = keys.follow(&Wish::default(), 2e-3);
-            assert!((now[0] - before[0] - SPEED * 2.0 * 2e-3).abs() < 1e-12, "step {step}: {before:?} to {now:?}");
-            assert_eq!(now, gamepad.follow(&wish([1.0, -1.0]), 2e-3));
-        }
-        // Both together are no faster than one, and one against the other is none.
-        for (stick, share) in [(1.0, 1.0), (-1.0, 0.0), (-0.25, 0.75)] {
-            let before = keys.goal();
-            let moved = keys.follow(&wish([stick, 0.0]), 2e-3)[0] - before[0];
-            assert!((moved - share * SPEED * 2.0 * 2e-3).abs() < 1e-12, "{stick}: {moved}");
-        }
-        keys.hear(Some([0.0; JOINTS]));
-        assert_eq!(keys.goal(), keys.follow(&Wish::default(), 2e-3), "it is let go");
-    }
-
-    #[test]
     fn a_window_that_loses_the_keyboard_or_falls_silent_moves_nothing() {
-        let asked = Wish { reset: true, ..wish([1.0, 0.0]) };
         let mut guide = guide();
         guide.hear(None);
         let start = guide.goal();
-        assert_eq!(guide.follow(&asked, 2e-3), start, "a gamepad is heard without the keyboard");
-        guide.hear(Some(speeds([1.0, 0.0])));
-        let held = guide.follow(&Wish::default(), 2e-3);
+        assert_eq!(guide.follow(2e-3), start);
+        guide.hear(keys([1.0, 0.0]));
+        let held = guide.follow(2e-3);
         assert!(held[0] > start[0], "{held:?}");
         guide.hear(None);
-        assert_eq!(guide.follow(&Wish::default(), 2e-3), held, "a key stays down");
+        assert_eq!(guide.follow(2e-3), held, "a key stays down");
         // It says nothing any more.
-        guide.hear(Some(speeds([1.0, 0.0])));
+        guide.hear(keys([1.0, 0.0]));
         for _ in 0..1000 {
-            guide.follow(&Wish::default(), 2e-3);
+            guide.follow(2e-3);
         }
         let gone = guide.goal()[0] - held[0];
         assert!((gone - SPEED * 2.0 * LONGEST_SILENCE).abs() < SPEED * 2.0 * 4e-3, "{gone}");
         let stopped = guide.goal();
-        assert_eq!(guide.follow(&asked, 2e-3), stopped);
+        assert_eq!(guide.follow(2e-3), stopped);
         // It is back.
-        guide.hear(Some([0.0; JOINTS]));
-        assert!(guide.follow(&wish([1.0, 0.0]), 2e-3)[0] > stopped[0]);
+        guide.hear(keys([1.0, 0.0]));
+        assert!(guide.follow(2e-3)[0] > stopped[0]);
     }
 
     #[test]
@@ -326,7 +310,7 @@ mod tests {
         guide.play(0);
         let (mut before, mut fastest, mut ends) = (guide.goal(), 0.0_f64, 0);
         for _ in 0..2000 {
-            let now = guide.follow(&Wish::default(), 2e-3);
+            let now = guide.follow(2e-3);
             fastest = fastest.max((now[0] - before[0]).abs() / 2e-3);
             ends += usize::from(now[0] > 0.499 && before[0] <= 0.499);
             before = now;
@@ -336,14 +320,14 @@ mod tests {
     }
 
     #[test]
-    fn a_reset_leads_home_without_a_blow_unless_another_takes_the_lead() {
-        let reset = Wish { reset: true, speeds: [0.0; JOINTS] };
+    fn the_key_home_leads_back_without_a_blow_unless_another_takes_the_lead() {
+        let home = Some(Keys { home: true, ..Keys::default() });
         let mut guide = guide();
         let mut before = guide.goal();
         let mut fastest = 0.0_f64;
-        guide.follow(&reset, 0.0);
+        guide.keys = home;
         for _ in 0..500 {
-            let now = guide.follow(&Wish::default(), 2e-3);
+            let now = guide.follow(2e-3);
             fastest = fastest.max((now[0] - before[0]).abs() / 2e-3);
             before = now;
         }
@@ -351,9 +335,10 @@ mod tests {
         // Minimum jerk: at most 15/8 of the mean speed.
         assert!(fastest < 1.01 * 1.875 * 0.5 / LEAD_IN, "{fastest}");
         guide.point(JointVector::from_slice(&[-0.5, 0.0]));
-        guide.follow(&reset, 0.0);
-        guide.follow(&Wish::default(), 0.5 * LEAD_IN);
-        let taken = guide.follow(&wish([1.0, 0.0]), 2e-3);
-        assert!(taken[0] < 0.1 && guide.follow(&Wish::default(), 1.0) == taken, "{taken:?}");
+        guide.follow(0.5 * LEAD_IN);
+        guide.keys = keys([1.0, 0.0]);
+        let taken = guide.follow(2e-3);
+        guide.keys = keys([0.0, 0.0]);
+        assert!(taken[0] < 0.1 && guide.follow(1.0) == taken, "{taken:?}");
     }
 }

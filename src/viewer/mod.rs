@@ -8,7 +8,6 @@
 //! | `theme`, `palette` | sizes and type, colours |
 //! | `loaded`, `job`, `background` | what is open, how it is baked or read, and all else that the window must not wait for |
 //! | `feel`, `guide`, `history` | the haptic loop beside the window, who leads the hand, what was felt lately |
-//! | `gamepad`, `gamepad_linux`, `pad` | the gamepad that leads it, how it is read, and what its sticks mean |
 //! | `scene`, `overlay`, `body` | the 3-D panel, what lies on top of its picture, the object on the GPU |
 //! | `steering`, `grip`, `camera` | whence it is seen, and the pointer's grip on the proxy |
 //! | `stage`, `pipelines`, `shapes`, `pixels` | the renderer of that panel |
@@ -29,9 +28,6 @@ mod controls;
 mod feel;
 mod files;
 mod gains;
-mod gamepad;
-#[cfg(target_os = "linux")]
-mod gamepad_linux;
 mod guide;
 mod history;
 mod job;
@@ -40,7 +36,6 @@ mod loaded;
 mod node_drag;
 mod offscreen;
 mod overlay;
-mod pad;
 mod palette;
 mod panels;
 mod pipelines;

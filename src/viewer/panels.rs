@@ -3,7 +3,6 @@
 use super::{
     app::{Viewer, not_drawn},
     feel::TickSource,
-    gamepad::{Found, Gamepad},
     guide::Guide,
     job::{Job, Task, short},
     loaded::Loaded,
@@ -173,7 +172,6 @@ impl Viewer {
             .size_range(CONTROLS_RANGE)
             .show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-                    gamepad(ui, &self.gamepad);
                     let (controls, loaded) = (&mut session.controls, &session.loaded);
                     bake = controls.show(ui, loaded, session.advice.as_deref(), &mut self.scene.shown, &self.solvers);
                 });
@@ -266,15 +264,6 @@ fn name(ui: &mut Ui, loaded: &Loaded, width: f32) {
     let shown = ui.add_sized(size, Label::new(text).truncate());
     if let Some(file) = &loaded.file {
         shown.on_hover_text(file.display().to_string());
-    }
-}
-
-/// Shows the name of the gamepad if there is one, or why it cannot be read.
-fn gamepad(ui: &mut Ui, gamepad: &Gamepad) {
-    match gamepad.found() {
-        Found::None => {}
-        Found::Connected(name) => drop(ui.label(RichText::new(format!("Gamepad: {name}")).weak().small())),
-        Found::Refused(why) => drop(ui.colored_label(ui.visuals().warn_fg_color, RichText::new(why).small())),
     }
 }
 

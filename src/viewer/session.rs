@@ -5,7 +5,6 @@ use super::{
     cloud::Cloud,
     controls::Controls,
     feel::{Feel, TickSource},
-    gamepad::Gamepad,
     guide::Guide,
     history::History,
     loaded::Loaded,
@@ -26,7 +25,6 @@ pub struct Session {
     pub loaded: Loaded,
     pub feel: Feel,
     pub history: History,
-    gamepad: Gamepad,
     pace: TickSource,
     /// The loop with the gains that the controls have, made in the background.
     retuning: Following<HapticsSpec, Result<Tuned, SetupError>>,
@@ -50,7 +48,6 @@ impl Session {
     pub fn new(
         loaded: Loaded,
         context: &Arc<Context>,
-        gamepad: &Gamepad,
         pace: TickSource,
         wake: impl Fn() + Send + 'static,
     ) -> Result<Self, String> {
@@ -58,12 +55,11 @@ impl Session {
         let gains = controls.tuning.haptics.clone();
         let haptics = Arc::clone(&loaded.setup.haptics);
         let history = History::new(haptics.period()).ok_or("no memory for histograms; close other programs")?;
-        let feel = Feel::start(haptics, &gains, Guide::new(&loaded), gamepad.clone(), pace)?;
+        let feel = Feel::start(haptics, &gains, Guide::new(&loaded), pace)?;
         let (slices, cloud) = (Slices::new(&loaded.dataset), Cloud::new(&loaded.dataset));
         let advice = loaded.setup.advice.clone();
         let retuning = Following::new(Some(gains));
-        let gamepad = gamepad.clone();
-        Ok(Self { loaded, feel, history, gamepad, pace, retuning, slices, cloud, controls, advice, cloud_first: false })
+        Ok(Self { loaded, feel, history, pace, retuning, slices, cloud, controls, advice, cloud_first: false })
     }
 
     /// Makes again what belongs to a window and a device that are gone; the loop goes on. `context` is the new one, `wake` is called
@@ -130,7 +126,7 @@ impl Session {
         let (haptics, advice) = made.map_err(|error| error.to_string())?;
         let guide = self.feel.guide().clone();
         self.history.collect(&mut self.feel);
-        self.feel = Feel::start(haptics, &self.controls.tuning.haptics, guide, self.gamepad.clone(), self.pace)?;
+        self.feel = Feel::start(haptics, &self.controls.tuning.haptics, guide, self.pace)?;
         self.history.begin_anew();
         self.advice = advice;
         Ok(())
@@ -163,7 +159,7 @@ mod tests {
         };
         let loaded = Loaded::new(bake.in_memory().unwrap().0, None, None).unwrap();
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-        let mut session = Session::new(loaded, &context, &Gamepad::default(), TickSource::Steps, || ()).unwrap();
+        let mut session = Session::new(loaded, &context, TickSource::Steps, || ()).unwrap();
         let (open, gate) = mpsc::channel::<()>();
         let other = HapticsSpec { interpolation: Interpolation::Potential, ..session.controls.tuning.haptics.clone() };
         session.controls.tuning.haptics = other.clone();

@@ -1,7 +1,11 @@
 //! Whence the 3-D scene is seen, and the hand in it: orbit, pan, zoom, reset; the pointer takes the proxy by a node and drags
 //! it; keys move joints.
 
-use super::{camera::Camera, guide::Guide, node_drag::NodeDrag, pad::JOINTS};
+use super::{
+    camera::Camera,
+    guide::{Guide, Keys},
+    node_drag::NodeDrag,
+};
 use crate::proxy::{Chain, Pose};
 use eframe::egui::{CursorIcon, InputState, Key, PointerButton, Pos2, Rect, Response, Ui};
 use glam::Vec2;
@@ -16,12 +20,11 @@ pub struct Steering {
 }
 
 /// Actions of pointer and keys over the scene, for the window's help.
-pub const HELP: [(&str, &str); 9] = [
+pub const HELP: [(&str, &str); 8] = [
     ("Drag a node of the arm", "move the device"),
-    ("A, D", "turn its first joint"),
-    ("W, S", "turn its second joint"),
-    ("E, Q", "turn its third joint"),
-    ("Gamepad: sticks, triggers, bumpers", "turn the joints; A or × leads back to the start"),
+    ("A D, W S, Q E", "turn its joints 1, 2, 3"),
+    ("F H, T G, R Y", "turn its joints 4, 5, 6"),
+    ("Home", "lead it back to the start"),
     ("Drag elsewhere", "orbit"),
     ("Right-drag, Shift-drag", "pan"),
     ("Wheel, pinch", "zoom"),
@@ -84,7 +87,7 @@ impl Steering {
             self.camera.zoom((-ZOOM_PER_POINT * scroll).exp() / pinch);
         }
         let meant = response.hovered() && ui.memory(|memory| memory.focused().is_none());
-        let held = |input: &InputState| if meant { held(input) } else { [0.0; JOINTS] };
+        let held = |input: &InputState| if meant { held(input) } else { Keys::default() };
         guide.hear(ui.input(|input| input.focused.then(|| held(input))));
         if self.grip.is_some() {
             ui.ctx().set_cursor_icon(CursorIcon::Grabbing);
@@ -96,9 +99,10 @@ impl Steering {
     }
 }
 
-/// How fast keys ask each joint to move, as a share of their speed: A and D the first, W and S the second, Q and E the third.
-fn held(input: &InputState) -> [f64; JOINTS] {
-    use Key::{A, D, E, Q, S, W};
-    let way = |less, more| f64::from(i8::from(input.key_down(more)) - i8::from(input.key_down(less)));
-    [way(A, D), way(S, W), way(Q, E), 0.0, 0.0, 0.0]
+/// Returns the keys that are held: a pair for each joint, the second of which moves it forwards.
+fn held(input: &InputState) -> Keys {
+    use Key::{A, D, E, F, G, H, Q, R, S, T, W, Y};
+    const PAIRS: [[Key; 2]; crate::MAX_JOINTS] = [[A, D], [S, W], [Q, E], [F, H], [G, T], [R, Y]];
+    let way = |[less, more]: [Key; 2]| f64::from(i8::from(input.key_down(more)) - i8::from(input.key_down(less)));
+    Keys { speeds: PAIRS.map(way), home: input.key_down(Key::Home) }
 }

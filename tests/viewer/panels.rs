@@ -160,7 +160,7 @@ fn the_window_says_what_pointer_and_keys_do_and_what_draws() {
     let adapter = DEVICE_NAME.get().unwrap();
     assert!(window.shows(&format!("drawn by {}", adapter.split(" (").next().unwrap())));
     window.click("Help");
-    for help in ["Drag a node of the arm", "A, D", "reset the view", "Right-drag, Ctrl-wheel"] {
+    for help in ["Drag a node of the arm", "A D, W S, Q E", "reset the view", "Right-drag, Ctrl-wheel"] {
         assert!(window.shows(help), "{help} is missing");
     }
 }

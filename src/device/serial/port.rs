@@ -3,6 +3,7 @@
 use crate::device::Halt;
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
+    fs::OFlags,
     termios::{OptionalActions, QueueSelector, ioctl_tiocexcl, tcflush, tcgetattr, tcsetattr},
 };
 use std::{
@@ -21,8 +22,11 @@ impl Port {
     /// # Errors
     /// In words, with the remedy.
     pub fn open(path: &str) -> Result<Self, String> {
-        let opened =
-            OpenOptions::new().read(true).write(true).custom_flags(libc::O_NOCTTY | libc::O_NONBLOCK).open(path);
+        let opened = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .custom_flags((OFlags::NOCTTY | OFlags::NONBLOCK).bits().cast_signed())
+            .open(path);
         let file = opened.map_err(|error| match error.kind() {
             ErrorKind::PermissionDenied => {
                 format!("{path} may not be opened: join its group (usermod -aG dialout $USER, on some systems uucp) and log in again")
