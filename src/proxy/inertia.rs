@@ -50,26 +50,50 @@ impl Chain {
     }
 }
 
-/// Solves `M x = b` in place by Cholesky's method. M must be positive definite, as every inertia with positive rotor
-/// inertias is. Allocates nothing.
-pub fn solve_positive(matrix: &JointMatrix, b: &mut JointVector) {
-    let mut l = *matrix;
-    let count = b.len();
-    for i in 0..count {
+/// Returns the lower Cholesky factor of the leading `joints` rows and columns; `None` if they are not positive definite.
+/// Allocates nothing.
+#[must_use]
+pub fn cholesky(matrix: &JointMatrix, joints: usize) -> Option<JointMatrix> {
+    let mut factor = [[0.0; MAX_JOINTS]; MAX_JOINTS];
+    for i in 0..joints {
         for j in 0..=i {
-            let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
-            let rest = l[i][j] - sum;
-            l[i][j] = if i == j { rest.max(f64::MIN_POSITIVE).sqrt() } else { rest / l[j][j] };
+            let sum: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
+            let entry = matrix[i][j] - sum;
+            if i == j {
+                // Also false for what is not a number.
+                if !(entry > 0.0 && entry.is_finite()) {
+                    return None;
+                }
+                factor[i][i] = entry.sqrt();
+            } else {
+                factor[i][j] = entry / factor[j][j];
+            }
         }
     }
-    for i in 0..count {
-        let sum: f64 = (0..i).map(|k| l[i][k] * b[k]).sum();
-        b[i] = (b[i] - sum) / l[i][i];
+    Some(factor)
+}
+
+/// `vector <- L^-T vector`.
+pub fn solve_transposed(factor: &JointMatrix, vector: &mut JointVector) {
+    let joints = vector.len();
+    for i in (0..joints).rev() {
+        let sum: f64 = (i + 1..joints).map(|j| factor[j][i] * vector[j]).sum();
+        vector[i] = (vector[i] - sum) / factor[i][i];
     }
-    for i in (0..count).rev() {
-        let sum: f64 = (i + 1..count).map(|k| l[k][i] * b[k]).sum();
-        b[i] = (b[i] - sum) / l[i][i];
+}
+
+/// Solves `M x = b` in place; x is NaN if M is not positive definite, as every inertia with positive rotor inertias is.
+/// Allocates nothing.
+pub fn solve_positive(matrix: &JointMatrix, b: &mut JointVector) {
+    let Some(factor) = cholesky(matrix, b.len()) else {
+        b.iter_mut().for_each(|entry| *entry = f64::NAN);
+        return;
+    };
+    for i in 0..b.len() {
+        let sum: f64 = (0..i).map(|k| factor[i][k] * b[k]).sum();
+        b[i] = (b[i] - sum) / factor[i][i];
     }
+    solve_transposed(&factor, b);
 }
 
 #[cfg(test)]

@@ -15,5 +15,5 @@ mod random;
 
 pub use chain::{Chain, Joint, Node, Pose};
 pub use dynamics::Dynamics;
-pub use inertia::{JointMatrix, solve_positive};
+pub use inertia::{JointMatrix, cholesky, solve_positive, solve_transposed};
 pub use links::Links;

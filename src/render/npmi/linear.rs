@@ -1,30 +1,9 @@
-//! Small dense linear algebra over the joints: factors and solves of matrices of order one to six.
+//! Small dense linear algebra over the joints: solves with held joints, and the gyroscopic matrix.
 
 use crate::{
     JointVector, MAX_JOINTS,
     proxy::{Dynamics, JointMatrix},
 };
-
-/// Lower Cholesky factor of the leading `joints` rows and columns; `None` when they are not positive definite.
-pub(super) fn cholesky(matrix: &JointMatrix, joints: usize) -> Option<JointMatrix> {
-    let mut factor = [[0.0; MAX_JOINTS]; MAX_JOINTS];
-    for i in 0..joints {
-        for j in 0..=i {
-            let sum: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
-            let entry = matrix[i][j] - sum;
-            if i == j {
-                // Also false for what is not a number.
-                if !(entry > 0.0 && entry.is_finite()) {
-                    return None;
-                }
-                factor[i][i] = entry.sqrt();
-            } else {
-                factor[i][j] = entry / factor[j][j];
-            }
-        }
-    }
-    Some(factor)
-}
 
 /// Solves `(A v)_free = r_free` with `v_held` as in `at`; A positive definite, symmetric or not. Elimination without
 /// pivoting: the pivots of a positive definite matrix are positive, and so are those of its rows and columns that are
@@ -62,15 +41,6 @@ pub(super) fn solve_held(
         solution[i] = (solution[i] - sum) / rows[i][i];
     }
     solution
-}
-
-/// `vector <- L^-T vector`.
-pub(super) fn solve_transposed(factor: &JointMatrix, vector: &mut JointVector) {
-    let joints = vector.len();
-    for i in (0..joints).rev() {
-        let sum: f64 = (i + 1..joints).map(|j| factor[j][i] * vector[j]).sum();
-        vector[i] = (vector[i] - sum) / factor[i][i];
-    }
 }
 
 /// S, the skew part of `C - L Ldot^T`, exactly skew. From `M = L L^T` follows `Ldot = L Phi`, Phi the lower triangle of

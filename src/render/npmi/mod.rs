@@ -33,9 +33,9 @@ mod tests;
 use crate::{
     JointVector, MAX_JOINTS,
     field::range::Stops,
-    proxy::{Chain, JointMatrix},
+    proxy::{Chain, JointMatrix, cholesky, solve_transposed},
 };
-use linear::{cholesky, solve_held};
+use linear::solve_held;
 use stops::{Side, solve_in_box};
 
 /// Size below which a decaying state of the haptic loop is set to zero, in its SI unit. It is far below anything that
@@ -317,7 +317,7 @@ impl MidpointInertia {
     /// L^-T p.
     fn velocity_of(&self, momentum: &JointVector) -> JointVector {
         let mut velocity = *momentum;
-        linear::solve_transposed(&self.factor, &mut velocity);
+        solve_transposed(&self.factor, &mut velocity);
         velocity
     }
 }
