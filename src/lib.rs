@@ -69,6 +69,7 @@ pub mod proxy;
 pub mod urdf;
 
 pub mod contact;
+pub mod fixtures;
 
 pub mod gpu;
 
@@ -83,6 +84,7 @@ pub mod device;
 pub mod render;
 
 pub mod report;
+pub mod studies;
 
 #[cfg(feature = "viewer")]
 pub mod viewer;

@@ -5,10 +5,11 @@ use glam::DVec3;
 
 /// A linear congruential generator, of which the upper 53 bits count (Knuth 1998, The Art of Computer Programming, volume 2,
 /// section 3.3.4).
-pub(crate) struct Random(u64);
+pub struct Random(u64);
 
 impl Random {
     /// Starts at `seed`.
+    #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 
 use haptize::{
-    report::accuracy::{self, Extent, Study},
     scene::{EFFECTS, Scene},
+    studies::accuracy::{self, Extent, Study},
 };
 use std::path::Path;
 

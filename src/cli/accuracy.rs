@@ -3,8 +3,8 @@
 use super::{Failure, Report, output::Folder, reach, tell};
 use crate::{
     haptize::BackendChoice,
-    report::accuracy::{self, Extent},
     scene::Scene,
+    studies::accuracy::{self, Extent},
 };
 use serde_json::Value;
 use std::path::PathBuf;

@@ -4,7 +4,7 @@ use super::{Failure, Report, bar::Bar, output::Folder};
 use crate::{
     gpu::{AdapterChoice, Context},
     haptize::{OTHER_ADAPTER, remedied},
-    report::stability::{Bound, Case, CaseResult, Effort, FILES, Setting, cases, table, write_all},
+    studies::stability::{Bound, Case, CaseResult, Effort, FILES, Setting, cases, table, write_all},
 };
 use std::{path::PathBuf, sync::Arc, time::Instant};
 

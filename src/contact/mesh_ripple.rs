@@ -90,8 +90,8 @@ fn facet(model: &Model<'_>, triangle: usize) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::bodies::{Ball, PAPER, contact, floating_bar, skinned, sphere};
     use crate::object::Object;
-    use crate::report::stability::contact::world::{Ball, PAPER, contact, floating_bar, skinned, sphere};
 
     /// The ripple of `object` under contact springs as stiff as a hand's.
     fn ripple(object: &Object) -> MeshRipple {

@@ -10,9 +10,9 @@ use super::{
 /// Width of a chart's sheet, in points.
 const WIDTH: f64 = 760.0;
 /// Margin of every sheet.
-pub(super) const MARGIN: f64 = 24.0;
+pub(crate) const MARGIN: f64 = 24.0;
 /// Left end of headlines.
-pub(super) const TITLE_LEFT: f64 = MARGIN;
+pub(crate) const TITLE_LEFT: f64 = MARGIN;
 /// Room for the tick labels left of a panel.
 const LEFT: f64 = 40.0;
 /// Room for the title and legend above a panel.
@@ -91,7 +91,7 @@ const SHADE: Colour = colour::SHADE;
 
 impl Lane {
     /// A panel without curves.
-    pub(super) fn empty(title: &str) -> Self {
+    pub(crate) fn empty(title: &str) -> Self {
         Self { title: title.to_owned(), curves: Vec::new(), height: 130.0, counts: false }
     }
 
@@ -195,6 +195,6 @@ impl Histogram {
 }
 
 /// The figure's title, top left.
-pub(super) fn headline(canvas: &mut Canvas, text: &str) {
+pub(crate) fn headline(canvas: &mut Canvas, text: &str) {
     canvas.text((TITLE_LEFT, MARGIN + 12.0), text, plot::HEADLINE);
 }

@@ -4,7 +4,6 @@
 //! it, [`raster`] draws solid bodies. The figures themselves are functions of the library's types; none of them knows
 //! how the data came about.
 
-pub mod accuracy;
 pub mod canvas;
 pub mod chart;
 pub mod colour;
@@ -21,8 +20,7 @@ pub mod press;
 pub mod raster;
 pub mod slices;
 pub mod space;
-pub mod stability;
-mod ticks;
+pub(crate) mod ticks;
 
 use crate::{
     dataset::{Dataset, replace_file},
@@ -133,7 +131,7 @@ pub fn write_png(folder: &Path, name: &str, canvas: &Canvas) -> Result<PathBuf, 
     write(folder.join(name).with_extension("png"), &canvas.pixels(PIXELS)?.png()?)
 }
 
-fn write(path: PathBuf, bytes: &[u8]) -> Result<PathBuf, ReportError> {
+pub(crate) fn write(path: PathBuf, bytes: &[u8]) -> Result<PathBuf, ReportError> {
     let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
     match made.and_then(|()| replace_file(&path, |file| file.write_all(bytes))) {
         Ok(()) => Ok(path),

@@ -14,16 +14,16 @@ const TICK_SIZE: f64 = 11.0;
 const TITLE_SIZE: f64 = 12.5;
 
 /// Tick labels.
-pub(super) const TICK: TextStyle =
+pub(crate) const TICK: TextStyle =
     TextStyle { size: TICK_SIZE, weight: Weight::Regular, colour: colour::SOFT_INK, anchor: Anchor::Middle };
 /// Titles of axes and panels.
-pub(super) const TITLE: TextStyle =
+pub(crate) const TITLE: TextStyle =
     TextStyle { size: TITLE_SIZE, weight: Weight::Medium, colour: colour::INK, anchor: Anchor::Start };
 /// Legends and notes.
-pub(super) const NOTE: TextStyle =
+pub(crate) const NOTE: TextStyle =
     TextStyle { size: TICK_SIZE + 0.5, weight: Weight::Regular, colour: colour::INK, anchor: Anchor::Start };
 /// Title of a whole figure.
-pub(super) const HEADLINE: TextStyle =
+pub(crate) const HEADLINE: TextStyle =
     TextStyle { size: 16.0, weight: Weight::Medium, colour: colour::INK, anchor: Anchor::Start };
 
 /// One axis: its ends in data units, and its name with the unit.
@@ -130,7 +130,7 @@ pub enum Mark {
 const TITLE_LIFT: f64 = 11.0;
 
 /// Lengths of dash and gap of dashed curves.
-pub(super) const DASHES: [f64; 2] = [5.0, 3.5];
+pub(crate) const DASHES: [f64; 2] = [5.0, 3.5];
 
 impl Panel {
     /// Position of a data point on the sheet.
@@ -219,7 +219,7 @@ impl Panel {
 }
 
 /// A legend on one line that ends at `right`, a point of its base line.
-pub(super) fn legend(canvas: &mut Canvas, right: (f64, f64), entries: &[Entry]) {
+pub(crate) fn legend(canvas: &mut Canvas, right: (f64, f64), entries: &[Entry]) {
     const SYMBOL: f64 = 18.0;
     const GAP: f64 = 6.0;
     const SPACE: f64 = 18.0;
@@ -247,7 +247,7 @@ pub(super) fn legend(canvas: &mut Canvas, right: (f64, f64), entries: &[Entry]) 
 
 /// A vertical colour bar in `area`, ticks on its right, its title above: beginning with the bar, or ending with the
 /// tick labels.
-pub(super) fn colour_bar(canvas: &mut Canvas, area: Area, map: ColourMap, title: &str, anchor: Anchor) {
+pub(crate) fn colour_bar(canvas: &mut Canvas, area: Area, map: ColourMap, title: &str, anchor: Anchor) {
     const STEPS: usize = 96;
     let [low, high] = map.range();
     let height = area.height / STEPS as f64;
@@ -302,7 +302,7 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 ///
 /// `values` has `columns` numbers a row; cells with a corner that is no number have no line. Where all four sides are
 /// crossed the mean of the corners decides which are joined.
-pub(super) fn level_lines(values: &[f64], columns: usize, level: f64) -> Vec<[(f64, f64); 2]> {
+pub(crate) fn level_lines(values: &[f64], columns: usize, level: f64) -> Vec<[(f64, f64); 2]> {
     let rows = values.len().checked_div(columns).unwrap_or(0);
     let mut segments = Vec::new();
     for row in 0..rows.saturating_sub(1) {

@@ -14,7 +14,7 @@ const AXIS_END: f64 = 0.005;
 
 /// Ticks of one axis.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Ticks {
+pub(crate) struct Ticks {
     /// Where, in data units, and what is written there.
     pub marks: Vec<(f64, String)>,
     /// Common factor as text, `×10⁻³`; empty when it is one.
@@ -22,7 +22,7 @@ pub(super) struct Ticks {
 }
 
 /// Ends of an axis that holds all finite `values` and `margin` of their extent on both sides; never empty.
-pub(super) fn range(values: impl Iterator<Item = f64>, margin: f64) -> [f64; 2] {
+pub(crate) fn range(values: impl Iterator<Item = f64>, margin: f64) -> [f64; 2] {
     let (low, high) = values
         .filter(|value| value.is_finite())
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
@@ -37,7 +37,7 @@ pub(super) fn range(values: impl Iterator<Item = f64>, margin: f64) -> [f64; 2] 
 
 /// The same range, its ends moved to the next hundredth of a power of ten if that is nearer than half a percent of the
 /// extent: a recording that ends one sample before 3 s shows its tick at 3 s.
-pub(super) fn snapped([low, high]: [f64; 2]) -> [f64; 2] {
+pub(crate) fn snapped([low, high]: [f64; 2]) -> [f64; 2] {
     let grain = 10_f64.powf((high - low).log10().floor() - 1.0);
     let snap = |end: f64| {
         let round = (end / grain).round() * grain;
@@ -47,7 +47,7 @@ pub(super) fn snapped([low, high]: [f64; 2]) -> [f64; 2] {
 }
 
 /// Ticks inside `range`, at most `intervals` of them and one.
-pub(super) fn ticks(range: [f64; 2], intervals: usize) -> Ticks {
+pub(crate) fn ticks(range: [f64; 2], intervals: usize) -> Ticks {
     let [low, high] = range;
     let none = Ticks { marks: Vec::new(), factor: String::new() };
     let extent = high - low;
@@ -80,7 +80,7 @@ const FEW_DECADES: usize = 4;
 
 /// Marks of a logarithmic axis, both ends positive, at most `intervals` of them and one: powers of ten, every so many;
 /// of few decades also the numbers between, 2 and 5 or 3, or round ones where the ends are close to each other.
-pub(super) fn decades(range: [f64; 2], intervals: usize) -> Ticks {
+pub(crate) fn decades(range: [f64; 2], intervals: usize) -> Ticks {
     let powers = multiples(range, &[1]);
     let few = || [&[1, 2, 5][..], &[1, 3]].map(|digits| multiples(range, digits)).into_iter();
     let marks = match powers.len() {
@@ -119,7 +119,7 @@ fn multiples([low, high]: [f64; 2], digits: &[u8]) -> Vec<(f64, String)> {
 }
 
 /// `value` with `decimals` digits after the point and a typographic minus.
-pub(super) fn number(value: f64, decimals: usize) -> String {
+pub(crate) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
         Some(magnitude) if magnitude.bytes().all(|byte| matches!(byte, b'0' | b'.')) => magnitude.to_owned(),
@@ -129,7 +129,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
 }
 
 /// Returns `number` with a comma before every third digit: `8,064`.
-pub(super) fn thousands(number: usize) -> String {
+pub(crate) fn thousands(number: usize) -> String {
     let digits = number.to_string();
     let mut text = String::new();
     for (index, digit) in digits.chars().enumerate() {

@@ -1,12 +1,12 @@
 //! Force balance, contact law, torque and energy of the energy form on random configurations.
 
-use crate::fixture::{Sequence, arm, arm_of_six, contact, random_configurations, sphere, torus};
+use crate::fixture::{Random, arm, arm_of_six, contact, random_configurations, sphere, torus};
 use crate::oracle::{check_account, check_contact_law, gap, pose};
 use glam::DVec3;
 use haptize::contact::{Equilibrium, Model, Solver, Status, Touch};
+use haptize::fixtures::bodies::{self, BALL, RADIUS, floating_bar, pressed};
 use haptize::object::Object;
 use haptize::proxy::Chain;
-use haptize::report::stability::contact::world::{self, BALL, RADIUS, floating_bar, pressed};
 use haptize::scene::{Algorithm, SpringKind};
 
 /// Solves all configurations, checks those in contact, and returns how many were and how many of them converged.
@@ -109,9 +109,9 @@ fn hard_configurations_are_balanced_or_flagged() {
         (10, axial, 1e4, true, 0.0, 1e6, [0.0, 0.2], vec![131]),
         (20, isotropic, 100.0, false, BALL, f64::INFINITY, [0.2, 0.5], vec![5, 14]),
     ] {
-        let object = world::sphere(world::Ball { rings, springs, ground, patch }).unwrap();
+        let object = bodies::sphere(bodies::Ball { rings, springs, ground, patch }).unwrap();
         let chain = floating_bar(radius);
-        let model = Model::new(&object, &chain, world::contact(stiffness));
+        let model = Model::new(&object, &chain, bodies::contact(stiffness));
         let [least, most] = depths.map(|depth| depth * RADIUS);
         let configurations = pressed(&model, 1, 1 + places.iter().max().unwrap(), least, most);
         let mut solver = Solver::new(&model);
@@ -164,11 +164,11 @@ fn the_residual_of_rigid_contact_is_the_imbalance_of_forces() {
 
 #[test]
 fn saddles_are_left() {
-    let object = world::sphere(world::PAPER).unwrap();
+    let object = bodies::sphere(bodies::PAPER).unwrap();
     let mut left = 0;
     for (radius, stiffness, height) in [(0.008, 500.0, 0.0398), (0.004, 5000.0, 0.044), (0.004, 5000.0, 0.042)] {
-        let chain = world::gantry(vec![haptize::scene::ProxyNodeSpec { position: DVec3::ZERO, radius, length: 0.0 }]);
-        let model = Model::new(&object, &chain, world::contact(stiffness));
+        let chain = bodies::gantry(vec![haptize::scene::ProxyNodeSpec { position: DVec3::ZERO, radius, length: 0.0 }]);
+        let model = Model::new(&object, &chain, bodies::contact(stiffness));
         let mut solver = Solver::new(&model);
         for aside in [-0.0047, 0.0] {
             let on = solver.solve(&[0.0, aside, height]);
@@ -186,9 +186,9 @@ fn saddles_are_left() {
 #[test]
 fn soft_balls_rest_deep_in_their_dents() {
     let object =
-        world::sphere(world::Ball { rings: 10, springs: SpringKind::Axial, ground: 1e3, patch: false }).unwrap();
+        bodies::sphere(bodies::Ball { rings: 10, springs: SpringKind::Axial, ground: 1e3, patch: false }).unwrap();
     let chain = floating_bar(BALL);
-    let model = Model::new(&object, &chain, world::contact(1e3));
+    let model = Model::new(&object, &chain, bodies::contact(1e3));
     let mut solver = Solver::new(&model);
     let configurations = pressed(&model, 1, 117, 0.2 * RADIUS, 0.5 * RADIUS);
     let (mut sunk, mut derivatives) = (0, 0);
@@ -217,7 +217,7 @@ fn soft_balls_rest_deep_in_their_dents() {
 fn chains_of_one_and_six_joints_work() {
     let object = sphere(SpringKind::Isotropic);
     let one = Chain::new(&haptize::scene::ProxySpec { joints: arm(0.0).joints.split_off(1)[..1].to_vec() });
-    let mut sequence = Sequence::new(5);
+    let mut sequence = Random::new(5);
     let turns: Vec<Vec<f64>> = (0..40).map(|_| vec![sequence.between(-0.3, 0.4)]).collect();
     let (touching, converged) = check(&object, &one, 500.0, &turns);
     assert!(touching > 5 && converged == touching, "{converged} of {touching}");

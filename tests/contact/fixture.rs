@@ -1,17 +1,17 @@
 //! Objects, proxies and configurations that the tests share, made of those of the hard cases.
 
 use glam::DVec3;
-pub use haptize::report::stability::contact::world::Sequence;
+pub use haptize::fixtures::Random;
 use haptize::{
+    fixtures::bodies::{self, Ball, PAPER, joint},
     object::Object,
     proxy::Chain,
-    report::stability::contact::world::{self, Ball, PAPER, joint},
     scene::{Algorithm, ContactSpec, JointKind, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind},
 };
 
 /// Springs of 300 N/m and ground of 100 N/m at every node.
 pub fn spec(shape: Shape, kind: SpringKind) -> ObjectSpec {
-    ObjectSpec { shape, ..world::sphere_spec(Ball { springs: kind, ..PAPER }, SPHERE_CENTRE, 1.0, 1.0) }
+    ObjectSpec { shape, ..bodies::sphere_spec(Ball { springs: kind, ..PAPER }, SPHERE_CENTRE, 1.0, 1.0) }
 }
 
 /// Where the sphere of [`sphere`] lies [m].
@@ -19,24 +19,24 @@ pub const SPHERE_CENTRE: DVec3 = DVec3::new(0.16, 0.0, 0.0);
 
 /// The paper's sphere of 102 nodes, radius 50 mm.
 pub fn sphere(kind: SpringKind) -> Object {
-    Object::build(&world::sphere_spec(Ball { springs: kind, ..PAPER }, SPHERE_CENTRE, 1.0, 1.0)).unwrap()
+    Object::build(&bodies::sphere_spec(Ball { springs: kind, ..PAPER }, SPHERE_CENTRE, 1.0, 1.0)).unwrap()
 }
 
 /// An object on a surface given by nodes and triangles.
 pub fn object(nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Object {
-    world::object(nodes, triangles).unwrap()
+    bodies::object(nodes, triangles).unwrap()
 }
 
 /// The same object held at every node by springs of this stiffness [N/m].
 pub fn grounded(object: &Object, stiffness: f64) -> Object {
-    let mut spec = world::sphere_spec(PAPER, SPHERE_CENTRE, 1.0, 1.0);
+    let mut spec = bodies::sphere_spec(PAPER, SPHERE_CENTRE, 1.0, 1.0);
     spec.ground.as_mut().unwrap().stiffness = stiffness;
     Object::from_surface(&spec, object.rest.clone(), object.triangles.clone()).unwrap()
 }
 
 /// A torus in place of the sphere: a surface with concave parts.
 pub fn torus() -> Object {
-    world::torus(SPHERE_CENTRE).unwrap()
+    bodies::torus(SPHERE_CENTRE).unwrap()
 }
 
 /// A regular octahedron of edge 0.1 m around the origin.
@@ -84,17 +84,17 @@ pub fn probe(from: DVec3, axis: DVec3) -> Chain {
 
 /// The same with a radius.
 pub fn ball(from: DVec3, axis: DVec3, radius: f64) -> Chain {
-    world::probe(from, axis, radius)
+    bodies::probe(from, axis, radius)
 }
 
 /// Contact springs Kc [N/m], and few iterations: what converges here does so soon.
 pub fn contact(algorithm: Algorithm, stiffness: f64) -> ContactSpec {
-    ContactSpec { algorithm, max_iterations: 100, ..world::contact(stiffness) }
+    ContactSpec { algorithm, max_iterations: 100, ..bodies::contact(stiffness) }
 }
 
 /// Joint coordinates of [`arm`] at random, about a third of them in contact with the sphere.
 pub fn random_configurations(seed: u64, count: usize) -> Vec<Vec<f64>> {
-    let mut sequence = Sequence::new(seed);
+    let mut sequence = Random::new(seed);
     (0..count)
         .map(|_| vec![sequence.between(-0.4, 0.4), sequence.between(-0.1, 0.45), sequence.between(-0.1, 0.7)])
         .collect()

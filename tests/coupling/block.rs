@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // Only tests call this.
 
-pub use haptize::report::stability::worlds::{BLOCK_STIFFNESS as STIFFNESS, block, block_scene as scene};
+pub use haptize::fixtures::worlds::{BLOCK_STIFFNESS as STIFFNESS, block, block_scene as scene};
 use haptize::{
     JointVector,
     render::{

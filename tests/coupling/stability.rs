@@ -1,6 +1,6 @@
 //! The hard cases of the tick, in their short form.
 
-use haptize::report::stability::{Effort, Setting, coupling::CASES, table};
+use haptize::studies::stability::{Effort, Setting, coupling::CASES, table};
 
 #[test]
 fn hard_cases_are_finite_bounded_and_passive_or_let_go() {

@@ -403,7 +403,7 @@ fn updates_are_refused() {
 /// origin, torque along paths and against the energy, singular arms; not the search for lower equilibria, which is the CPU's alone.
 #[test]
 fn the_gpu_keeps_the_bounds_of_its_hard_cases() {
-    use haptize::report::stability::{CaseResult, Effort, Setting, cases, table};
+    use haptize::studies::stability::{CaseResult, Effort, Setting, cases, table};
     let setting = Setting { effort: Effort::Sample, gpu: Some(context()) };
     for case in cases().into_iter().filter(|case| case.room == "contact" && case.name != "lowest equilibrium") {
         let outcomes = (case.run)(&setting).unwrap();

@@ -7,9 +7,9 @@ use crate::contact::geometry::smooth::CARRIERS;
 use crate::contact::law::depth::{Carriers, Contact, measure};
 use crate::contact::law::series::distribute_all;
 use crate::contact::linear::support::Support;
+use crate::fixtures::bodies::{Ball, PAPER, sphere};
 use crate::object::{Compliance, Object};
 use crate::random::Random;
-use crate::report::stability::contact::world::{Ball, PAPER, sphere};
 use crate::scene::SpringKind;
 use glam::DVec3;
 

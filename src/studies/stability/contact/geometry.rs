@@ -3,7 +3,7 @@
 
 use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::{Processor, processors};
-use super::world::{BALL, PAPER, RADIUS, contact, floating_bar, gantry, pressed, sphere, torus};
+use crate::fixtures::bodies::{BALL, PAPER, RADIUS, contact, floating_bar, gantry, pressed, sphere, torus};
 use crate::{
     JointVector,
     contact::{Model, Status},

@@ -5,7 +5,7 @@
 
 use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::Processor;
-use super::world::{BALL, Ball, RADIUS, contact, floating_bar, pressed, skinned, sphere};
+use crate::fixtures::bodies::{BALL, Ball, RADIUS, contact, floating_bar, pressed, skinned, sphere};
 use crate::{
     JointVector,
     contact::{Model, Solver, Status},

@@ -3,7 +3,7 @@
 
 use super::super::{Bound, CaseResult, Failure, Setting};
 use super::processor::{Processor, processors};
-use super::world::{PAPER, contact, joint, sphere};
+use crate::fixtures::bodies::{PAPER, contact, joint, sphere};
 use crate::{
     JointVector,
     contact::Model,

@@ -6,7 +6,7 @@
 
 use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::{Processor, processors};
-use super::world::{BALL, PAPER, RADIUS, contact, floating_bar, pressed, sphere};
+use crate::fixtures::bodies::{BALL, PAPER, RADIUS, contact, floating_bar, pressed, sphere};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},

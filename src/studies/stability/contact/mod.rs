@@ -8,7 +8,6 @@ mod meshes;
 mod processor;
 mod stiffness;
 mod units;
-pub mod world;
 
 use super::Case;
 

@@ -2,7 +2,7 @@
 
 use super::super::{Bound, CaseResult, Failure, Setting};
 use super::processor::{Processor, processors};
-use super::world::{PAPER, RADIUS, contact, floating_bar, joint, pressed, sphere, sphere_spec};
+use crate::fixtures::bodies::{PAPER, RADIUS, contact, floating_bar, joint, pressed, sphere, sphere_spec};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},

@@ -3,7 +3,7 @@
 
 use super::super::{Bound, CaseResult, Failure, Setting};
 use super::processor::{Processor, processors};
-use super::world::{PAPER, RADIUS, contact, joint, probe, sphere, sphere_spec};
+use crate::fixtures::bodies::{PAPER, RADIUS, contact, joint, probe, sphere, sphere_spec};
 use crate::{
     JointVector,
     contact::{Model, Solver, Status},
@@ -194,7 +194,7 @@ fn slivers(mut processor: Processor<'_>) -> Result<CaseResult, Failure> {
             }
         }
     }
-    let object = super::world::object(nodes, triangles)?;
+    let object = crate::fixtures::bodies::object(nodes, triangles)?;
     let mut worst = 0.0f64;
     let mut unconverged = 0;
     let mut tried = 0;

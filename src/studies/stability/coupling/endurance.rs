@@ -4,8 +4,8 @@ use super::{Bound, CaseResult, DESKTOP, Failure, Setting, Watch, on_time, open, 
 use crate::{
     JointVector,
     device::{Device, Motion},
+    fixtures::worlds::block,
     render::{haptic::Inputs, setup::Setup},
-    report::stability::worlds::block,
     scene::Waypoint,
     tolerances::ACCOUNT_ROUNDING,
 };

@@ -2,11 +2,11 @@
 
 use super::{Bound, CaseResult, DESKTOP, Failure, Setting, Watch, on_time, open, presses, seconds, way};
 use crate::{
+    fixtures::worlds::block,
     render::{
         passivity::{greatest_slope, greatest_stiffness},
         setup::Setup,
     },
-    report::stability::worlds::block,
     tolerances::GREATEST_GIVEN_ENERGY,
 };
 

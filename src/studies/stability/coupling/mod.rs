@@ -11,7 +11,8 @@ mod gains;
 mod places;
 mod time;
 
-use super::{Bound, Case, CaseResult, Effort, Failure, Setting, worlds::half_space};
+use super::{Bound, Case, CaseResult, Effort, Failure, Setting};
+use crate::fixtures::worlds::half_space;
 use crate::{
     JointVector,
     device::{Applied, Device, Motion, Reading, SimulatedHand},

@@ -9,7 +9,6 @@ pub mod coupling;
 mod figure;
 mod graphics;
 mod gridization;
-pub mod worlds;
 
 pub use figure::{FILES, write_all};
 
