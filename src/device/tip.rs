@@ -12,8 +12,7 @@
 use super::{Applied, Device, Guard, LinearMap, Reading, Scheduler};
 use crate::{
     JointVector, MAX_JOINTS,
-    haptize::scan::reach::approach,
-    proxy::{Chain, Pose, solve_positive},
+    proxy::{Chain, Pose, inverse_kinematics::approach, solve_positive},
     scene::{DeviceSpec, HapticsSpec},
 };
 use glam::DVec3;

@@ -8,6 +8,7 @@ mod chain;
 mod dynamics;
 mod gravity;
 mod inertia;
+pub mod inverse_kinematics;
 mod jacobian;
 mod links;
 #[cfg(test)]

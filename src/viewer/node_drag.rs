@@ -4,7 +4,7 @@
 use super::camera::Camera;
 use crate::{
     JointVector,
-    haptize::scan::reach::approach,
+    proxy::inverse_kinematics::approach,
     proxy::{Chain, Pose},
 };
 use glam::{Vec2, Vec3};

@@ -9,7 +9,6 @@
 mod control;
 mod log;
 mod plan;
-pub mod reach;
 mod rig;
 pub mod simulated;
 mod steady;
@@ -18,7 +17,6 @@ mod trajectory;
 pub use control::{PdControl, PdOutput};
 pub use log::{LogError, LogHeader, LogWriter, RowStatus, SIGNATURE, ScanLog, ScanRow};
 pub use plan::{Plan, Stop};
-pub use reach::reach;
 pub use rig::{Rig, RigError, RigReading};
 pub use steady::Steadiness;
 pub use trajectory::Trajectory;

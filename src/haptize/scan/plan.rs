@@ -4,7 +4,8 @@
 //! every other row of lines backwards so that neighbours in time are neighbours in space. A plan over joints goes through
 //! its grid row by row, every other row backwards.
 
-use super::{ScanError, reach::reach};
+use super::ScanError;
+use crate::proxy::inverse_kinematics::reach;
 use crate::{
     JointVector,
     proxy::Chain,

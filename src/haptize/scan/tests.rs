@@ -2,6 +2,7 @@
 
 use super::simulated::{Hand, NodeContact, SimulatedRig, Sponge};
 use super::*;
+use crate::proxy::inverse_kinematics::reach;
 use crate::scene::{PlanAxis, ScanScene, WorkspacePlan};
 use std::path::PathBuf;
 

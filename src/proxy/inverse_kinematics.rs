@@ -4,10 +4,8 @@
 //! the joints' limits; the damping (Nakamura and Hanafusa 1986) grows where a step makes things worse. Nearby positions
 //! thus get nearby configurations, with redundant chains too.
 
-use crate::{
-    JointVector,
-    proxy::{Chain, Pose},
-};
+use super::{Chain, Pose};
+use crate::JointVector;
 use glam::{DMat3, DVec3};
 
 /// Distance at which a position counts as reached by inverse kinematics [m]: a thousandth of an encoder step at 0.1 m.
