@@ -270,7 +270,7 @@ pub enum ContactSurface {
     /// The triangles.
     #[default]
     Facets,
-    /// A smooth surface through the mesh's nodes, quadratic over each triangle.
+    /// A smooth surface through the mesh's nodes: the limit of Loop's subdivision.
     Smooth,
 }
 
