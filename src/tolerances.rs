@@ -132,12 +132,6 @@ pub const INNER_ITERATIONS_PER_UNKNOWN: usize = 4;
 /// settle in two or three; more are cut off by a decrease that no longer grows.
 pub const MODEL_PASSES: usize = 6;
 
-/// Part e of a ball's compliance 1/kc that lies at each wall it touches [1]: on an edge, where it touches two facets at
-/// once, its spring is 5 per cent stiffer than on one, on a vertex of six 9, and never more than 11. Of 29 of the
-/// hardest balls on 2,027 nodes 28 converge with 0.1 and 0.2, 29 with 0.3; with 0.02 the walls' springs are so stiff
-/// that conjugate gradients take ten times as long.
-pub const FACET_COMPLIANCE: f64 = 0.1;
-
 /// First contact stiffness of the energy form, in units of the stiffness of the object's softest node (one over the
 /// trace of its compliance) [1]: soft contact, as stiff as the object itself, converges within a few steps from
 /// anywhere.

@@ -13,19 +13,12 @@
 mod deformation;
 
 use super::geometry::RestSurface;
-use super::geometry::closest_point::{Closest, Feature};
+use super::geometry::closest_point::Closest;
 use super::geometry::facet::Facet;
 use super::law::depth::{Carriers, Contact, measure};
-use super::law::series::distribute_all;
 use super::model::{Model, MotionBound};
-use crate::tolerances::FACET_COMPLIANCE;
 use deformation::Deformation;
 use glam::DVec3;
-
-/// How far beyond the walls that may bear it a ball knows of others, in radii [1]: they may be the next that do.
-/// Without, a rigid ball rattles between facets: of 100 configurations on 102 nodes (axial springs, Kg 1e4 N/m on a
-/// patch, to half a radius deep) 96 converged, with 0.3 98, while every wall within the radius pushed by itself.
-const KNOWN_FACETS: f64 = 0.3;
 
 /// Where a proxy node stands at rest, and what is known of it since.
 #[derive(Clone, Copy, Default)]
@@ -51,30 +44,12 @@ impl RestDistance {
     }
 }
 
-/// Which facets of the surface a node with a radius is measured against.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Facets {
-    /// The closest one.
-    Closest,
-    /// All that its spring acts on: those about as near as the closest (see [`super::law::series`]).
-    Felt,
-}
-
-/// Distance within which a ball knows facets whose closest is at the distance `least`: those that may take force, and
-/// those that may be the next that do [m].
-fn known_distance(radius: f64, least: f64) -> f64 {
-    least + FACET_COMPLIANCE * (radius - least).max(0.0) + KNOWN_FACETS * radius
-}
-
 /// Detection for one thread: node positions of the current configuration and reusable lists.
 pub struct Detection {
     /// Proxy nodes relative to the model's centre [m].
     nodes: Vec<DVec3>,
     at_rest: Vec<RestDistance>,
     deformation: Deformation,
-    /// Facets that the current ball may feel.
-    facets: Vec<Closest>,
-    parts: Vec<f64>,
 }
 
 impl Detection {
@@ -86,8 +61,6 @@ impl Detection {
             nodes: vec![DVec3::ZERO; count],
             at_rest: vec![RestDistance::default(); count],
             deformation: Deformation::new(model),
-            facets: Vec::new(),
-            parts: Vec::new(),
         }
     }
 
@@ -162,7 +135,7 @@ impl Detection {
     /// Contacts with the surface as displaced, in ascending order of proxy nodes. Nodes that touched before in this
     /// configuration are included with a depth below zero when they do not touch now, because they are the ones that
     /// may touch again.
-    pub fn deformed(&mut self, model: &Model, facets: Facets, contacts: &mut Vec<Contact>) {
+    pub fn deformed(&mut self, model: &Model, contacts: &mut Vec<Contact>) {
         contacts.clear();
         let MotionBound { moved, .. } = self.deformation.bound;
         for i in 0..self.nodes.len() {
@@ -178,8 +151,7 @@ impl Detection {
                     continue;
                 }
             }
-            let feels = facets == Facets::Felt && radius > 0.0;
-            let Some(closest) = self.closest(model, i, feels) else {
+            let Some(closest) = self.closest(model, i) else {
                 continue;
             };
             let known = &mut self.at_rest[i];
@@ -191,21 +163,12 @@ impl Detection {
                 continue;
             }
             contacts.push(contact);
-            if feels {
-                let within = known_distance(radius, closest.distance_squared.sqrt()).powi(2);
-                self.facets.retain(|facet| facet.distance_squared <= within && facet.triangle != closest.triangle);
-                self.facets.sort_unstable_by_key(|facet| facet.triangle);
-                let Self { facets, deformation, .. } = self;
-                contacts.extend(facets.iter().map(|facet| facing(model, i, x, deformation, facet)));
-            }
         }
-        distribute_all(contacts, &mut self.parts);
     }
 
-    /// The closest feature of the deformed surface to node `i`, if it is near enough to matter; with `feels`, the
-    /// facets that the node may feel are left in `facets`.
-    fn closest(&mut self, model: &Model, i: usize, feels: bool) -> Option<Closest> {
-        let Self { deformation, facets, .. } = self;
+    /// The closest feature of the deformed surface to node `i`, if it is near enough to matter.
+    fn closest(&mut self, model: &Model, i: usize) -> Option<Closest> {
+        let Self { deformation, .. } = self;
         let x = self.nodes[i];
         let radius = model.chain.nodes[i].radius;
         let known = self.at_rest[i];
@@ -220,20 +183,12 @@ impl Detection {
             closest.consider(x, deformation.facet(model, likely), likely, f64::MAX);
         }
         // Distance within which facets are looked for, and its square for their triangles.
-        let near = |closest: &Closest| {
-            let distance = closest.distance_squared.sqrt().min(matters);
-            if feels { known_distance(radius, distance) } else { distance }
-        };
+        let near = |closest: &Closest| closest.distance_squared.sqrt().min(matters);
         let within = |closest: &Closest| (near(closest) + bulge).powi(2);
-        facets.clear();
-        if feels || moved != 0.0 {
+        if moved != 0.0 {
             deformation.search(model, x, within(&closest), |triangle, facet| {
-                if (feels || triangle != likely)
-                    && let Some((point, distance_squared)) = closest.consider(x, facet, triangle, near(&closest))
-                    && feels
-                    && distance_squared <= near(&closest).powi(2)
-                {
-                    facets.push(Closest { distance_squared, triangle, point });
+                if triangle != likely {
+                    closest.consider(x, facet, triangle, near(&closest));
                 }
                 within(&closest)
             });
@@ -293,19 +248,6 @@ fn contact_with(model: &Model, i: usize, x: DVec3, closest: &Closest, facet: &Fa
     let measured = measure(x, radius, facet, &closest.point, pseudonormal);
     let carriers = Carriers::new(model.surface.carriers(closest.triangle), &closest.point);
     Contact { share: model.shares[i], ..Contact::new(i as u32, carriers, measured) }
-}
-
-/// The contact of the ball `i` at `x` with a facet that is not the closest, from the side on which its centre is.
-fn facing(model: &Model, i: usize, x: DVec3, deformation: &mut Deformation, closest: &Closest) -> Contact {
-    let facet = deformation.facet(model, closest.triangle);
-    let towards = x - facet.point(closest.point.weights);
-    let normal = facet.normal(closest.point.weights);
-    let direction = match closest.point.feature {
-        Feature::Face if normal.dot(towards) < 0.0 => -normal,
-        Feature::Face => normal,
-        _ => towards,
-    };
-    contact_with(model, i, x, closest, facet, direction)
 }
 
 #[cfg(test)]
@@ -424,7 +366,7 @@ mod tests {
                     assert!(displacement.iter().all(|u| u.length() <= bound.moved), "{size} {bound:?}");
                     detection.displace(&model, &nodes, &forces, bound);
                     let mut found = Vec::new();
-                    detection.deformed(&model, Facets::Closest, &mut found);
+                    detection.deformed(&model, &mut found);
                     found.retain(|contact| contact.depth > 0.0);
                     let expected = brute_force(&model, &x, &positions);
                     assert_eq!(found.len(), expected.len());

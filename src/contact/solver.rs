@@ -213,7 +213,7 @@ impl<'a> Solver<'a> {
         let state = &self.energy.state;
         self.held_by = HeldBy::Energy;
         equilibrium.energy = state.energy;
-        equilibrium.touches.extend(state.contacts.iter().filter(|c| c.push > 0.0).map(|contact| Touch {
+        equilibrium.touches.extend(state.contacts.iter().filter(|c| c.is_active()).map(|contact| Touch {
             proxy_node: contact.proxy_node,
             carriers: contact.carriers.iter().collect(),
             force: contact.normal * (self.model.kc * contact.force_over_kc()),

@@ -5,7 +5,6 @@ use glam::DVec3;
 use haptize::contact::Equilibrium;
 use haptize::object::Object;
 use haptize::proxy::{Chain, Pose};
-use haptize::tolerances::FACET_COMPLIANCE;
 
 /// Depth of a point below a surface, and the force law's direction and weights there.
 pub struct Depth {
@@ -93,41 +92,6 @@ fn closest(corners: [DVec3; 3], x: DVec3) -> ([f64; 3], DVec3) {
     (best, at(best))
 }
 
-/// The facets that a ball feels: force on it, triangle and weights of each. With t the shared part of its spring's compression,
-/// t / (1 - e) is the sum of (s - t) / e over the facets deeper than t: found by halving.
-fn felt(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3, radius: f64, kc: f64) -> Vec<(DVec3, usize, [f64; 3])> {
-    let mut all: Vec<_> = triangles
-        .iter()
-        .enumerate()
-        .map(|(t, triangle)| {
-            let (weights, p) = closest(triangle.map(|node| positions[node as usize]), x);
-            (radius - p.distance(x), 1.0, t, weights)
-        })
-        .collect();
-    if winding_number(positions, triangles, x) > 0.5 {
-        let nearest = all.iter_mut().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
-        (nearest.0, nearest.1) = (2.0 * radius - nearest.0, -1.0);
-    }
-    let (mut low, mut high) = (0.0, all.iter().map(|facet| facet.0).fold(0.0, f64::max));
-    for _ in 0..60 {
-        let t = 0.5 * (low + high);
-        let taken: f64 = all.iter().map(|facet| (facet.0 - t).max(0.0) / FACET_COMPLIANCE).sum();
-        if taken > t / (1.0 - FACET_COMPLIANCE) {
-            low = t;
-        } else {
-            high = t;
-        }
-    }
-    all.retain(|facet| facet.0 > low);
-    let force = |(depth, side, t, weights): (f64, f64, usize, [f64; 3])| {
-        let [a, b, c] = triangles[t].map(|node| positions[node as usize]);
-        let offset = x - (a * weights[0] + b * weights[1] + c * weights[2]);
-        let push = kc * (depth - low) / FACET_COMPLIANCE;
-        (offset.normalize() * (side * push), t, weights)
-    };
-    all.into_iter().map(force).collect()
-}
-
 /// Smallest signed distance of the proxy's nodes to the surface at rest, less their radius.
 pub fn gap(object: &Object, chain: &Chain, pose: &Pose) -> f64 {
     let nodes = chain.nodes.iter().zip(&pose.nodes);
@@ -187,9 +151,8 @@ pub fn check_account(object: &Object, chain: &Chain, q: &[f64], equilibrium: &Eq
 }
 
 /// Balance and contact law: with u = K^-1 (stored forces), every proxy node's force is kc times its depth below the
-/// displaced surface along the normal there, and the object's nodes carry it by the weights of the closest point. A node with a radius
-/// is a spring in series with one to each facet ([`felt`]). `tolerance` is relative to the largest force; a facet's own spring is
-/// stiffer than kc by 1 / FACET_COMPLIANCE.
+/// displaced surface along the normal there, and the object's nodes carry it by the weights of the closest point.
+/// `tolerance` is relative to the largest force.
 pub fn check_contact_law(
     object: &Object,
     chain: &Chain,
@@ -206,25 +169,9 @@ pub fn check_contact_law(
     let positions: Vec<DVec3> = object.rest.iter().zip(&u).map(|(rest, u)| *rest + *u).collect();
     let scale = equilibrium.touches.iter().map(|touch| touch.force.length()).fold(0.0, f64::max);
     let mut expected = vec![DVec3::ZERO; object.rest.len()];
-    let balls = chain.nodes.iter().any(|node| node.radius > 0.0);
     for (i, x) in pose(chain, q).nodes.iter().enumerate() {
         let below = depth(&positions, &object.triangles, *x);
         let radius = chain.nodes[i].radius;
-        let mut touches = equilibrium.touches.iter().filter(|touch| touch.proxy_node as usize == i).peekable();
-        if radius > 0.0 && touches.peek().is_some() {
-            let sum: DVec3 = touches.map(|touch| touch.force).sum();
-            let mut law = DVec3::ZERO;
-            for (force, triangle, weights) in felt(&positions, &object.triangles, *x, radius, kc) {
-                law += force;
-                for (node, weight) in object.triangles[triangle].iter().zip(weights) {
-                    expected[*node as usize] -= force * weight;
-                }
-            }
-            if (sum - law).length() > tolerance / FACET_COMPLIANCE * scale {
-                return Err(format!("node {i}: force {sum}, law {law}, largest {scale}"));
-            }
-            continue;
-        }
         let lambda = kc * (below.depth + radius).max(0.0);
         let touch = equilibrium.touches.iter().find(|touch| touch.proxy_node as usize == i);
         let force = touch.map_or(DVec3::ZERO, |touch| touch.force);
@@ -239,7 +186,6 @@ pub fn check_contact_law(
         }
     }
     for (node, (force, expected)) in forces.iter().zip(&expected).enumerate() {
-        let tolerance = if balls { tolerance / FACET_COMPLIANCE } else { tolerance };
         if (*force - *expected).length() > tolerance * scale {
             return Err(format!("object node {node}: force {force}, law {expected}"));
         }

@@ -9,8 +9,8 @@ use haptize::{
     haptize::Backend,
     object::{Compliance, Object},
     proxy::Chain,
-    scene::{Algorithm, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
-    tolerances::{FACET_COMPLIANCE, GPU_SETTLED_RESIDUAL},
+    scene::{Algorithm, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
+    tolerances::GPU_SETTLED_RESIDUAL,
 };
 
 /// Springs along their rest direction, and a solid: of both, unlike isotropic springs, the compliance has blocks of nine numbers.
@@ -82,8 +82,13 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
     let mut torque = JointVector::zeros(q.len());
     let mut energy = 0.0;
     for touch in &result.touches {
+        model.chain.add_torque(&pose, touch.proxy_node as usize, touch.force, &mut torque);
+        // The smooth surface hangs on other nodes than those of a triangle.
+        if model.contact.surface == ContactSurface::Smooth {
+            continue;
+        }
         let magnitude = touch.force.length();
-        // Contact law: lambda = kc depth, of one of several facets its part of it, and compression: lambda > 0 outwards.
+        // Contact law: lambda = kc depth, and compression: lambda > 0 outwards.
         let foot: DVec3 = (touch.carriers.iter())
             .map(|&(node, weight)| (model.object.rest[node as usize] + displacement(node)) * weight)
             .sum();
@@ -92,9 +97,7 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
         let normal = touch.force / magnitude;
         let push = |touch: &Touch| touch.force.length() / model.kc;
         let depth = radius + normal.dot(toward);
-        let whole: f64 = result.touches.iter().filter(|t| t.proxy_node == touch.proxy_node).map(push).sum();
-        let law = FACET_COMPLIANCE * push(touch) + (1.0 - FACET_COMPLIANCE) * whole;
-        if (depth - law).abs() > DEPTH_AGREEMENT + INVARIANT_AGREEMENT * depth.abs() {
+        if (depth - push(touch)).abs() > DEPTH_AGREEMENT + INVARIANT_AGREEMENT * depth.abs() {
             return Some(format!("contact law: depth {depth:e} m, force {magnitude:e} N"));
         }
         let outward =
@@ -105,7 +108,6 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
             return Some("tension".into());
         }
         energy += 0.5 * model.kc * push(touch) * depth;
-        model.chain.add_torque(&pose, touch.proxy_node as usize, touch.force, &mut torque);
     }
     for force in &result.forces {
         // The object's nodes carry what the touches press on them.
@@ -121,7 +123,8 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
     if distance(&torque, &result.torque) > 1e-12 * torque.norm() {
         return Some(format!("tau {:?} is not J^T f {torque:?}", result.torque));
     }
-    if (energy - result.energy).abs() > INVARIANT_AGREEMENT * energy {
+    let flat = model.contact.surface == ContactSurface::Facets;
+    if flat && (energy - result.energy).abs() > INVARIANT_AGREEMENT * energy {
         return Some(format!("U {:e}, by its forces {energy:e}", result.energy));
     }
     None
@@ -154,9 +157,10 @@ fn check_scene(name: &str, material: Option<Material>, algorithm: Algorithm, str
     // The paper's iteration is chaotic where it does not settle at once: rounding decides now and then whether it does.
     let allowed = if algorithm == Algorithm::Paper { configurations.len() / 50 } else { 0 };
     assert!(unlike.len() <= allowed, "{name}, {algorithm:?}: {unlike:#?}");
-    // Left to the CPU: what lies within rounding of no contact, about 1e-6 of all, and what does not settle: about one in twenty.
+    // Left to the CPU: what lies within rounding of no contact, about 1e-6 of all, and what does not settle: about one in twenty, of balls
+    // whose smooth surface the kernels do not know one in four.
     println!("{name}, {algorithm:?}: {touching} touch, {} by the CPU", gpu.left_to_cpu());
-    assert!(gpu.left_to_cpu() * 5 <= touching, "{name}, {algorithm:?}: {} left to the CPU", gpu.left_to_cpu());
+    assert!(gpu.left_to_cpu() * 3 <= touching, "{name}, {algorithm:?}: {} left to the CPU", gpu.left_to_cpu());
 }
 
 #[test]

@@ -17,10 +17,9 @@ use super::newton::{Damping, Newton, Step};
 use super::tangent;
 use crate::JointMatrix;
 use crate::contact::NodeForce;
-use crate::contact::detection::{Detection, Facets};
+use crate::contact::detection::Detection;
 use crate::contact::geometry::smooth::CARRIERS;
 use crate::contact::law::depth::Contact;
-use crate::contact::law::series::distribute_all;
 use crate::contact::law::springs::{Slots, Springs, add_contact_forces};
 use crate::contact::linear::support::{Support, dot, root};
 use crate::contact::model::{Model, MotionBound};
@@ -271,7 +270,7 @@ impl EnergySearch {
     fn freeze_here(&mut self, model: &Model, detection: &mut Detection) {
         self.displace(model, detection, &self.state.forces, self.state.elastic);
         let Self { state, frozen, .. } = self;
-        detection.deformed(model, Facets::Felt, frozen);
+        detection.deformed(model, frozen);
         frozen.iter_mut().for_each(Contact::freeze);
         // Depths at rest, by the slopes here.
         for row in frozen.iter_mut() {
@@ -354,8 +353,7 @@ impl EnergySearch {
         self.state.forces.clear();
         self.state.elastic = 0.0;
         detection.displace(model, &[], &[], MotionBound { moved: 0.0, bulge: model.surface.bulge });
-        let facets = if geometry == Geometry::Frozen { Facets::Closest } else { Facets::Felt };
-        detection.deformed(model, facets, &mut self.state.contacts);
+        detection.deformed(model, &mut self.state.contacts);
         if geometry == Geometry::Frozen {
             // 1/2 |u|^2 <= E <= E(0) in the energy norm and |u_j|^2 <= trace(C_jj) |u|^2, all along the search: nodes
             // farther from the surface than this can never touch.
@@ -421,7 +419,7 @@ impl EnergySearch {
         self.displace(model, detection, &self.trial.forces, self.trial.elastic);
         let contacts = &mut self.trial.contacts;
         match geometry {
-            Geometry::Deformed => detection.deformed(model, Facets::Felt, contacts),
+            Geometry::Deformed => detection.deformed(model, contacts),
             Geometry::Frozen => frozen_contacts(model, &self.frozen, detection, contacts),
         }
         self.trial.energy = self.trial.elastic + contact_energy(contacts, self.kc);
@@ -438,23 +436,20 @@ impl EnergySearch {
     }
 }
 
-/// Sets the multipliers of `contacts` to the forces that `force` predicts for the rows `before`, by their place: each
-/// row takes that of the row of its proxy node that faces most nearly the same way, zero where the node had none. Both
-/// lists ascend by proxy node [N].
+/// Sets the multipliers of `contacts` to the forces that `force` predicts for the rows `before`, by their place; zero for
+/// a proxy node that had no row. Both lists ascend by proxy node [N].
 fn predict_multipliers(contacts: &mut [Contact], before: &[Contact], force: impl Fn(usize) -> f64) {
-    let mut first = 0;
+    let mut k = 0;
     for contact in contacts {
-        while first < before.len() && before[first].proxy_node < contact.proxy_node {
-            first += 1;
+        while k < before.len() && before[k].proxy_node < contact.proxy_node {
+            k += 1;
         }
-        let rows = before[first..].iter().take_while(|row| row.proxy_node == contact.proxy_node);
-        let alike = |row: &Contact| row.normal.dot(contact.normal);
-        let nearest = rows.enumerate().max_by(|(_, a), (_, b)| alike(a).total_cmp(&alike(b)));
-        contact.multiplier = nearest.map_or(0.0, |(k, _)| force(first + k).max(0.0));
+        let had = before.get(k).is_some_and(|row| row.proxy_node == contact.proxy_node);
+        contact.multiplier = if had { force(k).max(0.0) } else { 0.0 };
     }
 }
 
-/// 1/2 kc sum_i share_i p_i depth_i, with the parts p_i of [`crate::contact::law::series`] [J].
+/// Returns 1/2 kc sum_i share_i max(0, depth_i)^2 [J].
 #[must_use]
 pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
     let mut sum = 0.0;
@@ -468,7 +463,6 @@ pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
 fn frozen_contacts(model: &Model, rows: &[Contact], detection: &mut Detection, contacts: &mut Vec<Contact>) {
     contacts.clear();
     contacts.extend(rows.iter().map(|row| Contact { depth: row.depth + linear_change(model, row, detection), ..*row }));
-    distribute_all(contacts, &mut Vec::new());
 }
 
 /// By how much that displacement deepens a frozen row [m].

@@ -23,7 +23,6 @@
 
 use super::woodbury::Woodbury;
 use crate::contact::law::depth::Contact;
-use crate::contact::law::series::distribute;
 use crate::contact::law::springs::{Springs, add_contact_hessian, stretched_and_bent};
 use crate::contact::linear::support::{Support, dot, root};
 use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES};
@@ -106,8 +105,6 @@ pub struct Newton {
     pub force: Vec<f64>,
     /// The force of each row after the step, to first order, over kc [m].
     pub forces_over_kc: Vec<f64>,
-    /// By how much the step deepens each row, to first order [m].
-    depth_change: Vec<f64>,
     /// The step du = C df on the support [m].
     displacement: Vec<f64>,
     /// The step of the pass before.
@@ -249,10 +246,8 @@ impl Newton {
         ] {
             vector.resize(order, 0.0);
         }
-        self.depth_change.clear();
-        self.depth_change.resize(contacts.len(), 0.0);
         self.active.clear();
-        self.active.extend(contacts.iter().map(|contact| contact.push > 0.0));
+        self.active.extend(contacts.iter().map(Contact::is_active));
         self.forces_over_kc.clear();
         self.forces_over_kc.resize(contacts.len(), 0.0);
     }
@@ -301,36 +296,29 @@ impl Newton {
         woodbury.apply(springs, (residual, product), preconditioned_force, preconditioned);
     }
 
-    /// Notes by how much the step deepens each row, g_i . du, and the rows' forces after it; returns m(0) - m(df), in
+    /// Notes the rows' forces after the step, to first order; returns m(0) - m(df), in
     /// differences that do not cancel near the solution [J].
     fn model_decrease(&mut self, springs: Springs, residual: &[f64]) -> f64 {
         let own = 0.5 * self.stiffening * dot(&self.displacement, &self.force);
         let mut decrease = dot(&self.displacement, residual) - own;
-        let Self { depth_change, forces_over_kc, displacement, .. } = self;
-        springs.for_each(|first, rows| {
-            let changes = &mut depth_change[first..first + rows.len()];
-            let forces = &mut forces_over_kc[first..first + rows.len()];
-            for (k, row) in rows.iter().enumerate() {
-                let v = springs.variation(first + k, displacement);
-                changes[k] = row.depth_change(&v);
-                if row.multiplier != 0.0 {
-                    decrease -= 0.5 * row.multiplier * row.second_variation(&v).dot(&v);
-                }
+        let Self { forces_over_kc, displacement, .. } = self;
+        for (k, row) in springs.contacts.iter().enumerate() {
+            let v = springs.variation(k, displacement);
+            let change = row.depth_change(&v);
+            if row.multiplier != 0.0 {
+                decrease -= 0.5 * row.multiplier * row.second_variation(&v).dot(&v);
             }
-            distribute(|k| rows[k].depth + changes[k], forces);
-            forces.iter_mut().zip(rows).for_each(|(force, row)| *force *= row.share);
-            let same = rows.iter().zip(&*forces).all(|(row, force)| (row.push > 0.0) == (*force > 0.0));
+            let force = row.share * (row.depth + change).max(0.0);
+            let before = row.force_over_kc();
             // The part that is of first order is in the residual.
-            let stretch = |((row, force), change): ((&Contact, &f64), &f64)| {
-                let before = row.force_over_kc();
-                if same {
-                    (force - before) * change
-                } else {
-                    force * (row.depth + change) - before * (row.depth + 2.0 * change)
-                }
+            let stretch = if row.is_active() == (force > 0.0) {
+                (force - before) * change
+            } else {
+                force * (row.depth + change) - before * (row.depth + 2.0 * change)
             };
-            decrease -= 0.5 * springs.kc * rows.iter().zip(&*forces).zip(&*changes).map(stretch).sum::<f64>();
-        });
+            decrease -= 0.5 * springs.kc * stretch;
+            forces_over_kc[k] = force;
+        }
         decrease
     }
 

@@ -16,7 +16,7 @@
 //! A node with a radius, which the paper does not have, acts through its deepest point x_i - r_i N_i.
 
 use super::energy::SolverStats;
-use crate::contact::detection::{Detection, Facets};
+use crate::contact::detection::Detection;
 use crate::contact::geometry::normals;
 use crate::contact::law::depth::Contact;
 use crate::contact::linear::cholesky;
@@ -125,7 +125,7 @@ impl PaperIteration {
         let moved = self.displacement.as_chunks().0.iter().map(|u| DVec3::from_array(*u).length()).fold(0.0, f64::max);
         let bound = MotionBound { moved: moved * (1.0 + LENGTH_ROUNDING), bulge: 0.0 };
         detection.displace(model, self.support.nodes(), &self.previous_forces, bound);
-        detection.deformed(model, Facets::Closest, &mut self.contacts);
+        detection.deformed(model, &mut self.contacts);
         self.support.clear();
         self.ties.clear();
         for contact in self.contacts.iter().filter(|contact| contact.depth > 0.0) {

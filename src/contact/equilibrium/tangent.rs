@@ -38,29 +38,22 @@ pub(super) fn tangent(
     let mut tangent = JointMatrix::zeros(joints);
     // E_uq, column by column.
     let mut loads = vec![vec![0.0; order]; joints];
-    springs.for_each(|first, rows| {
-        if rows.iter().all(|row| row.push == 0.0) {
-            return;
-        }
-        let node = rows[0].proxy_node as usize;
+    for (row, contact) in springs.contacts.iter().enumerate().filter(|(_, contact)| contact.is_active()) {
+        let node = contact.proxy_node as usize;
         let columns: Vec<DVec3> = (0..joints).map(|k| model.chain.jacobian_column(pose, node, k)).collect();
-        let force: DVec3 = rows.iter().map(|row| row.normal * row.multiplier).sum();
+        let force = contact.normal * contact.multiplier;
         for (k, column) in columns.iter().enumerate() {
-            let mut whole = DVec3::ZERO;
-            let resistance = |row: usize, reaction: Variation| {
-                whole += reaction.point;
-                springs.add_reaction(first + row, &reaction, &mut loads[k]);
-            };
-            springs.resist(rows, |row| rows[row].push > 0.0, |_| Variation::translation(-*column), resistance);
+            let reaction = springs.resist(row, true, &Variation::translation(-*column)).unwrap_or_default();
+            springs.add_reaction(row, &reaction, &mut loads[k]);
             for (l, other) in columns.iter().enumerate().take(k + 1) {
                 let turn = match model.chain.joints[l].kind {
                     JointKind::Revolute => pose.axes[l].cross(*column),
                     JointKind::Prismatic => DVec3::ZERO,
                 };
-                tangent.add(k, l, whole.dot(*other) + force.dot(turn));
+                tangent.add(k, l, reaction.point.dot(*other) + force.dot(turn));
             }
         }
-    });
+    }
     newton.factorise(support, springs);
     let mut responses: Vec<Vec<f64>> = Vec::with_capacity(joints);
     for k in 0..joints {

@@ -32,8 +32,7 @@ const MINIMUM_CURVATURE_RADIUS: f64 = 1e-11;
 /// leaps, and a step by it would be a hundred times as far.
 const LEAST_CONVEXITY: f64 = 1e-2;
 
-/// One proxy node and a surface feature that it feels: a row of the contact problem. A point has one row, a ball one
-/// for each facet that it feels (see [`super::series`]).
+/// One proxy node and the closest feature of the surface: a row of the contact problem.
 #[derive(Clone, Copy, Debug)]
 pub struct Contact {
     /// Number of the proxy node.
@@ -46,9 +45,6 @@ pub struct Contact {
     pub depth: f64,
     /// Stiffness of the proxy node's spring over that of [`crate::contact::Model::kc`] [1].
     pub share: f64,
-    /// Its part of the depth of the proxy node's spring: max(0, depth) where the node feels this facet alone; see
-    /// [`super::series`] [m].
-    pub push: f64,
     /// Force lambda by which the curvature counts: the row's force at the solution [N].
     pub multiplier: f64,
     /// Second derivative of s.
@@ -277,14 +273,21 @@ impl Contact {
     #[must_use]
     pub fn new(proxy_node: u32, carriers: Carriers, measured: (DVec3, f64, Curvature)) -> Self {
         let (normal, depth, curvature) = measured;
-        Self { proxy_node, carriers, normal, depth, share: 1.0, push: depth.max(0.0), multiplier: 0.0, curvature }
+        Self { proxy_node, carriers, normal, depth, share: 1.0, multiplier: 0.0, curvature }
     }
 
-    /// Its force over kc: its part of the depth times the node's share [m].
+    /// Whether it touches.
+    #[inline]
+    #[must_use]
+    pub fn is_active(&self) -> bool {
+        self.depth > 0.0
+    }
+
+    /// Its force over kc: max(0, depth) times the node's share [m].
     #[inline]
     #[must_use]
     pub fn force_over_kc(&self) -> f64 {
-        self.share * self.push
+        self.share * self.depth.max(0.0)
     }
 
     /// Returns by how much displacements `v` of its nodes, by their place, move its closest point [m].
@@ -357,12 +360,6 @@ impl Contact {
     /// Its depth changes in proportion to displacements from here on.
     pub fn freeze(&mut self) {
         self.curvature = Curvature::default();
-    }
-
-    /// Whether two rows belong to one proxy node, whose spring they share.
-    #[must_use]
-    pub fn shares_spring(&self, other: &Self) -> bool {
-        self.proxy_node == other.proxy_node
     }
 }
 

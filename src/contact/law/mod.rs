@@ -1,5 +1,4 @@
-//! The contact law: depths with their derivatives, what each facet takes of a node's spring, forces and Hessian.
+//! The contact law: depths with their derivatives, forces and Hessian.
 
 pub mod depth;
-pub mod series;
 pub mod springs;

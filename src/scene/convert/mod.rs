@@ -159,6 +159,10 @@ fn contact(checker: &Checker<'_>, table: &Spanned<ContactTable>, proxy: &ProxySp
         let message = "the algorithm \"paper\" is defined on the triangles: leave surface out, or take \"energy\"";
         return Err(checker.error(value.span(), message));
     }
+    // The closest facet of a dent of flat triangles changes with a kink, on which a ball balances.
+    let balls = proxy.joints.iter().flat_map(|joint| &joint.nodes).any(|node| node.radius > 0.0);
+    let smooth = balls && algorithm != Algorithm::Paper;
+    let default = if smooth { ContactSurface::Smooth } else { ContactSurface::Facets };
     Ok(ContactSpec {
         stiffness,
         stiffness_per_length,
@@ -166,6 +170,6 @@ fn contact(checker: &Checker<'_>, table: &Spanned<ContactTable>, proxy: &ProxySp
         tolerance: tolerance.unwrap_or(Ok(CONTACT_TOLERANCE))?,
         max_iterations,
         updates: updates(checker, table)?,
-        surface: table.surface.as_ref().map_or_else(ContactSurface::default, |value| *value.get_ref()),
+        surface: table.surface.as_ref().map_or(default, |value| *value.get_ref()),
     })
 }

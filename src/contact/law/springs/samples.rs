@@ -5,7 +5,6 @@ use crate::contact::geometry::facet::Facet;
 use crate::contact::geometry::normals;
 use crate::contact::geometry::smooth::CARRIERS;
 use crate::contact::law::depth::{Carriers, Contact, measure};
-use crate::contact::law::series::distribute_all;
 use crate::contact::linear::support::Support;
 use crate::fixtures::bodies::{Ball, PAPER, sphere};
 use crate::object::{Compliance, Object};
@@ -26,7 +25,7 @@ pub fn ball(springs: SpringKind) -> Object {
     sphere(Ball { springs, ..PAPER }).unwrap()
 }
 
-/// Five points and two balls on three facets each, all pressed in, and a point that is near, of stiffness `kc`; bent by
+/// Five points and two balls, all pressed in, and a point that is near, of stiffness `kc`; bent by
 /// `bending` times their forces.
 pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
     let mut random = Random::new(5);
@@ -45,17 +44,12 @@ pub fn sample(object: &Object, kc: f64, bending: f64) -> Sample {
     for i in 6..8 {
         let t = random.between(0.0, object.triangles.len() as f64) as usize;
         let x = corners(t)[0] * 1.02;
-        let shared = object.triangles[t][0];
-        let around = (0..object.triangles.len()).filter(|&near| object.triangles[near].contains(&shared));
-        for near in around.take(3) {
-            let facet = Facet::flat(corners(near));
-            let point = facet.closest(x, f64::MAX).unwrap();
-            let outward = x - facet.point(point.weights);
-            let measured = measure(x, 0.008, &facet, &point, outward.normalize());
-            contacts.push(Contact::new(i, Carriers::new((&object.triangles[near], None), &point), measured));
-        }
+        let facet = Facet::flat(corners(t));
+        let point = facet.closest(x, f64::MAX).unwrap();
+        let outward = x - facet.point(point.weights);
+        let measured = measure(x, 0.008, &facet, &point, outward.normalize());
+        contacts.push(Contact::new(i, Carriers::new((&object.triangles[t], None), &point), measured));
     }
-    distribute_all(&mut contacts, &mut Vec::new());
     for contact in &mut contacts {
         // Springs of different stiffness.
         contact.share = 0.5 + 0.25 * f64::from(contact.proxy_node);

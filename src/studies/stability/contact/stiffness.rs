@@ -5,13 +5,13 @@
 
 use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::Processor;
-use crate::fixtures::bodies::{BALL, Ball, RADIUS, contact, floating_bar, pressed, skinned, sphere};
+use crate::fixtures::bodies::{BALL, Ball, RADIUS, contact, default_contact, floating_bar, pressed, skinned, sphere};
 use crate::{
     JointVector,
     contact::{Model, Solver, Status},
     gpu::{Context, GpuError},
     object::Object,
-    scene::{Algorithm, SpringKind},
+    scene::{Algorithm, ContactSpec, SpringKind},
 };
 use rayon::prelude::*;
 use std::{
@@ -206,11 +206,13 @@ fn combination(
 ) -> Result<(), Failure> {
     let chains = [floating_bar(0.0), floating_bar(BALL)];
     for (radius, chain) in chains.iter().enumerate() {
-        let mut model = Model::new(object, chain, contact(1.0));
+        let mut model = Model::new(object, chain, default_contact(chain, 1.0));
+        let mut paper = Model::new(object, chain, ContactSpec { algorithm: Algorithm::Paper, ..contact(1.0) });
         for (depth, (from, to, _)) in DEPTHS.into_iter().enumerate() {
             let configurations = pressed(&model, 1, count, from * RADIUS, to * RADIUS);
             for (k, &stiffness) in stiffnesses.iter().enumerate() {
                 model.set_stiffness(stiffness);
+                paper.set_stiffness(stiffness);
                 let cell = &mut cells[8 * k + 4 * radius + 2 * depth + body];
                 let results: Vec<_> = configurations
                     .par_iter()
@@ -246,9 +248,7 @@ fn combination(
                 if cell.least.as_ref().is_none_or(|(least, _)| share < *least) {
                     cell.least = Some((share, name.clone()));
                 }
-                model.contact.algorithm = Algorithm::Paper;
-                cell.paper += tenth(&model, &configurations);
-                model.contact.algorithm = Algorithm::Energy;
+                cell.paper += tenth(&paper, &configurations);
                 if let Some(context) = &setting.gpu {
                     let every = if object.surface_nodes > 1000 { 10 } else { 1 };
                     let some: Vec<JointVector> = configurations.iter().step_by(every).copied().collect();
