@@ -57,7 +57,7 @@ impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
         let code = match error {
             SceneError::Unreadable { .. } => hz_code::HZ_FILE,
-            SceneError::Invalid(_) => hz_code::HZ_SCENE,
+            _ => hz_code::HZ_SCENE,
         };
         Self { code, message: error.to_string() }
     }

@@ -42,8 +42,9 @@ pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 pub fn scene(py: Python<'_>, error: &SceneFailure) -> PyErr {
     let (path, place) = match error {
-        SceneFailure::Unreadable { path, .. } => (path, None),
-        SceneFailure::Invalid(diagnostic) => (&diagnostic.path, Some((diagnostic.line, diagnostic.column))),
+        SceneFailure::Unreadable { path, .. } => (Some(path), None),
+        SceneFailure::Invalid(diagnostic) => (Some(&diagnostic.path), Some((diagnostic.line, diagnostic.column))),
+        _ => (None, None),
     };
     let raised = SceneError::new_err(error.to_string());
     let value = raised.value(py);
@@ -56,14 +57,17 @@ pub fn scene(py: Python<'_>, error: &SceneFailure) -> PyErr {
 
 pub fn dataset(py: Python<'_>, error: &dataset::Error) -> PyErr {
     use dataset::Error::{Damaged, Foreign, Inconsistent, Memory, Read, Version, Write};
-    let (Read { path, .. }
-    | Memory { path, .. }
-    | Write { path, .. }
-    | Foreign { path, .. }
-    | Version { path, .. }
-    | Damaged { path, .. }
-    | Inconsistent { path, .. }) = error;
-    with_path(py, error.to_string(), Some(path))
+    let path = match error {
+        Read { path, .. }
+        | Memory { path, .. }
+        | Write { path, .. }
+        | Foreign { path, .. }
+        | Version { path, .. }
+        | Damaged { path, .. }
+        | Inconsistent { path, .. } => Some(path.as_path()),
+        _ => None,
+    };
+    with_path(py, error.to_string(), path)
 }
 
 /// A [`DatasetError`] about `path`.

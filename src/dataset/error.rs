@@ -5,6 +5,7 @@ use std::{io, path::PathBuf};
 
 /// A dataset could not be read, written or exported.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The file is missing, or may not be read.
     #[error("{path}: cannot be read: {source}; check the path and its permissions")]

@@ -66,6 +66,7 @@ pub struct Finding {
 
 /// A device cannot be opened or does not fit the scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum OpenError {
     /// The device is not there or refuses.
     #[error("the device {device} cannot be opened: {what}")]

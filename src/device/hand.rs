@@ -21,6 +21,7 @@ pub struct SimulatedHand {
 
 /// A hand cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum HandError {
     /// The scene's haptics have another number of joints than what the hand is to follow.
     #[error("the hand is told {told} joints and the haptic device has {device}")]

@@ -21,6 +21,7 @@ pub struct LinearMap {
 
 /// A map cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MapError {
     /// Rows or offset have another length than the device has coordinates.
     #[error("map and offset must have {count} rows of {count} numbers, one for each coordinate of the device")]

@@ -21,6 +21,7 @@ pub struct Motion {
 
 /// A motion cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MotionError {
     /// No waypoint at all.
     #[error("the motion has no waypoints: give it at least one")]

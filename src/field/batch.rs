@@ -9,6 +9,7 @@ const SHARE: usize = 256;
 
 /// A batch of look-ups was refused; nothing was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BatchError {
     /// A buffer's length does not fit the others.
     #[error("the {buffer} hold {found} numbers where {expected} are needed: {rows} configurations of {joints} joints")]

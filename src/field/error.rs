@@ -5,6 +5,7 @@ use crate::{JointVector, memory::Shortage};
 
 /// A dataset cannot be rendered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FieldError {
     /// Its grid is none.
     #[error(transparent)]

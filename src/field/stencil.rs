@@ -44,6 +44,7 @@ pub struct Stencil {
 
 /// A grid cannot be looked up.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LatticeError {
     /// No joints, or too many.
     #[error("the dataset's grid has {0} axes; between 1 and {MAX_JOINTS} are possible")]

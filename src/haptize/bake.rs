@@ -45,6 +45,7 @@ pub fn build_object(scene: &Scene) -> Result<Object, SceneObjectError> {
 
 /// A scene could not be haptized.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BakeError {
     /// The scene's object is refused.
     #[error(transparent)]

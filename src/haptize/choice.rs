@@ -36,6 +36,7 @@ pub enum ChosenBackend<'a> {
 
 /// No backend could be opened.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BackendError {
     /// The system gives no threads.
     #[error("no threads to solve on: {0}; close other programs or raise the limit on processes (ulimit -u)")]

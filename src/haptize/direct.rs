@@ -28,6 +28,7 @@ pub struct Direct(Prepared);
 
 /// A configuration is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DirectError {
     /// Not as many coordinates as the proxy has joints.
     #[error("{found} coordinates were given for a proxy of {joints} joints")]

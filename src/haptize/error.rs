@@ -9,6 +9,7 @@ use std::{
 
 /// A sweep failed, or was stopped.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SweepError {
     /// The grid is none.
     #[error("the scene's grid: {0}; correct [[grid.axes]] in the scene")]

@@ -86,6 +86,7 @@ impl Contents {
 
 /// Shards cannot be merged.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MergeError {
     /// No shard is there.
     #[error(

@@ -170,6 +170,7 @@ pub struct Choice {
 
 /// No grid was chosen.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PilotError {
     /// The object cannot be built.
     #[error(transparent)]

@@ -108,6 +108,7 @@ pub struct Reach {
 
 /// No ranges were found.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReachError {
     /// The object is refused, or too large.
     #[error(transparent)]

@@ -29,6 +29,7 @@ pub(crate) struct Reference {
 
 /// There is nothing to compare with.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReferenceError {
     /// No backend.
     #[error(transparent)]

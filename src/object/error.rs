@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 /// Why no object can be made of a specification.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ObjectError {
     /// The mesh file cannot be read.
     #[error("{}: cannot read the mesh: {reason}", .file.display())]

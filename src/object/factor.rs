@@ -37,6 +37,7 @@ const MECHANISM_SHIFT: f64 = 1.5e-8;
 
 /// A factorisation failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FactorError {
     /// A pivot is not positive.
     #[error("the matrix of the object is not positive definite")]

@@ -30,6 +30,7 @@ pub struct ContactForces {
 
 /// The object cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GraphicsError {
     /// The dataset's grid is none.
     #[error(transparent)]

@@ -48,6 +48,7 @@ struct Row {
 
 /// A file is not a recording.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RecordingError {
     /// The file cannot be read.
     #[error("{}: cannot be read: {source}", .file.display())]

@@ -25,6 +25,7 @@ pub struct Plan {
 
 /// A session cannot run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SessionError {
     /// The device's first position is none.
     #[error("the session cannot start: {0}")]

@@ -45,6 +45,7 @@ pub struct Setup {
 
 /// A dataset cannot be rendered.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SetupError {
     /// The dataset has no scene: no chain, no gains.
     #[error("the dataset holds no scene, so that its proxy and gains are not known: bake or gridize it with one")]

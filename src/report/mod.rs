@@ -38,6 +38,7 @@ pub const PIXELS: f64 = 2.0;
 
 /// Why a figure could not be drawn or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReportError {
     /// The figure's file or folder could not be written.
     #[error("cannot write {}: {source}; check that the folder exists, is writable and has room", path.display())]

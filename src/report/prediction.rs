@@ -30,6 +30,7 @@ pub struct Prediction {
 
 /// Why there is no prediction.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PredictionError {
     /// Not a share, or none of so few samples.
     #[error("a share of {share} of {samples} samples cannot be held out: it must leave some on both sides")]

@@ -25,6 +25,7 @@ const MESSAGE_ENCODING: &str = "cdr";
 
 /// An MCAP file cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RosError {
     /// The file cannot be opened.
     #[error("{}: cannot be read: {source}; check the path and its permissions", .file.display())]

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Why a scene file is refused.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read at all.
     #[error("{}: cannot read the scene: {reason}", .path.display())]

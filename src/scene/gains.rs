@@ -6,6 +6,7 @@ use crate::JointVector;
 
 /// A gain that cannot be taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GainError {
     /// No gain of that name.
     #[error("there is no gain {key:?}: take one of {}", GAINS.map(|(key, ..)| key).join(", "))]

@@ -67,6 +67,7 @@ use crate::{
 
 /// The viewer cannot go on.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ViewError {
     /// The device that draws.
     #[error("{}", remedied(&.0.to_string(), OTHER_ADAPTER))]

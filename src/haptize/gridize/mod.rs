@@ -87,6 +87,7 @@ pub struct GridizeReport {
 
 /// Why a gridization was refused.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum GridizeError {
     /// The samples are not usable.
     #[error(transparent)]

@@ -27,6 +27,7 @@ pub struct Samples {
 
 /// Why measurements cannot be taken as they are.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SamplesError {
     /// No joint, or more than the engine has room for.
     #[error("the measurements have {0} joints; between 1 and {MAX_JOINTS} can be gridized")]

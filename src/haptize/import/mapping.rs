@@ -201,6 +201,7 @@ fn radians() -> String {
 
 /// Why a mapping was refused.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MappingError {
     /// The file cannot be read.
     #[error("{file}: cannot be read: {reason}")]

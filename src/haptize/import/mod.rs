@@ -38,6 +38,7 @@ const IMPORT_SAMPLES: usize = 5_000_000;
 
 /// Why a log was refused.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImportError {
     /// The file cannot be read.
     #[error("{file}: cannot be read: {source}; check the path and its permissions")]

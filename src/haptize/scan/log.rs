@@ -103,6 +103,7 @@ pub struct LogWriter {
 
 /// A log cannot be read, continued or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum LogError {
     /// The system refused.
     #[error("{}: cannot be read or written: {source}; check the path, its permissions and the room left", .path.display())]

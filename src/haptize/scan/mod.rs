@@ -39,6 +39,7 @@ const BRAKE_TIME: f64 = 0.3;
 
 /// A scan failed or was stopped.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ScanError {
     /// The plan has too many points.
     #[error("the plan has more than {limit} points: widen its spacing")]

@@ -85,6 +85,7 @@ struct Patch {
 
 /// An effect that the scene names cannot act.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum EffectError {
     /// The dataset lacks what it needs.
     #[error(transparent)]

@@ -107,6 +107,7 @@ pub struct Step {
 
 /// The proxy cannot be integrated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum InertiaError {
     /// M is not symmetric positive definite.
     #[error("the proxy's inertia is not positive definite: give every joint a mass or a rotor inertia")]

@@ -172,6 +172,7 @@ pub struct Extent {
 
 /// The study failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AccuracyError {
     /// The object cannot be built.
     #[error(transparent)]
