@@ -8,9 +8,10 @@ use std::time::Duration;
 /// Spun before a deadline: an idle Linux wakes a thread within this time nearly always (half of them within 5 us).
 const SPIN: Duration = Duration::from_micros(60);
 
-/// Waits until `deadline`, in time since the clock's origin, and returns the time it is then.
-pub fn wait_until(deadline: Duration) -> Duration {
-    sleep_until(deadline.saturating_sub(SPIN));
+/// Waits until `deadline`, in time since the clock's origin, and returns the time it is then. `spins`: whether the
+/// processor is kept busy before it.
+pub fn wait_until(deadline: Duration, spins: bool) -> Duration {
+    sleep_until(if spins { deadline.saturating_sub(SPIN) } else { deadline });
     loop {
         let now = now();
         if now >= deadline {

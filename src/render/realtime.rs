@@ -126,8 +126,18 @@ impl<'session> HapticLoop<'session> {
 
     /// Waits for the next deadline and does its tick. Allocates, locks and prints nothing.
     pub fn tick(&mut self) {
+        self.tick_after(true);
+    }
+
+    /// As [`HapticLoop::tick`], some tens of microseconds later, and without keeping the processor busy meanwhile: for a
+    /// hand that is simulated.
+    pub fn tick_relaxed(&mut self) {
+        self.tick_after(false);
+    }
+
+    fn tick_after(&mut self, spins: bool) {
         let deadline = self.began + self.period * self.next;
-        let now = clock::wait_until(deadline);
+        let now = clock::wait_until(deadline, spins);
         self.tick_at(now, deadline);
     }
 

@@ -53,7 +53,11 @@ pub struct Feel {
 /// How often the hand's goal is moved.
 const GUIDE_PERIOD: Duration = Duration::from_millis(2);
 
-/// Ticks and costs that wait for the window: sixteen seconds at 1 kHz, for a window at rest looks at them every ten.
+/// How often a goal at rest is looked at: what moves it again is felt after a hundredth of a second.
+const GUIDE_AT_REST: Duration = Duration::from_millis(10);
+
+/// Ticks and costs that wait for the window: sixteen seconds at 1 kHz. A window at rest looks at them once a minute; what
+/// does not fit then is a hand that has not moved.
 const RING: usize = 1 << 14;
 
 /// Everything that the haptic thread owns.
@@ -164,13 +168,15 @@ fn lock(guide: &Mutex<Guide>) -> MutexGuard<'_, Guide> {
 /// Moves the hand's goal until the loop is over.
 fn lead(guide: &Mutex<Guide>, mut input: PointerInput, over: &AtomicBool) {
     let mut last = Instant::now();
+    let mut before = None;
     while !over.load(Ordering::Acquire) {
         let now = Instant::now();
         let goal = lock(guide).follow((now - last).as_secs_f64());
         last = now;
         // A goal that is none is refused, and the hand stays.
         let _ = input.move_to(&goal);
-        std::thread::sleep(GUIDE_PERIOD);
+        std::thread::sleep(if before == Some(goal) { GUIDE_AT_REST } else { GUIDE_PERIOD });
+        before = Some(goal);
     }
 }
 
@@ -182,7 +188,7 @@ impl Body {
                 drop(report.send(Ok((ticks, latest, Some(clear)))));
                 drop(refuse.send(body.begin()));
                 while !self.stop.load(Ordering::Acquire) {
-                    body.tick();
+                    body.tick_relaxed();
                 }
             }
         }

@@ -20,7 +20,7 @@ const FRAME: Duration = Duration::from_micros(16_667);
 
 /// Time between two frames of a window at rest [s]: pointer, keys, a hand that moves and background work ask for one at once, and what
 /// is left is a fault of the loop or a late tick.
-const AT_REST: Duration = Duration::from_secs(10);
+const AT_REST: Duration = Duration::from_secs(60);
 
 /// Least time that a window lasts which was opened again, for another one to be opened when its device is lost, too [s]: one that
 /// is lost again and again is no use.
