@@ -5,8 +5,8 @@
 
 use glam::DVec3;
 use haptize::scene::{
-    Algorithm, Diagnostic, GraphicsEffects, GraphicsSpec, GroundNodes, Interpolation, JointKind, Material, Rendering,
-    Scene, SceneError, Shape,
+    Algorithm, ContactSurface, Diagnostic, GraphicsEffects, GraphicsSpec, GroundNodes, Interpolation, JointKind,
+    Material, Rendering, Scene, SceneError, Shape,
 };
 use haptize::{JointVector, MAX_JOINTS};
 use std::{
@@ -169,6 +169,23 @@ fn lines_of_nodes_include_both_ends() {
     let heights: Vec<f64> = nodes.iter().map(|node| node.position.z).collect();
     assert!(heights.iter().zip([0.0, 0.1, 0.2, 0.3]).all(|(a, b)| (a - b).abs() < 1e-15) && heights.len() == 4);
     assert!(nodes.iter().all(|node| node.radius == 0.01));
+}
+
+#[test]
+fn the_smooth_surface_is_touched_unless_the_scene_or_the_algorithm_says_otherwise() {
+    let surface = |contact: &str, node: &str| {
+        let text = LEAST
+            .replace("{ at = [0.1, 0, 0] }", node)
+            .replace("stiffness = 1000", &format!("stiffness = 1000\n{contact}"));
+        Scene::parse(&text, "surface.toml").map(|scene| scene.contact.surface)
+    };
+    let (point, ball) = ("{ at = [0.1, 0, 0] }", "{ at = [0.1, 0, 0], radius = 0.01 }");
+    assert_eq!(surface("", point).unwrap(), ContactSurface::Smooth);
+    assert_eq!(surface("", ball).unwrap(), ContactSurface::Smooth);
+    assert_eq!(surface("surface = \"facets\"", point).unwrap(), ContactSurface::Facets);
+    assert_eq!(surface("algorithm = \"paper\"", ball).unwrap(), ContactSurface::Facets);
+    let refused = surface("surface = \"facets\"", ball).unwrap_err().to_string();
+    assert!(refused.contains("leave surface out"), "{refused}");
 }
 
 #[test]

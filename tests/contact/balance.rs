@@ -92,7 +92,7 @@ fn balance_and_contact_law_hold_for_nodes_with_a_radius() {
         for stiffness in [100.0, 1e4] {
             let chain = Chain::new(&arm(radius));
             let object = sphere(SpringKind::Isotropic);
-            let model = Model::new(&object, &chain, bodies::default_contact(&chain, stiffness));
+            let model = Model::new(&object, &chain, bodies::contact_of(&chain, stiffness));
             let mut solver = Solver::new(&model);
             let (mut touching, mut missed) = (0, 0);
             for q in random_configurations(4, 100) {
@@ -110,7 +110,7 @@ fn balance_and_contact_law_hold_for_nodes_with_a_radius() {
 /// not converged. Returns how many of `places` converge.
 fn hard(object: &Object, radius: f64, stiffness: f64, depths: [f64; 2], places: &[usize]) -> usize {
     let chain = floating_bar(radius);
-    let model = Model::new(object, &chain, bodies::default_contact(&chain, stiffness));
+    let model = Model::new(object, &chain, bodies::contact_of(&chain, stiffness));
     let [least, most] = depths.map(|depth| depth * RADIUS);
     let configurations = pressed(&model, 1, 1 + places.iter().max().unwrap(), least, most);
     let mut solver = Solver::new(&model);
@@ -194,7 +194,7 @@ fn saddles_are_left() {
     let mut left = 0;
     for (radius, stiffness) in [(0.008, 500.0), (0.004, 5000.0)] {
         let chain = bodies::gantry(vec![haptize::scene::ProxyNodeSpec { position: DVec3::ZERO, radius, length: 0.0 }]);
-        let model = Model::new(&object, &chain, bodies::default_contact(&chain, stiffness));
+        let model = Model::new(&object, &chain, bodies::contact_of(&chain, stiffness));
         let mut solver = Solver::new(&model);
         for aside in [-0.0047, -0.002, 0.003] {
             for height in [0.03, 0.0315, 0.036, 0.042] {
@@ -216,7 +216,7 @@ fn soft_balls_rest_deep_in_their_dents() {
     let object =
         bodies::sphere(bodies::Ball { rings: 10, springs: SpringKind::Axial, ground: 1e3, patch: false }).unwrap();
     let chain = floating_bar(BALL);
-    let model = Model::new(&object, &chain, bodies::default_contact(&chain, 1e3));
+    let model = Model::new(&object, &chain, bodies::contact_of(&chain, 1e3));
     let mut solver = Solver::new(&model);
     let configurations = pressed(&model, 1, 117, 0.2 * RADIUS, 0.5 * RADIUS);
     let (mut sunk, mut derivatives, mut missed) = (0, 0, 0);
@@ -302,7 +302,7 @@ fn torque_is_minus_the_gradient_of_stored_energy() {
     for (kind, radius) in [(SpringKind::Isotropic, 0.0), (SpringKind::Axial, 0.0), (SpringKind::Isotropic, 0.008)] {
         let chain = Chain::new(&arm(radius));
         let object = sphere(kind);
-        let model = Model::new(&object, &chain, bodies::default_contact(&chain, 500.0));
+        let model = Model::new(&object, &chain, bodies::contact_of(&chain, 500.0));
         let mut solver = Solver::new(&model);
         // Down to half the object's radius, and deeper.
         let (mut derivatives, mut kinks) = ([0, 0], [0, 0]);

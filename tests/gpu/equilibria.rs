@@ -9,7 +9,7 @@ use haptize::{
     haptize::Backend,
     object::{Compliance, Object},
     proxy::Chain,
-    scene::{Algorithm, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
+    scene::{Algorithm, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
     tolerances::GPU_SETTLED_RESIDUAL,
 };
 
@@ -83,10 +83,6 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
     let mut energy = 0.0;
     for touch in &result.touches {
         model.chain.add_torque(&pose, touch.proxy_node as usize, touch.force, &mut torque);
-        // The smooth surface hangs on other nodes than those of a triangle.
-        if model.contact.surface == ContactSurface::Smooth {
-            continue;
-        }
         let magnitude = touch.force.length();
         // Contact law: lambda = kc depth, and compression: lambda > 0 outwards.
         let foot: DVec3 = (touch.carriers.iter())
@@ -123,8 +119,7 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
     if distance(&torque, &result.torque) > 1e-12 * torque.norm() {
         return Some(format!("tau {:?} is not J^T f {torque:?}", result.torque));
     }
-    let flat = model.contact.surface == ContactSurface::Facets;
-    if flat && (energy - result.energy).abs() > INVARIANT_AGREEMENT * energy {
+    if (energy - result.energy).abs() > INVARIANT_AGREEMENT * energy {
         return Some(format!("U {:e}, by its forces {energy:e}", result.energy));
     }
     None
@@ -157,10 +152,9 @@ fn check_scene(name: &str, material: Option<Material>, algorithm: Algorithm, str
     // The paper's iteration is chaotic where it does not settle at once: rounding decides now and then whether it does.
     let allowed = if algorithm == Algorithm::Paper { configurations.len() / 50 } else { 0 };
     assert!(unlike.len() <= allowed, "{name}, {algorithm:?}: {unlike:#?}");
-    // Left to the CPU: what lies within rounding of no contact, about 1e-6 of all, and what does not settle: about one in twenty, of balls
-    // whose smooth surface the kernels do not know one in four.
+    // Left to the CPU: what lies within rounding of no contact, about 1e-6 of all, and what does not settle: about one in twenty.
     println!("{name}, {algorithm:?}: {touching} touch, {} by the CPU", gpu.left_to_cpu());
-    assert!(gpu.left_to_cpu() * 3 <= touching, "{name}, {algorithm:?}: {} left to the CPU", gpu.left_to_cpu());
+    assert!(gpu.left_to_cpu() * 5 <= touching, "{name}, {algorithm:?}: {} left to the CPU", gpu.left_to_cpu());
 }
 
 #[test]

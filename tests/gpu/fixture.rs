@@ -4,7 +4,7 @@ use haptize::{
     gpu::{AdapterChoice, Context},
     object::Object,
     proxy::Chain,
-    scene::{Material, Scene},
+    scene::{ContactSurface, Material, Scene},
 };
 use std::{
     path::Path,
@@ -33,6 +33,8 @@ pub fn load_of(name: &str, material: Option<Material>) -> (Scene, Object, Chain)
         Scene::load(path.unwrap()).unwrap()
     };
     scene.object.material = material.unwrap_or(scene.object.material);
+    // The kernels know the triangles.
+    scene.contact.surface = ContactSurface::Facets;
     let object = Object::build(&scene.object).unwrap();
     let chain = Chain::new(&scene.proxy);
     (scene, object, chain)

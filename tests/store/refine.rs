@@ -20,6 +20,7 @@ const SCENE: &str = r#"
     sphere = { radius = 0.05, subdivisions = 3 }
     skin = { tension = 260.0, width = 0.0175, foundation = 1.6e5 }
     [contact]
+    surface = "facets"
     stiffness = 3000.0
     [grid]
     axes = [{ start = -0.41, stop = 0.39, count = 9 }, { start = -0.38, stop = 0.42, count = 9 }, { start = 0.006, stop = 0.022, count = 9 }]

@@ -99,7 +99,7 @@ fn shards_merge_to_the_bits_of_one_bake() {
     );
     assert_eq!(names(folder.path()), ["a.haptize", "parts"]);
     // The comparison sees one point's difference: another tolerance.
-    let other = Scene::parse(&lowest::SCENE.replace("stiffness = 500.0", "stiffness = 500.01"), "deep.toml").unwrap();
+    let other = Scene::parse(&lowest::SCENE.replace("stiffness = 5000.0", "stiffness = 5001.0"), "deep.toml").unwrap();
     assert!(whole(&other).0 != one);
 }
 
@@ -164,7 +164,7 @@ fn what_does_not_belong_together_is_refused() {
     let scene = scene();
     let parts = solved(&scene);
     let gathered = || Merge::gather(&[parts.path().to_path_buf()]).map(|_| ()).unwrap_err();
-    let other = Scene::parse(&lowest::SCENE.replace("stiffness = 500.0", "stiffness = 501.0"), "deep.toml").unwrap();
+    let other = Scene::parse(&lowest::SCENE.replace("stiffness = 5000.0", "stiffness = 5001.0"), "deep.toml").unwrap();
     let (file, _) = solve(&other, parts.path(), 1, usize::MAX).unwrap();
     let refused = gathered();
     assert!(matches!(refused, MergeError::Different { difference: "another text of the scene", .. }), "{refused}");

@@ -159,10 +159,17 @@ fn contact(checker: &Checker<'_>, table: &Spanned<ContactTable>, proxy: &ProxySp
         let message = "the algorithm \"paper\" is defined on the triangles: leave surface out, or take \"energy\"";
         return Err(checker.error(value.span(), message));
     }
-    // The closest facet of a dent of flat triangles changes with a kink, on which a ball balances.
     let balls = proxy.joints.iter().flat_map(|joint| &joint.nodes).any(|node| node.radius > 0.0);
-    let smooth = balls && algorithm != Algorithm::Paper;
-    let default = if smooth { ContactSurface::Smooth } else { ContactSurface::Facets };
+    if let Some(value) = &table.surface
+        && *value.get_ref() == ContactSurface::Facets
+        && algorithm != Algorithm::Paper
+        && balls
+    {
+        let message = "nodes with a radius do not balance where the closest triangle changes: leave surface out, and they touch \
+                       the smooth surface";
+        return Err(checker.error(value.span(), message));
+    }
+    let default = if algorithm == Algorithm::Paper { ContactSurface::Facets } else { ContactSurface::Smooth };
     Ok(ContactSpec {
         stiffness,
         stiffness_per_length,

@@ -6,7 +6,7 @@
 
 use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::{Processor, processors};
-use crate::fixtures::bodies::{BALL, PAPER, RADIUS, default_contact, floating_bar, pressed, sphere};
+use crate::fixtures::bodies::{BALL, PAPER, RADIUS, contact_of, floating_bar, pressed, sphere};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},
@@ -76,7 +76,7 @@ fn refined(
     };
     let object = sphere(PAPER)?;
     let chain = floating_bar(radius);
-    let model = Model::new(&object, &chain, default_contact(&chain, stiffness));
+    let model = Model::new(&object, &chain, contact_of(&chain, stiffness));
     let (mut worst, mut jump, mut flagged) = (0.0f64, 0.0f64, 0);
     for end in pressed(&model, 11, paths, 0.05 * RADIUS, 0.15 * RADIUS) {
         // A slide along the surface with a turn: 3 mm and 0.1 rad.
@@ -147,7 +147,7 @@ fn against_energy(
     let object = sphere(PAPER)?;
     let count = if effort == Effort::Full { 200 } else { 20 };
     let chain = floating_bar(radius);
-    let model = Model::new(&object, &chain, default_contact(&chain, stiffness));
+    let model = Model::new(&object, &chain, contact_of(&chain, stiffness));
     let stencil = |q: JointVector| {
         let mut stencil = vec![q];
         for joint in 0..q.len() {

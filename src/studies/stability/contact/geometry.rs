@@ -3,9 +3,7 @@
 
 use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::{Processor, processors};
-use crate::fixtures::bodies::{
-    BALL, PAPER, RADIUS, default_contact, floating_bar, gantry, pressed, skinned, sphere, torus,
-};
+use crate::fixtures::bodies::{BALL, PAPER, RADIUS, contact_of, floating_bar, gantry, pressed, skinned, sphere, torus};
 use crate::{
     JointVector,
     contact::{Model, Status},
@@ -49,7 +47,7 @@ fn at(place: DVec3) -> JointVector {
 pub fn exact_places(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let object = sphere(PAPER)?;
     let chain = gantry(vec![ProxyNodeSpec { position: DVec3::ZERO, radius: 0.0, length: 0.0 }]);
-    let mut model = Model::new(&object, &chain, default_contact(&chain, 1.0));
+    let mut model = Model::new(&object, &chain, contact_of(&chain, 1.0));
     let mut tried = Vec::new();
     for (kind, point, outward) in places(&object) {
         tried.extend([0.0, 1e-9, -1e-9].map(|offset| (kind, offset, at(point + outward * offset))));
@@ -96,7 +94,7 @@ pub fn coincident_nodes(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
             let configurations: Vec<JointVector> = places(object).into_iter().step_by(4).map(pressed_in).collect();
             let node = ProxyNodeSpec { position: DVec3::ZERO, radius, length: 0.0 };
             let [one, two] = [1, 2].map(|count| gantry(vec![node; count]));
-            let [mut one, mut two] = [&one, &two].map(|chain| Model::new(object, chain, default_contact(chain, 1.0)));
+            let [mut one, mut two] = [&one, &two].map(|chain| Model::new(object, chain, contact_of(chain, 1.0)));
             for stiffness in [1e2, 1e4] {
                 one.set_stiffness(2.0 * stiffness);
                 two.set_stiffness(stiffness);
@@ -158,7 +156,7 @@ pub fn right_through(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
         let mut tally = Tally::default();
         for radius in [0.0, BALL] {
             let chain = gantry(vec![ProxyNodeSpec { position: DVec3::ZERO, radius, length: 0.0 }]);
-            let mut model = Model::new(&object, &chain, default_contact(&chain, 1.0));
+            let mut model = Model::new(&object, &chain, contact_of(&chain, 1.0));
             let mut configurations = Vec::new();
             for axis in [DVec3::Z, DVec3::X, DVec3::new(0.3, -0.5, 0.8).normalize()] {
                 configurations.extend((-40..=40).map(|k| at(axis * (0.002 * f64::from(k)))));
@@ -184,7 +182,7 @@ pub fn concave(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let mut outcomes = Vec::new();
     for (name, radius) in [("points", 0.0), ("balls", 0.004)] {
         let chain = floating_bar(radius);
-        let mut model = Model::new(&object, &chain, default_contact(&chain, 1.0));
+        let mut model = Model::new(&object, &chain, contact_of(&chain, 1.0));
         // A fifth of the tube's radius.
         let configurations = pressed(&model, 3, count, 0.0, 0.2 * 0.016);
         for stiffness in [1e2, 1e4, 1e6] {
@@ -218,7 +216,7 @@ pub fn two_regions(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
                 length: 0.0,
             });
             let chain = gantry(nodes.to_vec());
-            let mut model = Model::new(&object, &chain, default_contact(&chain, 1.0));
+            let mut model = Model::new(&object, &chain, contact_of(&chain, 1.0));
             for stiffness in STIFFNESSES {
                 model.set_stiffness(stiffness);
                 for result in processor.solve(&model, &[at(DVec3::ZERO)])? {

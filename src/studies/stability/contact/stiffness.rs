@@ -5,7 +5,7 @@
 
 use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::Processor;
-use crate::fixtures::bodies::{BALL, Ball, RADIUS, contact, default_contact, floating_bar, pressed, skinned, sphere};
+use crate::fixtures::bodies::{BALL, Ball, RADIUS, contact, contact_of, floating_bar, pressed, skinned, sphere};
 use crate::{
     JointVector,
     contact::{Model, Solver, Status},
@@ -206,7 +206,7 @@ fn combination(
 ) -> Result<(), Failure> {
     let chains = [floating_bar(0.0), floating_bar(BALL)];
     for (radius, chain) in chains.iter().enumerate() {
-        let mut model = Model::new(object, chain, default_contact(chain, 1.0));
+        let mut model = Model::new(object, chain, contact_of(chain, 1.0));
         let mut paper = Model::new(object, chain, ContactSpec { algorithm: Algorithm::Paper, ..contact(1.0) });
         for (depth, (from, to, _)) in DEPTHS.into_iter().enumerate() {
             let configurations = pressed(&model, 1, count, from * RADIUS, to * RADIUS);
