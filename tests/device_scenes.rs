@@ -8,13 +8,13 @@ use haptize::{
     JointVector,
     contact::{Model, Proximity},
     dataset::Dataset,
-    device::{Motion, Recorded},
-    object::Object,
+    device::{LinearMap, Motion, Recorded},
+    haptize::{BackendChoice, Bake},
     proxy::Chain,
     render::{flags::Flags, session, setup::Setup},
-    scene::{Scene, Waypoint},
+    scene::{Rendering, Scene, Waypoint},
 };
-use std::{path::Path, process::Command};
+use std::{path::Path, sync::atomic::AtomicBool};
 
 fn shipped(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets").join(name)
@@ -30,15 +30,23 @@ fn tip(name: &str, q: &[f64], force: DVec3) -> (DVec3, JointVector) {
     (pose.nodes[0], torque)
 }
 
+/// From the device's coordinates to the joints, as the scene's `[device]` has it.
+fn map(name: &str) -> LinearMap {
+    let text = std::fs::read_to_string(shipped(name)).unwrap();
+    let device = Rendering::parse(&text, name).unwrap().device;
+    let offset = device.offset.unwrap_or(JointVector::zeros(3));
+    LinearMap::new(&device.map.unwrap(), &offset, 3).unwrap()
+}
+
 /// Positions and torques that `kinematics.cpp` of the device's own library computes.
 #[test]
 fn woodenhaptics_moves_as_its_library_says() {
-    let theta = [0.019_635_0, -0.078_539_8, 1.518_436_4];
-    let (position, torque) = tip("woodenhaptics.toml", &[theta[0], theta[1], theta[1] + theta[2]], DVec3::Z);
+    let map = map("woodenhaptics.toml");
+    let theta = JointVector::from_slice(&[0.019_635_0, -0.078_539_8, 1.518_436_4]);
+    let (position, torque) = tip("woodenhaptics.toml", &map.position(&theta), DVec3::Z);
     let expected = DVec3::new(0.008_536_06, 0.004_487_87, 0.191_545_74);
     assert!(position.distance(expected) < 1e-7, "{position}");
-    for (found, expected) in [torque[0], torque[1] + torque[2], torque[2]].iter().zip([0.0, 0.016_084_11, 0.244_664_24])
-    {
+    for (found, expected) in map.effort(&torque).iter().zip([0.0, 0.016_084_11, 0.244_664_24]) {
         assert!((found - expected).abs() < 1e-7, "{torque:?}");
     }
 }
@@ -50,7 +58,16 @@ fn the_touch_reaches_where_trigonometry_says() {
     let (position, _) = tip("touch.toml", &[waist, shoulder, elbow], DVec3::ZERO);
     let reach = 0.134 * shoulder.cos() + 0.1325 * (shoulder + elbow).sin();
     let height = 0.125 + 0.134 * shoulder.sin() - 0.1325 * (shoulder + elbow).cos();
-    assert!(position.distance(DVec3::new(-reach * waist.sin(), reach * waist.cos(), height)) < 1e-12, "{position}");
+    let expected = DVec3::new(-reach * waist.sin(), reach * waist.cos(), height);
+    assert!(position.distance(expected) < 1e-12, "{position}");
+    // The library counts the waist to the other side, and the lower arm against the vertical.
+    let theta = JointVector::from_slice(&[-waist, shoulder, shoulder + elbow]);
+    let (driven, torque) = tip("touch.toml", &map("touch.toml").position(&theta), DVec3::Z);
+    assert!(driven.distance(expected) < 1e-12, "{driven}");
+    // A force that lifts the tip turns the lower arm by its lever alone, the upper arm by its own.
+    let effort = map("touch.toml").effort(&torque);
+    let levers = [0.0, 0.134 * shoulder.cos(), 0.1325 * (shoulder + elbow).sin()];
+    assert!(effort.iter().zip(levers).all(|(effort, lever)| (effort - lever).abs() < 1e-12), "{effort:?}");
 }
 
 /// The pantograph of the vendor's package at the joint angles 168.25 and 12.5 degrees, bases 0.038 m apart: its end effector is
@@ -67,47 +84,52 @@ fn the_pantographs_end_effector_is_on_its_first_pair_of_bars() {
 }
 
 #[test]
-fn each_device_feels_its_scene() {
-    for (name, most) in [("woodenhaptics.toml", 1.2), ("touch.toml", 0.35), ("two_diy.toml", 0.123)] {
-        let folder = tempfile::tempdir().unwrap();
-        let run = |arguments: &[&str]| {
-            let output = Command::new(env!("CARGO_BIN_EXE_haptize"))
-                .args(arguments)
-                .current_dir(folder.path())
-                .output()
-                .unwrap();
-            assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-            serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
-        };
-        let scene = shipped(name).display().to_string();
-        let baked = run(&["bake", &scene, "--backend", "cpu", "--measure-error", "0", "-o", "x.haptize", "--json"]);
-        assert_eq!((&baked["unconverged"], &baked["overflowed"]), (&0.into(), &0.into()), "{name}: {baked:#}");
-        for motion in ["press", "scrape"] {
-            let felt = run(&["play", "x.haptize", "--motion", motion, "--json"]);
-            let number = |key: &str| felt[key].as_f64().unwrap();
-            assert!(felt["fault"].is_null() && number("faults") == 0.0, "{name}, {motion}: {felt:#}");
-            assert!(number("contact_share") > 0.2 && number("contact_share") < 0.95, "{name}, {motion}: {felt:#}");
-            assert!(
-                number("max_device_torque") > 0.05 * most && number("max_device_torque") <= most,
-                "{name}, {motion}: {felt:#}"
-            );
-            assert_eq!(number("outside"), 0.0, "{name}, {motion}: {felt:#}");
-            assert!(number("max_relative_account_residual") < 1e-10, "{name}, {motion}: {felt:#}");
-        }
-        anywhere_within_the_limits(name, &folder.path().join("x.haptize"));
+fn the_woodenhaptics_feels_its_scene() {
+    feels("woodenhaptics.toml", 1.2);
+}
+
+#[test]
+fn the_touch_feels_its_scene() {
+    feels("touch.toml", 0.35);
+}
+
+#[test]
+fn the_pantograph_feels_its_scene() {
+    feels("two_diy.toml", 0.123);
+}
+
+/// The scene is baked, and pressed and scraped by a device of at most `most` [N m].
+fn feels(name: &str, most: f64) {
+    let scene = Scene::load(shipped(name)).unwrap();
+    let stop = AtomicBool::new(false);
+    let progress = &mut |_| ();
+    let backend = BackendChoice::Cpu;
+    let bake = Bake { scene: &scene, backend, measured: Some(0), aim: None, date: "", stop: &stop, progress };
+    let (dataset, report) = bake.in_memory().unwrap();
+    assert_eq!((report.unconverged, report.overflowed), (0, 0), "{name}: {report:?}");
+    let setup = Setup::new(&dataset).unwrap();
+    for motion in [&setup.scene.motion.press, &setup.scene.motion.scrape] {
+        let motion = Motion::through(motion, setup.chain.joints.len()).unwrap();
+        // Without frames of the object, which the torque does not depend on.
+        let plan = setup.plan(&dataset, motion.duration(), 0);
+        let mut hand = setup.hand(motion).unwrap();
+        let felt = session::run(&setup.haptics, &mut hand, None, &plan).unwrap().summary();
+        assert_eq!((felt.faults, felt.outside), (0, 0), "{name}: {felt:?}");
+        assert!(felt.contact_share > 0.2 && felt.contact_share < 0.95, "{name}: {felt:?}");
+        assert!(felt.max_device_torque > 0.05 * most && felt.max_device_torque <= most, "{name}: {felt:?}");
+        assert!(felt.max_relative_account_residual < 1e-10, "{name}: {felt:?}");
     }
+    anywhere_within_the_limits(&scene, &dataset, &setup);
 }
 
 /// The hand goes anywhere within the device's limits, far beyond what is haptized: the proxy enters the object nowhere that was not
 /// solved, and a hand in the object is pushed back wherever it is.
-fn anywhere_within_the_limits(name: &str, file: &Path) {
+fn anywhere_within_the_limits(scene: &Scene, dataset: &Dataset, setup: &Setup) {
     /// Depth from which a hand must feel something [m]: well beyond a cell's error of where contact begins.
     const DEEP: f64 = 0.004;
-    let dataset = Dataset::load(file).unwrap();
-    let setup = Setup::new(&dataset).unwrap();
-    let scene = Scene::load(shipped(name)).unwrap();
-    let object = Object::build(&scene.object).unwrap();
-    let model = Model::new(&object, &setup.chain, scene.contact);
+    let object = setup.object.as_ref().unwrap();
+    let model = Model::new(object, &setup.chain, scene.contact);
+    let name = &scene.name;
     let mut proximity = Proximity::new(&model);
     let mut gap = |q: &JointVector| {
         proximity.place(q);
@@ -128,7 +150,7 @@ fn anywhere_within_the_limits(name: &str, file: &Path) {
             })
             .collect();
         let motion = Motion::through(&at, setup.chain.joints.len()).unwrap();
-        let plan = setup.plan(&dataset, 3.2, 0);
+        let plan = setup.plan(dataset, 3.2, 0);
         let trace = session::run(&setup.haptics, &mut Recorded::new(motion), None, &plan).unwrap();
         for tick in trace.ticks.iter().step_by(5) {
             let outside = tick.flags.contains(Flags::OUTSIDE);

@@ -20,7 +20,7 @@ if [[ ${1:-} == *rustc* ]]; then
     esac
 fi
 
-executions=${1:-20000}
+executions=${1:-17500}
 place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
 echo 'void __sanitizer_cov_8bit_counters_init(char *first, char *end) { (void)first; (void)end; }' |

@@ -65,7 +65,7 @@ def flex_model() -> mujoco.MjModel:
 def press(model: mujoco.MjModel, field: haptize.Field | None) -> tuple[np.ndarray, np.ndarray, float]:
     """Follow the scene's press under PD control, against `field` or what is in the model.
 
-    Returns times [s], contact torque at the joints [N m], and milliseconds a step.
+    Returns times [s], contact torque at the joints [N m], and milliseconds of a processor a step, which other programs do not lengthen.
     """
     data = mujoco.MjData(model)
     dof = [model.joint(name).dofadr[0] for name in JOINTS]
@@ -73,7 +73,7 @@ def press(model: mujoco.MjModel, field: haptize.Field | None) -> tuple[np.ndarra
     when = [0.0, 0.2, 1.2, 1.6, 2.6]
     way = np.array([[0.1, 1.65, -2.28]] * 2 + [[0.1, 1.65, -1.85]] * 2 + [[0.1, 1.65, -2.28]])
     data.qpos[place] = way[0]
-    times, torques, begin = [], [], time.perf_counter()
+    times, torques, begin = [], [], time.process_time()
     while data.time < when[-1]:
         goal = np.array([np.interp(data.time, when, way[:, joint]) for joint in range(3)])
         control = 60.0 * (goal - data.qpos[place]) - 1.0 * data.qvel[dof]
@@ -82,7 +82,7 @@ def press(model: mujoco.MjModel, field: haptize.Field | None) -> tuple[np.ndarra
         mujoco.mj_step(model, data)
         times.append(data.time)
         torques.append(data.qfrc_constraint[dof].copy() if field is None else felt)
-    return np.array(times), np.array(torques), 1e3 * (time.perf_counter() - begin) / len(times)
+    return np.array(times), np.array(torques), 1e3 * (time.process_time() - begin) / len(times)
 
 
 def main() -> None:

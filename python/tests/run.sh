@@ -37,12 +37,17 @@ if ! environment build "$newest" 'maturin>=1.9,<2'; then
     exit 0
 fi
 
-# Features that the tests ask of the package's dependencies, and the package does not: each has the engine compiled once more.
+# Features that the tests ask of the package's dependencies, and the package does not: each has the engine compiled once more, for minutes.
 features() {
     cargo tree --locked --prefix none -f '{p} [{f}]' "$@" | sed 's/ (\*)$//' | sort -u
 }
-comm -13 <(features --workspace -e all) <(features -p haptize-python -e normal,build) |
-    sed 's/^/compiled twice, for want of features in python\/Cargo.toml: /'
+twice=$(comm -13 <(features --workspace -e all) <(features -p haptize-python -e normal,build))
+if [ -n "$twice" ]; then
+    echo 'these would be compiled twice, and the engine with them: ask in python/Cargo.toml for the features that the workspace has of them'
+    echo '(cargo tree --workspace -e all -f "{p} [{f}]")'
+    sed 's/^/  /' <<<"$twice"
+    exit 1
+fi
 
 # The profile of the tests, so that what they have compiled is used.
 "$place/build/bin/maturin" build --quiet --locked --profile dev --compatibility linux --auditwheel skip --compression-method stored --out "$place"

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, replace_file},
-    device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, Watchdog, attach, open},
+    device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, attach, open},
     render::{
         mcap, realtime,
         recording::Recording,
@@ -213,10 +213,8 @@ fn drive(
     let guard =
         Guard::new(open(address, hand)?, hold_key.then_some(key)).map_err(|halt| format!("{address}: {halt}"))?;
     tell(format_args!("haptize: {}", guard.description()));
-    if guard.limits().watchdog == Watchdog::None && address.kind != Kind::Simulated {
-        tell(format_args!(
-            "haptize: note: this device has no watchdog: if haptize is killed the last torque stays on; keep its power switch at hand"
-        ));
+    if let Some(caution) = address.caution(&guard.limits()) {
+        tell(format_args!("haptize: note: {caution}"));
     }
     if hold_key {
         tell(format_args!("haptize: torque only while the space bar is held"));

@@ -1,6 +1,7 @@
 //! `haptize view`: the window, or one picture of it.
 
 use super::{Failure, Report};
+use crate::device::Address;
 use std::path::PathBuf;
 
 /// Arguments of `haptize view`.
@@ -10,12 +11,19 @@ use std::path::PathBuf;
 Examples:
   haptize view                           the sphere of the demo
   haptize view sphere.haptize
+  haptize view touch.haptize --device touch --hold-key
   haptize view sphere.haptize --screenshot window.png --motion scrape --time 2.5 --dark",
     adapter_help!()
 ))]
 pub struct Arguments {
     /// A scene, which is baked first, or a dataset; without one the paper's sphere.
     file: Option<PathBuf>,
+    /// A real device leads the arm instead of the pointer: KIND or KIND:PLACE, as `haptize device list` shows it.
+    #[arg(long, value_name = "NAME", conflicts_with = "screenshot")]
+    device: Option<Address>,
+    /// Torque only while the space bar is held in the window (a dead-man key).
+    #[arg(long, requires = "device")]
+    hold_key: bool,
     /// Write the window to this PNG file instead of opening it: needs no display, but some Vulkan, software too.
     #[arg(long, value_name = "PNG")]
     screenshot: Option<PathBuf>,
@@ -46,10 +54,11 @@ fn size(text: &str) -> Result<[f32; 2], String> {
 #[cfg(feature = "viewer")]
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     use super::output::{self, Kind};
-    use crate::viewer::{self, Picture, Start};
+    use crate::viewer::{self, DeviceChoice, Picture, Start};
     let start = arguments.file.clone().map_or(Start::Sphere, Start::File);
     let Some(file) = &arguments.screenshot else {
-        viewer::open(start)?;
+        let device = arguments.device.clone();
+        viewer::open(start, device.map(|address| DeviceChoice { address, hold_key: arguments.hold_key }))?;
         return Ok(Report { text: String::new(), json: serde_json::json!({}), whole: true });
     };
     if !file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {

@@ -246,6 +246,16 @@ impl FromStr for Address {
     }
 }
 
+impl Address {
+    /// Returns what its user should know before the motors of a device with `limits` go on.
+    #[must_use]
+    pub fn caution(&self, limits: &Limits) -> Option<&'static str> {
+        (limits.watchdog == Watchdog::None && self.kind != Kind::Simulated).then_some(
+            "this device has no watchdog: if haptize is killed the last torque stays on; keep its power switch at hand",
+        )
+    }
+}
+
 impl fmt::Display for Address {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.place {

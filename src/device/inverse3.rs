@@ -15,9 +15,12 @@
 //! Source: the maker's public documentation, version 3.5, and recorded messages of its client library. Not tried on
 //! hardware.
 
+mod frame;
+
+pub use frame::{DeviceState, Frame};
+
 use super::{Command, Coordinates, Halt, Hardware, Limits, Measurement, Watchdog};
 use crate::JointVector;
-use serde::Deserialize;
 use std::{
     fmt::Write as _,
     net::{TcpStream, ToSocketAddrs},
@@ -47,46 +50,6 @@ const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Longest message of the service [bytes]: an inventory of many devices has some thousand.
 const LONGEST_MESSAGE: usize = 1 << 20;
-
-/// The part of a state frame that is used; anything else may be there or not.
-#[derive(Deserialize)]
-struct Frame {
-    #[serde(default)]
-    inverse3: Vec<DeviceFrame>,
-}
-
-#[derive(Deserialize)]
-struct DeviceFrame {
-    device_id: String,
-    state: Option<StateFrame>,
-    status: Option<StatusFrame>,
-}
-
-#[derive(Deserialize)]
-struct StateFrame {
-    cursor_position: Option<Vector>,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-struct Vector {
-    x: f64,
-    y: f64,
-    z: f64,
-}
-
-#[derive(Clone, Copy, Default, Deserialize)]
-#[serde(default)]
-struct StatusFrame {
-    calibrated: bool,
-    ready: bool,
-    power_supply: bool,
-}
-
-impl StatusFrame {
-    fn is_ready(self) -> bool {
-        self.calibrated && self.ready && self.power_supply
-    }
-}
 
 /// Message of the thread to the loop.
 #[derive(Clone, Copy, Debug)]
@@ -143,15 +106,15 @@ impl Inverse3 {
         let (mut socket, _) = tungstenite::client::client_with_config(format!("ws://{address}/"), stream, Some(config))
             .map_err(|error| format!("{address} is no Haply service: {error}"))?;
         let inventory = receive(&mut socket).map_err(|halt| format!("{address}: no inventory: {halt}"))?;
-        let chosen = inventory.inverse3.iter().find(|device| wanted_id.is_none_or(|id| device.device_id == id));
+        let chosen = inventory.devices().find(|device| wanted_id.is_none_or(|id| device.id() == id));
         let Some(device) = chosen else {
-            let known: Vec<&str> = inventory.inverse3.iter().map(|device| device.device_id.as_str()).collect();
+            let known: Vec<&str> = inventory.devices().map(DeviceState::id).collect();
             return Err(match wanted_id {
                 Some(id) => format!("the service has no device {id}; it has: {}", known.join(", ")),
                 None => "the service has no Inverse3: plug it in, switch its power on".into(),
             });
         };
-        let id = device.device_id.clone();
+        let id = device.id().to_owned();
         if !id.chars().all(|c| c.is_ascii_alphanumeric()) {
             return Err(format!("the service names a device {id:?}, which is no number of a device"));
         }
@@ -186,7 +149,7 @@ fn connect(address: &str) -> Result<TcpStream, String> {
 fn receive(socket: &mut WebSocket<TcpStream>) -> Result<Frame, Halt> {
     loop {
         match socket.read() {
-            Ok(Message::Text(text)) => return serde_json::from_str(&text).map_err(|_| Halt::Garbage),
+            Ok(Message::Text(text)) => return Frame::parse(&text),
             Ok(Message::Ping(_) | Message::Pong(_)) => {}
             Ok(Message::Binary(_) | Message::Frame(_)) => return Err(Halt::Garbage),
             Ok(Message::Close(_)) | Err(_) => return Err(Halt::Unplugged),
@@ -196,12 +159,12 @@ fn receive(socket: &mut WebSocket<TcpStream>) -> Result<Frame, Halt> {
 
 impl Seen {
     /// Takes in what `device` says.
-    fn take(&mut self, device: &DeviceFrame) {
-        if let Some(status) = device.status {
-            self.ready = status.is_ready();
+    fn take(&mut self, device: &DeviceState) {
+        if let Some(ready) = device.is_ready() {
+            self.ready = ready;
         }
-        if let Some(Vector { x, y, z }) = device.state.as_ref().and_then(|state| state.cursor_position) {
-            (self.position, self.at) = ([x, y, z], Instant::now());
+        if let Some(position) = device.cursor_position() {
+            (self.position, self.at) = (position, Instant::now());
         }
     }
 }
@@ -245,7 +208,7 @@ impl Link {
         let message = message(session, &self.id, force);
         self.socket.send(Message::text(message)).map_err(|_| Halt::Unplugged)?;
         let frame = receive(&mut self.socket)?;
-        match frame.inverse3.iter().find(|device| device.device_id == self.id) {
+        match frame.devices().find(|device| device.id() == self.id) {
             Some(device) => self.seen.take(device),
             None => return Err(Halt::Unplugged),
         }
@@ -328,32 +291,5 @@ mod tests {
             message("", "049D", None),
             r#"{"inverse3":[{"device_id":"049D","commands":{"probe_position":{}}}]}"#
         );
-    }
-
-    #[test]
-    fn frames_are_read_with_whatever_they_hold_or_lack() {
-        let read = |text: &str| serde_json::from_str::<Frame>(text);
-        let full = r#"{"session_id":15,"inverse3":[{"device_id":"04BA","config":{"type":"inverse3"},"state":{"angular_position":
-            {"a0":-69.31704},"cursor_position":{"x":0.0206,"y":-0.0276,"z":0},"mode":"idle","transform":{}},
-            "status":{"calibrated":true,"in_use":false,"power_supply":true,"ready":true,"started":true}}],"verse_grip":[]}"#;
-        let frame = read(full).unwrap();
-        assert!(frame.inverse3[0].status.unwrap().is_ready());
-        assert_eq!(frame.inverse3[0].state.as_ref().unwrap().cursor_position.unwrap().z, 0.0);
-        assert!(read("{}").unwrap().inverse3.is_empty());
-        assert!(read(r#"{"inverse3":[{"device_id":"1"}]}"#).unwrap().inverse3[0].state.is_none());
-        assert!(
-            !read(r#"{"inverse3":[{"device_id":"1","status":{"ready":true}}]}"#).unwrap().inverse3[0]
-                .status
-                .unwrap()
-                .is_ready()
-        );
-        for wrong in [
-            "",
-            "[]x",
-            r#"{"inverse3":7}"#,
-            r#"{"inverse3":[{"device_id":"1","state":{"cursor_position":{"x":"a"}}}]}"#,
-        ] {
-            assert!(read(wrong).is_err(), "{wrong}");
-        }
     }
 }

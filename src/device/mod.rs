@@ -24,7 +24,7 @@ mod guard;
 mod halt;
 mod hand;
 mod hardware;
-mod inverse3;
+pub mod inverse3;
 mod joints;
 mod key;
 mod linear_map;

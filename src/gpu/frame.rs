@@ -16,6 +16,7 @@ use super::{
     layout::FrameParameters,
     shaders,
 };
+use crate::memory::{self, Shortage};
 use crate::object::{Compliance, Factor, FactorError, Object, Stiffening, Stiffness, settled};
 use crate::scene::GraphicsEffects;
 use glam::DVec3;
@@ -65,6 +66,14 @@ pub enum FrameError {
     /// The matrix.
     #[error(transparent)]
     Matrix(#[from] FactorError),
+    /// The inverse would not fit in memory.
+    #[error("the motion of an object of {nodes} nodes: {shortage}, or use a coarser surface")]
+    Memory {
+        /// Nodes of the object.
+        nodes: usize,
+        /// Memory that is needed, and that is left.
+        shortage: Shortage,
+    },
     /// The time between frames is not a positive number.
     #[error("the time between frames is {0} s; it must be a positive number")]
     Period(f64),
@@ -121,7 +130,8 @@ impl FrameUpdate {
     /// frame. Smoothing is no matter of the device: forces are filtered before they come here.
     ///
     /// # Errors
-    /// When the matrix is not positive definite (masses, damping or period are not positive) or the device refuses.
+    /// When the matrix is not positive definite (masses, damping or period are not positive), its inverse would not fit in memory, or the
+    /// device refuses.
     pub fn new(
         context: Arc<Context>,
         object: &Object,
@@ -278,22 +288,32 @@ impl FrameUpdate {
 }
 
 /// Inverse of 2M/T + B + (T/2) K, row-major; of (T/2) K in quasi-static graphics. One number for a pair of nodes where the three
-/// coordinates are alike, which the flag tells, else 3 x 3.
+/// coordinates are alike, which the flag tells, else 3 x 3. An inverse that would not fit in memory is an error before it is begun.
 fn inverse(
     object: &Object,
     stiffness: &Stiffness,
     period: f64,
     effects: &GraphicsEffects,
-) -> Result<(Vec<f32>, bool), FactorError> {
+) -> Result<(Vec<f32>, bool), FrameError> {
     let nodes = object.rest.len();
     let inertia = object.mass.iter().zip(&object.damping);
     let mut diagonal: Vec<f64> = inertia.map(|(mass, damping)| 2.0 * mass / period + damping).collect();
     if effects.quasi_static {
         diagonal.fill(0.0);
     }
+    check_memory(nodes, stiffness.is_isotropic())?;
     let inverse = Compliance::inverse(&Factor::of(stiffness, period / 2.0, &diagonal)?, nodes);
     let entries = inverse.entries.iter().map(|&entry| entry as f32).collect();
     Ok((entries, inverse.rows_per_node == 1))
+}
+
+/// Refuses an inverse over `nodes` nodes that would not fit in the host's memory, before anything is allocated: f64 as it is solved, f32 as
+/// the device takes it, and once more on its way there.
+fn check_memory(nodes: usize, is_isotropic: bool) -> Result<(), FrameError> {
+    let order = nodes.saturating_mul(if is_isotropic { 1 } else { 3 });
+    let bytes = order.saturating_pow(2).saturating_mul(size_of::<f64>() + 2 * size_of::<f32>());
+    let enough = if bytes > memory::SMALL { memory::check(bytes) } else { Ok(()) };
+    enough.map_err(|shortage| FrameError::Memory { nodes, shortage })
 }
 
 const DENSE: [Access; 8] = {
@@ -362,4 +382,24 @@ fn iterative_stages(
     }
     stages.push(stage(&shaders::FRAME_FINISH, vectors(1) + 2 * state.size())?);
     Ok(stages)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn an_inverse_that_no_memory_holds_is_refused_with_bytes_and_remedy() {
+        assert!(check_memory(100, true).is_ok() && check_memory(100, false).is_ok());
+        // 2^24 nodes need 2^52 bytes, or nine times as many.
+        for (is_isotropic, megabytes) in [(true, "4503599628 MB"), (false, "40532396647 MB")] {
+            let Err(FrameError::Memory { nodes, shortage }) = check_memory(1 << 24, is_isotropic) else {
+                panic!("no machine has so much memory");
+            };
+            assert_eq!(nodes, 1 << 24);
+            let said = FrameError::Memory { nodes, shortage }.to_string();
+            assert!(said.contains(megabytes) && said.contains("ulimit -v") && said.contains("coarser"), "{said}");
+        }
+    }
 }

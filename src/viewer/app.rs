@@ -6,6 +6,7 @@ use super::{
     feel::TickSource,
     files::Files,
     job::{Job, JobResult, Solver, Task},
+    lead::DeviceChoice,
     plots::Plots,
     scene::{SceneView, Shown},
     session::Session,
@@ -57,6 +58,8 @@ const SPHERE: &str = include_str!("../../datasets/sphere.toml");
 pub struct Viewer {
     pub(super) context: Arc<Context>,
     pub(super) pace: TickSource,
+    /// The haptic device that leads; none where pointer, keys or motions do.
+    device: Option<DeviceChoice>,
     pub(super) session: Option<Session>,
     pub(super) scene: SceneView,
     pub(super) plots: Plots,
@@ -81,6 +84,7 @@ pub struct Viewer {
 pub struct Rescue {
     /// The open session, whose loop goes on.
     session: Option<Session>,
+    device: Option<DeviceChoice>,
     /// The task that was under way.
     task: Option<Task>,
     solver: Solver,
@@ -122,6 +126,7 @@ impl Viewer {
             scene: SceneView::new(Arc::clone(&context), render, samples)?,
             context,
             pace,
+            device: None,
             session: None,
             plots: Plots::default(),
             files: Files::new(folder),
@@ -152,6 +157,7 @@ impl Viewer {
     pub fn rescue(&mut self, egui: &egui::Context) -> Rescue {
         Rescue {
             session: self.session.take(),
+            device: self.device.clone(),
             task: self.job.take().map(|job| job.task.clone()),
             solver: self.solver.clone(),
             shown: self.scene.shown,
@@ -163,7 +169,7 @@ impl Viewer {
     /// again.
     pub fn resume(&mut self, rescue: Rescue, why: &str, egui: &egui::Context) {
         egui.set_theme(rescue.theme);
-        self.session = rescue.session;
+        (self.session, self.device) = (rescue.session, rescue.device);
         (self.solver, self.scene.shown) = (rescue.solver, rescue.shown);
         if let Some(session) = &mut self.session {
             let egui = egui.clone();
@@ -178,6 +184,11 @@ impl Viewer {
              GPU's driver if this comes back, or draw on another adapter: set {ADAPTER_VARIABLE} to a part of its name before \
              haptize starts; haptize doctor lists them"
         ));
+    }
+
+    /// Lets a haptic device lead in everything that is opened from now on.
+    pub fn drive(&mut self, device: DeviceChoice) {
+        self.device = Some(device);
     }
 
     /// Begins to open `start`.
@@ -224,12 +235,16 @@ impl Viewer {
             JobResult::Failed(reason) => self.error = Some(reason),
             JobResult::Loaded(loaded) => {
                 let (loaded, body) = *loaded;
-                let egui = egui.clone();
-                match Session::new(loaded, &self.context, self.pace, move || egui.request_repaint()) {
+                let wake = egui.clone();
+                let wake = move || wake.request_repaint();
+                // Two sessions cannot hold one device: the one before ends first.
+                let ended = self.session.take_if(|session| session.lead.is_some()).map(|session| session.controls);
+                let device = self.device.as_ref();
+                match Session::new(loaded, &self.context, self.pace, device, wake) {
                     Ok(mut session) => {
                         self.scene.open(&session.loaded, body);
-                        if let Some(before) = &self.session {
-                            session.controls.keep(&before.controls);
+                        if let Some(before) = ended.as_ref().or(self.session.as_ref().map(|before| &before.controls)) {
+                            session.controls.keep(before);
                         }
                         self.session = Some(session);
                     }
@@ -288,7 +303,9 @@ impl Viewer {
     /// Whether nothing moves and nothing is made, so that another frame would look the same.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
-        let busy = |session: &Session| session.feel.guide().is_running() || session.is_retuning();
+        // A device moves when it likes.
+        let busy =
+            |session: &Session| session.lead.is_some() || session.feel.guide().is_running() || session.is_retuning();
         self.job.is_none()
             && !self.session.as_ref().is_some_and(busy)
             && !self.scene.is_redrawing()

@@ -8,7 +8,7 @@
 use super::{background::spawn, guide::Guide};
 use crate::{
     JointVector,
-    device::{Applied, Device, Pointer, PointerInput, Reading},
+    device::{Applied, Device, Pointer, PointerInput, Reading, Scheduler},
     render::{
         haptic::Haptics,
         realtime::{ClearFault, Ends, HapticLoop},
@@ -47,6 +47,7 @@ pub struct Feel {
     steps: Option<mpsc::Sender<usize>>,
     stepped: mpsc::Receiver<()>,
     refused: mpsc::Receiver<Vec<String>>,
+    returned: mpsc::Receiver<Box<dyn Device>>,
     threads: Vec<JoinHandle<()>>,
 }
 
@@ -65,23 +66,41 @@ struct Body {
     haptics: Arc<Haptics>,
     device: Timed,
     stop: Arc<AtomicBool>,
+    /// Whether the device is the simulated one that is led, which may wait a little longer.
+    is_led: bool,
+    /// Takes the device in the end.
+    give_back: mpsc::Sender<Box<dyn Device>>,
 }
 
 /// The ends of the buffers that the haptic thread returns before its first tick.
 type Seen = (rtrb::Consumer<Tick>, triple_buffer::Output<Latest>, Option<ClearFault>);
 
 impl Feel {
-    /// Starts the loop with the device where `guide` leads it.
+    /// Starts the loop with `device`; without one, with a simulated one that is held where `guide` leads it.
     ///
     /// # Errors
     /// In words, when device and loop do not fit or the system gives no threads.
-    pub fn start(haptics: Arc<Haptics>, gains: &HapticsSpec, guide: Guide, pace: TickSource) -> Result<Self, String> {
-        let (pointer, input) = Pointer::new(gains, &guide.goal()).map_err(|error| error.to_string())?;
+    pub fn start(
+        haptics: Arc<Haptics>,
+        gains: &HapticsSpec,
+        guide: Guide,
+        pace: TickSource,
+        device: Option<Box<dyn Device>>,
+    ) -> Result<Self, String> {
+        let (device, input): (Box<dyn Device>, _) = match device {
+            Some(device) => (device, None),
+            None => {
+                let (pointer, input) = Pointer::new(gains, &guide.goal()).map_err(|error| error.to_string())?;
+                (Box::new(pointer), Some(input))
+            }
+        };
+        let is_led = input.is_some();
         let guide = Arc::new(Mutex::new(guide));
         let stop = Arc::new(AtomicBool::new(false));
         let (cost, costs) = rtrb::RingBuffer::new(RING);
-        let device = Timed { pointer, read: Instant::now(), cost };
-        let body = Body { haptics, device, stop: Arc::clone(&stop) };
+        let device = Timed { device, read: Instant::now(), cost };
+        let (give_back, returned) = mpsc::channel();
+        let body = Body { haptics, device, stop: Arc::clone(&stop), is_led, give_back };
         let (report, began) = mpsc::channel();
         let (refuse, refused) = mpsc::channel();
         let (acknowledge, stepped) = mpsc::channel();
@@ -89,8 +108,10 @@ impl Feel {
         let mut threads = Vec::new();
         let steps = match pace {
             TickSource::Clock => {
-                let (leader, over) = (Arc::clone(&guide), Arc::clone(&stop));
-                threads.push(spawn("guide", move || lead(&leader, input, &over))?);
+                if let Some(input) = input {
+                    let (leader, over) = (Arc::clone(&guide), Arc::clone(&stop));
+                    threads.push(spawn("guide", move || lead(&leader, input, &over))?);
+                }
                 threads.push(spawn("haptic", move || body.by_the_clock(&report, &refuse))?);
                 None
             }
@@ -102,7 +123,18 @@ impl Feel {
         };
         let ended = "the haptic thread ended before its first tick; start haptize again".to_owned();
         let (ticks, latest, clear) = began.recv().map_err(|_| ended)??;
-        Ok(Self { guide, ticks, costs, latest, clear, stop, steps, stepped, refused, threads })
+        Ok(Self { guide, ticks, costs, latest, clear, stop, steps, stepped, refused, returned, threads })
+    }
+
+    /// Ends the loop and gives back the device, without torque; none where its thread ended before.
+    pub fn end(&mut self) -> Option<Box<dyn Device>> {
+        self.stop.store(true, Ordering::Release);
+        self.steps = None;
+        for thread in self.threads.drain(..) {
+            // A thread that panicked has said so already.
+            let _ = thread.join();
+        }
+        self.returned.try_recv().ok()
     }
 
     /// The hand's leader. The haptic thread never locks it.
@@ -151,12 +183,7 @@ impl Feel {
 
 impl Drop for Feel {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        self.steps = None;
-        for thread in self.threads.drain(..) {
-            // A thread that panicked has said so already.
-            let _ = thread.join();
-        }
+        self.end();
     }
 }
 
@@ -182,22 +209,42 @@ fn lead(guide: &Mutex<Guide>, mut input: PointerInput, over: &AtomicBool) {
 
 impl Body {
     fn by_the_clock(mut self, report: &mpsc::Sender<Result<Seen, String>>, refuse: &mpsc::Sender<Vec<String>>) {
+        let scheduler = self.device.scheduler();
+        let goes_on = || !self.stop.load(Ordering::Acquire);
         match HapticLoop::new(&self.haptics, &mut self.device) {
             Err(error) => drop(report.send(Err(error.to_string()))),
             Ok((mut body, Ends { ticks, latest, clear, .. })) => {
                 drop(report.send(Ok((ticks, latest, Some(clear)))));
-                drop(refuse.send(body.begin()));
-                while !self.stop.load(Ordering::Acquire) {
-                    body.tick_relaxed();
+                match scheduler {
+                    None => {
+                        drop(refuse.send(body.begin()));
+                        while goes_on() {
+                            if self.is_led {
+                                body.tick_relaxed();
+                            } else {
+                                body.tick();
+                            }
+                        }
+                    }
+                    Some(scheduler) => {
+                        let run = scheduler.run(&mut || {
+                            body.tick_now();
+                            goes_on()
+                        });
+                        let stopped = run.err().map(|halt| format!("the device's own thread stopped: {halt}"));
+                        drop(refuse.send(stopped.into_iter().collect()));
+                    }
                 }
             }
         }
+        // Whoever is gone needs no device.
+        let _ = self.give_back.send(self.device.device);
     }
 
     fn by_steps(
         mut self,
         guide: &Mutex<Guide>,
-        mut input: PointerInput,
+        mut input: Option<PointerInput>,
         report: &mpsc::Sender<Result<Seen, String>>,
         asked: &mpsc::Receiver<usize>,
         done: &mpsc::Sender<()>,
@@ -214,8 +261,10 @@ impl Body {
         let period = self.haptics.period();
         for count in asked {
             for _ in 0..count {
-                let goal = lock(guide).follow(period);
-                let _ = input.move_to(&goal);
+                if let Some(input) = &mut input {
+                    let goal = lock(guide).follow(period);
+                    let _ = input.move_to(&goal);
+                }
                 let (tick, state) = driver.tick(period, period);
                 latest.write(state);
                 // Ticks beyond the ring are not recorded; steps are far shorter than it.
@@ -225,19 +274,21 @@ impl Body {
                 break;
             }
         }
+        drop(driver);
+        let _ = self.give_back.send(self.device.device);
     }
 }
 
 /// The device, with the time from its reading to the torque that answers it: what a tick costs.
 struct Timed {
-    pointer: Pointer,
+    device: Box<dyn Device>,
     read: Instant,
     cost: rtrb::Producer<Duration>,
 }
 
 impl Device for Timed {
     fn read(&mut self, elapsed: f64) -> Reading {
-        let reading = self.pointer.read(elapsed);
+        let reading = self.device.read(elapsed);
         self.read = Instant::now();
         reading
     }
@@ -245,6 +296,10 @@ impl Device for Timed {
     fn apply(&mut self, torque: &JointVector) -> Applied {
         // Unread costs of the last seconds are as good as newer ones.
         let _ = self.cost.push(self.read.elapsed());
-        self.pointer.apply(torque)
+        self.device.apply(torque)
+    }
+
+    fn scheduler(&self) -> Option<Arc<dyn Scheduler>> {
+        self.device.scheduler()
     }
 }

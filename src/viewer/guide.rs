@@ -20,6 +20,8 @@ pub struct Guide {
     from: JointVector,
     /// Least and greatest coordinate of each joint [rad or m].
     limits: Vec<[f64; 2]>,
+    /// Whether a haptic device leads, and nobody here does.
+    handed_over: bool,
     /// Where the hand is at first [rad or m].
     home: JointVector,
     /// The way back there, and the time in it [s], while the hand takes it.
@@ -73,6 +75,7 @@ impl Guide {
             goal: loaded.start(),
             from: loaded.start(),
             limits,
+            handed_over: false,
             home: loaded.start(),
             way_home: None,
             keys: None,
@@ -82,6 +85,18 @@ impl Guide {
         };
         guide.point(loaded.start());
         guide
+    }
+
+    /// Leaves the lead to a haptic device: there are no motions then, and nothing for a pointer to take.
+    pub fn hand_over(&mut self) {
+        (self.handed_over, self.playing) = (true, None);
+        self.motions.clear();
+    }
+
+    /// Whether a haptic device leads.
+    #[must_use]
+    pub fn is_handed_over(&self) -> bool {
+        self.handed_over
     }
 
     /// Names of the motions.
@@ -239,6 +254,7 @@ mod tests {
             goal: start,
             from: start,
             limits: vec![[-1.0, 1.0], [-0.2, 0.2]],
+            handed_over: false,
             home,
             way_home: None,
             keys: Some(Keys::default()),

@@ -8,6 +8,7 @@
 //! | `theme`, `palette` | sizes and type, colours |
 //! | `loaded`, `job`, `background` | what is open, how it is baked or read, and all else that the window must not wait for |
 //! | `feel`, `guide`, `history` | the haptic loop beside the window, who leads the hand, what was felt lately |
+//! | `lead` | a haptic device that leads in the place of all these |
 //! | `scene`, `overlay`, `body` | the 3-D panel, what lies on top of its picture, the object on the GPU |
 //! | `steering`, `grip`, `camera` | whence it is seen, and the pointer's grip on the proxy |
 //! | `stage`, `pipelines`, `shapes`, `pixels` | the renderer of that panel |
@@ -31,6 +32,7 @@ mod gains;
 mod guide;
 mod history;
 mod job;
+mod lead;
 mod legend;
 mod loaded;
 mod node_drag;
@@ -55,6 +57,7 @@ mod window;
 pub use app::{Rescue, Start, Viewer};
 pub use eframe::egui_wgpu::RenderState;
 pub use feel::TickSource;
+pub use lead::DeviceChoice;
 pub use offscreen::{Picture, render_state, screenshot};
 pub use theme::{LEAST_WINDOW, apply as dress};
 pub use window::open;

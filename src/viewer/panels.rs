@@ -5,6 +5,7 @@ use super::{
     feel::TickSource,
     guide::Guide,
     job::{Job, Task, short},
+    lead::Lead,
     loaded::Loaded,
     number,
     plots::{self, Plots},
@@ -83,8 +84,10 @@ impl Viewer {
             self.save();
         }
         ui.separator();
-        if let Some(session) = &self.session {
-            motions(ui, &mut session.feel.guide());
+        match &self.session {
+            Some(Session { lead: Some(lead), .. }) => led(ui, lead),
+            Some(session) => motions(ui, &mut session.feel.guide()),
+            None => {}
         }
     }
 
@@ -122,6 +125,11 @@ impl Viewer {
                     if ui.small_button("Clear fault").clicked() {
                         session.feel.clear_fault();
                     }
+                }
+                if let (Some(halt), Some(_)) = (tick.applied.halt, &session.lead) {
+                    ui.separator();
+                    let what = format!("no torque: {halt}");
+                    ui.colored_label(ui.visuals().error_fg_color, RichText::new(what).small());
                 }
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -284,6 +292,20 @@ fn plots_panel(ui: &mut Ui, frame: Frame, height: f32, plots: &mut Plots, sessio
             session.history.hold_still(&mut session.feel);
         }
     });
+}
+
+/// Says which device leads, and presses its dead-man key while the space bar is held.
+fn led(ui: &mut Ui, lead: &Lead) {
+    ui.label(RichText::new(format!("led by {}", lead.description)).weak());
+    if let Some(caution) = lead.caution {
+        ui.colored_label(ui.visuals().warn_fg_color, "no watchdog").on_hover_text(caution);
+    }
+    if let Some(key) = &lead.key {
+        ui.label("hold the space bar for torque");
+        if ui.input(|input| input.focused && input.key_down(egui::Key::Space)) {
+            key.press();
+        }
+    }
 }
 
 /// Motions of the scene: choose, play, pause, scrub.

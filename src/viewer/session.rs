@@ -7,6 +7,7 @@ use super::{
     feel::{Feel, TickSource},
     guide::Guide,
     history::History,
+    lead::{DeviceChoice, Lead},
     loaded::Loaded,
     slices::Slices,
     theme::{FINE_GAP, GAP, PLANE_SHARE, ROOM_FOR_BOTH},
@@ -25,6 +26,8 @@ pub struct Session {
     pub loaded: Loaded,
     pub feel: Feel,
     pub history: History,
+    /// The haptic device that leads; none where pointer, keys or motions do.
+    pub lead: Option<Lead>,
     pace: TickSource,
     /// The loop with the gains that the controls have, made in the background.
     retuning: Following<HapticsSpec, Result<Tuned, SetupError>>,
@@ -41,25 +44,31 @@ pub struct Session {
 type Tuned = (Arc<Haptics>, Option<String>);
 
 impl Session {
-    /// Begins to feel `loaded`.
+    /// Begins to feel `loaded`, with `device` where one is chosen.
     ///
     /// # Errors
-    /// In words, when it cannot be felt as the scene has it.
+    /// In words, when it cannot be felt as the scene has it, or with that device.
     pub fn new(
         loaded: Loaded,
         context: &Arc<Context>,
         pace: TickSource,
+        device: Option<&DeviceChoice>,
         wake: impl Fn() + Send + 'static,
     ) -> Result<Self, String> {
         let controls = Controls::new(&loaded, context, wake);
         let gains = controls.tuning.haptics.clone();
         let haptics = Arc::clone(&loaded.setup.haptics);
         let history = History::new(haptics.period()).ok_or("no memory for histograms; close other programs")?;
-        let feel = Feel::start(haptics, &gains, Guide::new(&loaded), pace)?;
+        let mut guide = Guide::new(&loaded);
+        let (device, lead) = device.map(|device| device.open(&loaded)).transpose()?.unzip();
+        if lead.is_some() {
+            guide.hand_over();
+        }
+        let feel = Feel::start(haptics, &gains, guide, pace, device)?;
         let (slices, cloud) = (Slices::new(&loaded.dataset), Cloud::new(&loaded.dataset));
         let advice = loaded.setup.advice.clone();
         let retuning = Following::new(Some(gains));
-        Ok(Self { loaded, feel, history, pace, retuning, slices, cloud, controls, advice, cloud_first: false })
+        Ok(Self { loaded, feel, history, lead, pace, retuning, slices, cloud, controls, advice, cloud_first: false })
     }
 
     /// Makes again what belongs to a window and a device that are gone; the loop goes on. `context` is the new one, `wake` is called
@@ -126,7 +135,14 @@ impl Session {
         let (haptics, advice) = made.map_err(|error| error.to_string())?;
         let guide = self.feel.guide().clone();
         self.history.collect(&mut self.feel);
-        self.feel = Feel::start(haptics, &self.controls.tuning.haptics, guide, self.pace)?;
+        let device = match &self.lead {
+            // There is one of it: the last loop ends first.
+            Some(lead) => {
+                Some(self.feel.end().ok_or_else(|| format!("{} is lost: open the file again", lead.description))?)
+            }
+            None => None,
+        };
+        self.feel = Feel::start(haptics, &self.controls.tuning.haptics, guide, self.pace, device)?;
         self.history.begin_anew();
         self.advice = advice;
         Ok(())
@@ -159,7 +175,7 @@ mod tests {
         };
         let loaded = Loaded::new(bake.in_memory().unwrap().0, None, None).unwrap();
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-        let mut session = Session::new(loaded, &context, TickSource::Steps, || ()).unwrap();
+        let mut session = Session::new(loaded, &context, TickSource::Steps, None, || ()).unwrap();
         let (open, gate) = mpsc::channel::<()>();
         let other = HapticsSpec { interpolation: Interpolation::Potential, ..session.controls.tuning.haptics.clone() };
         session.controls.tuning.haptics = other.clone();

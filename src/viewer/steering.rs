@@ -56,7 +56,8 @@ impl Steering {
             Vec2::new(2.0 * from_centre.x / rect.width(), -2.0 * from_centre.y / rect.height())
         };
         let pressed = ui.input(|input| input.pointer.press_origin());
-        if response.drag_started_by(PointerButton::Primary)
+        if !guide.is_handed_over()
+            && response.drag_started_by(PointerButton::Primary)
             && let Some(origin) = pressed
         {
             self.grip = NodeDrag::take(&self.camera, aspect, at(origin), pose);
@@ -91,7 +92,8 @@ impl Steering {
         guide.hear(ui.input(|input| input.focused.then(|| held(input))));
         if self.grip.is_some() {
             ui.ctx().set_cursor_icon(CursorIcon::Grabbing);
-        } else if let Some(pointer) = response.hover_pos()
+        } else if !guide.is_handed_over()
+            && let Some(pointer) = response.hover_pos()
             && NodeDrag::take(&self.camera, aspect, at(pointer), pose).is_some()
         {
             ui.ctx().set_cursor_icon(CursorIcon::Grab);

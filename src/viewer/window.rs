@@ -1,6 +1,6 @@
 //! The viewer in a window of the desktop.
 
-use super::{Rescue, Start, TickSource, ViewError, Viewer, dress, theme};
+use super::{DeviceChoice, Rescue, Start, TickSource, ViewError, Viewer, dress, theme};
 use crate::gpu::{AdapterChoice, Context, GpuError};
 use eframe::{
     egui::{self, ViewportBuilder},
@@ -29,16 +29,17 @@ const LEAST_LIFE: Duration = Duration::from_secs(30);
 /// Longest wait for the last frame of a window that is closed.
 const LAST_WORK: Duration = Duration::from_secs(1);
 
-/// Opens a window on `start` and returns when it is closed. A file that cannot be read is reported before there is a window;
+/// Opens a window on `start`, led by `device` where there is one, and returns when it is closed. A file that cannot be read is reported before
+/// there is a window;
 /// what is wrong within it, in the window, where another one can be opened. A window whose device is lost cannot draw any
 /// more: it is closed, and another one opened on a new device.
 ///
 /// # Errors
 /// When the file cannot be read, there is no device or no display, or the device is lost again and again.
-pub fn open(start: Start) -> Result<(), ViewError> {
+pub fn open(start: Start, device: Option<DeviceChoice>) -> Result<(), ViewError> {
     start.check()?;
     let mut context = Arc::new(Context::open(AdapterChoice::Any)?);
-    let mut begin = Begin::Start(start);
+    let mut begin = Begin::Start(start, device);
     loop {
         let (opened, is_anew) = (Instant::now(), matches!(begin, Begin::Resume(..)));
         let Some((rescue, why)) = show(&context, begin)? else { return Ok(()) };
@@ -52,7 +53,7 @@ pub fn open(start: Start) -> Result<(), ViewError> {
 
 /// The state that a window begins with.
 enum Begin {
-    Start(Start),
+    Start(Start, Option<DeviceChoice>),
     Resume(Box<Rescue>, String),
 }
 
@@ -81,7 +82,12 @@ fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<(Rescue, String)>
         let folder = std::env::current_dir().unwrap_or_else(|_| ".".into());
         let mut viewer = Viewer::new(device, render, TickSource::Clock, folder)?;
         match begin {
-            Begin::Start(start) => viewer.start(&start, &creation.egui_ctx),
+            Begin::Start(start, device) => {
+                if let Some(device) = device {
+                    viewer.drive(device);
+                }
+                viewer.start(&start, &creation.egui_ctx);
+            }
             Begin::Resume(rescue, why) => viewer.resume(*rescue, &why, &creation.egui_ctx),
         }
         Ok(Box::new(App { viewer, last: Instant::now(), egui: creation.egui_ctx.clone(), leave }))

@@ -1,6 +1,6 @@
 //! What is felt: motions, the pointer, keys, gains, interpolation, effects.
 
-use super::window::{Window, scanned, small_scene};
+use super::window::{SPHERE, Window, scanned, small_scene};
 use eframe::egui::{Theme, accesskit::Role};
 use egui_kittest::kittest::{NodeT, Queryable};
 use haptize::viewer::Start;
@@ -140,6 +140,66 @@ fn keys_press_the_arm_onto_the_object_and_off_it() {
     window.harness.key_down(Key::E);
     window.pass(0.5);
     assert_eq!(window.harness.state().tip_in(scene), tip);
+}
+
+#[test]
+fn a_device_leads_the_arm_and_goes_on_under_other_gains_and_in_other_files() {
+    let mut window = Window::driven("simulated", false);
+    assert_eq!(window.harness.state().error(), None);
+    assert!(window.shows("led by") && window.shows("simulated"));
+    assert!(window.harness.query_by_label("Press").is_none(), "a motion may be chosen");
+    // The simulated device goes along the scene's press by itself.
+    window.pass(2.2);
+    let pressed = window.torque();
+    assert!(pressed > 0.1 && window.shows("nodes in contact"), "{pressed}");
+    // The same device in another loop: it goes on from where it is.
+    window.harness.get_by_label("Boundary slope Ks").set_value_accesskit(12.0);
+    window.harness.run_ok();
+    window.wait();
+    window.pass(0.1);
+    assert_eq!(window.harness.state().error(), None);
+    assert!(window.torque() > 0.05 && window.shows("nodes in contact"), "{}", window.torque());
+    // A file that is opened has it from its beginning.
+    let ctx = window.harness.ctx.clone();
+    window.harness.state_mut().start(&Start::File(SPHERE.1.clone()), &ctx);
+    window.wait();
+    window.pass(0.2);
+    assert_eq!(window.harness.state().error(), None);
+    assert!(window.shows("led by") && window.torque() == 0.0);
+    assert!(!window.harness.state().is_at_rest(), "a window that draws nothing does not see the device move");
+}
+
+#[test]
+fn the_window_says_why_a_device_gives_no_torque() {
+    let mut window = Window::driven("simulated:unplugged@0.5", false);
+    window.pass(0.4);
+    assert!(!window.shows("no torque"));
+    window.pass(0.3);
+    assert!(window.shows("no torque: the device is unplugged"));
+    drop(window);
+    // One that is not there opens no session.
+    let window = Window::driven("woodenhaptics:/nowhere", false);
+    assert!(window.harness.state().error().is_some_and(|why| why.contains("/nowhere")));
+    assert!(!window.shows("led by"));
+}
+
+#[test]
+fn the_space_bar_is_the_dead_man_key() {
+    use eframe::egui::Key;
+    let mut window = Window::driven("simulated", true);
+    window.pass(1.0);
+    assert!(window.shows("hold the space bar for torque") && window.shows("no torque: the dead-man key is not held"));
+    window.harness.key_down(Key::Space);
+    for _ in 0..10 {
+        window.harness.step();
+        window.advance(0.1);
+    }
+    window.harness.step();
+    assert!(!window.shows("no torque"));
+    window.harness.key_up(Key::Space);
+    window.harness.step();
+    window.pass(0.5);
+    assert!(window.shows("no torque: the dead-man key is not held"));
 }
 
 #[test]

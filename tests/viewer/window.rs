@@ -11,7 +11,7 @@ use haptize::{
     gpu::{AdapterChoice, Context},
     haptize::{BackendChoice, Bake},
     scene::Scene,
-    viewer::{self, Start, TickSource, Viewer},
+    viewer::{self, DeviceChoice, Start, TickSource, Viewer},
 };
 use std::{
     path::{Path, PathBuf},
@@ -81,6 +81,17 @@ impl Window {
             .renderer(WgpuTestRenderer::from_render_state(render))
             .build_ui_state(|ui, viewer: &mut Viewer| viewer.ui(ui), viewer);
         Self { harness, folder, _device: device }
+    }
+
+    /// The sphere, led by the device at `address`.
+    pub fn driven(address: &str, hold_key: bool) -> Self {
+        let mut window = Self::empty([1200.0, 800.0], Theme::Light);
+        let device = DeviceChoice { address: address.parse().unwrap(), hold_key };
+        let ctx = window.harness.ctx.clone();
+        window.harness.state_mut().drive(device);
+        window.harness.state_mut().start(&Start::File(SPHERE.1.clone()), &ctx);
+        window.wait();
+        window
     }
 
     pub fn sphere() -> Self {

@@ -240,6 +240,7 @@ macro_rules! targets {
 
 targets! {
     datasets: targets::DATASETS;
+    sparse_stores: targets::STORES;
     scenes: targets::SCENES;
     obj_meshes: targets::OBJ;
     ply_meshes: targets::PLY;
@@ -249,6 +250,7 @@ targets! {
     joint_states_in_mcap: targets::MCAP;
     device_mappings: targets::DEVICES;
     replies_of_devices: targets::REPLIES;
+    frames_of_the_inverse3: targets::FRAMES;
     scan_logs: targets::LOGS;
     column_mappings_and_tables: targets::MAPPINGS;
     recordings: targets::RECORDINGS;

@@ -3,10 +3,12 @@
 mod devices;
 mod measured;
 mod meshes;
+mod stores;
 
-pub use devices::{DEVICES, REPLIES};
+pub use devices::{DEVICES, FRAMES, REPLIES};
 pub use measured::{LOGS, MAPPINGS, MCAP};
 pub use meshes::{MSH, OBJ, PLY, ROBOTS, STL};
+pub use stores::STORES;
 
 use super::mutate::{self, Random};
 use crate::program;
@@ -65,15 +67,7 @@ pub const DATASETS: Target = Target {
     name: "datasets",
     extension: "haptize",
     seeds: || BAKED.clone(),
-    mutate: |random, input, other| {
-        let (header, data) = parts(input);
-        let (other_header, other_data) = parts(other);
-        match random.below(8) {
-            0 => mended(&mutate::binary(random, input, other)),
-            1..5 => joined(&mutate::text(random, header, other_header), data),
-            _ => joined(header, &mutate::binary(random, data, other_data)),
-        }
-    },
+    mutate: container,
     run: |file, input| {
         write(file, input);
         let dataset = match Dataset::load(file) {
@@ -137,6 +131,17 @@ fn baked(object: &str) -> Vec<u8> {
     let file = folder.path().join("x.haptize");
     bake.in_memory().unwrap().0.save(&file).unwrap();
     std::fs::read(file).unwrap()
+}
+
+/// Mutates header or data of a file that both have, and its length and checksum are as they must be.
+fn container(random: &mut Random, input: &[u8], other: &[u8]) -> Vec<u8> {
+    let (header, data) = parts(input);
+    let (other_header, other_data) = parts(other);
+    match random.below(8) {
+        0 => mended(&mutate::binary(random, input, other)),
+        1..5 => joined(&mutate::text(random, header, other_header), data),
+        _ => joined(header, &mutate::binary(random, data, other_data)),
+    }
 }
 
 /// Header without its padding, and data.

@@ -1,8 +1,10 @@
-// A CHAI3D tool that feels a baked object: the joint torque of a haptize field becomes the tool's force. Needs CHAI3D 3, and is compiled where
-// CMakeLists.txt finds it; it was compiled with the headers of CHAI3D 3.3.0, and not run.
+// A CHAI3D tool that feels a baked object: the joint torque of a haptize field becomes the tool's force. Needs CHAI3D 3; chai3d_press.cpp drives it
+// without a device.
 //
 // The arm's joints must be those of the device: here the first three, and J, whose columns are the tip's velocity for a unit rate of each joint,
 // comes from the device's kinematics. At the tip F = J^-T tau.
+#pragma once
+
 #include <chai3d.h>
 #include <haptize.h>
 
