@@ -213,7 +213,7 @@ fn drive(
     let guard =
         Guard::new(open(address, hand)?, hold_key.then_some(key)).map_err(|halt| format!("{address}: {halt}"))?;
     tell(format_args!("haptize: {}", guard.description()));
-    if let Some(caution) = address.caution(&guard.limits()) {
+    if let Some(caution) = address.caution(guard.limits()) {
         tell(format_args!("haptize: note: {caution}"));
     }
     if hold_key {

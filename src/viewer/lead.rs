@@ -41,7 +41,7 @@ impl DeviceChoice {
         let guard = Guard::new(hardware, self.hold_key.then_some(key)).map_err(|halt| format!("{address}: {halt}"))?;
         let lead = Lead {
             description: guard.description(),
-            caution: address.caution(&guard.limits()),
+            caution: address.caution(guard.limits()),
             key: self.hold_key.then_some(input),
         };
         let device = attach(guard, address, loaded.setup.chain.clone(), &loaded.setup.scene);
