@@ -76,9 +76,9 @@ pub mod gpu;
 pub mod ros;
 
 pub mod dataset;
+pub use dataset::store;
 pub mod field;
 pub mod haptize;
-pub mod store;
 
 pub mod device;
 pub mod render;

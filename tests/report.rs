@@ -136,6 +136,7 @@ fn dataset(chain: &Chain, object: &Object, counts: &[usize]) -> Dataset {
         contacts: Some(Contacts { offsets: offsets.into(), nodes: nodes.into(), forces: forces.into() }),
         touches: None,
         surface: Some(Surface::of(object)),
+        refinement: None,
         scene: String::new(),
         provenance: Provenance::default(),
     }

@@ -5,7 +5,7 @@ use super::{
     bar::Bar,
     info, interrupt, max_error,
     output::{self, Kind},
-    reach,
+    reach, refine,
     shard::ShardChoice,
     tell,
 };
@@ -14,6 +14,7 @@ use crate::{
         Aim, BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, Shard, Sweep, SweepReport,
     },
     scene::{Algorithm, Scene},
+    store::space::MAX_LEVELS,
 };
 use std::{
     fmt::{self, Write},
@@ -29,6 +30,7 @@ Examples:
   haptize bake sphere.toml
   haptize bake sphere.toml --max-error 5%
   haptize bake sphere.toml --max-error 0.002Nm -o fine.haptize
+  haptize bake organ.toml --max-error 10% --refine 3     finer where it errs, six joints included
   haptize bake sphere.toml --backend gpu --resume
   haptize bake sphere.toml --shard auto/64 -o shards     one task of a cluster's array; see haptize plan",
     adapter_help!()
@@ -57,6 +59,10 @@ pub struct Arguments {
     /// torque's own rms over the grid (0.01 or 1%), or a torque ("0.002 N m").
     #[arg(long, value_name = "ERROR", allow_negative_numbers = true)]
     max_error: Option<Aim>,
+    /// Instead of choosing a uniform grid for --max-error, refine the scene's grid where it errs: by up to so many levels, itself included, each of half
+    /// the spacing.
+    #[arg(long, value_name = "LEVELS", requires = "max_error", conflicts_with_all = ["resume", "algorithm", "shard"], value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_LEVELS)))]
+    refine: Option<u32>,
     /// Maximum number of grid points that --max-error may choose.
     #[arg(long, default_value_t = 2_000_000, value_name = "POINTS")]
     max_points: usize,
@@ -83,6 +89,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let earlier = output::check(&output, Kind::Dataset, [arguments.scene.as_path()])?;
     output::check(&Sweep::growing_of(&output), Kind::Dataset, [])?;
     let scene = reach::complete(scene, arguments.backend, arguments.max_error.is_some())?;
+    if let (Some(aim), Some(levels)) = (arguments.max_error, arguments.refine) {
+        let wanted = refine::Wanted { aim, levels, most: arguments.max_points, output: &output };
+        let mut report = refine::run(&scene, &wanted)?;
+        earlier.tell(&mut report.text, &mut report.json);
+        return Ok(report);
+    }
     if let Some(aim) = arguments.max_error {
         let wanted =
             max_error::AccuracyGoal { aim, points: arguments.max_points, output: &output, resume: arguments.resume };

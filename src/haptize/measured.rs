@@ -245,6 +245,7 @@ fn window(grid: &Grid, table: &Table<'_>, lines: &[Range<usize>]) -> Dataset {
         contacts: None,
         touches: None,
         surface: None,
+        refinement: None,
         scene: String::new(),
         provenance: Provenance::default(),
     }

@@ -90,6 +90,22 @@ pub struct Sweep<'a> {
     pub(super) proxy_nodes: usize,
 }
 
+/// The grid of `scene`, with the names and units of its joints.
+#[must_use]
+pub fn grid_of(scene: &Scene) -> Grid {
+    let axes = scene.proxy.joints.iter().zip(&scene.grid.axes).map(|(joint, axis)| Axis {
+        name: joint.name.clone(),
+        unit: match joint.kind {
+            JointKind::Revolute => "rad".into(),
+            JointKind::Prismatic => "m".into(),
+        },
+        start: axis.start,
+        step: axis.step,
+        count: axis.count,
+    });
+    Grid { axes: axes.collect() }
+}
+
 impl<'a> Sweep<'a> {
     /// The sweep that `scene` asks for, over `object`, which was built from it.
     ///
@@ -99,17 +115,7 @@ impl<'a> Sweep<'a> {
     /// # Errors
     /// [`SweepError::Grid`].
     pub fn new(scene: &Scene, object: &Object, backend: &str, adapter: &str, date: &str) -> Result<Self, SweepError> {
-        let axes = scene.proxy.joints.iter().zip(&scene.grid.axes).map(|(joint, axis)| Axis {
-            name: joint.name.clone(),
-            unit: match joint.kind {
-                JointKind::Revolute => "rad".into(),
-                JointKind::Prismatic => "m".into(),
-            },
-            start: axis.start,
-            step: axis.step,
-            count: axis.count,
-        });
-        let grid = Grid { axes: axes.collect() };
+        let grid = grid_of(scene);
         check_given(scene)?;
         if grid.joints() != scene.proxy.joints.len() {
             return Err(SweepError::Grid(format!("{} axes for {} joints", grid.joints(), scene.proxy.joints.len())));
@@ -425,6 +431,7 @@ impl<'a> Sweep<'a> {
             contacts: self.with_forces.then(|| contacts(columns.contacts)),
             touches: self.shape.with_touches.then(|| contacts(columns.touches)),
             surface: Some(self.surface.clone()),
+            refinement: None,
             scene: self.scene.clone(),
             provenance,
         }

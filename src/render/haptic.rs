@@ -17,6 +17,7 @@ use super::{
     coupling::Coupling,
     effects::{ContactEffects, EffectState, Pending},
     flags::{Fault, Flags},
+    live::Live,
     npmi::{Motion, Npmi},
     torque_history::TorqueHistory,
     watchdog::{self, TickRate, Watchdog},
@@ -237,6 +238,11 @@ impl Haptics {
 
     /// One tick.
     pub fn tick(&self, state: &mut State, inputs: &Inputs) -> Output {
+        self.tick_with(state, inputs, None)
+    }
+
+    /// One tick over contact that is solved meanwhile, if it is `live`.
+    pub fn tick_with(&self, state: &mut State, inputs: &Inputs, mut live: Option<&mut Live>) -> Output {
         let checked = self
             .watchdog
             .check(inputs, &state.device)
@@ -253,7 +259,10 @@ impl Haptics {
             state.accounts.device_moved(&self.coupling, inputs.elapsed, moved, &proxy, torque);
             state.device = inputs.position;
         }
-        let sample = self.field.sample(&proxy);
+        let sample = match &mut live {
+            None => self.field.sample(&proxy),
+            Some(live) => live.sample(&self.field, &proxy, &state.accounts, self.period),
+        };
         let stored = self.field.has_energy().then_some(sample.energy);
         let spring = self.coupling.spring_energy(&proxy, &state.device);
         state.accounts.at_tick(state.motion.kinetic_energy(), spring, stored, sample.index > 0.0);
@@ -278,6 +287,9 @@ impl Haptics {
 
         let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
         let stopped = self.move_proxy(state, interval, &velocity, &sample);
+        if let Some(live) = live {
+            live.tell(&state.motion.position, &state.proxy_velocity);
+        }
         Output { torque, device: state.device, proxy, sample, flags: sample.flags | limited | stopped, fault, accounts }
     }
 

@@ -8,6 +8,7 @@ use super::{
     clock,
     graphics::Graphics,
     haptic::Haptics,
+    live::{Answers, Live},
     session::{Driver, Frames, Latest, Plan, SessionError},
     steal::{LateTick, StealObserver},
     timing::{Durations, Percentiles, Timing},
@@ -116,6 +117,12 @@ impl<'session> HapticLoop<'session> {
         Ok((this, Ends { ticks, latest: reader, late: late_ticks, clear: ClearFault(clear) }))
     }
 
+    /// The same over contact that is solved meanwhile.
+    #[must_use]
+    pub fn with_live(self, live: Option<Live>) -> Self {
+        Self { driver: self.driver.with_live(live), ..self }
+    }
+
     /// Asks the system for a real-time priority for the calling thread, and sets the first deadline to now. Returns what was not
     /// granted.
     pub fn begin(&mut self) -> Vec<String> {
@@ -196,8 +203,24 @@ pub fn run(
     plan: &Plan,
     stop: &AtomicBool,
 ) -> Result<(Trace, Timing), SessionError> {
+    run_live(haptics, device, graphics, plan, stop, None).map(|(trace, timing, _)| (trace, timing))
+}
+
+/// The same over contact that is solved meanwhile, if it is `live`; also what answered.
+///
+/// # Errors
+/// As for [`run`].
+pub fn run_live(
+    haptics: &Haptics,
+    device: &mut dyn Device,
+    graphics: Option<&mut Graphics<'_>>,
+    plan: &Plan,
+    stop: &AtomicBool,
+    live: Option<Live>,
+) -> Result<(Trace, Timing, Option<Answers>), SessionError> {
     let scheduler = device.scheduler();
-    let (mut body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device)?;
+    let (body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device)?;
+    let mut body = body.with_live(live);
     let start = *body.driver.start();
     let frame_cost = Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()))?;
     let mut recorded = plan.new_ticks()?;
@@ -230,7 +253,8 @@ pub fn run(
                     run.err().map(|halt| format!("the device's own thread stopped: {halt}")).into_iter().collect()
                 }
             };
-            (refused, body.lateness, body.cost, body.missed, body.unrecorded)
+            let answers = body.driver.live().map(|live| *live.answers());
+            (refused, body.lateness, body.cost, body.missed, body.unrecorded, answers)
         });
         let feeling = match feeling {
             Ok(thread) => thread,
@@ -258,7 +282,7 @@ pub fn run(
         let felt = feeling.join().map_err(|_| SessionError::Thread("haptic"))?;
         let drawn = drawing.map(|thread| thread.join().map_err(|_| SessionError::Thread("graphics"))).transpose()?;
         clock::unlock_memory();
-        let (refused, lateness, cost, missed_deadlines, unrecorded) = felt;
+        let (refused, lateness, cost, missed_deadlines, unrecorded, answers) = felt;
         let Drawn { frames, shown, cost: frame_cost, missed: missed_frames } = drawn.unwrap_or_default();
         let timing = Timing {
             refused,
@@ -271,7 +295,7 @@ pub fn run(
             steal: observer.finish(),
             unrecorded,
         };
-        Ok((Trace { joints: plan.joints.clone(), start, ticks: recorded, frames, shown }, timing))
+        Ok((Trace { joints: plan.joints.clone(), start, ticks: recorded, frames, shown }, timing, answers))
     })
 }
 

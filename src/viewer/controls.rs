@@ -265,7 +265,7 @@ fn lacking(interpolation: Interpolation, dataset: &Dataset) -> Option<&'static s
     match interpolation {
         Interpolation::Linear => None,
         Interpolation::GapField => dataset.gap.is_none().then_some("gap"),
-        Interpolation::Potential => dataset.energy.is_none().then_some("energy"),
+        Interpolation::Potential | Interpolation::Direct => dataset.energy.is_none().then_some("energy"),
     }
 }
 

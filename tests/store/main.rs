@@ -8,5 +8,6 @@ mod file;
 mod fixture;
 mod interleavings;
 mod interpolation;
+mod live;
 mod publication;
 mod refine;

@@ -239,6 +239,7 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
         contacts: None,
         touches: None,
         surface: None,
+        refinement: None,
         scene: String::new(),
         provenance: Provenance {
             version: env!("CARGO_PKG_VERSION").to_owned(),

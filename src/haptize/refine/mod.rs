@@ -14,11 +14,10 @@
 //! *Verification.* The error is measured at random configurations that no estimate has seen. While it is above the aim the store is filled
 //! again, for a smaller error, from the nodes that are solved and some more.
 
-mod node;
-
-use node::Solved;
-
-use super::reference::{Reference, ReferenceError};
+use super::{
+    node::{self, Scale, Solved},
+    reference::{Reference, ReferenceError},
+};
 use crate::{
     JointVector, MAX_JOINTS,
     contact::{Model, Solvers, Status},
@@ -110,6 +109,12 @@ impl Judge {
         Reference::in_contact(scene, model, seed, contacts).map(Self)
     }
 
+    /// Rms of the torque [N m].
+    #[must_use]
+    pub fn torque(&self) -> f64 {
+        self.0.torque
+    }
+
     /// Rms error of the torque that `answer` gives, over the rms of the torque [1].
     pub fn relative_error(&self, answer: impl FnMut(&JointVector) -> JointVector) -> f64 {
         self.0.errors(answer).0 / self.0.torque
@@ -124,9 +129,8 @@ struct Cell {
 
 /// Solves nodes, each once.
 struct Nodebook<'a> {
-    model: &'a Model<'a>,
     space: Space,
-    steps: Vec<f64>,
+    scale: Scale,
     levers: JointVector,
     pool: rayon::ThreadPool,
     solvers: Solvers<'a>,
@@ -139,10 +143,10 @@ impl Nodebook<'_> {
         let wanted: BTreeSet<Place> =
             nodes.into_iter().filter(|node| !self.solved.contains_key(&(level, *node))).collect();
         let wanted: Vec<Place> = wanted.into_iter().collect();
-        let (space, steps, kc) = (&self.space, &self.steps, self.model.kc);
+        let (space, scale) = (&self.space, &self.scale);
         let solvers = &self.solvers;
         let solve =
-            || solvers.map(&wanted, |solver, place| node::solve(solver, &space.configuration(level, place), steps, kc));
+            || solvers.map(&wanted, |solver, place| node::solve(solver, &space.configuration(level, place), scale));
         let solved = self.pool.install(solve);
         self.solved.extend(wanted.iter().map(|place| (level, *place)).zip(solved));
     }
@@ -184,8 +188,7 @@ impl Refine<'_> {
             *lever = if joint.kind == JointKind::Prismatic { LEVER_ARM } else { 1.0 };
         });
         let mut book = Nodebook {
-            model: self.model,
-            steps: (0..space.joints()).map(|a| space.step(0, a)).collect(),
+            scale: Scale::new(self.model, &space),
             space,
             levers,
             solvers: Solvers::new(self.model, pool.current_num_threads()),
@@ -344,14 +347,14 @@ fn publish(store: &mut Store, book: &Nodebook<'_>, level: u32, nodes: &BTreeSet<
     let space = store.space().clone();
     let mut blocks: BTreeMap<(u32, Place), Nodes> = BTreeMap::new();
     for node in nodes {
-        blocks.entry((level, node.map(|i| i >> 1))).or_default();
+        blocks.entry((level, space.block_of(node))).or_default();
     }
     // From the finest down: what a block rests on, and what that rests on.
     for at in (1..=level).rev() {
         let above: Vec<Place> = blocks.keys().filter(|(l, _)| *l == at).map(|(_, block)| *block).collect();
-        for below in above.iter().flat_map(|block| store.foundation(at, block)) {
-            if store.get(at - 1, &below).is_none() {
-                blocks.entry((at - 1, below)).or_default();
+        for (below, place) in above.iter().flat_map(|block| store.foundation(at, block)) {
+            if store.get(below, &place).is_none() {
+                blocks.entry((below, place)).or_default();
             }
         }
     }

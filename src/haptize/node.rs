@@ -12,12 +12,13 @@
 //! h the base's spacing, end where g = -e, with e a share of the gap at the start. The contact solved there gives w by
 //! Taylor's formula, `w(q) = w* + grad w* . (q - q*)`, at most zero. So a free node depends on its own configuration and
 //! the base's spacing, and is the same whenever it is solved. Where the boundary is farther than some cells of the base, or not found, w is
-//! `-sqrt(kc) g`, that of one contact spring.
+//! `-sqrt(kc) g`, that of one contact spring; where it is farther by a bound of the proxy's motion, without slopes.
 
 use crate::{
     JointVector,
-    contact::{Solver, Status},
+    contact::{Model, Solver, Status},
     store::{
+        Space,
         record::{mixed, slope, width},
         root_of,
     },
@@ -49,8 +50,38 @@ pub struct Solved {
     pub equilibria: u32,
 }
 
-/// Solves the node at `q`; `steps`: spacing of the base along each axis; `kc`: contact stiffness [N/m].
-pub(super) fn solve(solver: &mut Solver<'_>, q: &JointVector, steps: &[f64], kc: f64) -> Solved {
+/// What a node depends on beside its configuration.
+pub(super) struct Scale {
+    /// Spacing of the base along each axis [rad or m].
+    steps: Vec<f64>,
+    /// No node of the proxy moves farther when each joint moves by the base's spacing [m].
+    reach: f64,
+    /// Contact stiffness [N/m].
+    kc: f64,
+}
+
+impl Scale {
+    /// For nodes in `space`, solved by `model`.
+    pub fn new(model: &Model<'_>, space: &Space) -> Self {
+        let joints = space.joints();
+        let steps: Vec<f64> = (0..joints).map(|a| space.step(0, a)).collect();
+        let first = space.configuration(0, &[0; crate::MAX_JOINTS]);
+        let last = space.configuration(0, &space.last(0));
+        let ranges: Vec<[f64; 2]> = first.iter().zip(last.iter()).map(|(first, last)| [*first, *last]).collect();
+        let bounds = model.chain.jacobian_bounds(&ranges);
+        let reaches = bounds.iter().map(|bound| bound.iter().zip(&steps).map(|(lever, step)| lever * step).sum());
+        let reach = reaches.fold(0.0, f64::max);
+        Self { steps, reach, kc: model.kc }
+    }
+
+    /// No node of the proxy moves farther when each joint moves by the spacing of `level` [m].
+    pub fn reach(&self, level: u32) -> f64 {
+        self.reach * 0.5_f64.powi(level as i32)
+    }
+}
+
+/// Solves the node at `q`.
+pub(super) fn solve(solver: &mut Solver<'_>, q: &JointVector, scale: &Scale) -> Solved {
     let joints = q.len();
     let here = solver.solve(q);
     let touches = here.status.is_in_contact();
@@ -61,11 +92,16 @@ pub(super) fn solve(solver: &mut Solver<'_>, q: &JointVector, steps: &[f64], kc:
         status: here.status,
         equilibria: u32::from(touches),
     };
+    let steps = &scale.steps;
     let record = if touches && here.energy > LEAST_ENERGY {
         let tangent: Option<Vec<f64>> = here.tangent.map(|tangent| tangent.lower().collect());
         root_of(here.energy, &here.torque, tangent.as_deref())
+    } else if here.gap > FARTHEST * scale.reach {
+        let mut record = vec![0.0; width(joints)];
+        record[0] = -scale.kc.sqrt() * here.gap;
+        record
     } else {
-        continued(solver, q, here.gap.max(0.0), steps, kc, &mut solved.equilibria)
+        continued(solver, q, here.gap.max(0.0), scale, &mut solved.equilibria)
     };
     let record = limited(record, steps);
     solved.record.iter_mut().zip(record).for_each(|(to, number)| *to = number as f32);
@@ -85,14 +121,8 @@ fn limited(mut record: Vec<f64>, steps: &[f64]) -> Vec<f64> {
 }
 
 /// The numbers of a free node with gap `gap`.
-fn continued(
-    solver: &mut Solver<'_>,
-    q: &JointVector,
-    gap: f64,
-    steps: &[f64],
-    kc: f64,
-    equilibria: &mut u32,
-) -> Vec<f64> {
+fn continued(solver: &mut Solver<'_>, q: &JointVector, gap: f64, scale: &Scale, equilibria: &mut u32) -> Vec<f64> {
+    let Scale { steps, kc, .. } = scale;
     let joints = q.len();
     let mut record = vec![0.0; width(joints)];
     let slopes = gradient(solver, q, steps);
