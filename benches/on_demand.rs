@@ -2,8 +2,9 @@
 //!
 //!     cargo bench --bench on_demand -- [SCENE [LEVELS [SECONDS]]]
 //!
-//! `SCENE`: by default datasets/organ.toml. Time is simulated: for each millisecond of the loop the thread that solves gets a millisecond of
-//! processor time, as one that has a core to itself. So other work on the machine changes the figures little.
+//! `SCENE`: by default datasets/organ.toml. Time is simulated: for each millisecond of the loop the thread that solves
+//! gets a millisecond of processor time, as one that has a core to itself. So other work on the machine changes the
+//! figures little.
 
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 

@@ -1,5 +1,5 @@
-//! The real-time loop: it allocates nothing, and does every tick that it does not report as missed. The device whose hand
-//! another thread leads.
+//! The real-time loop: it allocates nothing, and does every tick that it does not report as missed. The device whose
+//! hand another thread leads.
 
 #![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 
@@ -233,7 +233,8 @@ fn rubbing() -> HapticEffects {
     }
 }
 
-/// The sphere over every third line of its grid, a little less than the joints can reach, with what friction and contact damping need.
+/// The sphere over every third line of its grid, a little less than the joints can reach, with what friction and
+/// contact damping need.
 fn sphere() -> Dataset {
     let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
     scene.haptics.effects = rubbing();

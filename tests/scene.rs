@@ -55,8 +55,8 @@ fn diagnostic(text: &str) -> Diagnostic {
     }
 }
 
-/// Scenes of real devices: their limits are those of the machine, which may be anywhere within them when it is switched on. That
-/// its hand is free there, and held where contact was not solved, is tested in `device_scenes.rs`.
+/// Scenes of real devices: their limits are those of the machine, which may be anywhere within them when it is switched
+/// on. That its hand is free there, and held where contact was not solved, is tested in `device_scenes.rs`.
 const OF_MACHINES: [&str; 3] = ["touch.toml", "two_diy.toml", "woodenhaptics.toml"];
 
 #[test]

@@ -53,7 +53,8 @@ pub struct Arguments {
     /// Move the device exactly as the motion says, whatever the torque, instead of letting a simulated hand hold it.
     #[arg(long)]
     exact: bool,
-    /// A real device instead of a simulated hand, always against the clock: KIND or KIND:PLACE, as `haptize device list` shows it.
+    /// A real device instead of a simulated hand, always against the clock: KIND or KIND:PLACE, as `haptize device
+    /// list` shows it.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["exact", "beside", "replay"])]
     device: Option<Address>,
     /// Torque only while the space bar is held (a dead-man key).
@@ -62,8 +63,8 @@ pub struct Arguments {
     /// Run against the clock, in a real-time thread where permitted, instead of as fast as possible.
     #[arg(long)]
     realtime: bool,
-    /// Record the session into this file: all inputs of the loop and all its outputs. A name that ends in .mcap gives joint
-    /// states in MCAP, for other programs; only the table that other names give can be replayed.
+    /// Record the session into this file: all inputs of the loop and all its outputs. A name that ends in .mcap gives
+    /// joint states in MCAP, for other programs; only the table that other names give can be replayed.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replay the session in this file and check that it matches bit for bit.
@@ -75,8 +76,8 @@ pub struct Arguments {
     /// Another dataset, played with the same motion: the forces at the ends of both arms are drawn in one figure.
     #[arg(long, value_name = "DATASET", conflicts_with = "replay")]
     beside: Option<PathBuf>,
-    /// Begin at once, against the clock, from a scene of which nothing was baked: contact is solved ahead of the motion, coarse before fine, and
-    /// kept in this file, a dataset. What it holds already is used.
+    /// Begin at once, against the clock, from a scene of which nothing was baked: contact is solved ahead of the
+    /// motion, coarse before fine, and kept in this file, a dataset. What it holds already is used.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "record", "beside"])]
     on_demand: Option<PathBuf>,
     #[command(flatten)]

@@ -20,8 +20,8 @@ use std::{
     time::{Instant, SystemTime},
 };
 
-/// Configurations in contact by which the refinement is stopped, and as many others at which its error is measured [1]: with fewer the rms varies
-/// by more than a tenth.
+/// Configurations in contact by which the refinement is stopped, and as many others at which its error is measured [1]:
+/// with fewer the rms varies by more than a tenth.
 const JUDGED: usize = 400;
 
 /// What is asked for.

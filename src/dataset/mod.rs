@@ -63,8 +63,8 @@ pub struct Dataset {
     pub touches: Option<Contacts>,
     /// The object's geometry at rest; absent in scanned datasets.
     pub surface: Option<Surface>,
-    /// Nodes between the grid's points, and those on them from which the columns were taken; absent where the grid is all there is. Shared with
-    /// those that solve more of it.
+    /// Nodes between the grid's points, and those on them from which the columns were taken; absent where the grid is
+    /// all there is. Shared with those that solve more of it.
     pub refinement: Option<Arc<store::Store>>,
     /// The scene's text; empty for scanned datasets without one.
     pub scene: String,

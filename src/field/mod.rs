@@ -1,11 +1,11 @@
 //! The contact torque as a function of configuration: interpolation over the dataset's grid (section 3.1).
 //!
 //! Three ways, chosen by the scene ([`Interpolation`]): `linear` and `gap-field` (`layered.rs`) interpolate the torque
-//! and hold it behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient.
-//! A refined dataset is interpolated by its store, in the store's own way (`refined.rs`). All are continuous and without
-//! memory. What they share is here: the cell around q, the fade outside the grid
-//! (`stencil.rs`), what is said of points that were not computed or did not converge, and the contact index
-//! `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored (contact, unconverged, overflowed) and 0 at free points.
+//! and hold it behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient. A
+//! refined dataset is interpolated by its store, in the store's own way (`refined.rs`). All are continuous and without
+//! memory. What they share is here: the cell around q, the fade outside the grid (`stencil.rs`), what is said of points
+//! that were not computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is
+//! stored (contact, unconverged, overflowed) and 0 at free points.
 //!
 //! A field owns a copy of what it needs, interleaved point by point. The real-time thread thus never touches a mapped
 //! file, which would end the process when somebody else truncates it.
@@ -121,9 +121,9 @@ impl TorqueField {
         Self::interpolated(dataset, Interpolation::Linear, threshold, slope)
     }
 
-    /// Any interpolation over `dataset`; a refined one is interpolated in the way of its store, whatever `interpolation`
-    /// says. `threshold` counts for `linear` alone, `slope` for all but `potential`, which takes its mixed derivatives
-    /// from the dataset's tangents where it has them.
+    /// Any interpolation over `dataset`; a refined one is interpolated in the way of its store, whatever
+    /// `interpolation` says. `threshold` counts for `linear` alone, `slope` for all but `potential`, which takes its
+    /// mixed derivatives from the dataset's tangents where it has them.
     ///
     /// # Errors
     /// As [`TorqueField::new`]; also when the dataset lacks the column that `interpolation` needs.
@@ -228,8 +228,8 @@ impl TorqueField {
         }
     }
 
-    /// The field of a refined dataset at `q`, of the first `horizon` blocks of its store, and the levels, from the base up, whose cell around
-    /// `q` is whole. Other fields have no blocks and no levels. Never allocates.
+    /// The field of a refined dataset at `q`, of the first `horizon` blocks of its store, and the levels, from the base
+    /// up, whose cell around `q` is whole. Other fields have no blocks and no levels. Never allocates.
     #[must_use]
     pub fn sample_within(&self, q: &[f64], horizon: u64) -> (Sample, u32) {
         match &self.source {

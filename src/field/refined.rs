@@ -1,7 +1,8 @@
 //! The field of a refined dataset: the store answers, with the finest of its levels that are there.
 //!
-//! Its order says how (`dataset/store`): `potential` is minus the gradient of one smooth energy, whichever nodes there are. There is no boundary
-//! layer: the torque begins at w = 0 without a jump. What a store does not keep is not told: how many nodes of the object touch.
+//! Its order says how (`dataset/store`): `potential` is minus the gradient of one smooth energy, whichever nodes there
+//! are. There is no boundary layer: the torque begins at w = 0 without a jump. What a store does not keep is not told:
+//! how many nodes of the object touch.
 
 use super::{Flags, Sample, stencil::Lattice};
 use crate::{JointVector, store::Store, tolerances::GRADIENT_STEP};
@@ -32,8 +33,8 @@ pub(super) fn sample(lattice: &Lattice, store: &Store, q: &[f64], horizon: u64) 
     (sample, root.whole)
 }
 
-/// Greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), over nodes in contact, evenly chosen where there are many. By
-/// differences of the torque over small steps: between nodes it may be greater.
+/// Greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), over nodes in contact, evenly chosen where
+/// there are many. By differences of the torque over small steps: between nodes it may be greater.
 pub(super) fn relative_stiffness(store: &Store, slopes: &JointVector) -> f64 {
     let space = store.space();
     let finest = space.levels() - 1;

@@ -69,8 +69,8 @@ pub trait Backend {
     /// When the device fails; nothing of the batch is returned then.
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Self::Error>;
 
-    /// Returns what a user of the results should know of the time since the last call, each a sentence without its full stop. It
-    /// holds from the first configuration of the last batch on, and goes into the dataset's provenance.
+    /// Returns what a user of the results should know of the time since the last call, each a sentence without its full
+    /// stop. It holds from the first configuration of the last batch on, and goes into the dataset's provenance.
     fn notices(&mut self) -> Vec<String> {
         Vec::new()
     }

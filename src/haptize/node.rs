@@ -1,18 +1,20 @@
 //! A node of the store: one configuration solved, and its root w.
 //!
-//! In contact `w = sqrt(2 U)` with its gradient and mixed derivatives, from energy, torque and tangent (`store::root_of`). U and its
-//! gradient vanish at the boundary of contact, where U grows like the square of the depth: w passes zero there with a slope, and is
-//! continued to free configurations, so that interpolation sees a smooth function.
+//! In contact `w = sqrt(2 U)` with its gradient and mixed derivatives, from energy, torque and tangent
+//! (`store::root_of`). U and its gradient vanish at the boundary of contact, where U grows like the square of the
+//! depth: w passes zero there with a slope, and is continued to free configurations, so that interpolation sees a
+//! smooth function.
 //!
-//! *Limit.* Where an equilibrium is about to give way to another the tangent grows without bound, and at the onset of contact its error is
-//! divided by a small w. So in steps h of the base no mixed derivative is larger than the largest slope:
-//! `|w_ab| h_a h_b <= max_c |w_c| h_c`.
+//! *Limit.* Where an equilibrium is about to give way to another the tangent grows without bound, and at the onset of
+//! contact its error is divided by a small w. So in steps h of the base no mixed derivative is larger than the largest
+//! slope: `|w_ab| h_a h_b <= max_c |w_c| h_c`.
 //!
-//! *Free configurations.* The gap g and its gradient lead to the boundary: Newton steps `dq_a = -(g + e) h_a^2 g_a / sum_b h_b^2 g_b^2`,
-//! h the base's spacing, end where g = -e, with e a share of the gap at the start. The contact solved there gives w by
-//! Taylor's formula, `w(q) = w* + grad w* . (q - q*)`, at most zero. So a free node depends on its own configuration and
-//! the base's spacing, and is the same whenever it is solved. Where the boundary is farther than some cells of the base, or not found, w is
-//! `-sqrt(kc) g`, that of one contact spring; where it is farther by a bound of the proxy's motion, without slopes.
+//! *Free configurations.* The gap g and its gradient lead to the boundary: Newton steps `dq_a = -(g + e) h_a^2 g_a /
+//! sum_b h_b^2 g_b^2`, h the base's spacing, end where g = -e, with e a share of the gap at the start. The contact
+//! solved there gives w by Taylor's formula, `w(q) = w* + grad w* . (q - q*)`, at most zero. So a free node depends on
+//! its own configuration and the base's spacing, and is the same whenever it is solved. Where the boundary is farther
+//! than some cells of the base, or not found, w is `-sqrt(kc) g`, that of one contact spring; where it is farther by a
+//! bound of the proxy's motion, without slopes.
 
 use crate::{
     JointVector,
@@ -25,11 +27,12 @@ use crate::{
     tolerances::{GRADIENT_STEP, LEAST_ENERGY, LEAST_GAP},
 };
 
-/// Depth behind the boundary at which contact is solved for a free node, over its gap [1]. Larger: the slope is that of deeper contact, of
-/// which more nodes touch. Smaller: w is a root of less energy, which errs more.
+/// Depth behind the boundary at which contact is solved for a free node, over its gap [1]. Larger: the slope is that of
+/// deeper contact, of which more nodes touch. Smaller: w is a root of less energy, which errs more.
 const DEPTH_SHARE: f64 = 0.05;
 
-/// Farthest boundary that is looked for, in cells of the base along any axis [1]: beyond, no cell of the node holds contact.
+/// Farthest boundary that is looked for, in cells of the base along any axis [1]: beyond, no cell of the node holds
+/// contact.
 const FARTHEST: f64 = 2.0;
 
 /// Most Newton steps to the boundary: the gap is nearly linear, and each step squares the error.

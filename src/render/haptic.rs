@@ -1,11 +1,12 @@
 //! One tick of the haptic loop: device position in, device torque out (section 3.1). Pure: no clock, no thread, no
 //! allocation, no panic.
 //!
-//! At t_k: check the device's position; coupling torque for the device from y_k and x_k; contact torque tau_bar(x_k) from
-//! the dataset; one NPMI step of the proxy to x_{k+1}; energy accounts. The device's torque is limited in size, and in
-//! rate against the torque before it. On a fault (see [`Watchdog`]) its goal is zero, which it reaches at the greatest rate,
-//! without a jump; the fault stays, the proxy tied to the last good position, until [`Haptics::restart`]. So it is when the
-//! passivity observer of the device's port finds that the hand has been given energy from nowhere ([`Fault::Energy`]).
+//! At t_k: check the device's position; coupling torque for the device from y_k and x_k; contact torque tau_bar(x_k)
+//! from the dataset; one NPMI step of the proxy to x_{k+1}; energy accounts. The device's torque is limited in size,
+//! and in rate against the torque before it. On a fault (see [`Watchdog`]) its goal is zero, which it reaches at the
+//! greatest rate, without a jump; the fault stays, the proxy tied to the last good position, until
+//! [`Haptics::restart`]. So it is when the passivity observer of the device's port finds that the hand has been given
+//! energy from nowhere ([`Fault::Energy`]).
 //!
 //! What the scene may name beside (channels, controller, effects at contacts) is decided once, in [`Haptics::new`] and
 //! [`Haptics::with_effects`]; what it does not name has no state and does no work.
@@ -187,8 +188,8 @@ impl Haptics {
         self.period
     }
 
-    /// The state before the first tick: device and proxy at rest at `position`, the proxy within its limits and the haptized
-    /// range, no torque.
+    /// The state before the first tick: device and proxy at rest at `position`, the proxy within its limits and the
+    /// haptized range, no torque.
     ///
     /// # Errors
     /// When `position` is not a position of the device.
@@ -210,8 +211,8 @@ impl Haptics {
         Ok(state)
     }
 
-    /// Ends a fault: starts again at `position` as [`Haptics::start`] does, accounts included, but from the torque that the
-    /// device is under, so that there is no jump. Never allocates.
+    /// Ends a fault: starts again at `position` as [`Haptics::start`] does, accounts included, but from the torque that
+    /// the device is under, so that there is no jump. Never allocates.
     ///
     /// # Errors
     /// When `position` is not a position of the device; the fault then stays.
@@ -293,7 +294,8 @@ impl Haptics {
         Output { torque, device: state.device, proxy, sample, flags: sample.flags | limited | stopped, fault, accounts }
     }
 
-    /// Returns the torque to command to the device, which moves at `velocity`: coupling, channels, controller [N m or N].
+    /// Returns the torque to command to the device, which moves at `velocity`: coupling, channels, controller [N m or
+    /// N].
     fn device_torque(
         &self,
         state: &mut State,
@@ -375,7 +377,8 @@ impl Haptics {
 }
 
 impl State {
-    /// Takes the torque that the device holds of what the last tick answered [N m or N]: accounts and channels rest on it.
+    /// Takes the torque that the device holds of what the last tick answered [N m or N]: accounts and channels rest on
+    /// it.
     pub fn hold(&mut self, torque: &JointVector) {
         self.held.correct(torque);
     }

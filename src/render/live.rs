@@ -1,11 +1,13 @@
 //! Contact that is solved while it is felt: the loop's end of `haptize/ahead`.
 //!
-//! The loop tells where the proxy is and goes, and feels what is there: the equilibrium solved at the proxy and its tangent, if the scene asks for
-//! that (`direct`) and it comes in time; else the store, with the finest level that is there. What others publish meanwhile
-//! changes nothing within a tick: the store is read up to one [horizon](crate::store::Store::horizon). From tick to tick the torque passes over
-//! without a jump and without energy from nowhere (`passage.rs`).
+//! The loop tells where the proxy is and goes, and feels what is there: the equilibrium solved at the proxy and its
+//! tangent, if the scene asks for that (`direct`) and it comes in time; else the store, with the finest level that is
+//! there. What others publish meanwhile changes nothing within a tick: the store is read up to one
+//! [horizon](crate::store::Store::horizon). From tick to tick the torque passes over without a jump and without energy
+//! from nowhere (`passage.rs`).
 //!
-//! Nothing here allocates, locks or waits: places and solutions go through triple buffers, of which each end has a value of its own.
+//! Nothing here allocates, locks or waits: places and solutions go through triple buffers, of which each end has a
+//! value of its own.
 
 use super::{accounts::Accounts, passage::Passage};
 use crate::{
@@ -17,12 +19,12 @@ use crate::{
 };
 use serde::Serialize;
 
-/// Ticks after which a solution is late [1]. More: the tangent is followed farther. Fewer: the store answers where the thread that solves was
-/// held up.
+/// Ticks after which a solution is late [1]. More: the tangent is followed farther. Fewer: the store answers where the
+/// thread that solves was held up.
 const LATE: u64 = 8;
 
-/// Farthest way of a node of the proxy, by a bound, on which a tangent is followed [m]: the second order errs by some percent of the force where
-/// the way is a tenth of the length over which a dent is rounded.
+/// Farthest way of a node of the proxy, by a bound, on which a tangent is followed [m]: the second order errs by some
+/// percent of the force where the way is a tenth of the length over which a dent is rounded.
 const FARTHEST: f64 = 0.003;
 
 /// Contact that is solved while it is felt.
@@ -117,8 +119,8 @@ impl Source<'_> {
 }
 
 impl Live {
-    /// For a proxy that starts at `start`, with so many `levels` wanted and the greatest lever of each joint; `threads` fill the store, and with
-    /// `direct` another one solves at the proxy.
+    /// For a proxy that starts at `start`, with so many `levels` wanted and the greatest lever of each joint; `threads`
+    /// fill the store, and with `direct` another one solves at the proxy.
     #[must_use]
     pub fn new(
         start: &JointVector,

@@ -1,18 +1,20 @@
 //! How the contact torque passes from one function to another while it is felt.
 //!
-//! When finer values arrive the torque tau and the energy U at the proxy's place change, though it does not move. The difference, old less
-//! new, is kept as a constant torque o, which has the potential `V(x) = V_0 - o . (x - x_0)`, with V_0 the difference of the
-//! energies. What is felt, `tau + o` with the energy `U + V`, goes on without a jump; it is minus a gradient wherever tau is.
+//! When finer values arrive the torque tau and the energy U at the proxy's place change, though it does not move. The
+//! difference, old less new, is kept as a constant torque o, which has the potential `V(x) = V_0 - o . (x - x_0)`, with
+//! V_0 the difference of the energies. What is felt, `tau + o` with the energy `U + V`, goes on without a jump; it is
+//! minus a gradient wherever tau is.
 //!
-//! Then o and V fade together, by the same factor each tick. Where V is positive this takes energy out. Where it is negative, -V dr is
-//! given from nowhere in a tick; so it fades only as far as the proxy's damping has taken more than the field has given beyond what it
-//! stored ([`Accounts::created`](super::accounts::Accounts::created)): as an energy tank lets a varying stiffness (Ferraguti, Secchi and
-//! Fantuzzi 2013). So the field with all that arrives never gives more than the damping takes, whatever arrives and when.
+//! Then o and V fade together, by the same factor each tick. Where V is positive this takes energy out. Where it is
+//! negative, -V dr is given from nowhere in a tick; so it fades only as far as the proxy's damping has taken more than
+//! the field has given beyond what it stored ([`Accounts::created`](super::accounts::Accounts::created)): as an energy
+//! tank lets a varying stiffness (Ferraguti, Secchi and Fantuzzi 2013). So the field with all that arrives never gives
+//! more than the damping takes, whatever arrives and when.
 
 use crate::JointVector;
 
-/// Time in which a difference fades to 1/e [s]. Longer: the torque errs longer. Shorter: it changes faster; with this, by a twentieth of the
-/// difference a millisecond.
+/// Time in which a difference fades to 1/e [s]. Longer: the torque errs longer. Shorter: it changes faster; with this,
+/// by a twentieth of the difference a millisecond.
 const TIME: f64 = 0.02;
 
 /// What is left of differences.
@@ -54,7 +56,8 @@ impl Passage {
         }
     }
 
-    /// Fades over `period` [s], giving at most `budget` [J], nothing if that is negative. Returns what it gave; negative where it took.
+    /// Fades over `period` [s], giving at most `budget` [J], nothing if that is negative. Returns what it gave;
+    /// negative where it took.
     pub fn fade(&mut self, period: f64, budget: f64) -> f64 {
         let mut share = 1.0 - (-period / TIME).exp();
         if self.energy < 0.0 {

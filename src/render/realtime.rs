@@ -1,8 +1,9 @@
 //! A session against the clock: a haptic thread with absolute deadlines, a graphics thread, and the caller as recorder.
 //!
-//! The haptic thread never waits for anybody: graphics takes the latest tick from a triple buffer, the recorder takes all
-//! ticks from a ring. When the ring is full, ticks go unrecorded, and are counted. A deadline that has passed before its
-//! tick could begin is left out, and counted; the proxy then steps by the longer time, which its integration allows.
+//! The haptic thread never waits for anybody: graphics takes the latest tick from a triple buffer, the recorder takes
+//! all ticks from a ring. When the ring is full, ticks go unrecorded, and are counted. A deadline that has passed
+//! before its tick could begin is left out, and counted; the proxy then steps by the longer time, which its integration
+//! allows.
 
 use super::{
     clock,
@@ -123,8 +124,8 @@ impl<'session> HapticLoop<'session> {
         Self { driver: self.driver.with_live(live), ..self }
     }
 
-    /// Asks the system for a real-time priority for the calling thread, and sets the first deadline to now. Returns what was not
-    /// granted.
+    /// Asks the system for a real-time priority for the calling thread, and sets the first deadline to now. Returns
+    /// what was not granted.
     pub fn begin(&mut self) -> Vec<String> {
         let refused = clock::ask_for_real_time();
         self.began = clock::now();
@@ -136,8 +137,8 @@ impl<'session> HapticLoop<'session> {
         self.tick_after(true);
     }
 
-    /// As [`HapticLoop::tick`], some tens of microseconds later, and without keeping the processor busy meanwhile: for a
-    /// hand that is simulated.
+    /// As [`HapticLoop::tick`], some tens of microseconds later, and without keeping the processor busy meanwhile: for
+    /// a hand that is simulated.
     pub fn tick_relaxed(&mut self) {
         self.tick_after(false);
     }
@@ -148,8 +149,8 @@ impl<'session> HapticLoop<'session> {
         self.tick_at(now, deadline);
     }
 
-    /// Does a tick now: for a thread that somebody else paces. The deadline is a period after the last tick, or now, if that was less
-    /// long ago. Allocates, locks and prints nothing.
+    /// Does a tick now: for a thread that somebody else paces. The deadline is a period after the last tick, or now, if
+    /// that was less long ago. Allocates, locks and prints nothing.
     pub fn tick_now(&mut self) {
         let now = clock::now();
         let deadline = self.last.map_or(now, |last| (last + self.period).min(now));
@@ -192,7 +193,8 @@ impl<'session> HapticLoop<'session> {
     }
 }
 
-/// Runs a session against the clock, as long as `plan` says, until `stop` is raised or the device stops for good. Graphics, where there is any, runs in a thread of its own.
+/// Runs a session against the clock, as long as `plan` says, until `stop` is raised or the device stops for good.
+/// Graphics, where there is any, runs in a thread of its own.
 ///
 /// # Errors
 /// When the device reports no position, or the system gives no threads or memory.
@@ -308,8 +310,8 @@ struct Drawn {
     missed: u64,
 }
 
-/// The graphics thread: a frame whenever one is due, from the first tick on, until the session is over. When it falls behind
-/// by more than a frame it draws the frames that it owes, without waiting: the object's time must not slow down.
+/// The graphics thread: a frame whenever one is due, from the first tick on, until the session is over. When it falls
+/// behind by more than a frame it draws the frames that it owes, without waiting: the object's time must not slow down.
 fn draw(
     mut frames: Frames<'_, '_>,
     mut latest: triple_buffer::Output<Latest>,

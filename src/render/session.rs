@@ -1,8 +1,8 @@
 //! A rendering session: device, haptic loop and graphics loop, recorded. Offline, as fast as it goes and deterministic;
 //! `realtime.rs` runs the same ticks and frames against the clock.
 //!
-//! Two loops at two rates (section 3.2): a tick every T, and a frame of the object every T_g. Frame j is drawn at the first
-//! tick at or after `j T_g`, from the proxy's configuration then.
+//! Two loops at two rates (section 3.2): a tick every T, and a frame of the object every T_g. Frame j is drawn at the
+//! first tick at or after `j T_g`, from the proxy's configuration then.
 
 use super::{
     flags::Fault,
@@ -124,8 +124,8 @@ impl<'session> Driver<'session> {
         &self.start
     }
 
-    /// One tick, `elapsed` after the one before and `interval` before the next [s]: read, compute, apply. Answers with the
-    /// record and what graphics needs of it. Never allocates.
+    /// One tick, `elapsed` after the one before and `interval` before the next [s]: read, compute, apply. Answers with
+    /// the record and what graphics needs of it. Never allocates.
     pub fn tick(&mut self, elapsed: f64, interval: f64) -> (Tick, Latest) {
         // The first tick follows the reading in `new` at once.
         let since = if self.ticks == 0 { 0.0 } else { elapsed };

@@ -453,7 +453,8 @@ pub enum Interpolation {
     GapField,
     /// Minus the gradient of a smoothly interpolated energy: makes no energy around any loop.
     Potential,
-    /// The equilibrium itself, solved beside the loop, and its tangent until the next one; where that is late, and in a dataset, `potential`.
+    /// The equilibrium itself, solved beside the loop, and its tangent until the next one; where that is late, and in a
+    /// dataset, `potential`.
     Direct,
 }
 

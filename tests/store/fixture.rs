@@ -52,7 +52,8 @@ pub fn blocks(space: &Space, level: u32) -> Vec<Place> {
     places
 }
 
-/// The nodes of a block, each there with probability `share`, with the numbers that `record` gives for its configuration.
+/// The nodes of a block, each there with probability `share`, with the numbers that `record` gives for its
+/// configuration.
 pub fn nodes(
     space: &Space,
     level: u32,
@@ -71,7 +72,8 @@ pub fn nodes(
     nodes
 }
 
-/// A store in which blocks are there with probability `share`, as far as their foundations allow, and nodes in them, too.
+/// A store in which blocks are there with probability `share`, as far as their foundations allow, and nodes in them,
+/// too.
 pub fn store(
     joints: usize,
     levels: u32,

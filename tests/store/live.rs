@@ -1,4 +1,5 @@
-//! Contact that is solved while it is felt: no jump, no energy from nowhere, no allocation, and the same store whoever solved it.
+//! Contact that is solved while it is felt: no jump, no energy from nowhere, no allocation, and the same store whoever
+//! solved it.
 
 use assert_no_alloc::assert_no_alloc;
 use haptize::{

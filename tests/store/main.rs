@@ -1,4 +1,5 @@
-//! The sparse store of C-space: continuity across blocks and levels, exactness, order of publication, readers beside writers.
+//! The sparse store of C-space: continuity across blocks and levels, exactness, order of publication, readers beside
+//! writers.
 
 #![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 #![allow(clippy::duplicate_mod)] // The directory is included twice: with the orders that it has, and with weaker ones.

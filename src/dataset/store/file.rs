@@ -1,5 +1,6 @@
-//! A refined dataset's file: a safetensors file like any dataset's (`dataset/file.rs`: page-aligned, checked as a whole, replaced whole or
-//! not at all), of format `haptize store 1`. What a dataset has at each point of its grid is taken from the nodes of the base.
+//! A refined dataset's file: a safetensors file like any dataset's (`dataset/file.rs`: page-aligned, checked as a
+//! whole, replaced whole or not at all), of format `haptize store 1`. What a dataset has at each point of its grid is
+//! taken from the nodes of the base.
 //!
 //! | tensor | type | shape | |
 //! |---|---|---|---|
@@ -10,8 +11,9 @@
 //! | `node_status` | u8 | n | [`crate::contact::Status`] |
 //! | `surface_nodes`, `surface_triangles`, ... | | | the object's geometry, as in a dataset's file |
 //!
-//! Beside grid (the base), provenance and scene the header's metadata has `store`: `{"levels":6,"order":"potential"}`. Nodes are as they
-//! were solved: what is in the file depends neither on the order of publication nor on the interpolation.
+//! Beside grid (the base), provenance and scene the header's metadata has `store`: `{"levels":6,"order":"potential"}`.
+//! Nodes are as they were solved: what is in the file depends neither on the order of publication nor on the
+//! interpolation.
 //!
 //! In Python, with `from safetensors import safe_open; f = safe_open("sphere.store", "numpy"); t = f.get_tensor`:
 //!
@@ -47,8 +49,9 @@ struct Shape {
 }
 
 impl Dataset {
-    /// A dataset over the base of `store`, which refines it: at each point of `grid`, of which the store was made, what its node there says,
-    /// and [`Status::Outside`] where there is none. `surface`: the object's geometry; `scene`: the scene's text.
+    /// A dataset over the base of `store`, which refines it: at each point of `grid`, of which the store was made, what
+    /// its node there says, and [`Status::Outside`] where there is none. `surface`: the object's geometry; `scene`: the
+    /// scene's text.
     #[must_use]
     pub fn refined(
         store: Arc<Store>,

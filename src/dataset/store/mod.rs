@@ -9,17 +9,17 @@
 //! | `kernel` | the interpolants of one cell |
 //! | `file` | a store on disk |
 //!
-//! *Hierarchy.* The interpolated function is a sum over the levels, each the interpolant of what the level's nodes have more than
-//! the levels below give there (their *surplus*): `w(q) = sum_l sum_n B_n(q) s_n`. The basis functions B of a node are
-//! tensor products with support in the cells around it: C1 cubic Hermite polynomials of value, slopes and mixed second derivatives
-//! ([`Order::Potential`]), or hats ([`Order::Linear`]). A node that was not solved has no surplus: there the function is what the
-//! coarser levels say. So w is C1, or continuous, whichever nodes there are, and exact at all of them, value, gradient and mixed
-//! derivatives. (Bungartz and Griebel 2004, Sparse grids, section 3, for hats; here with Hermite data and without the sparse grid's
-//! choice of levels.)
+//! *Hierarchy.* The interpolated function is a sum over the levels, each the interpolant of what the level's nodes have
+//! more than the levels below give there (their *surplus*): `w(q) = sum_l sum_n B_n(q) s_n`. The basis functions B of a
+//! node are tensor products with support in the cells around it: C1 cubic Hermite polynomials of value, slopes and
+//! mixed second derivatives ([`Order::Potential`]), or hats ([`Order::Linear`]). A node that was not solved has no
+//! surplus: there the function is what the coarser levels say. So w is C1, or continuous, whichever nodes there are,
+//! and exact at all of them, value, gradient and mixed derivatives. (Bungartz and Griebel 2004, Sparse grids, section
+//! 3, for hats; here with Hermite data and without the sparse grid's choice of levels.)
 //!
-//! *Order of publication.* A surplus is final only if nothing below it can change: a block is published after the blocks of the level
-//! below that hold the corners of its cells. Within a published block a node that was not solved stays so. Then the same nodes give
-//! the same store, to the bit, in whatever order they came.
+//! *Order of publication.* A surplus is final only if nothing below it can change: a block is published after the
+//! blocks of the level below that hold the corners of its cells. Within a published block a node that was not solved
+//! stays so. Then the same nodes give the same store, to the bit, in whatever order they came.
 //!
 //! Design, bounds and figures: docs/store.md.
 
@@ -55,13 +55,14 @@ pub enum Order {
 
 /// Blocks of C-space at several levels. Any number of threads may read and publish at once.
 ///
-/// Blocks are numbered in the order in which they are published. A reader that needs the same function twice, between which others publish,
-/// names a [horizon](Store::horizon): the number of blocks that count.
+/// Blocks are numbered in the order in which they are published. A reader that needs the same function twice, between
+/// which others publish, names a [horizon](Store::horizon): the number of blocks that count.
 pub struct Store {
     space: Space,
     order: Order,
     blocks: Directory<Block>,
-    /// Number of the next block. Held by writers while a block gets its number and is published, so that all before it are there.
+    /// Number of the next block. Held by writers while a block gets its number and is published, so that all before it
+    /// are there.
     numbers: Mutex<u64>,
     /// Number of blocks that are published, without gaps.
     published: AtomicU64,
@@ -190,15 +191,16 @@ impl Store {
         blocks
     }
 
-    /// The blocks on which a block of `level` rests, by level and place: those that hold the corners of the cells of the level below around
-    /// its nodes. Blocks of one node rest on blocks of any level below, those to which these corners belong.
+    /// The blocks on which a block of `level` rests, by level and place: those that hold the corners of the cells of
+    /// the level below around its nodes. Blocks of one node rest on blocks of any level below, those to which these
+    /// corners belong.
     pub fn foundation(&self, level: u32, block: &Place) -> impl Iterator<Item = (u32, Place)> + use<> {
         let space = self.space.clone();
         let (joints, is_one) = (space.joints(), space.block_nodes() == 1);
         let (below, block) = (level.checked_sub(1), *block);
         let last = below.map_or([0; MAX_JOINTS], |below| space.last(below));
-        // A block of 2^d nodes: node `block` of the level below, and those one farther; at most twice as many blocks are listed as there
-        // are. One node: those around it, along the axes along which it lies between two.
+        // A block of 2^d nodes: node `block` of the level below, and those one farther; at most twice as many blocks
+        // are listed as there are. One node: those around it, along the axes along which it lies between two.
         let (first, axes) =
             if is_one { (block.map(|i| i >> 1), block.map(|i| i & 1)) } else { (block, [1; MAX_JOINTS]) };
         let between = (0..joints).map(|a| (axes[a] as usize) << a).sum::<usize>();
@@ -211,8 +213,8 @@ impl Store {
         })
     }
 
-    /// The blocks that hold the corners of the cell of `level` whose first corner is `low`, by level and place, without those of levels
-    /// below; with blocks of 2^d nodes some twice.
+    /// The blocks that hold the corners of the cell of `level` whose first corner is `low`, by level and place, without
+    /// those of levels below; with blocks of 2^d nodes some twice.
     pub fn corners(&self, level: u32, low: &Place) -> impl Iterator<Item = Place> + use<> {
         let (space, low) = (self.space.clone(), *low);
         let nodes = (0..1_usize << space.joints()).map(move |set| beyond(&low, set));
@@ -331,8 +333,8 @@ impl Store {
         self.sample_within(q, u64::MAX)
     }
 
-    /// The same with the first `horizon` blocks alone: whatever others publish, it does not change. A block counts with those on which it
-    /// rests, which were published before it.
+    /// The same with the first `horizon` blocks alone: whatever others publish, it does not change. A block counts with
+    /// those on which it rests, which were published before it.
     #[must_use]
     pub fn sample_within(&self, q: &[f64], horizon: u64) -> Root {
         use kernel::rates;
@@ -375,7 +377,8 @@ impl Store {
         })
     }
 
-    /// Adds up the levels: `add` adds one, from the `N` numbers at the `C` corners of the cell of that level and the fractions of it.
+    /// Adds up the levels: `add` adds one, from the `N` numbers at the `C` corners of the cell of that level and the
+    /// fractions of it.
     #[inline]
     fn sum<const D: usize, const C: usize, const N: usize>(
         &self,
@@ -414,8 +417,8 @@ impl Store {
         horizon: u64,
         numbers: &mut [[f64; C]; N],
     ) -> Gathered {
-        // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to the other. With
-        // blocks of one node they do so along all axes.
+        // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to
+        // the other. With blocks of one node they do so along all axes.
         let parity = (0..D).map(|a| ((low[a] & 1) as usize) << a).sum::<usize>();
         let is_one = self.space.block_nodes() == 1;
         let (odd, places) = if is_one { (C - 1, 0) } else { (parity, C - 1) };
@@ -462,8 +465,9 @@ impl Store {
     }
 }
 
-/// The numbers of a node from its energy U [J], torque [N m] and tangent d tau/d q, lower triangle [N m/rad]: `w = sqrt(2 U)`,
-/// `w_a = -tau_a / w`, `w_ab = -(d tau_a/d q_b + w_a w_b) / w`. Without a tangent the mixed derivatives are zero.
+/// The numbers of a node from its energy U [J], torque [N m] and tangent d tau/d q, lower triangle [N m/rad]: `w =
+/// sqrt(2 U)`, `w_a = -tau_a / w`, `w_ab = -(d tau_a/d q_b + w_a w_b) / w`. Without a tangent the mixed derivatives are
+/// zero.
 #[must_use]
 pub fn root_of(energy: f64, torque: &[f64], tangent: Option<&[f64]>) -> Vec<f64> {
     let joints = torque.len();

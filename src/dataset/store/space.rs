@@ -1,10 +1,10 @@
 //! Where nodes and blocks lie: a base grid, and levels above it whose spacing halves from one to the next.
 //!
-//! Node `i` of level l is at `start + i step / 2^l` along each axis, so that node 2 i of level l + 1 is node i of level l. Block `k` of a
-//! level holds the nodes `2 k` and `2 k + 1` along each axis, 2^d in all: bit a of a node's place in its block is its parity along axis a.
-//! Beyond [`MOST_BLOCK_JOINTS`] joints a block is one node: a cell that lies across blocks takes all of their nodes, with blocks of 2^d
-//! nodes 1.5^d times as many as it has corners on average. A key packs a level and the coordinates of a block into 64 bits, ascending with
-//! the level.
+//! Node `i` of level l is at `start + i step / 2^l` along each axis, so that node 2 i of level l + 1 is node i of level
+//! l. Block `k` of a level holds the nodes `2 k` and `2 k + 1` along each axis, 2^d in all: bit a of a node's place in
+//! its block is its parity along axis a. Beyond [`MOST_BLOCK_JOINTS`] joints a block is one node: a cell that lies
+//! across blocks takes all of their nodes, with blocks of 2^d nodes 1.5^d times as many as it has corners on average. A
+//! key packs a level and the coordinates of a block into 64 bits, ascending with the level.
 
 use crate::{MAX_JOINTS, dataset::Grid};
 
@@ -17,7 +17,8 @@ const LEVEL_BITS: u32 = 4;
 /// Most levels.
 pub const MAX_LEVELS: u32 = 1 << LEVEL_BITS;
 
-/// Most joints with blocks of 2^d nodes [1]. More: blocks of which a cell uses few nodes. Fewer: more look-ups in the directory for a cell.
+/// Most joints with blocks of 2^d nodes [1]. More: blocks of which a cell uses few nodes. Fewer: more look-ups in the
+/// directory for a cell.
 pub const MOST_BLOCK_JOINTS: usize = 3;
 
 /// The lattice of all levels.
@@ -194,7 +195,8 @@ impl Space {
         (0..self.joints).all(|a| u64::from(block[a]) << self.shift <= u64::from(last[a])).then_some((level, block))
     }
 
-    /// The nodes of a block that lie in the grid and belong to its level, those of the base or not all even: place and node.
+    /// The nodes of a block that lie in the grid and belong to its level, those of the base or not all even: place and
+    /// node.
     pub fn nodes(&self, level: u32, block: &Place) -> impl Iterator<Item = (usize, Place)> + use<> {
         let (joints, shift, last, block) = (self.joints, self.shift, self.last(level), *block);
         (0..self.block_nodes()).filter_map(move |place| {
@@ -207,7 +209,8 @@ impl Space {
         })
     }
 
-    /// The first corner of the cell of `level` around `q`, which has one entry per joint, at the grid's border beyond it.
+    /// The first corner of the cell of `level` around `q`, which has one entry per joint, at the grid's border beyond
+    /// it.
     #[must_use]
     pub fn cell(&self, level: u32, q: &[f64]) -> Place {
         let mut cell = self.locate(q);

@@ -1,4 +1,5 @@
-//! The equilibrium at the proxy itself, solved beside the loop, and its tangent, which the loop follows until the next one.
+//! The equilibrium at the proxy itself, solved beside the loop, and its tangent, which the loop follows until the next
+//! one.
 
 use super::Whereabouts;
 use crate::{
@@ -60,8 +61,8 @@ impl Solution {
         }
     }
 
-    /// Torque [N m or N] and energy [J] at `q`, to second order of the energy: `tau + K dq` and `U - tau . dq - dq . K dq / 2`, and nothing
-    /// where the root `sqrt(2 U)`, to first order, is negative: there contact has ended.
+    /// Torque [N m or N] and energy [J] at `q`, to second order of the energy: `tau + K dq` and `U - tau . dq - dq . K
+    /// dq / 2`, and nothing where the root `sqrt(2 U)`, to first order, is negative: there contact has ended.
     #[must_use]
     pub fn at(&self, q: &JointVector) -> (JointVector, f64) {
         let nothing = (JointVector::zeros(q.len()), 0.0);
@@ -82,7 +83,8 @@ impl Solution {
     }
 }
 
-/// Solves equilibria one after another along a way: each starts from the forces of the one before; where that does not settle, from rest.
+/// Solves equilibria one after another along a way: each starts from the forces of the one before; where that does not
+/// settle, from rest.
 pub struct Follower<'a> {
     solver: Solver<'a>,
     before: Option<Equilibrium>,

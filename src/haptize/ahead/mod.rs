@@ -1,14 +1,17 @@
-//! Contact solved ahead of a motion, while it is felt: blocks of a store around the proxy and along its way, coarse before fine.
+//! Contact solved ahead of a motion, while it is felt: blocks of a store around the proxy and along its way, coarse
+//! before fine.
 //!
-//! *What is wanted.* The proxy at q moves with v. Of each level l the cells are wanted through which q + v t passes within a time that halves from
-//! level to level, as the cells do: all levels look ahead over as many cells. Levels are filled from the base up, each from the
-//! proxy outwards. When all that is there the cells beside the proxy's follow, the nearest first: the hand may turn.
+//! *What is wanted.* The proxy at q moves with v. Of each level l the cells are wanted through which q + v t passes
+//! within a time that halves from level to level, as the cells do: all levels look ahead over as many cells. Levels are
+//! filled from the base up, each from the proxy outwards. When all that is there the cells beside the proxy's follow,
+//! the nearest first: the hand may turn.
 //!
-//! *What is left out.* Above the base, a node around which nothing can touch, by a bound of how far the proxy moves within its cells, is not
-//! solved if the levels below say that it is free.
+//! *What is left out.* Above the base, a node around which nothing can touch, by a bound of how far the proxy moves
+//! within its cells, is not solved if the levels below say that it is free.
 //!
-//! Several threads share the work: each claims some blocks, solves and publishes them. A node depends on its own configuration, the base's
-//! spacing and the nodes on which it rests. So the store is the same, to the bit, whoever solved it and in whatever order.
+//! Several threads share the work: each claims some blocks, solves and publishes them. A node depends on its own
+//! configuration, the base's spacing and the nodes on which it rests. So the store is the same, to the bit, whoever
+//! solved it and in whatever order.
 
 mod follow;
 
@@ -30,13 +33,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How far ahead the base is solved [s]. Longer: more is solved that is never felt. Shorter: a hand that speeds up is not kept up with.
+/// How far ahead the base is solved [s]. Longer: more is solved that is never felt. Shorter: a hand that speeds up is
+/// not kept up with.
 const AHEAD: f64 = 0.4;
 
 /// Places along the way at which cells are looked up at most, a level.
 const MOST_PLACES: usize = 32;
 
-/// Blocks that a thread claims at once. More: the next ones are found for a motion that has gone on. Fewer: more time goes into finding them.
+/// Blocks that a thread claims at once. More: the next ones are found for a motion that has gone on. Fewer: more time
+/// goes into finding them.
 const BATCH: usize = 8;
 
 /// How long a thread sleeps that has nothing to do.
@@ -142,8 +147,8 @@ impl<'a> Ahead<'a> {
         });
     }
 
-    /// Solves the blocks that a proxy `at` wants most, some at most; with `beside` those beside its way, too. False where none is wanted that
-    /// nobody has claimed.
+    /// Solves the blocks that a proxy `at` wants most, some at most; with `beside` those beside its way, too. False
+    /// where none is wanted that nobody has claimed.
     pub fn advance(&self, solver: &mut Solver<'_>, at: &Whereabouts, beside: bool) -> bool {
         let blocks = self.claim(at, beside);
         for (level, block) in &blocks {

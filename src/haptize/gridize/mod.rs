@@ -4,7 +4,8 @@
 //! what the paper's TriScatteredInterp and SciPy's LinearNDInterpolator compute: exact for torques linear in q,
 //! continuous, bounded by the measured values, and *absent* outside the convex hull of the samples
 //! ([`Status::Outside`]). One joint: a sorted line. Two: `spade`. Three: tetrahedra of our own on exact predicates.
-//! Four to six: the simplices of the grid points alone (see `hyperspace`). Natural neighbours in two joints, where asked.
+//! Four to six: the simplices of the grid points alone (see `hyperspace`). Natural neighbours in two joints, where
+//! asked.
 //!
 //! The contact index of a grid point is the paper's (section 3.1): contact where the torque exceeds epsilon.
 
