@@ -52,7 +52,7 @@ fn nanoseconds(mut work: impl FnMut(f64)) -> f64 {
 fn places(space: &Space, level: u32) -> Vec<Place> {
     let mut places = vec![[0; MAX_JOINTS]];
     for a in 0..space.joints() {
-        let last = space.last(level)[a] / 2;
+        let last = space.block_of(&space.last(level))[a];
         places = places
             .iter()
             .flat_map(|place| {

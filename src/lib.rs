@@ -1,17 +1,19 @@
 //! Configuration-space haptization: contact between a multi-link virtual proxy and a deformable virtual object is
 //! solved beforehand for every joint configuration, and felt at 1 kHz by interpolation.
 //!
-//! A [`scene`] says what is touched with what. An [`object`] deforms, a [`proxy`] moves its joints (it may come from a robot's file, [`urdf`]), and their
-//! equilibrium ([`contact`]) at every point of a grid over the joint angles q gives a [`dataset`] ([`haptize`], on the
-//! CPU or through [`gpu`]): the joint torque tau(q), the stored energy U(q) and the contact forces. [`render`] looks
-//! torques up in it, a thousand times a second, for the hand or log that [`device`] stands for; [`report`] draws what
-//! came out. Data flows one way: a room knows only the rooms above it in the list below.
+//! A [`scene`] says what is touched with what. An [`object`] deforms, a [`proxy`] moves its joints (it may come from a
+//! robot's file, [`urdf`]), and their equilibrium ([`contact`]) at every point of a grid over the joint angles q gives
+//! a [`dataset`] ([`haptize`], on the CPU or through [`gpu`]): the joint torque tau(q), the stored energy U(q) and the
+//! contact forces. [`render`] looks torques up in it, a thousand times a second, for the hand or log that [`device`]
+//! stands for; [`report`] draws what came out. Data flows one way: a room knows only the rooms above it in the list
+//! below.
 //!
 //! All quantities are SI: m, rad, N, N m, kg, s, J.
 //!
 //! # Example
 //!
-//! A finger of one joint presses a soft ball of 50 mm radius, at eight angles; then the torque is looked up between them.
+//! A finger of one joint presses a soft ball of 50 mm radius, at eight angles; then the torque is looked up between
+//! them.
 //!
 //! ```
 //! use haptize::{
@@ -76,9 +78,9 @@ pub mod gpu;
 pub mod ros;
 
 pub mod dataset;
+pub use dataset::store;
 pub mod field;
 pub mod haptize;
-pub mod store;
 
 pub mod device;
 pub mod render;

@@ -73,6 +73,7 @@ fn sample() -> Dataset {
                 regions: vec![3, 1].into(),
             }),
         }),
+        refinement: None,
         scene: "name = \"sample\" # Kontakt \u{fc}ber \u{3c0}\n".into(),
         provenance: Provenance {
             notices: vec!["from grid point 7 on: solved otherwise".into()],

@@ -14,7 +14,7 @@ use haptize::{
     render::{flags::Flags, session, setup::Setup},
     scene::{Rendering, Scene, Waypoint},
 };
-use std::{path::Path, sync::atomic::AtomicBool};
+use std::{path::Path, process::Command, sync::atomic::AtomicBool};
 
 fn shipped(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets").join(name)
@@ -168,4 +168,46 @@ fn anywhere_within_the_limits(scene: &Scene, dataset: &Dataset, setup: &Setup) {
         }
     }
     assert!(free > 500 && held > 50, "{name}: {free} ticks free beyond the grid, {held} held at its border");
+}
+
+/// Nothing was baked: contact is solved while it is felt, kept, and felt again from what was kept.
+#[test]
+fn the_organ_is_felt_at_once_and_what_was_explored_is_a_dataset() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_haptize")).args(arguments).current_dir(folder.path()).output().unwrap();
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.success(), told, serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap())
+    };
+    let scene = shipped("organ.toml").display().to_string();
+    let play = ["play", &scene, "--on-demand", "organ.haptize", "--seconds", "2.2", "--json"];
+    let (_, told, felt) = run(&play);
+    let explored = &felt["explored"];
+    // How much there is depends on how busy the machine is.
+    let nodes = explored["solved"]["nodes"].as_u64().unwrap();
+    assert!(nodes > 0 && explored["answers"]["ticks"].as_u64().unwrap() > 0, "{told} {felt:#}");
+    assert!(felt["max_relative_account_residual"].as_f64().unwrap() < 1e-9, "{felt:#}");
+    // It is a dataset like any other.
+    let (whole, told, info) = run(&["info", "organ.haptize", "--json"]);
+    assert!(
+        whole && info["points"].as_u64().unwrap() == 2304 && info["refinement"]["nodes"].is_array(),
+        "{told} {info:#}"
+    );
+    let (whole, told, again) = run(&["play", "organ.haptize", "--seconds", "2.2", "--json"]);
+    assert!(whole && again["explored"].is_null(), "{told} {again:#}");
+    let (whole, told, inspected) = run(&["inspect", "organ.haptize", "--q=0.02,0.6,-0.2,0.1,-1.5,0.1", "--json"]);
+    assert!(whole && inspected["interpolated"]["torque"].is_array(), "{told} {inspected:#}");
+    assert!(run(&["export", "organ.haptize", "--format", "npz", "--json"]).0);
+    // And is gone on with: what is there is not solved again.
+    let (_, told, more) = run(&play);
+    assert!(more["explored"]["known_blocks"].as_u64().unwrap() > 0, "{told} {more:#}");
+    // Not with another number of levels.
+    let output = Command::new(env!("CARGO_BIN_EXE_haptize"))
+        .args(play)
+        .args(["--levels", "3"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(!output.status.success() && String::from_utf8_lossy(&output.stderr).contains("another file"));
 }

@@ -1,5 +1,5 @@
-//! The real-time loop: it allocates nothing, and does every tick that it does not report as missed. The device whose hand
-//! another thread leads.
+//! The real-time loop: it allocates nothing, and does every tick that it does not report as missed. The device whose
+//! hand another thread leads.
 
 #![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 
@@ -11,14 +11,21 @@ use desktop::{haptics, proxy};
 use haptize as engine;
 use haptize::{
     JointVector, MAX_JOINTS,
-    dataset::Dataset,
+    contact::Model,
+    dataset::{Dataset, Provenance},
     device::{Device, HandError, Motion, Pointer, SimulatedHand},
     field::TorqueField,
-    haptize::{BackendChoice, Bake},
+    haptize::{
+        BackendChoice, Bake,
+        ahead::{Ahead, Follower},
+        build_object, grid_of,
+    },
+    proxy::Chain,
     render::{
         flags::Fault,
         graphics::Graphics,
         haptic::{Haptics, Inputs},
+        live::{Live, LiveEnds},
         realtime::{self, Ends, HapticLoop},
         recording::Recording,
         session::{Driver, Plan},
@@ -28,9 +35,10 @@ use haptize::{
         ContactDampingSpec, FourChannelSpec, FrictionSpec, GraphicsEffects, GraphicsSpec, HapticEffects, HapticsSpec,
         Interpolation, ProxyInertia, Scene, Waypoint,
     },
+    store::{Order, Space, Store},
 };
 use std::{
-    sync::atomic::AtomicBool,
+    sync::{Arc, atomic::AtomicBool},
     time::{Duration, Instant},
 };
 use synthetic::{grid, half_space};
@@ -225,7 +233,8 @@ fn rubbing() -> HapticEffects {
     }
 }
 
-/// The sphere over every third line of its grid, a little less than the joints can reach, with what friction and contact damping need.
+/// The sphere over every third line of its grid, a little less than the joints can reach, with what friction and
+/// contact damping need.
 fn sphere() -> Dataset {
     let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
     scene.haptics.effects = rubbing();
@@ -292,6 +301,45 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
         }
     }
     assert!(touched > 36 * 20, "{touched}");
+}
+
+/// Contact solved between the ticks, by the store and at the proxy.
+#[test]
+fn contact_that_is_solved_meanwhile_allocates_nothing_in_a_tick() {
+    let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/organ.toml")).unwrap();
+    let (object, chain) = (build_object(&scene).unwrap(), Chain::new(&scene.proxy));
+    let mut model = Model::new(&object, &chain, scene.contact);
+    model.with_tangent = true;
+    let grid = grid_of(&scene);
+    let space = Space::new(&grid, 2).unwrap();
+    let levers = JointVector::from_slice(&[0.3; MAX_JOINTS]);
+    for direct in [false, true] {
+        let store = Arc::new(Store::new(space.clone(), Order::Potential, 20_000));
+        let ahead = Ahead::new(&model, Arc::clone(&store));
+        let dataset = Dataset::refined(store, grid.clone(), None, scene.text.clone(), Provenance::default());
+        let setup = Setup::new(&dataset).unwrap();
+        // In contact from the beginning, where nothing is known yet.
+        let way = [Waypoint { time: 0.0, ..scene.motion.press[2] }, Waypoint { time: 0.3, ..scene.motion.press[3] }];
+        let mut hand = setup.hand(Motion::through(&way, MAX_JOINTS).unwrap()).unwrap();
+        let (live, LiveEnds { mut whereabouts, solutions }) = Live::new(&way[0].q, 2, &levers, 1, direct);
+        let mut driver = Driver::new(&setup.haptics, &mut hand).unwrap().with_live(Some(live));
+        let (mut solutions, mut solver, mut follower) = (solutions, ahead.solver(), Follower::new(&model));
+        for k in 0..600 {
+            assert_no_alloc(|| driver.tick(1e-3, 1e-3));
+            if let Some(solutions) = &mut solutions {
+                // Sometimes late.
+                if k % 50 < 30 {
+                    solutions.write(follower.solve(whereabouts[1].read()));
+                }
+            }
+            if k % 10 == 0 {
+                ahead.advance(&mut solver, whereabouts[0].read(), false);
+            }
+        }
+        let answers = driver.live().unwrap().answers();
+        assert_eq!(answers.direct > 0, direct, "{answers:?}");
+        assert!(answers.changes > 0, "{answers:?}");
+    }
 }
 
 #[cfg(target_os = "linux")]

@@ -136,6 +136,7 @@ fn dataset(chain: &Chain, object: &Object, counts: &[usize]) -> Dataset {
         contacts: Some(Contacts { offsets: offsets.into(), nodes: nodes.into(), forces: forces.into() }),
         touches: None,
         surface: Some(Surface::of(object)),
+        refinement: None,
         scene: String::new(),
         provenance: Provenance::default(),
     }
@@ -325,7 +326,8 @@ fn files_are_complete_and_the_same_twice() {
     assert_eq!(differing, ["motion.svg", "motion.png"]);
 }
 
-/// Several figures stand in one page: a name that two clips share must mean one rectangle, or the page clips one figure as the other.
+/// Several figures stand in one page: a name that two clips share must mean one rectangle, or the page clips one figure
+/// as the other.
 #[test]
 fn clips_of_equal_names_are_equal_rectangles() {
     let figures = all(&dataset(&arm(3), &sphere(), counts(3)), &arm(3), &recording(&arm(3), &sphere(), 1000));

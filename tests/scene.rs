@@ -55,8 +55,8 @@ fn diagnostic(text: &str) -> Diagnostic {
     }
 }
 
-/// Scenes of real devices: their limits are those of the machine, which may be anywhere within them when it is switched on. That
-/// its hand is free there, and held where contact was not solved, is tested in `device_scenes.rs`.
+/// Scenes of real devices: their limits are those of the machine, which may be anywhere within them when it is switched
+/// on. That its hand is free there, and held where contact was not solved, is tested in `device_scenes.rs`.
 const OF_MACHINES: [&str; 3] = ["touch.toml", "two_diy.toml", "woodenhaptics.toml"];
 
 #[test]
@@ -99,7 +99,7 @@ fn spheres_have_the_papers_grid() {
 
 #[test]
 fn shipped_motions_stay_within_the_grid() {
-    for name in ["paper.toml", "sphere.toml", "mesh.toml"] {
+    for name in ["paper.toml", "sphere.toml", "mesh.toml", "organ.toml"] {
         let scene = shipped(name);
         assert!(!scene.motion.press.is_empty() && !scene.motion.scrape.is_empty(), "{name}");
         for waypoint in scene.motion.press.iter().chain(&scene.motion.scrape) {
@@ -121,6 +121,21 @@ fn mesh_scene_mixes_joints_and_names_a_file_beside_it() {
     assert!(matches!(scene.object.ground.unwrap().nodes, GroundNodes::Below(_)));
     let points: usize = scene.grid.axes.iter().map(|axis| axis.count).product();
     assert!((6_000..=10_000).contains(&points));
+}
+
+#[test]
+fn the_organ_is_a_smooth_soft_body_under_six_joints() {
+    let scene = shipped("organ.toml");
+    assert_eq!(scene.proxy.joints.len(), 6);
+    assert_eq!(scene.contact.surface, ContactSurface::Smooth);
+    let object = haptize::haptize::build_object(&scene).unwrap();
+    assert_eq!((object.surface_nodes, object.triangles.len()), (1002, 2000));
+    assert!(object.skin.is_some());
+    // The arm is that of the Touch up to its wrist.
+    let touch = shipped("touch.toml");
+    for (joint, other) in scene.proxy.joints.iter().zip(&touch.proxy.joints) {
+        assert_eq!((joint.origin, joint.axis), (other.origin, other.axis), "{}", joint.name);
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use super::{
     bar::Bar,
     info, interrupt, max_error,
     output::{self, Kind},
-    reach,
+    reach, refine,
     shard::ShardChoice,
     tell,
 };
@@ -14,6 +14,7 @@ use crate::{
         Aim, BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, Shard, Sweep, SweepReport,
     },
     scene::{Algorithm, Scene},
+    store::space::MAX_LEVELS,
 };
 use std::{
     fmt::{self, Write},
@@ -29,6 +30,7 @@ Examples:
   haptize bake sphere.toml
   haptize bake sphere.toml --max-error 5%
   haptize bake sphere.toml --max-error 0.002Nm -o fine.haptize
+  haptize bake organ.toml --max-error 10% --refine 3     finer where it errs, six joints included
   haptize bake sphere.toml --backend gpu --resume
   haptize bake sphere.toml --shard auto/64 -o shards     one task of a cluster's array; see haptize plan",
     adapter_help!()
@@ -36,7 +38,8 @@ Examples:
 pub struct Arguments {
     /// The scene.
     scene: PathBuf,
-    /// The dataset to write; by default the scene's name in the current folder, ending in .haptize. With --shard the folder to write to.
+    /// The dataset to write; by default the scene's name in the current folder, ending in .haptize. With --shard the
+    /// folder to write to.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// The backend that solves contact.
@@ -45,23 +48,28 @@ pub struct Arguments {
     /// How contact is solved, instead of as the scene says.
     #[arg(long)]
     algorithm: Option<Algorithm>,
-    /// Continue a bake that was interrupted. What was solved is kept; the search for lower equilibria and the measurement of the error, which
-    /// come last, start again.
+    /// Continue a bake that was interrupted. What was solved is kept; the search for lower equilibria and the
+    /// measurement of the error, which come last, start again.
     #[arg(long)]
     resume: bool,
-    /// Number of random configurations at which the dataset's error is measured afterwards; 0 skips this. By default a tenth of
-    /// the points in contact, at least 100 and at most 1000.
+    /// Number of random configurations at which the dataset's error is measured afterwards; 0 skips this. By default a
+    /// tenth of the points in contact, at least 100 and at most 1000.
     #[arg(long, value_name = "COUNT", conflicts_with = "max_error")]
     measure_error: Option<usize>,
-    /// Choose grid spacing, interpolation and solver tolerance for this rms error of the torque, and verify it: a fraction of the
-    /// torque's own rms over the grid (0.01 or 1%), or a torque ("0.002 N m").
+    /// Choose grid spacing, interpolation and solver tolerance for this rms error of the torque, and verify it: a
+    /// fraction of the torque's own rms over the grid (0.01 or 1%), or a torque ("0.002 N m").
     #[arg(long, value_name = "ERROR", allow_negative_numbers = true)]
     max_error: Option<Aim>,
+    /// Instead of choosing a uniform grid for --max-error, refine the scene's grid where it errs: by up to so many
+    /// levels, itself included, each of half the spacing.
+    #[arg(long, value_name = "LEVELS", requires = "max_error", conflicts_with_all = ["resume", "algorithm", "shard"], value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_LEVELS)))]
+    refine: Option<u32>,
     /// Maximum number of grid points that --max-error may choose.
     #[arg(long, default_value_t = 2_000_000, value_name = "POINTS")]
     max_points: usize,
-    /// Solve one of N shards, counted from 0, into a file of its own: "3/64"; "auto/64" takes the number from the environment of the job
-    /// scheduler. An unfinished shard is continued, a whole one left as it is. `haptize merge` puts them together.
+    /// Solve one of N shards, counted from 0, into a file of its own: "3/64"; "auto/64" takes the number from the
+    /// environment of the job scheduler. An unfinished shard is continued, a whole one left as it is. `haptize merge`
+    /// puts them together.
     #[arg(long, value_name = "I/N", conflicts_with_all = ["max_error", "measure_error"])]
     shard: Option<ShardChoice>,
 }
@@ -83,6 +91,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let earlier = output::check(&output, Kind::Dataset, [arguments.scene.as_path()])?;
     output::check(&Sweep::growing_of(&output), Kind::Dataset, [])?;
     let scene = reach::complete(scene, arguments.backend, arguments.max_error.is_some())?;
+    if let (Some(aim), Some(levels)) = (arguments.max_error, arguments.refine) {
+        let wanted = refine::Wanted { aim, levels, most: arguments.max_points, output: &output };
+        let mut report = refine::run(&scene, &wanted)?;
+        earlier.tell(&mut report.text, &mut report.json);
+        return Ok(report);
+    }
     if let Some(aim) = arguments.max_error {
         let wanted =
             max_error::AccuracyGoal { aim, points: arguments.max_points, output: &output, resume: arguments.resume };
@@ -152,7 +166,8 @@ pub fn warn(report: &SweepReport) {
     report.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
 }
 
-/// Describes what was baked into `file`, for people; `aim`: the rms error over the rms torque that was asked for, if any.
+/// Describes what was baked into `file`, for people; `aim`: the rms error over the rms torque that was asked for, if
+/// any.
 pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Option<f64>) -> fmt::Result {
     let SweepReport { points, contact_points, unconverged, overflowed, .. } = report;
     let SweepReport { seconds, configurations_per_second, algorithm, backend, adapter, left_to_cpu, .. } = report;

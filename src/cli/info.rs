@@ -3,7 +3,7 @@
 use super::{Failure, Report};
 use crate::{
     contact::MeshRipple,
-    dataset::{Axis, Dataset, MeasuredError, Summary},
+    dataset::{Axis, Dataset, MeasuredError, Refinement, Summary},
     object::Skin,
     scene::{Material, ObjectSpec, Rendering, SkinSpec},
 };
@@ -84,6 +84,10 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
         let effort = axis.effort_unit();
         writeln!(text, "  {name:<12} {count} lines, {start:.4} to {last:.4} {unit} by {step:.4}")?;
         writeln!(text, "  {:<12} {least:.4} to {greatest:.4} {effort}", "")?;
+    }
+    if let Some(Refinement { nodes, bytes }) = &summary.refinement {
+        let nodes: Vec<String> = nodes.iter().map(ToString::to_string).collect();
+        writeln!(text, "  refined      {} nodes by level, {:.1} MB in memory", nodes.join(" + "), *bytes as f64 / 1e6)?;
     }
     let counts = &summary.statuses;
     write!(text, "  status       {} free, {} in contact", counts.free, counts.contact)?;

@@ -1,15 +1,16 @@
 //! Command line: one thin file a subcommand, everything else in the library.
 //!
 //! A subcommand `name` is a file `name.rs` beside this one with
-//! - `pub struct Arguments`, deriving `clap::Args`: its arguments, documented, since the doc comments are the help text;
+//! - `pub struct Arguments`, deriving `clap::Args`: its arguments, documented, since the doc comments are the help
+//!   text;
 //! - `pub fn run(arguments: &Arguments) -> Result<Report, Failure>`: its work.
 //!
 //! and three lines here: `mod name;`, a variant of `Command` and an arm of `Command::run`. A subcommand appears
 //! here only once it works. It never prints its result itself: it returns a `Report`, and `--json` (an option of every
 //! subcommand) decides here which half of it goes to standard output. Notes and progress go to standard error.
 //!
-//! Exit codes: 0 the work is whole, 1 it failed or is not whole, 2 the command line itself is wrong (given by clap), 130 a signal ended
-//! it.
+//! Exit codes: 0 the work is whole, 1 it failed or is not whole, 2 the command line itself is wrong (given by clap),
+//! 130 a signal ended it.
 
 /// Which adapter draws and computes, for the help of commands that use one.
 macro_rules! adapter_help {
@@ -38,12 +39,14 @@ mod max_error;
 mod memory;
 mod merge;
 mod new;
+mod on_demand;
 mod output;
 mod paper;
 mod plan;
 mod play;
 mod playback_report;
 mod reach;
+mod refine;
 mod scan;
 mod shard;
 mod stability;

@@ -3,6 +3,7 @@
 use super::{
     Failure, Report, interrupt,
     keyboard::Keyboard,
+    on_demand::{self, Explored, OnDemand},
     output::{self, Folder, Kind as FileKind},
     playback_report::PlaybackReport,
     tell,
@@ -37,10 +38,11 @@ Examples:
   haptize play sphere.haptize --motion scrape
   haptize play sphere.haptize --motion hand.csv --seconds 10 --realtime
   haptize play sphere.haptize --record session.csv
+  haptize play organ.toml --on-demand organ.haptize      nothing baked: contact is solved where the hand goes, and kept
   haptize play sphere.haptize --replay session.csv
   haptize play sponge.haptize --motion scrape --beside sponge_fabric.haptize")]
 pub struct Arguments {
-    /// The dataset's file.
+    /// The dataset's file; with --on-demand a scene.
     dataset: PathBuf,
     /// Motion of the hand: `press` or `scrape` as in the scene, or a CSV file of times [s] and joint coordinates.
     #[arg(long, default_value = "press")]
@@ -51,7 +53,8 @@ pub struct Arguments {
     /// Move the device exactly as the motion says, whatever the torque, instead of letting a simulated hand hold it.
     #[arg(long)]
     exact: bool,
-    /// A real device instead of a simulated hand, always against the clock: KIND or KIND:PLACE, as `haptize device list` shows it.
+    /// A real device instead of a simulated hand, always against the clock: KIND or KIND:PLACE, as `haptize device
+    /// list` shows it.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["exact", "beside", "replay"])]
     device: Option<Address>,
     /// Torque only while the space bar is held (a dead-man key).
@@ -60,8 +63,8 @@ pub struct Arguments {
     /// Run against the clock, in a real-time thread where permitted, instead of as fast as possible.
     #[arg(long)]
     realtime: bool,
-    /// Record the session into this file: all inputs of the loop and all its outputs. A name that ends in .mcap gives joint
-    /// states in MCAP, for other programs; only the table that other names give can be replayed.
+    /// Record the session into this file: all inputs of the loop and all its outputs. A name that ends in .mcap gives
+    /// joint states in MCAP, for other programs; only the table that other names give can be replayed.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replay the session in this file and check that it matches bit for bit.
@@ -73,6 +76,12 @@ pub struct Arguments {
     /// Another dataset, played with the same motion: the forces at the ends of both arms are drawn in one figure.
     #[arg(long, value_name = "DATASET", conflicts_with = "replay")]
     beside: Option<PathBuf>,
+    /// Begin at once, against the clock, from a scene of which nothing was baked: contact is solved ahead of the
+    /// motion, coarse before fine, and kept in this file, a dataset. What it holds already is used.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "record", "beside"])]
+    on_demand: Option<PathBuf>,
+    #[command(flatten)]
+    choices: on_demand::Choices,
 }
 
 /// Shapes of the object that are kept.
@@ -98,19 +107,34 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if let Some(file) = asked {
         filled.keep_apart(file)?;
     }
-    let dataset = Dataset::load(&arguments.dataset)?;
+    let kept = arguments.on_demand.as_ref();
+    let explored = kept.map(|file| output::check(file, FileKind::Dataset, inputs().chain(moved()))).transpose()?;
+    if let Some(file) = kept {
+        filled.keep_apart(file)?;
+    }
+    let open = |file: &PathBuf| OnDemand::open(&arguments.dataset, file, arguments.choices);
+    let on_demand = kept.map(open).transpose()?;
+    let mut dataset = match &on_demand {
+        Some(on_demand) => on_demand.dataset(),
+        None => Dataset::load(&arguments.dataset)?,
+    };
     let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
     if let Some(advice) = &setup.advice {
         tell(format_args!("haptize: note: {advice}"));
     }
     let (played, told) = match &arguments.replay {
         Some(file) => replay(&setup, &dataset, file)?,
-        None => (perform(&setup, &dataset, arguments)?, None),
+        None => (perform(&setup, &dataset, arguments, on_demand.as_ref())?, None),
     };
+    if let (Some(file), Some(on_demand)) = (kept, &on_demand) {
+        // With what was solved meanwhile.
+        dataset = on_demand.dataset();
+        dataset.save(file.as_path())?;
+    }
     if let Some(timing) = &played.timing {
         timing.refused.iter().for_each(|refused| tell(format_args!("haptize: note: {refused}")));
     }
-    let mut files = Vec::new();
+    let mut files: Vec<PathBuf> = kept.into_iter().cloned().collect();
     if let Some(file) = &arguments.record {
         record(&played, arguments, file)?;
         files.push(file.clone());
@@ -133,6 +157,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     json["timing"] = serde_json::to_value(&played.timing)?;
     json["fault"] = fault.as_ref().map(|(time, reason)| json!({ "time": time, "reason": reason })).into();
     json["replayed"] = told.is_some().into();
+    json["explored"] = played.explored.as_ref().map(Explored::json).into();
     json["device"] = device_json(arguments, &tally)?;
     json["files"] = files.iter().map(|file| Value::from(file.display().to_string())).collect();
     let mut text = told.unwrap_or_default();
@@ -142,6 +167,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         writeln!(text, "  border       holds the device with the coupling's stiffness Kvc: {stiffness}")?;
     }
     felt.describe(&mut text)?;
+    if let Some(explored) = &played.explored {
+        explored.describe(&mut text)?;
+    }
     if let Some((time, reason)) = &fault {
         writeln!(text, "  fault        at {time:.4} s the torque went to zero: {reason}; play again to clear it")?;
     }
@@ -153,6 +181,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     if let Some(file) = &arguments.record {
         writeln!(text, "recorded in {}", file.display())?;
+    }
+    if let (Some(explored), Some(file)) = (explored, kept) {
+        writeln!(text, "explored, kept in {}", file.display())?;
+        explored.tell(&mut text, &mut json["kept"]);
     }
     if let Some(recorded) = recorded {
         recorded.tell(&mut text, &mut json["recording"]);
@@ -184,29 +216,40 @@ fn describe_tally(text: &mut String, tally: &Tally) -> fmt::Result {
 }
 
 /// The session that `arguments` ask for.
-fn perform(setup: &Setup, dataset: &Dataset, arguments: &Arguments) -> Result<Played, Failure> {
+fn perform(
+    setup: &Setup,
+    dataset: &Dataset,
+    arguments: &Arguments,
+    on_demand: Option<&OnDemand>,
+) -> Result<Played, Failure> {
     let motion = motion(setup, &arguments.motion)?;
     let seconds = arguments.seconds.unwrap_or_else(|| motion.duration());
     if !(seconds > 0.0 && seconds <= LONGEST) {
         return Err(format!("cannot play {seconds} s: give --seconds between 0 and {LONGEST}").into());
     }
     if let Some(address) = &arguments.device {
-        return drive(setup, dataset, address, motion, seconds, arguments.hold_key);
+        let how = How { seconds, hold_key: arguments.hold_key, on_demand };
+        return drive(setup, dataset, address, motion, how);
     }
     let mut device: Box<dyn Device> =
         if arguments.exact { Box::new(Recorded::new(motion)) } else { Box::new(setup.hand(motion)?) };
-    play(setup, dataset, device.as_mut(), seconds, arguments.realtime)
+    match on_demand {
+        Some(on_demand) => on_demand.play(setup, device.as_mut(), &setup.plan(dataset, seconds, 0)),
+        None => play(setup, dataset, device.as_mut(), seconds, arguments.realtime),
+    }
+}
+
+/// How a device is driven.
+struct How<'a> {
+    /// Duration [s].
+    seconds: f64,
+    hold_key: bool,
+    on_demand: Option<&'a OnDemand>,
 }
 
 /// Feels the dataset with the device at `address`, until Ctrl-C at the latest. The simulated one is led along `motion`.
-fn drive(
-    setup: &Setup,
-    dataset: &Dataset,
-    address: &Address,
-    motion: Motion,
-    seconds: f64,
-    hold_key: bool,
-) -> Result<Played, Failure> {
+fn drive(setup: &Setup, dataset: &Dataset, address: &Address, motion: Motion, how: How<'_>) -> Result<Played, Failure> {
+    let How { seconds, hold_key, on_demand } = how;
     let hand = if address.kind == Kind::Simulated { Some(setup.hand(motion)?) } else { None };
     let (key, input) = Key::new();
     let _keyboard = if hold_key { Some(Keyboard::start(input)?) } else { None };
@@ -224,12 +267,16 @@ fn drive(
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
     // Last of all: the motors go on.
     let mut device = attach(guard, address, setup.chain.clone(), &setup.scene)?;
-    let played = realtime::run(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, stop);
+    let played = match on_demand {
+        Some(on_demand) => on_demand.play(setup, device.as_mut(), &plan),
+        None => realtime::run(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, stop)
+            .map(|(trace, timing)| Played { trace, timing: Some(timing), explored: None })
+            .map_err(Failure::from),
+    };
     // Motors off before anything is drawn or written.
     drop(device);
     interrupt::over();
-    let (trace, timing) = played?;
-    Ok(Played { trace, timing: Some(timing) })
+    played
 }
 
 /// Replays the session in `file`. Returns its trace, and a line that says that it matched.
@@ -245,7 +292,7 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Opti
         );
     }
     let told = format!("{} ticks replayed, torque and proxy equal to the last bit\n", recording.ticks());
-    Ok((Played { trace, timing: None }, Some(told)))
+    Ok((Played { trace, timing: None, explored: None }, Some(told)))
 }
 
 /// Where traces and figures go.
@@ -291,6 +338,8 @@ pub struct Played {
     pub trace: Trace,
     /// How punctual it was, if it ran against the clock.
     pub timing: Option<Timing>,
+    /// What was solved meanwhile, if anything.
+    pub explored: Option<Explored>,
 }
 
 /// Plays for `seconds` what `device` does.
@@ -305,10 +354,10 @@ pub fn play(
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
     if against_the_clock {
         let (trace, timing) = realtime::run(&setup.haptics, device, graphics.as_mut(), &plan, &AtomicBool::new(false))?;
-        return Ok(Played { trace, timing: Some(timing) });
+        return Ok(Played { trace, timing: Some(timing), explored: None });
     }
     let played: Result<Trace, SessionError> = session::run(&setup.haptics, device, graphics.as_mut(), &plan);
-    Ok(Played { trace: played?, timing: None })
+    Ok(Played { trace: played?, timing: None, explored: None })
 }
 
 /// Writes traces and figures of `played` into `folder`, and returns their paths.

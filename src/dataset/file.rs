@@ -32,7 +32,7 @@
 //! A mapped file must not be cut short by anyone while it is open: the system then kills the reader (SIGBUS). Programs
 //! of this crate never do that, they rename; the haptic loop reads through [`Dataset::load`], which copies.
 
-use super::{Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, Target, check, replace_file};
+use super::{Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, Target, check, replace_file, store};
 use crate::JointMatrix;
 use bytemuck::Pod;
 use safetensors::{Dtype, tensor::TensorInfo};
@@ -195,6 +195,9 @@ impl Dataset {
     pub fn save<'a>(&self, target: impl Into<Target<'a>>) -> Result<(), Error> {
         let target = target.into();
         check::check(self).map_err(|reason| Error::Inconsistent { path: target.path().into(), reason })?;
+        if let Some(store) = &self.refinement {
+            return store::file::save(self, store, target);
+        }
         let heading = Heading { grid: &self.grid, provenance: &self.provenance, scene: &self.scene };
         write_file(target, heading, tensors(self))
     }

@@ -27,6 +27,7 @@ impl Dataset {
             contacts: None,
             touches: None,
             surface: None,
+            refinement: None,
             scene: String::new(),
             provenance: Provenance::default(),
         }

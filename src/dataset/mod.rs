@@ -16,6 +16,7 @@ mod file;
 mod grid;
 mod known;
 mod read;
+pub mod store;
 mod summary;
 mod surface;
 
@@ -29,11 +30,11 @@ pub(crate) use file::{
     CONTACTS, Contents as TensorContents, Heading, Kind, TOUCHES, Tensor, surface_tensors, write_container, write_file,
 };
 pub use grid::{Axis, Grid};
-pub(crate) use read::open_container;
-pub use summary::{StatusCounts, Summary};
+pub use summary::{Refinement, StatusCounts, Summary};
 
 use crate::contact::{MeshRipple, NodeForce, Status};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// A dataset. Columns are owned (just baked) or lie in a mapped file (just opened); both read alike.
 pub struct Dataset {
@@ -62,6 +63,9 @@ pub struct Dataset {
     pub touches: Option<Contacts>,
     /// The object's geometry at rest; absent in scanned datasets.
     pub surface: Option<Surface>,
+    /// Nodes between the grid's points, and those on them from which the columns were taken; absent where the grid is
+    /// all there is. Shared with those that solve more of it.
+    pub refinement: Option<Arc<store::Store>>,
     /// The scene's text; empty for scanned datasets without one.
     pub scene: String,
     /// Where it comes from.

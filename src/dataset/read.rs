@@ -3,6 +3,7 @@
 use super::{
     Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, check,
     file::{CHECKSUM, CONTACTS, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, TOUCHES, digits},
+    store,
 };
 use crate::{
     JointMatrix,
@@ -69,19 +70,15 @@ fn regular_file(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// Maps the file at `path`, and checks header and checksum; `format` is that of its kind.
-pub(crate) fn open_container(path: &Path, format: &'static str) -> Result<Container, Error> {
-    let read = |source| Error::Read { path: path.into(), source };
-    let file = regular_file(path).map_err(read)?;
-    // SAFETY: as in [`Dataset::open`].
-    let map = unsafe { Mmap::map(&file) }.map_err(read)?;
-    Container::check(path, map, format)
-}
-
 /// Checks a whole file and makes a dataset of windows into it.
 fn decode(path: &Path, map: Mmap) -> Result<Dataset, Error> {
     let damaged = |reason: String| Error::Damaged { path: path.into(), reason };
-    let mut container = Container::check(path, map, FORMAT)?;
+    let mut container = Container::check(path, map)?;
+    if container.text("format").is_ok_and(|format| format == store::file::FORMAT) {
+        let dataset = store::file::decode(path, container)?;
+        check::check(&dataset).map_err(damaged)?;
+        return Ok(dataset);
+    }
     let (grid, provenance) = container.heading().map_err(damaged)?;
     let scene = container.text("scene").map_err(damaged)?.to_string();
     let Container { windows, tensors, .. } = &mut container;
@@ -101,7 +98,7 @@ pub(crate) struct Container {
 
 impl Container {
     /// Checks the whole file.
-    fn check(path: &Path, map: Mmap, format: &'static str) -> Result<Self, Error> {
+    fn check(path: &Path, map: Mmap) -> Result<Self, Error> {
         let foreign = |reason: &str| Error::Foreign { path: path.into(), reason: reason.into() };
         let damaged = |reason: String| Error::Damaged { path: path.into(), reason };
 
@@ -139,8 +136,8 @@ impl Container {
             windows: Windows { map: Arc::new(map), start },
         };
         let found = container.text("format").map_err(damaged)?;
-        if found != format {
-            return Err(Error::Version { path: path.into(), found: found.into(), expected: format });
+        if ![FORMAT, store::file::FORMAT].contains(&found) {
+            return Err(Error::Version { path: path.into(), found: found.into(), expected: FORMAT });
         }
         Ok(container)
     }
@@ -162,6 +159,11 @@ impl Container {
     /// Takes the tensor `name`; `shape` leaves free lengths as `None`. `Err` says what is wrong, or that it is missing.
     pub(crate) fn take<T: Element>(&mut self, name: &str, shape: &[Option<usize>]) -> Result<Column<T>, String> {
         self.windows.column(&mut self.tensors, name, shape)?.ok_or_else(|| missing(name))
+    }
+
+    /// Takes the object's geometry; `None` where it is absent. `Err` says what is wrong.
+    pub(super) fn surface(&mut self) -> Result<Option<Surface>, String> {
+        self.windows.surface(&mut self.tensors)
     }
 
     /// `Err` names a tensor that has not been taken.
@@ -199,29 +201,29 @@ impl Windows {
             iterations: self.column(tensors, "iterations", &counts)?,
             contacts: self.contacts(tensors, CONTACTS)?,
             touches: self.contacts(tensors, TOUCHES)?,
-            surface: match self.column(tensors, "surface_nodes", &[None, Some(3)])? {
-                None => None,
-                Some(nodes) => Some(Surface {
-                    nodes,
-                    triangles: self
-                        .column(tensors, "surface_triangles", &[None, Some(3)])?
-                        .ok_or_else(|| missing("surface_triangles"))?,
-                    solid: match self.column(tensors, "tetrahedra", &[None, Some(4)])? {
-                        None => None,
-                        Some(tetrahedra) => Some(Solid {
-                            inner_nodes: self
-                                .column(tensors, "inner_nodes", &[None, Some(3)])?
-                                .ok_or_else(|| missing("inner_nodes"))?,
-                            tetrahedra,
-                            regions: self.column(tensors, "regions", &[None])?.unwrap_or_else(|| Vec::new().into()),
-                        }),
-                    },
-                }),
-            },
+            surface: self.surface(tensors)?,
+            refinement: None,
             grid,
             scene,
             provenance,
         })
+    }
+
+    /// Takes the object's geometry out of `tensors`; `None` where it is absent.
+    fn surface(&self, tensors: &mut BTreeMap<String, TensorInfo>) -> Result<Option<Surface>, String> {
+        let Some(nodes) = self.column(tensors, "surface_nodes", &[None, Some(3)])? else { return Ok(None) };
+        let triangles = self.column(tensors, "surface_triangles", &[None, Some(3)])?;
+        let solid = match self.column(tensors, "tetrahedra", &[None, Some(4)])? {
+            None => None,
+            Some(tetrahedra) => Some(Solid {
+                inner_nodes: self
+                    .column(tensors, "inner_nodes", &[None, Some(3)])?
+                    .ok_or_else(|| missing("inner_nodes"))?,
+                tetrahedra,
+                regions: self.column(tensors, "regions", &[None])?.unwrap_or_else(|| Vec::new().into()),
+            }),
+        };
+        Ok(Some(Surface { nodes, triangles: triangles.ok_or_else(|| missing("surface_triangles"))?, solid }))
     }
 
     /// Takes contact forces out of `tensors`; `None` where they are absent.

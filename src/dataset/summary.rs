@@ -1,6 +1,6 @@
 //! What a dataset holds, in a few numbers: for `info`, reports and tests.
 
-use super::{Axis, Dataset, Provenance};
+use super::{Axis, Dataset, Provenance, store::Store};
 use crate::contact::Status;
 use serde::Serialize;
 
@@ -30,10 +30,33 @@ pub struct Summary {
     pub max_force: Option<f64>,
     /// Nodes and triangles of the object's surface.
     pub surface: Option<[usize; 2]>,
-    /// Memory of all columns [bytes].
+    /// What refines the grid.
+    pub refinement: Option<Refinement>,
+    /// Memory of all columns, and of what refines them [bytes].
     pub bytes: usize,
     /// Where the dataset comes from.
     pub provenance: Provenance,
+}
+
+/// Key figures of a store that refines a dataset.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Refinement {
+    /// Nodes of each level, the grid's first.
+    pub nodes: Vec<usize>,
+    /// Memory [bytes].
+    pub bytes: usize,
+}
+
+impl Refinement {
+    fn of(store: &Store) -> Self {
+        let mut nodes = vec![0; store.space().levels() as usize];
+        for (key, block) in store.blocks() {
+            if let Some((level, _)) = store.space().block(key) {
+                nodes[level as usize] += block.nodes().count();
+            }
+        }
+        Self { nodes, bytes: store.bytes() }
+    }
 }
 
 /// Number of points of each status.
@@ -92,6 +115,7 @@ impl Dataset {
         }
         let force = |point| self.forces(point).map(|contact| contact.force.length()).fold(0.0, f64::max);
         let rows = self.contacts.as_ref().map(|contacts| contacts.offsets.windows(2).map(|pair| pair[1] - pair[0]));
+        let refinement = self.refinement.as_deref().map(Refinement::of);
         Summary {
             axes: self.grid.axes.clone(),
             points,
@@ -104,7 +128,8 @@ impl Dataset {
             max_contacts: rows.map(|rows| rows.max().unwrap_or(0) as usize),
             max_force: self.contacts.as_ref().map(|_| converged().map(force).fold(0.0, f64::max)),
             surface: self.surface.as_ref().map(|surface| [surface.nodes.len() / 3, surface.triangles.len() / 3]),
-            bytes: super::file::bytes(self),
+            bytes: super::file::bytes(self) + refinement.as_ref().map_or(0, |refinement| refinement.bytes),
+            refinement,
             provenance: self.provenance.clone(),
         }
     }

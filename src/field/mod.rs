@@ -1,10 +1,11 @@
 //! The contact torque as a function of configuration: interpolation over the dataset's grid (section 3.1).
 //!
 //! Three ways, chosen by the scene ([`Interpolation`]): `linear` and `gap-field` (`layered.rs`) interpolate the torque
-//! and hold it behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient.
-//! All are continuous and without memory. What they share is here: the cell around q, the fade outside the grid
-//! (`stencil.rs`), what is said of points that were not computed or did not converge, and the contact index
-//! `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored (contact, unconverged, overflowed) and 0 at free points.
+//! and hold it behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient. A
+//! refined dataset is interpolated by its store, in the store's own way (`refined.rs`). All are continuous and without
+//! memory. What they share is here: the cell around q, the fade outside the grid (`stencil.rs`), what is said of points
+//! that were not computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is
+//! stored (contact, unconverged, overflowed) and 0 at free points.
 //!
 //! A field owns a copy of what it needs, interleaved point by point. The real-time thread thus never touches a mapped
 //! file, which would end the process when somebody else truncates it.
@@ -18,6 +19,7 @@ mod layered;
 mod points;
 mod potential;
 pub mod range;
+mod refined;
 mod slope;
 pub mod stencil;
 mod work;
@@ -26,15 +28,33 @@ pub use batch::{BatchError, check_rows, fill_rows};
 pub use error::FieldError;
 pub use flags::Flags;
 
-use crate::{JointVector, MAX_JOINTS, contact::Status, dataset::Dataset, scene::Interpolation};
+use crate::{
+    JointVector, MAX_JOINTS,
+    contact::Status,
+    dataset::Dataset,
+    scene::Interpolation,
+    store::{Order, Store},
+};
 use layered::Layered;
 use points::{Checked, Point};
 use potential::Potential;
-use stencil::Lattice;
+use std::sync::Arc;
+use stencil::{Lattice, Stencil};
 
 /// The contact torque around one object.
 pub struct TorqueField {
     lattice: Lattice,
+    source: Source,
+}
+
+/// What answers.
+enum Source {
+    Grid(OnGrid),
+    Store(Arc<Store>),
+}
+
+/// Numbers at the points of the grid.
+struct OnGrid {
     points: Vec<Point>,
     has_energy: bool,
     interpolant: Interpolant,
@@ -101,8 +121,9 @@ impl TorqueField {
         Self::interpolated(dataset, Interpolation::Linear, threshold, slope)
     }
 
-    /// Any interpolation over `dataset`. `threshold` counts for `linear` alone, `slope` for all but `potential`, which
-    /// takes its mixed derivatives from the dataset's tangents where it has them.
+    /// Any interpolation over `dataset`; a refined one is interpolated in the way of its store, whatever
+    /// `interpolation` says. `threshold` counts for `linear` alone, `slope` for all but `potential`, which takes its
+    /// mixed derivatives from the dataset's tangents where it has them.
     ///
     /// # Errors
     /// As [`TorqueField::new`]; also when the dataset lacks the column that `interpolation` needs.
@@ -119,14 +140,18 @@ impl TorqueField {
         if slope.len() != lattice.joints() || !slope.iter().all(|slope| *slope > 0.0 && slope.is_finite()) {
             return Err(FieldError::Slope(*slope));
         }
+        if let Some(store) = &dataset.refinement {
+            return Ok(Self { lattice, source: Source::Store(Arc::clone(store)) });
+        }
         let (points, nearest) = points::survey(&lattice, dataset)?;
         let data = Checked { lattice: &lattice, dataset, points: &points, nearest: &nearest };
         let interpolant = match interpolation {
             Interpolation::Linear => Interpolant::Layered(Layered::linear(&data, threshold, slope)?),
             Interpolation::GapField => Interpolant::Layered(Layered::gap_field(&data, slope)?),
-            Interpolation::Potential => Interpolant::Potential(Potential::new(&data)?),
+            Interpolation::Potential | Interpolation::Direct => Interpolant::Potential(Potential::new(&data)?),
         };
-        Ok(Self { lattice, points, has_energy: dataset.energy.is_some(), interpolant })
+        let on_grid = OnGrid { points, has_energy: dataset.energy.is_some(), interpolant };
+        Ok(Self { lattice, source: Source::Grid(on_grid) })
     }
 
     /// Number of joints d.
@@ -144,42 +169,79 @@ impl TorqueField {
     /// Whether the dataset has the energy U.
     #[must_use]
     pub fn has_energy(&self) -> bool {
-        self.has_energy
+        match &self.source {
+            Source::Grid(on_grid) => on_grid.has_energy,
+            Source::Store(_) => true,
+        }
     }
 
     /// Whether the torque is minus the gradient of [`Sample::energy`] inside the grid.
     #[must_use]
     pub fn is_potential(&self) -> bool {
-        matches!(self.interpolant, Interpolant::Potential(_))
+        match &self.source {
+            Source::Grid(on_grid) => matches!(on_grid.interpolant, Interpolant::Potential(_)),
+            Source::Store(store) => store.order() == Order::Potential,
+        }
     }
 
     /// Upper bound of the stiffness of the interpolated torque inside the grid, before any boundary layer, relative to
     /// `slopes`, one per joint [N m/rad]: no Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), is
-    /// greater. One or less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
+    /// greater; of a refined dataset none at its nodes, or at some thousands of them. One or less: nowhere steeper than
+    /// `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
     #[must_use]
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
-        match &self.interpolant {
-            Interpolant::Layered(layered) => layered.relative_stiffness(&self.lattice, slopes),
-            Interpolant::Potential(potential) => potential.relative_stiffness(&self.lattice, slopes),
+        match &self.source {
+            Source::Grid(OnGrid { interpolant: Interpolant::Layered(layered), .. }) => {
+                layered.relative_stiffness(&self.lattice, slopes)
+            }
+            Source::Grid(OnGrid { interpolant: Interpolant::Potential(potential), .. }) => {
+                potential.relative_stiffness(&self.lattice, slopes)
+            }
+            Source::Store(store) => refined::relative_stiffness(store, slopes),
         }
     }
 
     /// The field at `q`, one entry per joint. Never allocates; takes the same time wherever `q` is.
     #[must_use]
     pub fn sample(&self, q: &[f64]) -> Sample {
+        let on_grid = match &self.source {
+            Source::Grid(on_grid) => on_grid,
+            Source::Store(store) => return refined::sample(&self.lattice, store, q, u64::MAX).0,
+        };
+        let stencil = self.lattice.locate(q);
         match self.joints() {
-            1 => self.sample_joints::<1, 1>(q),
-            2 => self.sample_joints::<2, 4>(q),
-            3 => self.sample_joints::<3, 16>(q),
-            4 => self.sample_joints::<4, 64>(q),
-            5 => self.sample_joints::<5, 256>(q),
-            _ => self.sample_joints::<MAX_JOINTS, 1024>(q),
+            1 => on_grid.sample_joints::<1, 1>(&stencil),
+            2 => on_grid.sample_joints::<2, 4>(&stencil),
+            3 => on_grid.sample_joints::<3, 16>(&stencil),
+            4 => on_grid.sample_joints::<4, 64>(&stencil),
+            5 => on_grid.sample_joints::<5, 256>(&stencil),
+            _ => on_grid.sample_joints::<MAX_JOINTS, 1024>(&stencil),
         }
     }
 
-    /// `N = 4^(D-1)`.
-    fn sample_joints<const D: usize, const N: usize>(&self, q: &[f64]) -> Sample {
-        let stencil = self.lattice.locate(q);
+    /// The store of a refined dataset.
+    #[must_use]
+    pub fn store(&self) -> Option<&Store> {
+        match &self.source {
+            Source::Store(store) => Some(store),
+            Source::Grid(_) => None,
+        }
+    }
+
+    /// The field of a refined dataset at `q`, of the first `horizon` blocks of its store, and the levels, from the base
+    /// up, whose cell around `q` is whole. Other fields have no blocks and no levels. Never allocates.
+    #[must_use]
+    pub fn sample_within(&self, q: &[f64], horizon: u64) -> (Sample, u32) {
+        match &self.source {
+            Source::Store(store) => refined::sample(&self.lattice, store, q, horizon),
+            Source::Grid(_) => (self.sample(q), 0),
+        }
+    }
+}
+
+impl OnGrid {
+    /// The field in the cell of `stencil`. `N = 4^(D-1)`.
+    fn sample_joints<const D: usize, const N: usize>(&self, stencil: &Stencil) -> Sample {
         let mut corners = Corners::default();
         let mut heaviest = 0.0;
         for (point, weight) in stencil.corners().filter(|(_, weight)| *weight > 0.0) {
@@ -196,14 +258,14 @@ impl TorqueField {
         let (mut torque, energy, inside, share);
         match &self.interpolant {
             Interpolant::Layered(layered) => {
-                let at = layered.at::<D>(&stencil);
+                let at = layered.at::<D>(stencil);
                 (torque, energy, inside, share) = (at.torque, at.energy, at.depth > 0.0, at.held);
                 if at.held < 1.0 {
                     corners.flags |= Flags::LAYER;
                 }
             }
             Interpolant::Potential(potential) => {
-                let at = potential.at::<D, N>(&stencil);
+                let at = potential.at::<D, N>(stencil);
                 (torque, energy, inside, share) = (at.torque, at.energy, at.contact, at.share);
             }
         }

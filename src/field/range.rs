@@ -102,7 +102,8 @@ impl HaptizedRange {
             *open = joint.limits[0] < reached[0] || joint.limits[1] > reached[1];
             *reached = [reached[0].min(joint.limits[0]), reached[1].max(joint.limits[1])];
         }
-        if open.contains(&true) {
+        let is_known = dataset.status.iter().any(|&number| number != Status::Outside as u8);
+        if open.contains(&true) && (is_known || dataset.refinement.is_none()) {
             let (points, nearest) = points::survey(&lattice, dataset)?;
             range.beyond = Some(match &dataset.gap {
                 Some(gap) => {

@@ -27,6 +27,15 @@ struct Line {
     stride: usize,
 }
 
+impl Line {
+    /// One within the axis, falling to zero one step beyond.
+    fn fade(&self, coordinate: f64) -> f64 {
+        let beyond = (coordinate - coordinate.clamp(self.start, self.end)).abs() / self.step;
+        // False for what is not a number.
+        if beyond < 1.0 { 1.0 - beyond } else { 0.0 }
+    }
+}
+
 /// The corners around one configuration; the first `count` entries count.
 #[derive(Clone, Copy, Debug)]
 pub struct Stencil {
@@ -128,6 +137,12 @@ impl Lattice {
         [(position > 0).then(|| point - stride), (position + 1 < count).then(|| point + stride)]
     }
 
+    /// [`Stencil::fade`] at `q`, which has one entry per joint.
+    #[must_use]
+    pub fn fade(&self, q: &[f64]) -> f64 {
+        self.axes[..self.joints].iter().zip(q).fold(1.0, |fade, (line, &coordinate)| fade.min(line.fade(coordinate)))
+    }
+
     /// The cell around `q`, which has one entry per joint. A configuration that is not finite is outside, with `fade`
     /// zero.
     #[must_use]
@@ -142,9 +157,8 @@ impl Lattice {
         stencil.weights[0] = 1.0;
         for ((line, &coordinate), kept) in self.axes[..self.joints].iter().zip(q).zip(&mut stencil.fractions) {
             let held = if coordinate.is_finite() { coordinate.clamp(line.start, line.end) } else { line.start };
-            let beyond = (coordinate - held).abs() / line.step;
+            stencil.fade = stencil.fade.min(line.fade(coordinate));
             let inside = ((held - line.start) / line.step).min((line.count - 1) as f64);
-            stencil.fade = stencil.fade.min(if beyond < 1.0 { 1.0 - beyond } else { 0.0 });
             // The last point belongs to the last cell; an axis of one point is a cell without extent.
             let low = (inside as usize).min(line.count.saturating_sub(2));
             let fraction = inside - low as f64;

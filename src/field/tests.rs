@@ -280,7 +280,9 @@ fn a_linear_object_is_rendered_exactly_by_its_gap_and_by_its_potential() {
                 Interpolation::Linear => assert!(worst > 0.02, "{joints} joints: {worst}"),
                 // Gaps are stored in f32.
                 Interpolation::GapField => assert!(worst < 1e-6, "{joints} joints: {worst}"),
-                Interpolation::Potential => assert!(worst < 1e-12, "{joints} joints: {worst}"),
+                Interpolation::Potential | Interpolation::Direct => {
+                    assert!(worst < 1e-12, "{joints} joints: {worst}");
+                }
             }
         }
     }

@@ -1,11 +1,12 @@
-//! The error of a bake's own dataset: random configurations solved directly, beside what each interpolation gives there.
+//! The error of a bake's own dataset: random configurations solved directly, beside what each interpolation gives
+//! there.
 //!
-//! The configurations are spread evenly over the cells of the grid that have a corner in contact, the same ones every time. Each is solved
-//! as a grid point is, from rest, and from those corners of its cell that predict a lower energy (`lowest.rs`). Errors are Euclidean norms
-//! over the joints; a prismatic joint counts with [`LEVER_ARM`].
+//! The configurations are spread evenly over the cells of the grid that have a corner in contact, the same ones every
+//! time. Each is solved as a grid point is, from rest, and from those corners of its cell that predict a lower energy
+//! (`lowest.rs`). Errors are Euclidean norms over the joints; a prismatic joint counts with [`LEVER_ARM`].
 //!
-//! An interpolation is formed of the whole grid where that has at most [`WHOLE`] points, else of the grid lines around each
-//! configuration, so that memory does not grow with the grid. The boundary layer then knows the surroundings only.
+//! An interpolation is formed of the whole grid where that has at most [`WHOLE`] points, else of the grid lines around
+//! each configuration, so that memory does not grow with the grid. The boundary layer then knows the surroundings only.
 
 use super::{
     lowest::{self, Neighbourhood},
@@ -26,8 +27,8 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-/// Configurations that are solved unless a number is given: a tenth of the points in contact, and so a tenth of the time, within these
-/// limits. An rms over the fewest is good to a tenth, over the most to a thirtieth.
+/// Configurations that are solved unless a number is given: a tenth of the points in contact, and so a tenth of the
+/// time, within these limits. An rms over the fewest is good to a tenth, over the most to a thirtieth.
 const CONFIGURATIONS: Range<usize> = 100..1000;
 
 /// Seed of the random configurations; differs from the pilot's.
@@ -60,7 +61,8 @@ struct Place {
 }
 
 impl ErrorCheck<'_> {
-    /// Error of the dataset of `grid` in `table`, `contacts` of whose points are in contact. `None` where it is left out, or stopped.
+    /// Error of the dataset of `grid` in `table`, `contacts` of whose points are in contact. `None` where it is left
+    /// out, or stopped.
     pub fn measure(
         &self,
         grid: &Grid,
@@ -120,7 +122,8 @@ impl ErrorCheck<'_> {
     }
 }
 
-/// Evaluates an interpolation of the grid, with its threshold and slope, at each place; grids of at most `whole` points are formed as a whole.
+/// Evaluates an interpolation of the grid, with its threshold and slope, at each place; grids of at most `whole` points
+/// are formed as a whole.
 fn interpolated(
     grid: &Grid,
     table: &Table<'_>,
@@ -150,8 +153,8 @@ fn interpolated(
 
 /// Random configurations, evenly spread over the cells with a corner in contact, at most `count` of them.
 ///
-/// A corner in contact is drawn, then one of the cells around it, which is taken with a probability of one over its corners in
-/// contact: so each such cell is as likely as any other.
+/// A corner in contact is drawn, then one of the cells around it, which is taken with a probability of one over its
+/// corners in contact: so each such cell is as likely as any other.
 fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize) -> Vec<Place> {
     struct Draw {
         rank: usize,
@@ -245,6 +248,7 @@ fn window(grid: &Grid, table: &Table<'_>, lines: &[Range<usize>]) -> Dataset {
         contacts: None,
         touches: None,
         surface: None,
+        refinement: None,
         scene: String::new(),
         provenance: Provenance::default(),
     }

@@ -1,5 +1,6 @@
 //! Sweeps: a virtual object haptized over a grid in C-space.
 
+pub mod ahead;
 mod assembly;
 mod bake;
 mod choice;
@@ -18,6 +19,7 @@ mod inspection;
 mod lowest;
 mod measured;
 mod merge;
+mod node;
 mod part;
 mod pilot;
 mod plan;
@@ -50,7 +52,7 @@ pub use reach::{DepthShare, JointReach, Reach, ReachError};
 pub use reference::ReferenceError;
 pub use report::{Iterations, SweepReport};
 pub use shard::{EXTENSION as SHARD_EXTENSION, Shard, ranges};
-pub use sweep::{Progress, Run, Sweep};
+pub use sweep::{Progress, Run, Sweep, grid_of};
 
 use crate::{JointVector, contact::Equilibrium};
 
@@ -67,8 +69,8 @@ pub trait Backend {
     /// When the device fails; nothing of the batch is returned then.
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Self::Error>;
 
-    /// Returns what a user of the results should know of the time since the last call, each a sentence without its full stop. It
-    /// holds from the first configuration of the last batch on, and goes into the dataset's provenance.
+    /// Returns what a user of the results should know of the time since the last call, each a sentence without its full
+    /// stop. It holds from the first configuration of the last batch on, and goes into the dataset's provenance.
     fn notices(&mut self) -> Vec<String> {
         Vec::new()
     }

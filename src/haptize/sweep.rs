@@ -90,26 +90,32 @@ pub struct Sweep<'a> {
     pub(super) proxy_nodes: usize,
 }
 
+/// The grid of `scene`, with the names and units of its joints.
+#[must_use]
+pub fn grid_of(scene: &Scene) -> Grid {
+    let axes = scene.proxy.joints.iter().zip(&scene.grid.axes).map(|(joint, axis)| Axis {
+        name: joint.name.clone(),
+        unit: match joint.kind {
+            JointKind::Revolute => "rad".into(),
+            JointKind::Prismatic => "m".into(),
+        },
+        start: axis.start,
+        step: axis.step,
+        count: axis.count,
+    });
+    Grid { axes: axes.collect() }
+}
+
 impl<'a> Sweep<'a> {
     /// The sweep that `scene` asks for, over `object`, which was built from it.
     ///
-    /// Provenance is given `backend` (`cpu` or `gpu`), `adapter` and `date` (ISO 8601, UTC): they are not measured here,
-    /// so that the same sweep makes the same file.
+    /// Provenance is given `backend` (`cpu` or `gpu`), `adapter` and `date` (ISO 8601, UTC): they are not measured
+    /// here, so that the same sweep makes the same file.
     ///
     /// # Errors
     /// [`SweepError::Grid`].
     pub fn new(scene: &Scene, object: &Object, backend: &str, adapter: &str, date: &str) -> Result<Self, SweepError> {
-        let axes = scene.proxy.joints.iter().zip(&scene.grid.axes).map(|(joint, axis)| Axis {
-            name: joint.name.clone(),
-            unit: match joint.kind {
-                JointKind::Revolute => "rad".into(),
-                JointKind::Prismatic => "m".into(),
-            },
-            start: axis.start,
-            step: axis.step,
-            count: axis.count,
-        });
-        let grid = Grid { axes: axes.collect() };
+        let grid = grid_of(scene);
         check_given(scene)?;
         if grid.joints() != scene.proxy.joints.len() {
             return Err(SweepError::Grid(format!("{} axes for {} joints", grid.joints(), scene.proxy.joints.len())));
@@ -167,8 +173,8 @@ impl<'a> Sweep<'a> {
         self.provenance.mesh_ripple
     }
 
-    /// Skips the points that [`FreeSpace`] proves free: `model` is that of the scene. Nothing is changed but gaps farther than
-    /// [`FreeSpace::MARGIN`] grid steps from any contact, which become lower bounds.
+    /// Skips the points that [`FreeSpace`] proves free: `model` is that of the scene. Nothing is changed but gaps
+    /// farther than [`FreeSpace::MARGIN`] grid steps from any contact, which become lower bounds.
     ///
     /// # Errors
     /// [`SweepError::Grid`] when the model's proxy has other joints.
@@ -177,8 +183,8 @@ impl<'a> Sweep<'a> {
         Ok(())
     }
 
-    /// Replaces equilibria by lower ones that are reached from those of neighbouring points, where the scene's algorithm minimises the
-    /// energy: U then has no jumps. `model` is that of the scene.
+    /// Replaces equilibria by lower ones that are reached from those of neighbouring points, where the scene's
+    /// algorithm minimises the energy: U then has no jumps. `model` is that of the scene.
     ///
     /// # Errors
     /// [`SweepError::Grid`] when the model's proxy has other joints.
@@ -190,7 +196,8 @@ impl<'a> Sweep<'a> {
         Ok(())
     }
 
-    /// Measures the dataset's error at random configurations; see [`super::Bake::measured`]. `model` and `haptics` are those of the scene.
+    /// Measures the dataset's error at random configurations; see [`super::Bake::measured`]. `model` and `haptics` are
+    /// those of the scene.
     ///
     /// # Errors
     /// [`SweepError::Grid`] when the model's proxy has other joints.
@@ -228,7 +235,8 @@ impl<'a> Sweep<'a> {
         &self.grid
     }
 
-    /// Returns the memory and disk space of a sweep in memory, or else into a file, with chunks of `chunk` configurations.
+    /// Returns the memory and disk space of a sweep in memory, or else into a file, with chunks of `chunk`
+    /// configurations.
     #[must_use]
     pub fn footprint(&self, chunk: usize, in_memory: bool) -> Footprint {
         let points = self.points();
@@ -282,11 +290,12 @@ impl<'a> Sweep<'a> {
         Ok((self.dataset(columns, provenance), report))
     }
 
-    /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. While it is put
-    /// together its name ends in `.growing`. Memory does not grow with the grid.
+    /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. While it
+    /// is put together its name ends in `.growing`. Memory does not grow with the grid.
     ///
-    /// With `resume` it continues from such a part; the file is then the same, bit for bit, as without the interruption,
-    /// the date of the beginning included. Without a part it begins. Without `resume` a part that holds results is an error.
+    /// With `resume` it continues from such a part; the file is then the same, bit for bit, as without the
+    /// interruption, the date of the beginning included. Without a part it begins. Without `resume` a part that holds
+    /// results is an error.
     ///
     /// # Errors
     /// Any [`SweepError`]; the part then keeps what is done, and an earlier file `output` is untouched.
@@ -425,6 +434,7 @@ impl<'a> Sweep<'a> {
             contacts: self.with_forces.then(|| contacts(columns.contacts)),
             touches: self.shape.with_touches.then(|| contacts(columns.touches)),
             surface: Some(self.surface.clone()),
+            refinement: None,
             scene: self.scene.clone(),
             provenance,
         }

@@ -6,14 +6,14 @@
 //! so that `coupling_work + channel_work + field_work >= 0` from rest: it never gives more than was put in (sections 3,
 //! 3.1). Terms of effects that the scene does not name stay zero.
 //!
-//! *Passivity observers* (Hannaford and Ryu 2002) watch what the loop can still create, which lies outside this balance.
-//! At the object's port, [`Accounts::created`]: a torque field that is not exactly a gradient gives more than was stored. At
-//! the device's port, [`Accounts::device_port`]: the torque that is held between two ticks gives more than the hand put
-//! in ([`Accounts::hold_gain`]), which the device's own damping has to take.
+//! *Passivity observers* (Hannaford and Ryu 2002) watch what the loop can still create, which lies outside this
+//! balance. At the object's port, [`Accounts::created`]: a torque field that is not exactly a gradient gives more than
+//! was stored. At the device's port, [`Accounts::device_port`]: the torque that is held between two ticks gives more
+//! than the hand put in ([`Accounts::hold_gain`]), which the device's own damping has to take.
 //!
-//! The device's end of the coupling moves in two ways. When y jumps from y_{k-1} to y_k with the proxy at x_k, the spring
-//! takes in `Kvc ((y_{k-1} + y_k)/2 - x_k) . (y_k - y_{k-1})`; during the step it is the damper's end that moves, at w_k,
-//! and takes in `T Bvc (w_k - v_hat_k) . w_k`, of which `T Bvc |w_k - v_hat_k|^2` becomes heat.
+//! The device's end of the coupling moves in two ways. When y jumps from y_{k-1} to y_k with the proxy at x_k, the
+//! spring takes in `Kvc ((y_{k-1} + y_k)/2 - x_k) . (y_k - y_{k-1})`; during the step it is the damper's end that
+//! moves, at w_k, and takes in `T Bvc (w_k - v_hat_k) . w_k`, of which `T Bvc |w_k - v_hat_k|^2` becomes heat.
 
 use super::{coupling::Coupling, npmi::Step};
 use crate::JointVector;
@@ -119,7 +119,8 @@ impl Accounts {
         given - taken - self.kinetic - self.spring - self.bristles
     }
 
-    /// Returns the energy that the proxy and its coupling have taken in and not given back [J]: never less than `-initial`.
+    /// Returns the energy that the proxy and its coupling have taken in and not given back [J]: never less than
+    /// `-initial`.
     #[must_use]
     pub fn absorbed(&self) -> f64 {
         self.coupling_work + self.channel_work + self.field_work
@@ -132,20 +133,27 @@ impl Accounts {
         self.coupling_work - self.port_work
     }
 
-    /// The passivity observer of the device's port [J]: what there was at the beginning, and what came in through the port
-    /// or went into the device's own damping since. Negative: the hand has been given energy from nowhere. `None` while
-    /// it is not known what the object had stored at the beginning.
+    /// The passivity observer of the device's port [J]: what there was at the beginning, and what came in through the
+    /// port or went into the device's own damping since. Negative: the hand has been given energy from nowhere. `None`
+    /// while it is not known what the object had stored at the beginning.
     #[must_use]
     pub fn device_port(&self) -> Option<f64> {
         self.first_stored.map(|stored| self.initial + stored + self.port_work + self.device_dissipation)
     }
 
     /// The passivity observer of the object's port, turned round [J]: what the contact torque has given beyond what the
-    /// object had stored. Positive: energy from nowhere. With the dataset's energy U it is the leak; without, what is more
-    /// than the object can have had.
+    /// object had stored. Positive: energy from nowhere. With the dataset's energy U it is the leak; without, what is
+    /// more than the object can have had.
     #[must_use]
     pub fn created(&self) -> f64 {
         self.first_stored.map_or(0.0, |first| self.field_work + self.stored - first)
+    }
+
+    /// Returns what damping, friction, stops and controller have taken from the proxy [J].
+    #[must_use]
+    pub fn taken_from_field(&self) -> f64 {
+        self.proxy_dissipation + self.friction_dissipation + self.contact_dissipation + self.control_dissipation
+            - self.stop_work
     }
 
     /// Books the state at a tick: what the object has stored, if the dataset holds it, and whether it is touched.

@@ -1,11 +1,12 @@
 //! One tick of the haptic loop: device position in, device torque out (section 3.1). Pure: no clock, no thread, no
 //! allocation, no panic.
 //!
-//! At t_k: check the device's position; coupling torque for the device from y_k and x_k; contact torque tau_bar(x_k) from
-//! the dataset; one NPMI step of the proxy to x_{k+1}; energy accounts. The device's torque is limited in size, and in
-//! rate against the torque before it. On a fault (see [`Watchdog`]) its goal is zero, which it reaches at the greatest rate,
-//! without a jump; the fault stays, the proxy tied to the last good position, until [`Haptics::restart`]. So it is when the
-//! passivity observer of the device's port finds that the hand has been given energy from nowhere ([`Fault::Energy`]).
+//! At t_k: check the device's position; coupling torque for the device from y_k and x_k; contact torque tau_bar(x_k)
+//! from the dataset; one NPMI step of the proxy to x_{k+1}; energy accounts. The device's torque is limited in size,
+//! and in rate against the torque before it. On a fault (see [`Watchdog`]) its goal is zero, which it reaches at the
+//! greatest rate, without a jump; the fault stays, the proxy tied to the last good position, until
+//! [`Haptics::restart`]. So it is when the passivity observer of the device's port finds that the hand has been given
+//! energy from nowhere ([`Fault::Energy`]).
 //!
 //! What the scene may name beside (channels, controller, effects at contacts) is decided once, in [`Haptics::new`] and
 //! [`Haptics::with_effects`]; what it does not name has no state and does no work.
@@ -17,6 +18,7 @@ use super::{
     coupling::Coupling,
     effects::{ContactEffects, EffectState, Pending},
     flags::{Fault, Flags},
+    live::Live,
     npmi::{Motion, Npmi},
     torque_history::TorqueHistory,
     watchdog::{self, TickRate, Watchdog},
@@ -186,8 +188,8 @@ impl Haptics {
         self.period
     }
 
-    /// The state before the first tick: device and proxy at rest at `position`, the proxy within its limits and the haptized
-    /// range, no torque.
+    /// The state before the first tick: device and proxy at rest at `position`, the proxy within its limits and the
+    /// haptized range, no torque.
     ///
     /// # Errors
     /// When `position` is not a position of the device.
@@ -209,8 +211,8 @@ impl Haptics {
         Ok(state)
     }
 
-    /// Ends a fault: starts again at `position` as [`Haptics::start`] does, accounts included, but from the torque that the
-    /// device is under, so that there is no jump. Never allocates.
+    /// Ends a fault: starts again at `position` as [`Haptics::start`] does, accounts included, but from the torque that
+    /// the device is under, so that there is no jump. Never allocates.
     ///
     /// # Errors
     /// When `position` is not a position of the device; the fault then stays.
@@ -237,6 +239,11 @@ impl Haptics {
 
     /// One tick.
     pub fn tick(&self, state: &mut State, inputs: &Inputs) -> Output {
+        self.tick_with(state, inputs, None)
+    }
+
+    /// One tick over contact that is solved meanwhile, if it is `live`.
+    pub fn tick_with(&self, state: &mut State, inputs: &Inputs, mut live: Option<&mut Live>) -> Output {
         let checked = self
             .watchdog
             .check(inputs, &state.device)
@@ -253,7 +260,10 @@ impl Haptics {
             state.accounts.device_moved(&self.coupling, inputs.elapsed, moved, &proxy, torque);
             state.device = inputs.position;
         }
-        let sample = self.field.sample(&proxy);
+        let sample = match &mut live {
+            None => self.field.sample(&proxy),
+            Some(live) => live.sample(&self.field, &proxy, &state.accounts, self.period),
+        };
         let stored = self.field.has_energy().then_some(sample.energy);
         let spring = self.coupling.spring_energy(&proxy, &state.device);
         state.accounts.at_tick(state.motion.kinetic_energy(), spring, stored, sample.index > 0.0);
@@ -278,10 +288,14 @@ impl Haptics {
 
         let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
         let stopped = self.move_proxy(state, interval, &velocity, &sample);
+        if let Some(live) = live {
+            live.tell(&state.motion.position, &state.proxy_velocity);
+        }
         Output { torque, device: state.device, proxy, sample, flags: sample.flags | limited | stopped, fault, accounts }
     }
 
-    /// Returns the torque to command to the device, which moves at `velocity`: coupling, channels, controller [N m or N].
+    /// Returns the torque to command to the device, which moves at `velocity`: coupling, channels, controller [N m or
+    /// N].
     fn device_torque(
         &self,
         state: &mut State,
@@ -363,7 +377,8 @@ impl Haptics {
 }
 
 impl State {
-    /// Takes the torque that the device holds of what the last tick answered [N m or N]: accounts and channels rest on it.
+    /// Takes the torque that the device holds of what the last tick answered [N m or N]: accounts and channels rest on
+    /// it.
     pub fn hold(&mut self, torque: &JointVector) {
         self.held.correct(torque);
     }

@@ -1,13 +1,15 @@
 //! A session against the clock: a haptic thread with absolute deadlines, a graphics thread, and the caller as recorder.
 //!
-//! The haptic thread never waits for anybody: graphics takes the latest tick from a triple buffer, the recorder takes all
-//! ticks from a ring. When the ring is full, ticks go unrecorded, and are counted. A deadline that has passed before its
-//! tick could begin is left out, and counted; the proxy then steps by the longer time, which its integration allows.
+//! The haptic thread never waits for anybody: graphics takes the latest tick from a triple buffer, the recorder takes
+//! all ticks from a ring. When the ring is full, ticks go unrecorded, and are counted. A deadline that has passed
+//! before its tick could begin is left out, and counted; the proxy then steps by the longer time, which its integration
+//! allows.
 
 use super::{
     clock,
     graphics::Graphics,
     haptic::Haptics,
+    live::{Answers, Live},
     session::{Driver, Frames, Latest, Plan, SessionError},
     steal::{LateTick, StealObserver},
     timing::{Durations, Percentiles, Timing},
@@ -116,8 +118,14 @@ impl<'session> HapticLoop<'session> {
         Ok((this, Ends { ticks, latest: reader, late: late_ticks, clear: ClearFault(clear) }))
     }
 
-    /// Asks the system for a real-time priority for the calling thread, and sets the first deadline to now. Returns what was not
-    /// granted.
+    /// The same over contact that is solved meanwhile.
+    #[must_use]
+    pub fn with_live(self, live: Option<Live>) -> Self {
+        Self { driver: self.driver.with_live(live), ..self }
+    }
+
+    /// Asks the system for a real-time priority for the calling thread, and sets the first deadline to now. Returns
+    /// what was not granted.
     pub fn begin(&mut self) -> Vec<String> {
         let refused = clock::ask_for_real_time();
         self.began = clock::now();
@@ -129,8 +137,8 @@ impl<'session> HapticLoop<'session> {
         self.tick_after(true);
     }
 
-    /// As [`HapticLoop::tick`], some tens of microseconds later, and without keeping the processor busy meanwhile: for a
-    /// hand that is simulated.
+    /// As [`HapticLoop::tick`], some tens of microseconds later, and without keeping the processor busy meanwhile: for
+    /// a hand that is simulated.
     pub fn tick_relaxed(&mut self) {
         self.tick_after(false);
     }
@@ -141,8 +149,8 @@ impl<'session> HapticLoop<'session> {
         self.tick_at(now, deadline);
     }
 
-    /// Does a tick now: for a thread that somebody else paces. The deadline is a period after the last tick, or now, if that was less
-    /// long ago. Allocates, locks and prints nothing.
+    /// Does a tick now: for a thread that somebody else paces. The deadline is a period after the last tick, or now, if
+    /// that was less long ago. Allocates, locks and prints nothing.
     pub fn tick_now(&mut self) {
         let now = clock::now();
         let deadline = self.last.map_or(now, |last| (last + self.period).min(now));
@@ -185,7 +193,8 @@ impl<'session> HapticLoop<'session> {
     }
 }
 
-/// Runs a session against the clock, as long as `plan` says, until `stop` is raised or the device stops for good. Graphics, where there is any, runs in a thread of its own.
+/// Runs a session against the clock, as long as `plan` says, until `stop` is raised or the device stops for good.
+/// Graphics, where there is any, runs in a thread of its own.
 ///
 /// # Errors
 /// When the device reports no position, or the system gives no threads or memory.
@@ -196,8 +205,24 @@ pub fn run(
     plan: &Plan,
     stop: &AtomicBool,
 ) -> Result<(Trace, Timing), SessionError> {
+    run_live(haptics, device, graphics, plan, stop, None).map(|(trace, timing, _)| (trace, timing))
+}
+
+/// The same over contact that is solved meanwhile, if it is `live`; also what answered.
+///
+/// # Errors
+/// As for [`run`].
+pub fn run_live(
+    haptics: &Haptics,
+    device: &mut dyn Device,
+    graphics: Option<&mut Graphics<'_>>,
+    plan: &Plan,
+    stop: &AtomicBool,
+    live: Option<Live>,
+) -> Result<(Trace, Timing, Option<Answers>), SessionError> {
     let scheduler = device.scheduler();
-    let (mut body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device)?;
+    let (body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device)?;
+    let mut body = body.with_live(live);
     let start = *body.driver.start();
     let frame_cost = Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()))?;
     let mut recorded = plan.new_ticks()?;
@@ -230,7 +255,8 @@ pub fn run(
                     run.err().map(|halt| format!("the device's own thread stopped: {halt}")).into_iter().collect()
                 }
             };
-            (refused, body.lateness, body.cost, body.missed, body.unrecorded)
+            let answers = body.driver.live().map(|live| *live.answers());
+            (refused, body.lateness, body.cost, body.missed, body.unrecorded, answers)
         });
         let feeling = match feeling {
             Ok(thread) => thread,
@@ -258,7 +284,7 @@ pub fn run(
         let felt = feeling.join().map_err(|_| SessionError::Thread("haptic"))?;
         let drawn = drawing.map(|thread| thread.join().map_err(|_| SessionError::Thread("graphics"))).transpose()?;
         clock::unlock_memory();
-        let (refused, lateness, cost, missed_deadlines, unrecorded) = felt;
+        let (refused, lateness, cost, missed_deadlines, unrecorded, answers) = felt;
         let Drawn { frames, shown, cost: frame_cost, missed: missed_frames } = drawn.unwrap_or_default();
         let timing = Timing {
             refused,
@@ -271,7 +297,7 @@ pub fn run(
             steal: observer.finish(),
             unrecorded,
         };
-        Ok((Trace { joints: plan.joints.clone(), start, ticks: recorded, frames, shown }, timing))
+        Ok((Trace { joints: plan.joints.clone(), start, ticks: recorded, frames, shown }, timing, answers))
     })
 }
 
@@ -284,8 +310,8 @@ struct Drawn {
     missed: u64,
 }
 
-/// The graphics thread: a frame whenever one is due, from the first tick on, until the session is over. When it falls behind
-/// by more than a frame it draws the frames that it owes, without waiting: the object's time must not slow down.
+/// The graphics thread: a frame whenever one is due, from the first tick on, until the session is over. When it falls
+/// behind by more than a frame it draws the frames that it owes, without waiting: the object's time must not slow down.
 fn draw(
     mut frames: Frames<'_, '_>,
     mut latest: triple_buffer::Output<Latest>,

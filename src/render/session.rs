@@ -1,13 +1,14 @@
 //! A rendering session: device, haptic loop and graphics loop, recorded. Offline, as fast as it goes and deterministic;
 //! `realtime.rs` runs the same ticks and frames against the clock.
 //!
-//! Two loops at two rates (section 3.2): a tick every T, and a frame of the object every T_g. Frame j is drawn at the first
-//! tick at or after `j T_g`, from the proxy's configuration then.
+//! Two loops at two rates (section 3.2): a tick every T, and a frame of the object every T_g. Frame j is drawn at the
+//! first tick at or after `j T_g`, from the proxy's configuration then.
 
 use super::{
     flags::Fault,
     graphics::{Graphics, GraphicsError},
     haptic::{Haptics, Inputs, State},
+    live::Live,
     trace::{Frame, JointLabel, Tick, Trace},
 };
 use crate::{JointVector, device::Device, memory};
@@ -63,6 +64,7 @@ pub struct Driver<'session> {
     ticks: usize,
     restart: bool,
     start: JointVector,
+    live: Option<Live>,
 }
 
 impl Plan {
@@ -94,7 +96,20 @@ impl<'session> Driver<'session> {
     pub fn new(haptics: &'session Haptics, device: &'session mut dyn Device) -> Result<Self, Fault> {
         let position = device.read(0.0).position;
         let state = haptics.start(&position)?;
-        Ok(Self { haptics, device, state, time: 0.0, ticks: 0, restart: false, start: position })
+        Ok(Self { haptics, device, state, time: 0.0, ticks: 0, restart: false, start: position, live: None })
+    }
+
+    /// The same over contact that is solved meanwhile.
+    #[must_use]
+    pub fn with_live(mut self, live: Option<Live>) -> Self {
+        self.live = live;
+        self
+    }
+
+    /// The contact that is solved meanwhile.
+    #[must_use]
+    pub fn live(&self) -> Option<&Live> {
+        self.live.as_ref()
     }
 
     /// Asks for a fault to be cleared at the next tick: the loop then starts again where the device is. Nothing happens
@@ -109,8 +124,8 @@ impl<'session> Driver<'session> {
         &self.start
     }
 
-    /// One tick, `elapsed` after the one before and `interval` before the next [s]: read, compute, apply. Answers with the
-    /// record and what graphics needs of it. Never allocates.
+    /// One tick, `elapsed` after the one before and `interval` before the next [s]: read, compute, apply. Answers with
+    /// the record and what graphics needs of it. Never allocates.
     pub fn tick(&mut self, elapsed: f64, interval: f64) -> (Tick, Latest) {
         // The first tick follows the reading in `new` at once.
         let since = if self.ticks == 0 { 0.0 } else { elapsed };
@@ -122,7 +137,7 @@ impl<'session> Driver<'session> {
             && self.state.fault().is_some()
             && self.haptics.restart(&mut self.state, &reading.position).is_ok();
         let inputs = Inputs { position: reading.position, age: reading.age, elapsed, interval };
-        let output = self.haptics.tick(&mut self.state, &inputs);
+        let output = self.haptics.tick_with(&mut self.state, &inputs, self.live.as_mut());
         let applied = self.device.apply(&output.torque);
         self.state.hold(&applied.torque);
         let share = if output.sample.contact { output.sample.share } else { 0.0 };

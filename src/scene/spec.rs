@@ -453,10 +453,13 @@ pub enum Interpolation {
     GapField,
     /// Minus the gradient of a smoothly interpolated energy: makes no energy around any loop.
     Potential,
+    /// The equilibrium itself, solved beside the loop, and its tangent until the next one; where that is late, and in a
+    /// dataset, `potential`.
+    Direct,
 }
 
 impl Interpolation {
-    /// All of them, from the roughest on.
+    /// All between the points of a grid, from the roughest on.
     pub const ALL: [Self; 3] = [Self::Linear, Self::GapField, Self::Potential];
 
     /// As the scene names it.
@@ -466,6 +469,7 @@ impl Interpolation {
             Self::Linear => "linear",
             Self::GapField => "gap-field",
             Self::Potential => "potential",
+            Self::Direct => "direct",
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Settings that can be turned while one feels: gains, interpolation, effects with their prices, what is shown, and how the scene is
-//! baked.
+//! Settings that can be turned while one feels: gains, interpolation, effects with their prices, what is shown, and how
+//! the scene is baked.
 
 use super::{
     gains,
@@ -36,13 +36,14 @@ pub struct Controls {
     prices: Prices,
 }
 
-/// Greatest stiffness of contact that can be typed [N/m], and the change for each point of the pointer's way [N/m/point].
+/// Greatest stiffness of contact that can be typed [N/m], and the change for each point of the pointer's way
+/// [N/m/point].
 const CONTACT_STIFFNESS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 const CONTACT_STIFFNESS_DRAG: f64 = 5.0;
 
 impl Controls {
-    /// As `loaded` has them. Everything is priced in the background, frames on the device of `context`; `wake` is called
-    /// whenever there is news.
+    /// As `loaded` has them. Everything is priced in the background, frames on the device of `context`; `wake` is
+    /// called whenever there is news.
     #[must_use]
     pub fn new(loaded: &Loaded, context: &Arc<Context>, wake: impl Fn() + Send + 'static) -> Self {
         let original = loaded.tuning();
@@ -66,8 +67,8 @@ impl Controls {
         self.prices.wait();
     }
 
-    /// Shows the panel, and returns whether the scene is to be baked again. `advice`: what is wrong with the gains, if anything;
-    /// `solvers`: what this machine bakes with.
+    /// Shows the panel, and returns whether the scene is to be baked again. `advice`: what is wrong with the gains, if
+    /// anything; `solvers`: what this machine bakes with.
     pub fn show(
         &mut self,
         ui: &mut Ui,
@@ -265,7 +266,7 @@ fn lacking(interpolation: Interpolation, dataset: &Dataset) -> Option<&'static s
     match interpolation {
         Interpolation::Linear => None,
         Interpolation::GapField => dataset.gap.is_none().then_some("gap"),
-        Interpolation::Potential => dataset.energy.is_none().then_some("energy"),
+        Interpolation::Potential | Interpolation::Direct => dataset.energy.is_none().then_some("energy"),
     }
 }
 

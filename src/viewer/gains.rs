@@ -45,7 +45,7 @@ const GAINS: [Gain; 4] = [
         of: |gains| &mut gains.boundary_slope,
         bound: |gains, joint| Some(passivity::greatest_slope(gains, joint)),
         positive: true,
-        counts: |interpolation| interpolation != Interpolation::Potential,
+        counts: |interpolation| !matches!(interpolation, Interpolation::Potential | Interpolation::Direct),
     },
     Gain {
         name: "Coupling damping Bvc",
@@ -67,7 +67,8 @@ const GAINS: [Gain; 4] = [
     },
 ];
 
-/// Greatest contact threshold that can be chosen [1]: an index reaches one only where all corners of a cell are in contact.
+/// Greatest contact threshold that can be chosen [1]: an index reaches one only where all corners of a cell are in
+/// contact.
 const GREATEST_THRESHOLD: f64 = 0.95;
 
 /// The slider's end over the larger of the bound and the scene's gain [1]: both lie well within it.
@@ -119,8 +120,8 @@ pub fn sliders(ui: &mut Ui, axes: &[Axis], chosen: Option<usize>, gains: &mut Ha
     }
 }
 
-/// Everything to the right of the mark may create energy. Joints whose gains in the scene differ, in unit or in size, share a
-/// slider of what all are multiplied by; those that have none there keep none.
+/// Everything to the right of the mark may create energy. Joints whose gains in the scene differ, in unit or in size,
+/// share a slider of what all are multiplied by; those that have none there keep none.
 fn slider(ui: &mut Ui, gain: &Gain, axes: &[Axis], joints: &[usize], gains: &mut HapticsSpec, original: &HapticsSpec) {
     let unit = |joint: usize| {
         let axis = &axes[joint];

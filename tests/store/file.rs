@@ -3,20 +3,26 @@
 use crate::fixture::{noise, space, step, store};
 use haptize::{
     MAX_JOINTS,
-    dataset::{Axis, Error, Grid, Provenance},
-    store::{Order, StoreFile},
+    contact::Status,
+    dataset::{Axis, Dataset, Error, Grid, Provenance},
+    store::{Order, Store},
 };
-use std::{fs, path::Path};
+use std::{fs, path::Path, sync::Arc};
 
-fn file(joints: usize) -> StoreFile {
+fn file(joints: usize) -> Dataset {
     let count = space(joints, 1).last(0)[0] as usize + 1;
     let axis = |a: usize| Axis { name: format!("joint {a}"), unit: "rad".into(), start: -0.2, step: step(a), count };
-    StoreFile {
-        store: store(joints, 2, Order::Potential, 0.6, 4, noise(joints, 2)),
-        grid: Grid { axes: (0..joints).map(axis).collect() },
-        scene: "name = \"made\"".into(),
-        provenance: Provenance { version: "1".into(), ..Provenance::default() },
-    }
+    Dataset::refined(
+        Arc::new(store(joints, 2, Order::Potential, 0.6, 4, noise(joints, 2))),
+        Grid { axes: (0..joints).map(axis).collect() },
+        None,
+        "name = \"made\"".into(),
+        Provenance { version: "1".into(), ..Provenance::default() },
+    )
+}
+
+fn refinement(dataset: &Dataset) -> &Store {
+    dataset.refinement.as_ref().unwrap()
 }
 
 #[test]
@@ -26,16 +32,16 @@ fn a_store_comes_back_to_the_bit() {
         let path = folder.path().join(format!("{joints}.store"));
         let written = file(joints);
         written.save(path.as_path()).unwrap();
-        let read = StoreFile::open(&path, 0).unwrap();
+        let read = Dataset::load(&path).unwrap();
         assert_eq!((&read.grid, &read.scene, &read.provenance), (&written.grid, &written.scene, &written.provenance));
-        assert_eq!(read.store.order(), written.store.order());
-        let blocks = |file: &StoreFile| -> Vec<_> {
-            file.store.blocks().into_iter().map(|(key, block)| (key, block.nodes().clone())).collect()
+        assert_eq!(refinement(&read).order(), refinement(&written).order());
+        let blocks = |file: &Dataset| -> Vec<_> {
+            refinement(file).blocks().into_iter().map(|(key, block)| (key, block.nodes().clone())).collect()
         };
         assert_eq!(blocks(&read), blocks(&written));
         for k in 0..50 {
             let q: Vec<f64> = (0..joints).map(|a| 0.1 + 0.2 * (f64::from(k) + a as f64).sin()).collect();
-            assert_eq!(read.store.sample(&q), written.store.sample(&q));
+            assert_eq!(refinement(&read).sample(&q), refinement(&written).sample(&q));
         }
         // And to the bit on disk.
         let again = folder.path().join("again.store");
@@ -53,7 +59,7 @@ fn a_file_that_is_cut_short_altered_or_of_another_kind_is_refused() {
     let bad = folder.path().join("bad.store");
     let refused = |bytes: &[u8]| {
         fs::write(&bad, bytes).unwrap();
-        StoreFile::open(&bad, 0).map(|_| ()).unwrap_err()
+        Dataset::open(&bad).map(|_| ()).unwrap_err()
     };
     for length in [0, 7, 100, whole.len() / 2, whole.len() - 1] {
         refused(&whole[..length]);
@@ -63,6 +69,23 @@ fn a_file_that_is_cut_short_altered_or_of_another_kind_is_refused() {
         altered[at] ^= 4;
         refused(&altered);
     }
-    assert!(matches!(haptize::dataset::Dataset::open(&path).map(|_| ()), Err(Error::Version { .. })));
-    assert!(matches!(StoreFile::open(Path::new("/nowhere"), 0).map(|_| ()), Err(Error::Read { .. })));
+    assert!(matches!(Dataset::open(Path::new("/nowhere")).map(|_| ()), Err(Error::Read { .. })));
+}
+
+#[test]
+fn the_points_of_the_grid_have_what_the_nodes_of_the_base_say() {
+    let dataset = file(2);
+    let mut there = 0;
+    for point in 0..dataset.grid.points() {
+        let root = refinement(&dataset).sample(&dataset.grid.configuration(point));
+        if dataset.status(point) == Status::Outside {
+            continue;
+        }
+        there += 1;
+        assert!((dataset.energy.as_ref().unwrap()[point] - root.energy()).abs() < 1e-5);
+        for (stored, felt) in dataset.torque(point).iter().zip(root.torque().iter()) {
+            assert!((stored - felt).abs() < 1e-4, "{stored} {felt}");
+        }
+    }
+    assert_eq!(there, dataset.grid.points());
 }

@@ -39,7 +39,7 @@ pub fn blocks(space: &Space, level: u32) -> Vec<Place> {
     let joints = space.joints();
     let mut places = vec![[0; MAX_JOINTS]];
     for a in 0..joints {
-        let along = 0..=space.last(level)[a] / 2;
+        let along = 0..=space.block_of(&space.last(level))[a];
         places = places
             .iter()
             .flat_map(|place| along.clone().map(|k| (*place, k)))
@@ -52,7 +52,8 @@ pub fn blocks(space: &Space, level: u32) -> Vec<Place> {
     places
 }
 
-/// The nodes of a block, each there with probability `share`, with the numbers that `record` gives for its configuration.
+/// The nodes of a block, each there with probability `share`, with the numbers that `record` gives for its
+/// configuration.
 pub fn nodes(
     space: &Space,
     level: u32,
@@ -71,7 +72,8 @@ pub fn nodes(
     nodes
 }
 
-/// A store in which blocks are there with probability `share`, as far as their foundations allow, and nodes in them, too.
+/// A store in which blocks are there with probability `share`, as far as their foundations allow, and nodes in them,
+/// too.
 pub fn store(
     joints: usize,
     levels: u32,
@@ -86,8 +88,7 @@ pub fn store(
     let store = Store::new(space.clone(), order, most);
     for level in 0..levels {
         for block in blocks(&space, level) {
-            let rests =
-                level == 0 || store.foundation(level, &block).all(|below| store.get(level - 1, &below).is_some());
+            let rests = store.foundation(level, &block).all(|(below, place)| store.get(below, &place).is_some());
             if rests && (level == 0 || random.is(share)) {
                 let is_there = |_: &Place| level == 0 || random.is(0.8);
                 let nodes = nodes(&space, level, &block, is_there, &mut record);

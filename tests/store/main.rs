@@ -1,4 +1,5 @@
-//! The sparse store of C-space: continuity across blocks and levels, exactness, order of publication, readers beside writers.
+//! The sparse store of C-space: continuity across blocks and levels, exactness, order of publication, readers beside
+//! writers.
 
 #![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 #![allow(clippy::duplicate_mod)] // The directory is included twice: with the orders that it has, and with weaker ones.
@@ -8,5 +9,6 @@ mod file;
 mod fixture;
 mod interleavings;
 mod interpolation;
+mod live;
 mod publication;
 mod refine;

@@ -101,6 +101,6 @@ fn keys_come_back_and_what_cannot_be_numbered_is_refused() {
     let axis = |count| Axis { name: "a".into(), unit: "rad".into(), start: 0.0, step: 0.1, count };
     let grid = |count| Grid { axes: vec![axis(count); 6] };
     assert!(matches!(Space::new(&grid(1), 2), Err(SpaceError::Flat { .. })));
-    assert!(matches!(Space::new(&grid(1000), 3), Err(SpaceError::Levels { most: 2, .. })));
-    assert!(Space::new(&grid(1000), 2).is_ok());
+    assert!(matches!(Space::new(&grid(500), 3), Err(SpaceError::Levels { most: 2, .. })));
+    assert!(Space::new(&grid(500), 2).is_ok());
 }

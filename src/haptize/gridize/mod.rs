@@ -4,7 +4,8 @@
 //! what the paper's TriScatteredInterp and SciPy's LinearNDInterpolator compute: exact for torques linear in q,
 //! continuous, bounded by the measured values, and *absent* outside the convex hull of the samples
 //! ([`Status::Outside`]). One joint: a sorted line. Two: `spade`. Three: tetrahedra of our own on exact predicates.
-//! Four to six: the simplices of the grid points alone (see `hyperspace`). Natural neighbours in two joints, where asked.
+//! Four to six: the simplices of the grid points alone (see `hyperspace`). Natural neighbours in two joints, where
+//! asked.
 //!
 //! The contact index of a grid point is the paper's (section 3.1): contact where the torque exceeds epsilon.
 
@@ -239,6 +240,7 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
         contacts: None,
         touches: None,
         surface: None,
+        refinement: None,
         scene: String::new(),
         provenance: Provenance {
             version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -1,24 +1,23 @@
 //! A store filled level by level, where the interpolation errs.
 //!
-//! *Estimate.* At a node of level l the torque that the levels below give errs by e = |tau_interpolated - tau_solved|: the two
-//! interpolations that meet there differ by the node's surplus. A cell of level l - 1 that is refined takes all nodes of level l in
-//! it; each of its halves, 2^d cells of level l, is expected to err by the rms of e over the nodes of level l at its
-//! corners, times the ratio by which e fell from the last level to this one. The cells of the base are probed at their middles, which are
-//! nodes of the first level, and expected to err by a share of the torque at their corners at least: contact that no node of the base
-//! and no middle meets is not seen.
+//! *Estimate.* At a node of level l the torque that the levels below give errs by e = |tau_interpolated - tau_solved|:
+//! the two interpolations that meet there differ by the node's surplus. A cell of level l - 1 that is refined takes all
+//! nodes of level l in it; each of its halves, 2^d cells of level l, is expected to err by the rms of e over the nodes
+//! of level l at its corners, times the ratio by which e fell from the last level to this one. The cells of the base
+//! are probed at their middles, which are nodes of the first level, and expected to err by a share of the torque at
+//! their corners at least: contact that no node of the base and no middle meets is not seen.
 //!
-//! *Marking.* Cells with the greatest expected error are refined until those that are not add up to at most half of what is left of the
-//! squared error: with that, each level leaves less to the next. (Doerfler 1996, A convergent adaptive algorithm for Poisson's
-//! equation, with the complement of the bulk.)
+//! *Marking.* Cells with the greatest expected error are refined until those that are not add up to at most half of
+//! what is left of the squared error: with that, each level leaves less to the next. (Doerfler 1996, A convergent
+//! adaptive algorithm for Poisson's equation, with the complement of the bulk.)
 //!
-//! *Verification.* The error is measured at random configurations that no estimate has seen. While it is above the aim the store is filled
-//! again, for a smaller error, from the nodes that are solved and some more.
+//! *Verification.* The error is measured at random configurations that no estimate has seen. While it is above the aim
+//! the store is filled again, for a smaller error, from the nodes that are solved and some more.
 
-mod node;
-
-use node::Solved;
-
-use super::reference::{Reference, ReferenceError};
+use super::{
+    node::{self, Scale, Solved},
+    reference::{Reference, ReferenceError},
+};
 use crate::{
     JointVector, MAX_JOINTS,
     contact::{Model, Solvers, Status},
@@ -35,17 +34,20 @@ const TIGHTER: f64 = 0.75;
 /// Most rounds: the internal aim is then a twentieth of the first.
 const ROUNDS: usize = 12;
 
-/// Squared error of a cell over that at its middle [1]: of the product of parabolas in three dimensions (8/15)^3 = 0.15, of a kink anywhere
-/// more. Measured on datasets/sphere.toml, potential: an aim of 5 % gives an estimate of 3.7 % and an error of 4.4 %, one of 1.2 %
-/// 1.1 % and 1.1 %. Smaller: the error is thought to be smaller than it is, and more rounds are needed.
+/// Squared error of a cell over that at its middle [1]: of the product of parabolas in three dimensions (8/15)^3 =
+/// 0.15, of a kink anywhere more. Measured on datasets/sphere.toml, potential: an aim of 5 % gives an estimate of 3.7 %
+/// and an error of 4.4 %, one of 1.2 % 1.1 % and 1.1 %. Smaller: the error is thought to be smaller than it is, and
+/// more rounds are needed.
 const SPREAD: f64 = 1.0;
 
-/// Ratio of the errors of two levels that is expected at least, and of the first two [1]. Larger: the next level is refined more widely.
-/// Smooth fields gain a factor of four to eight, kinks one of two; the sphere scene's first two levels one of three.
+/// Ratio of the errors of two levels that is expected at least, and of the first two [1]. Larger: the next level is
+/// refined more widely. Smooth fields gain a factor of four to eight, kinks one of two; the sphere scene's first two
+/// levels one of three.
 const LEAST_FALL: f64 = 0.35;
 
-/// Error that is expected of a cell of the base whatever its middle says, over the rms torque at its corners [1]: the middle may be
-/// free, or met by chance. Larger: the first level is refined nearly everywhere in contact. Smaller: contact near few corners is missed.
+/// Error that is expected of a cell of the base whatever its middle says, over the rms torque at its corners [1]: the
+/// middle may be free, or met by chance. Larger: the first level is refined nearly everywhere in contact. Smaller:
+/// contact near few corners is missed.
 const UNSEEN: f64 = 0.3;
 
 /// What a store is to be.
@@ -102,12 +104,19 @@ pub enum RefineError {
 pub struct Judge(Reference);
 
 impl Judge {
-    /// Draws configurations in the grid of `scene` until `contacts` of them are in contact, the same ones every time for the same `seed`.
+    /// Draws configurations in the grid of `scene` until `contacts` of them are in contact, the same ones every time
+    /// for the same `seed`.
     ///
     /// # Errors
     /// When nothing touches.
     pub fn new(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, ReferenceError> {
         Reference::in_contact(scene, model, seed, contacts).map(Self)
+    }
+
+    /// Rms of the torque [N m].
+    #[must_use]
+    pub fn torque(&self) -> f64 {
+        self.0.torque
     }
 
     /// Rms error of the torque that `answer` gives, over the rms of the torque [1].
@@ -124,9 +133,8 @@ struct Cell {
 
 /// Solves nodes, each once.
 struct Nodebook<'a> {
-    model: &'a Model<'a>,
     space: Space,
-    steps: Vec<f64>,
+    scale: Scale,
     levers: JointVector,
     pool: rayon::ThreadPool,
     solvers: Solvers<'a>,
@@ -139,10 +147,10 @@ impl Nodebook<'_> {
         let wanted: BTreeSet<Place> =
             nodes.into_iter().filter(|node| !self.solved.contains_key(&(level, *node))).collect();
         let wanted: Vec<Place> = wanted.into_iter().collect();
-        let (space, steps, kc) = (&self.space, &self.steps, self.model.kc);
+        let (space, scale) = (&self.space, &self.scale);
         let solvers = &self.solvers;
         let solve =
-            || solvers.map(&wanted, |solver, place| node::solve(solver, &space.configuration(level, place), steps, kc));
+            || solvers.map(&wanted, |solver, place| node::solve(solver, &space.configuration(level, place), scale));
         let solved = self.pool.install(solve);
         self.solved.extend(wanted.iter().map(|place| (level, *place)).zip(solved));
     }
@@ -158,7 +166,8 @@ impl Nodebook<'_> {
         (squares.sum::<f64>() / corners as f64).sqrt()
     }
 
-    /// Distance of the torque that `store` gives at a solved node from the solved one; zero where that did not converge [N m].
+    /// Distance of the torque that `store` gives at a solved node from the solved one; zero where that did not converge
+    /// [N m].
     fn error(&self, store: &Store, level: u32, node: &Place) -> f64 {
         let Some(solved) = self.solved.get(&(level, *node)) else { return 0.0 };
         if !matches!(solved.status, Status::Free | Status::Contact) {
@@ -184,8 +193,7 @@ impl Refine<'_> {
             *lever = if joint.kind == JointKind::Prismatic { LEVER_ARM } else { 1.0 };
         });
         let mut book = Nodebook {
-            model: self.model,
-            steps: (0..space.joints()).map(|a| space.step(0, a)).collect(),
+            scale: Scale::new(self.model, &space),
             space,
             levers,
             solvers: Solvers::new(self.model, pool.current_num_threads()),
@@ -310,7 +318,8 @@ fn inside(space: &Space, low: &Place) -> impl Iterator<Item = Place> {
     })
 }
 
-/// The 2^d cells of the next level in a cell, each with the error that the nodes at its corners had before, times `fall`.
+/// The 2^d cells of the next level in a cell, each with the error that the nodes at its corners had before, times
+/// `fall`.
 fn halves(space: &Space, low: &Place, errors: &HashMap<Place, f64>, fall: f64) -> Vec<Cell> {
     let joints = space.joints();
     let first: Place = low.map(|i| 2 * i);
@@ -344,14 +353,14 @@ fn publish(store: &mut Store, book: &Nodebook<'_>, level: u32, nodes: &BTreeSet<
     let space = store.space().clone();
     let mut blocks: BTreeMap<(u32, Place), Nodes> = BTreeMap::new();
     for node in nodes {
-        blocks.entry((level, node.map(|i| i >> 1))).or_default();
+        blocks.entry((level, space.block_of(node))).or_default();
     }
     // From the finest down: what a block rests on, and what that rests on.
     for at in (1..=level).rev() {
         let above: Vec<Place> = blocks.keys().filter(|(l, _)| *l == at).map(|(_, block)| *block).collect();
-        for below in above.iter().flat_map(|block| store.foundation(at, block)) {
-            if store.get(at - 1, &below).is_none() {
-                blocks.entry((at - 1, below)).or_default();
+        for (below, place) in above.iter().flat_map(|block| store.foundation(at, block)) {
+            if store.get(below, &place).is_none() {
+                blocks.entry((below, place)).or_default();
             }
         }
     }

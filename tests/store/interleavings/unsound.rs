@@ -7,5 +7,5 @@ mod sync {
     pub(super) const OBSERVE: Ordering = Ordering::Relaxed;
 }
 
-#[path = "../../../src/store/directory.rs"]
+#[path = "../../../src/dataset/store/directory.rs"]
 pub mod directory;

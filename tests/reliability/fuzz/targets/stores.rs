@@ -4,9 +4,10 @@ use super::{Target, container, write};
 use haptize::{
     MAX_JOINTS,
     contact::Status,
-    dataset::{Axis, Grid, Provenance},
-    store::{Nodes, Order, Space, Store, StoreFile, record::width},
+    dataset::{Axis, Dataset, Grid, Provenance},
+    store::{Nodes, Order, Space, Store, record::width},
 };
+use std::sync::Arc;
 
 pub const STORES: Target = Target {
     name: "stores",
@@ -15,21 +16,22 @@ pub const STORES: Target = Target {
     mutate: container,
     run: |file, input| {
         write(file, input);
-        let read = match StoreFile::open(file, 0) {
+        let read = match Dataset::open(file) {
             Ok(read) => read,
             Err(error) => return error.to_string(),
         };
+        let Some(store) = &read.refinement else { return "a dataset".into() };
         let joints = read.grid.axes.len();
         for q in [-1e9, -0.2, -0.13, 0.05, 1e9] {
-            let root = read.store.sample(&[q; MAX_JOINTS][..joints]);
+            let root = store.sample(&[q; MAX_JOINTS][..joints]);
             let torque = root.torque();
             assert_eq!(torque.len(), joints);
         }
         // What was taken in is a store: it is written, and read again, as it is.
         read.save(file).unwrap();
-        let again = StoreFile::open(file, 0).unwrap();
-        let keys = |file: &StoreFile| file.store.blocks().into_iter().map(|(key, _)| key).collect::<Vec<_>>();
-        assert_eq!(keys(&again), keys(&read));
+        let again = Dataset::open(file).unwrap();
+        let keys = |store: &Store| store.blocks().into_iter().map(|(key, _)| key).collect::<Vec<_>>();
+        assert_eq!(keys(again.refinement.as_ref().unwrap()), keys(store));
         "fine".into()
     },
     kinds: 40,
@@ -60,6 +62,7 @@ fn made(joints: usize, order: Order) -> Vec<u8> {
     }
     let file = tempfile::NamedTempFile::new().unwrap();
     let provenance = Provenance { version: "1".into(), ..Provenance::default() };
-    StoreFile { store, grid, scene: "name = \"made\"".into(), provenance }.save(file.path()).unwrap();
+    let dataset = Dataset::refined(Arc::new(store), grid, None, "name = \"made\"".into(), provenance);
+    dataset.save(file.path()).unwrap();
     std::fs::read(file.path()).unwrap()
 }

@@ -1,10 +1,12 @@
 //! A table from keys to values that many threads read while many write: append-only, without locks.
 //!
-//! Open addressing with linear probing over a fixed number of slots, at most half of them full (Knuth, The Art of Computer Programming
-//! 3, section 6.4). A slot is one pointer, null or to an entry that never changes: one compare-and-swap publishes a whole entry, one load
-//! finds a whole entry or none. Entries are freed with the table, never before, so that a reference lives as long as its borrow of it.
+//! Open addressing with linear probing over a fixed number of slots, at most half of them full (Knuth, The Art of
+//! Computer Programming 3, section 6.4). A slot is one pointer, null or to an entry that never changes: one
+//! compare-and-swap publishes a whole entry, one load finds a whole entry or none. Entries are freed with the table,
+//! never before, so that a reference lives as long as its borrow of it.
 //!
-//! [`Directory::get`] does not allocate, lock or wait: it loads a pointer for each probe, 1.5 on average where the table is half full.
+//! [`Directory::get`] does not allocate, lock or wait: it loads a pointer for each probe, 1.5 on average where the
+//! table is half full.
 
 use super::sync::{AtomicPtr, OBSERVE, Ordering, PUBLISH};
 use std::{marker::PhantomData, ptr};

@@ -1,13 +1,14 @@
 //! The interpolants of one cell, from the numbers at its 2^d corners.
 //!
-//! A corner's number says by bit a on which side of the cell it lies along axis a. Numbers are kept kind by kind, corners side by side:
-//! to contract the last axis is to combine the second half of the corners with the first, which the compiler does several at a time.
-//! Lengths are in steps of the cell. Nothing allocates, nothing branches on data.
+//! A corner's number says by bit a on which side of the cell it lies along axis a. Numbers are kept kind by kind,
+//! corners side by side: to contract the last axis is to combine the second half of the corners with the first, which
+//! the compiler does several at a time. Lengths are in steps of the cell. Nothing allocates, nothing branches on data.
 //!
-//! *Hermite.* In one dimension `f(x) = f_0 (1 - 3x^2 + 2x^3) + g_0 (x - 2x^2 + x^3) + f_1 (3x^2 - 2x^3) + g_1 (x^3 - x^2)`; in d dimensions
-//! the product, axis by axis, of which a corner has the value, the d slopes and the mixed second derivatives: all derivatives of higher
-//! order are zero there. Contracting axis a turns the numbers of the first a + 1 axes (see [`super::record`]) into those of the first
-//! a at half as many corners. Six joints take some 5,000 multiplications, three 250.
+//! *Hermite.* In one dimension `f(x) = f_0 (1 - 3x^2 + 2x^3) + g_0 (x - 2x^2 + x^3) + f_1 (3x^2 - 2x^3) + g_1 (x^3 -
+//! x^2)`; in d dimensions the product, axis by axis, of which a corner has the value, the d slopes and the mixed second
+//! derivatives: all derivatives of higher order are zero there. Contracting axis a turns the numbers of the first a + 1
+//! axes (see [`super::record`]) into those of the first a at half as many corners. Six joints take some 5,000
+//! multiplications, three 250.
 
 use super::record::{MAX_WIDTH, mixed, sets, slope, width};
 use crate::MAX_JOINTS;
@@ -119,8 +120,8 @@ pub(super) fn multilinear<const D: usize, const C: usize>(numbers: &mut [[f64; C
     }
 }
 
-/// Weight that each number of a corner on `side` has in each number of a node at `fractions` of its cell, in steps of the cell: entry
-/// `[to][from]`. `None` where all are zero.
+/// Weight that each number of a corner on `side` has in each number of a node at `fractions` of its cell, in steps of
+/// the cell: entry `[to][from]`. `None` where all are zero.
 pub(super) fn transfer(
     joints: usize,
     side: usize,

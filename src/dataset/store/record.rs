@@ -1,7 +1,8 @@
 //! The numbers of a node: a function w, its gradient and its mixed second derivatives.
 //!
-//! They are ordered by axis: those that belong to the first a axes alone are the first [`width`]`(a)`. Axis a adds `w_a` and then
-//! `w_ab` for all b < a. Second derivatives along one axis are not among them: Hermite interpolation does not use them.
+//! They are ordered by axis: those that belong to the first a axes alone are the first [`width`]`(a)`. Axis a adds
+//! `w_a` and then `w_ab` for all b < a. Second derivatives along one axis are not among them: Hermite interpolation
+//! does not use them.
 
 use crate::MAX_JOINTS;
 

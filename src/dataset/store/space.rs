@@ -1,8 +1,10 @@
 //! Where nodes and blocks lie: a base grid, and levels above it whose spacing halves from one to the next.
 //!
-//! Node `i` of level l is at `start + i step / 2^l` along each axis, so that node 2 i of level l + 1 is node i of level l. Block `k` of a
-//! level holds the nodes `2 k` and `2 k + 1` along each axis, 2^d in all: bit a of a node's place in its block is its parity along axis a.
-//! A key packs a level and the coordinates of a block into 64 bits, ascending with the level.
+//! Node `i` of level l is at `start + i step / 2^l` along each axis, so that node 2 i of level l + 1 is node i of level
+//! l. Block `k` of a level holds the nodes `2 k` and `2 k + 1` along each axis, 2^d in all: bit a of a node's place in
+//! its block is its parity along axis a. Beyond [`MOST_BLOCK_JOINTS`] joints a block is one node: a cell that lies
+//! across blocks takes all of their nodes, with blocks of 2^d nodes 1.5^d times as many as it has corners on average. A
+//! key packs a level and the coordinates of a block into 64 bits, ascending with the level.
 
 use crate::{MAX_JOINTS, dataset::Grid};
 
@@ -14,6 +16,10 @@ const LEVEL_BITS: u32 = 4;
 
 /// Most levels.
 pub const MAX_LEVELS: u32 = 1 << LEVEL_BITS;
+
+/// Most joints with blocks of 2^d nodes [1]. More: blocks of which a cell uses few nodes. Fewer: more look-ups in the
+/// directory for a cell.
+pub const MOST_BLOCK_JOINTS: usize = 3;
 
 /// The lattice of all levels.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +34,8 @@ pub struct Space {
     cells: [u32; MAX_JOINTS],
     /// Bits of a key for each coordinate.
     bits: u32,
+    /// Logarithm of the nodes of a block along each axis: 1 or 0.
+    shift: u32,
 }
 
 /// A grid cannot be refined so often.
@@ -79,14 +87,15 @@ impl Space {
             step: [0.0; MAX_JOINTS],
             cells: [0; MAX_JOINTS],
             bits,
+            shift: u32::from(joints <= MOST_BLOCK_JOINTS),
         };
         for (j, axis) in base.axes.iter().enumerate() {
             if axis.count < 2 {
                 return Err(SpaceError::Flat { axis: axis.name.clone() });
             }
             (space.start[j], space.step[j]) = (axis.start, axis.step);
-            // Coordinates of nodes are below 2^31 and below twice those of blocks.
-            let limit = 1_u64 << bits.saturating_add(1).min(31);
+            // Coordinates of nodes are below 2^31 and those of blocks below 2^bits.
+            let limit = 1_u64 << (bits + space.shift).min(31);
             let fits = |levels: &u32| (axis.count as u64 - 1) < limit >> (levels - 1);
             let most = (1..=MAX_LEVELS).take_while(fits).last().unwrap_or(0);
             if levels > most {
@@ -113,6 +122,35 @@ impl Space {
     #[must_use]
     pub fn step(&self, level: u32, axis: usize) -> f64 {
         self.step[axis] / f64::from(1_u32 << level)
+    }
+
+    /// The block of a node of the same level.
+    #[must_use]
+    #[inline]
+    pub fn block_of(&self, node: &Place) -> Place {
+        node.map(|i| i >> self.shift)
+    }
+
+    /// Place of a node in its block.
+    #[inline]
+    pub(super) fn place_of(&self, node: &Place) -> usize {
+        if self.shift == 0 { 0 } else { (0..self.joints).map(|a| ((node[a] & 1) as usize) << a).sum() }
+    }
+
+    /// Nodes that a block has.
+    #[must_use]
+    pub fn block_nodes(&self) -> usize {
+        1 << (self.joints as u32 * self.shift)
+    }
+
+    /// The level to which a node of `level` belongs, that of the coarsest grid on which it lies, and its place there.
+    #[must_use]
+    pub fn owner(&self, mut level: u32, mut node: Place) -> (u32, Place) {
+        while level > 0 && node.iter().all(|i| i & 1 == 0) {
+            level -= 1;
+            node = node.map(|i| i >> 1);
+        }
+        (level, node)
     }
 
     /// Last node of `level` along each axis.
@@ -154,19 +192,30 @@ impl Space {
         }
         let level = u32::try_from(rest).ok().filter(|level| *level < self.levels)?;
         let last = self.last(level);
-        (0..self.joints).all(|a| 2 * u64::from(block[a]) <= u64::from(last[a])).then_some((level, block))
+        (0..self.joints).all(|a| u64::from(block[a]) << self.shift <= u64::from(last[a])).then_some((level, block))
     }
 
-    /// The nodes of a block that lie in the grid and belong to its level, those of the base or not all even: place and node.
+    /// The nodes of a block that lie in the grid and belong to its level, those of the base or not all even: place and
+    /// node.
     pub fn nodes(&self, level: u32, block: &Place) -> impl Iterator<Item = (usize, Place)> + use<> {
-        let (joints, last, block) = (self.joints, self.last(level), *block);
-        (usize::from(level > 0)..1 << joints).filter_map(move |place| {
+        let (joints, shift, last, block) = (self.joints, self.shift, self.last(level), *block);
+        (0..self.block_nodes()).filter_map(move |place| {
             let mut node = [0; MAX_JOINTS];
             for a in 0..joints {
-                node[a] = 2 * block[a] + (place >> a & 1) as u32;
+                node[a] = (block[a] << shift) + (place >> a & 1) as u32;
             }
-            (0..joints).all(|a| node[a] <= last[a]).then_some((place, node))
+            let is_own = level == 0 || node.iter().any(|i| i & 1 == 1);
+            (is_own && (0..joints).all(|a| node[a] <= last[a])).then_some((place, node))
         })
+    }
+
+    /// The first corner of the cell of `level` around `q`, which has one entry per joint, at the grid's border beyond
+    /// it.
+    #[must_use]
+    pub fn cell(&self, level: u32, q: &[f64]) -> Place {
+        let mut cell = self.locate(q);
+        (0..level).for_each(|_| cell.halve());
+        cell.low
     }
 
     /// The cell of the base around `q`, which has one entry per joint, at the grid's border beyond it.

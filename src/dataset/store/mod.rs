@@ -9,36 +9,39 @@
 //! | `kernel` | the interpolants of one cell |
 //! | `file` | a store on disk |
 //!
-//! *Hierarchy.* The interpolated function is a sum over the levels, each the interpolant of what the level's nodes have more than
-//! the levels below give there (their *surplus*): `w(q) = sum_l sum_n B_n(q) s_n`. The basis functions B of a node are
-//! tensor products with support in the cells around it: C1 cubic Hermite polynomials of value, slopes and mixed second derivatives
-//! ([`Order::Potential`]), or hats ([`Order::Linear`]). A node that was not solved has no surplus: there the function is what the
-//! coarser levels say. So w is C1, or continuous, whichever nodes there are, and exact at all of them, value, gradient and mixed
-//! derivatives. (Bungartz and Griebel 2004, Sparse grids, section 3, for hats; here with Hermite data and without the sparse grid's
-//! choice of levels.)
+//! *Hierarchy.* The interpolated function is a sum over the levels, each the interpolant of what the level's nodes have
+//! more than the levels below give there (their *surplus*): `w(q) = sum_l sum_n B_n(q) s_n`. The basis functions B of a
+//! node are tensor products with support in the cells around it: C1 cubic Hermite polynomials of value, slopes and
+//! mixed second derivatives ([`Order::Potential`]), or hats ([`Order::Linear`]). A node that was not solved has no
+//! surplus: there the function is what the coarser levels say. So w is C1, or continuous, whichever nodes there are,
+//! and exact at all of them, value, gradient and mixed derivatives. (Bungartz and Griebel 2004, Sparse grids, section
+//! 3, for hats; here with Hermite data and without the sparse grid's choice of levels.)
 //!
-//! *Order of publication.* A surplus is final only if nothing below it can change: a block is published after the blocks of the level
-//! below that hold the corners of its cells. Within a published block a node that was not solved stays so. Then the same nodes give
-//! the same store, to the bit, in whatever order they came.
+//! *Order of publication.* A surplus is final only if nothing below it can change: a block is published after the
+//! blocks of the level below that hold the corners of its cells. Within a published block a node that was not solved
+//! stays so. Then the same nodes give the same store, to the bit, in whatever order they came.
 //!
 //! Design, bounds and figures: docs/store.md.
 
 mod block;
 mod directory;
-mod file;
+pub(super) mod file;
 mod kernel;
 pub mod record;
 pub mod space;
 mod sync;
 
 pub use block::{Block, Nodes};
-pub use file::StoreFile;
 pub use space::{Place, Space, SpaceError};
 
 use crate::{JointVector, MAX_JOINTS};
 use block::beyond;
 use directory::{Directory, Refusal};
 use record::{MAX_WIDTH, mixed, sets, slope, width};
+use std::sync::{
+    Mutex, PoisonError,
+    atomic::{AtomicU64, Ordering},
+};
 
 /// How a store interpolates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
@@ -51,10 +54,18 @@ pub enum Order {
 }
 
 /// Blocks of C-space at several levels. Any number of threads may read and publish at once.
+///
+/// Blocks are numbered in the order in which they are published. A reader that needs the same function twice, between
+/// which others publish, names a [horizon](Store::horizon): the number of blocks that count.
 pub struct Store {
     space: Space,
     order: Order,
     blocks: Directory<Block>,
+    /// Number of the next block. Held by writers while a block gets its number and is published, so that all before it
+    /// are there.
+    numbers: Mutex<u64>,
+    /// Number of blocks that are published, without gaps.
+    published: AtomicU64,
 }
 
 /// A block was not published; the store is as before.
@@ -94,8 +105,22 @@ pub struct Root {
     pub slopes: JointVector,
     /// Levels with a block around the configuration; 0 if there is none.
     pub levels: u32,
+    /// Levels, from the base up, whose cell around the configuration has all its blocks.
+    pub whole: u32,
     /// Whether a node around the configuration did not converge.
     pub failed: bool,
+}
+
+/// What was found at the corners of a cell.
+struct Gathered {
+    /// A block.
+    found: bool,
+    /// All blocks.
+    whole: bool,
+    /// A node.
+    any: bool,
+    /// A node that did not converge.
+    failed: bool,
 }
 
 impl Root {
@@ -118,7 +143,19 @@ impl Store {
     /// An empty store over `space` with room for `most` blocks.
     #[must_use]
     pub fn new(space: Space, order: Order, most: usize) -> Self {
-        Self { space, order, blocks: Directory::new(most) }
+        Self { space, order, blocks: Directory::new(most), numbers: Mutex::new(0), published: AtomicU64::new(0) }
+    }
+
+    /// Number of blocks published so far: what [`Store::sample_within`] needs to see the same function again.
+    #[must_use]
+    pub fn horizon(&self) -> u64 {
+        self.published.load(Ordering::Acquire)
+    }
+
+    /// Most blocks for which there is room.
+    #[must_use]
+    pub fn capacity(&self) -> usize {
+        self.blocks.capacity()
     }
 
     /// Where its nodes lie.
@@ -154,15 +191,37 @@ impl Store {
         blocks
     }
 
-    /// The blocks on which a block of `level` rests: those of the level below that hold the corners of its cells.
-    pub fn foundation(&self, level: u32, block: &Place) -> impl Iterator<Item = Place> + use<> {
-        let joints = self.space.joints();
+    /// The blocks on which a block of `level` rests, by level and place: those that hold the corners of the cells of
+    /// the level below around its nodes. Blocks of one node rest on blocks of any level below, those to which these
+    /// corners belong.
+    pub fn foundation(&self, level: u32, block: &Place) -> impl Iterator<Item = (u32, Place)> + use<> {
+        let space = self.space.clone();
+        let (joints, is_one) = (space.joints(), space.block_nodes() == 1);
         let (below, block) = (level.checked_sub(1), *block);
-        let last = below.map_or([0; MAX_JOINTS], |below| self.space.last(below));
-        // Node `block` of the level below, and those one farther; twice as many blocks are listed as there are, at most.
-        let corners = (0..1_usize << joints).filter(move |_| below.is_some()).map(move |set| beyond(&block, set));
-        let inside = corners.filter(move |node| (0..joints).all(|a| node[a] <= last[a]));
-        inside.map(|node| node.map(|i| i >> 1))
+        let last = below.map_or([0; MAX_JOINTS], |below| space.last(below));
+        // A block of 2^d nodes: node `block` of the level below, and those one farther; at most twice as many blocks
+        // are listed as there are. One node: those around it, along the axes along which it lies between two.
+        let (first, axes) =
+            if is_one { (block.map(|i| i >> 1), block.map(|i| i & 1)) } else { (block, [1; MAX_JOINTS]) };
+        let between = (0..joints).map(|a| (axes[a] as usize) << a).sum::<usize>();
+        let sets = (0..1_usize << joints).filter(move |set| below.is_some() && set & !between == 0);
+        let inside =
+            sets.map(move |set| beyond(&first, set)).filter(move |node| (0..joints).all(|a| node[a] <= last[a]));
+        inside.map(move |node| {
+            let below = below.unwrap_or(0);
+            if is_one { space.owner(below, node) } else { (below, space.block_of(&node)) }
+        })
+    }
+
+    /// The blocks that hold the corners of the cell of `level` whose first corner is `low`, by level and place, without
+    /// those of levels below; with blocks of 2^d nodes some twice.
+    pub fn corners(&self, level: u32, low: &Place) -> impl Iterator<Item = Place> + use<> {
+        let (space, low) = (self.space.clone(), *low);
+        let nodes = (0..1_usize << space.joints()).map(move |set| beyond(&low, set));
+        let is_one = space.block_nodes() == 1;
+        nodes
+            .filter(move |node| !is_one || level == 0 || node.iter().any(|i| i & 1 == 1))
+            .map(move |node| space.block_of(&node))
     }
 
     /// Publishes a block: its nodes, of those that [`Space::nodes`] names.
@@ -179,14 +238,19 @@ impl Store {
         if !nodes.is_sound(self.space.joints(), allowed) {
             return Err(PublishError::Unsound { key });
         }
-        for below in self.foundation(level, place) {
-            if self.get(level - 1, &below).is_none() {
-                return Err(PublishError::Order { key, missing: self.space.key(level - 1, &below) });
+        for (at, below) in self.foundation(level, place) {
+            if self.get(at, &below).is_none() {
+                return Err(PublishError::Order { key, missing: self.space.key(at, &below) });
             }
         }
         let surplus = self.surplus(level, &all, &nodes);
-        match self.blocks.publish(key, Block::new(nodes, surplus)) {
-            Ok(_) => Ok(()),
+        let mut next = self.numbers.lock().unwrap_or_else(PoisonError::into_inner);
+        match self.blocks.publish(key, Block::new(nodes, surplus, *next)) {
+            Ok(_) => {
+                *next += 1;
+                self.published.store(*next, Ordering::Release);
+                Ok(())
+            }
             Err(Refusal::Taken) => Err(PublishError::Taken { key }),
             Err(Refusal::Full) => Err(PublishError::Full(self.blocks.capacity())),
         }
@@ -239,9 +303,8 @@ impl Store {
             }
             for side in 0..corners {
                 let corner = beyond(&cell.low, side);
-                let Some(block) = self.get(below, &corner.map(|i| i >> 1)) else { continue };
-                let place = (0..joints).map(|a| ((corner[a] & 1) as usize) << a).sum::<usize>();
-                let Some(surplus) = block.surplus_at(place, self.kinds()) else { continue };
+                let Some(block) = self.get(below, &self.space.block_of(&corner)) else { continue };
+                let Some(surplus) = block.surplus_at(self.space.place_of(&corner), self.kinds()) else { continue };
                 let at = |kind: usize| f64::from(surplus[kind]);
                 match self.order {
                     Order::Linear => {
@@ -267,26 +330,33 @@ impl Store {
     /// The function at `q`, one entry per joint; beyond the grid that at its border. Never allocates, locks or waits.
     #[must_use]
     pub fn sample(&self, q: &[f64]) -> Root {
+        self.sample_within(q, u64::MAX)
+    }
+
+    /// The same with the first `horizon` blocks alone: whatever others publish, it does not change. A block counts with
+    /// those on which it rests, which were published before it.
+    #[must_use]
+    pub fn sample_within(&self, q: &[f64], horizon: u64) -> Root {
         use kernel::rates;
         match (self.order, self.space.joints()) {
-            (Order::Linear, 1) => self.linear::<1, 2, 2>(q),
-            (Order::Linear, 2) => self.linear::<2, 4, 3>(q),
-            (Order::Linear, 3) => self.linear::<3, 8, 4>(q),
-            (Order::Linear, 4) => self.linear::<4, 16, 5>(q),
-            (Order::Linear, 5) => self.linear::<5, 32, 6>(q),
-            (Order::Linear, _) => self.linear::<MAX_JOINTS, 64, 7>(q),
-            (Order::Potential, 1) => self.potential::<1, 2, { width(1) }, { rates(1) }>(q),
-            (Order::Potential, 2) => self.potential::<2, 4, { width(2) }, { rates(2) }>(q),
-            (Order::Potential, 3) => self.potential::<3, 8, { width(3) }, { rates(3) }>(q),
-            (Order::Potential, 4) => self.potential::<4, 16, { width(4) }, { rates(4) }>(q),
-            (Order::Potential, 5) => self.potential::<5, 32, { width(5) }, { rates(5) }>(q),
-            (Order::Potential, _) => self.potential::<MAX_JOINTS, 64, MAX_WIDTH, { rates(MAX_JOINTS) }>(q),
+            (Order::Linear, 1) => self.linear::<1, 2, 2>(q, horizon),
+            (Order::Linear, 2) => self.linear::<2, 4, 3>(q, horizon),
+            (Order::Linear, 3) => self.linear::<3, 8, 4>(q, horizon),
+            (Order::Linear, 4) => self.linear::<4, 16, 5>(q, horizon),
+            (Order::Linear, 5) => self.linear::<5, 32, 6>(q, horizon),
+            (Order::Linear, _) => self.linear::<MAX_JOINTS, 64, 7>(q, horizon),
+            (Order::Potential, 1) => self.potential::<1, 2, { width(1) }, { rates(1) }>(q, horizon),
+            (Order::Potential, 2) => self.potential::<2, 4, { width(2) }, { rates(2) }>(q, horizon),
+            (Order::Potential, 3) => self.potential::<3, 8, { width(3) }, { rates(3) }>(q, horizon),
+            (Order::Potential, 4) => self.potential::<4, 16, { width(4) }, { rates(4) }>(q, horizon),
+            (Order::Potential, 5) => self.potential::<5, 32, { width(5) }, { rates(5) }>(q, horizon),
+            (Order::Potential, _) => self.potential::<MAX_JOINTS, 64, MAX_WIDTH, { rates(MAX_JOINTS) }>(q, horizon),
         }
     }
 
     /// `C = 2^D`, `N = 1 + D`.
-    fn linear<const D: usize, const C: usize, const N: usize>(&self, q: &[f64]) -> Root {
-        self.sum::<D, C, N>(q, |_, numbers, fractions, root| {
+    fn linear<const D: usize, const C: usize, const N: usize>(&self, q: &[f64], horizon: u64) -> Root {
+        self.sum::<D, C, N>(q, horizon, |_, numbers, fractions, root| {
             kernel::multilinear::<D, C>(numbers, fractions);
             root.value += numbers[0][0];
             root.slopes.iter_mut().zip(&numbers[1..]).for_each(|(sum, slope)| *sum += slope[0]);
@@ -294,8 +364,12 @@ impl Store {
     }
 
     /// `C = 2^D`, `W = width(D)`, `R = rates(D)`.
-    fn potential<const D: usize, const C: usize, const W: usize, const R: usize>(&self, q: &[f64]) -> Root {
-        self.sum::<D, C, W>(q, |level, numbers, fractions, root| {
+    fn potential<const D: usize, const C: usize, const W: usize, const R: usize>(
+        &self,
+        q: &[f64],
+        horizon: u64,
+    ) -> Root {
+        self.sum::<D, C, W>(q, horizon, |level, numbers, fractions, root| {
             let (value, slopes) = kernel::hermite::<D, C, W, R>(numbers, fractions);
             let rise = f64::from(1_u32 << level);
             root.value += value;
@@ -303,23 +377,31 @@ impl Store {
         })
     }
 
-    /// Adds up the levels: `add` adds one, from the `N` numbers at the `C` corners of the cell of that level and the fractions of it.
+    /// Adds up the levels: `add` adds one, from the `N` numbers at the `C` corners of the cell of that level and the
+    /// fractions of it.
     #[inline]
     fn sum<const D: usize, const C: usize, const N: usize>(
         &self,
         q: &[f64],
+        horizon: u64,
         mut add: impl FnMut(u32, &mut [[f64; C]; N], &[f64; MAX_JOINTS], &mut Root),
     ) -> Root {
-        let mut root = Root { value: 0.0, slopes: JointVector::zeros(self.space.joints()), levels: 0, failed: false };
+        let slopes = JointVector::zeros(self.space.joints());
+        let mut root = Root { value: 0.0, slopes, levels: 0, whole: 0, failed: false };
         let mut numbers = [[0.0; C]; N];
         let mut cell = self.space.locate(q);
         for level in 0..self.space.levels() {
             if level > 0 {
                 cell.halve();
             }
-            let Some(any) = self.gather::<D, C, N>(level, &cell.low, &mut numbers, &mut root.failed) else { break };
+            let gathered = self.gather::<D, C, N>(level, &cell.low, horizon, &mut numbers);
+            if !gathered.found {
+                break;
+            }
             root.levels = level + 1;
-            if any {
+            root.whole += u32::from(gathered.whole && root.whole == level);
+            root.failed |= gathered.failed;
+            if gathered.any {
                 add(level, &mut numbers, &cell.fractions, &mut root);
             }
         }
@@ -327,31 +409,39 @@ impl Store {
         root
     }
 
-    /// Copies the surplus at the corners of the cell with first corner `low`, zeros where there is no node; `None` if there is no block,
-    /// else whether there is a node.
+    /// Copies the surplus at the corners of the cell with first corner `low`, zeros where there is no node.
     fn gather<const D: usize, const C: usize, const N: usize>(
         &self,
         level: u32,
         low: &Place,
+        horizon: u64,
         numbers: &mut [[f64; C]; N],
-        failed: &mut bool,
-    ) -> Option<bool> {
-        // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to the other.
-        let odd = (0..D).map(|a| ((low[a] & 1) as usize) << a).sum::<usize>();
+    ) -> Gathered {
+        // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to
+        // the other. With blocks of one node they do so along all axes.
+        let parity = (0..D).map(|a| ((low[a] & 1) as usize) << a).sum::<usize>();
+        let is_one = self.space.block_nodes() == 1;
+        let (odd, places) = if is_one { (C - 1, 0) } else { (parity, C - 1) };
         let even = (C - 1) ^ odd;
-        let first = self.space.key(level, &low.map(|i| i >> 1));
-        let (mut found, mut any, mut beside, mut inside) = (false, false, 0_usize, 0_usize);
+        let first = self.space.key(level, &self.space.block_of(low));
+        let mut gathered = Gathered { found: false, whole: true, any: false, failed: false };
+        let (mut beside, mut inside) = (0_usize, 0_usize);
         loop {
             let beyond: u64 = (0..D).map(|a| self.space.stride(a) & (beside as u64 >> a & 1).wrapping_neg()).sum();
-            let block = self.blocks.get(first + beyond);
-            found |= block.is_some();
+            // The corner whose coordinates are all even belongs to a level below: a block of it alone does not exist.
+            let is_below = is_one && level > 0 && beside == parity;
+            let block = if is_below { None } else { self.blocks.get(first + beyond) };
+            let block = block.filter(|block| block.number < horizon);
+            gathered.found |= block.is_some();
+            gathered.whole &= is_below || block.is_some();
             loop {
                 let corner = beside | inside;
-                match block.and_then(|block| block.surplus_at(corner ^ odd, N)) {
+                let place = (corner ^ odd) & places;
+                match block.and_then(|block| block.surplus_at(place, N)) {
                     Some(surplus) => {
-                        any = true;
+                        gathered.any = true;
                         numbers.iter_mut().zip(surplus).for_each(|(number, &surplus)| number[corner] = surplus.into());
-                        *failed |= block.is_some_and(|block| block.failed >> (corner ^ odd) & 1 == 1);
+                        gathered.failed |= block.is_some_and(|block| block.failed >> place & 1 == 1);
                     }
                     None => numbers.iter_mut().for_each(|number| number[corner] = 0.0),
                 }
@@ -365,7 +455,7 @@ impl Store {
                 break;
             }
         }
-        found.then_some(any)
+        gathered
     }
 
     /// Memory of all blocks [bytes].
@@ -375,8 +465,9 @@ impl Store {
     }
 }
 
-/// The numbers of a node from its energy U [J], torque [N m] and tangent d tau/d q, lower triangle [N m/rad]: `w = sqrt(2 U)`,
-/// `w_a = -tau_a / w`, `w_ab = -(d tau_a/d q_b + w_a w_b) / w`. Without a tangent the mixed derivatives are zero.
+/// The numbers of a node from its energy U [J], torque [N m] and tangent d tau/d q, lower triangle [N m/rad]: `w =
+/// sqrt(2 U)`, `w_a = -tau_a / w`, `w_ab = -(d tau_a/d q_b + w_a w_b) / w`. Without a tangent the mixed derivatives are
+/// zero.
 #[must_use]
 pub fn root_of(energy: f64, torque: &[f64], tangent: Option<&[f64]>) -> Vec<f64> {
     let joints = torque.len();

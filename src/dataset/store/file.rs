@@ -1,0 +1,171 @@
+//! A refined dataset's file: a safetensors file like any dataset's (`dataset/file.rs`: page-aligned, checked as a
+//! whole, replaced whole or not at all), of format `haptize store 1`. What a dataset has at each point of its grid is
+//! taken from the nodes of the base.
+//!
+//! | tensor | type | shape | |
+//! |---|---|---|---|
+//! | `block_keys` | u64 | b | level and coordinates of each block (`space.rs`), ascending |
+//! | `block_nodes` | u64 | b | bit p: the block has the node at place p |
+//! | `node_records` | f32 | n, 1 + d (d + 1) / 2 | numbers of each node, in the order of blocks and places (`record.rs`) |
+//! | `node_gap` | f32 | n | smallest signed distance at rest [m] |
+//! | `node_status` | u8 | n | [`crate::contact::Status`] |
+//! | `surface_nodes`, `surface_triangles`, ... | | | the object's geometry, as in a dataset's file |
+//!
+//! Beside grid (the base), provenance and scene the header's metadata has `store`: `{"levels":6,"order":"potential"}`.
+//! Nodes are as they were solved: what is in the file depends neither on the order of publication nor on the
+//! interpolation.
+//!
+//! In Python, with `from safetensors import safe_open; f = safe_open("sphere.store", "numpy"); t = f.get_tensor`:
+//!
+//! ```text
+//! keys, nodes, w = t("block_keys"), t("block_nodes"), t("node_records")[:, 0]
+//! bits, side = 60 // d, 2 if d <= 3 else 1           # bits of a key for each coordinate, the level above them; nodes of a block
+//! place = [(b, p) for b, s in enumerate(nodes) for p in range(side**d) if int(s) >> p & 1]
+//! level = [int(k) >> bits * d for k in keys]
+//! node = lambda b, p: [side * (int(keys[b]) >> bits * (d - 1 - a) & 2**bits - 1) + (p >> a & 1) for a in range(d)]
+//! q = lambda b, p: [axis["start"] + i * axis["step"] / 2**level[b] for i, axis in zip(node(b, p), grid["axes"])]
+//! energy = 0.5 * w.clip(0)**2                        # row r belongs to (b, p) = place[r]
+//! ```
+
+use super::{Nodes, Order, Space, Store, record::slope, record::width};
+use crate::{
+    contact::Status,
+    dataset::{
+        Dataset, Error, Grid, Heading, Kind, Provenance, Surface, Target, Tensor, read::Container, surface_tensors,
+        write_container,
+    },
+};
+use serde::{Deserialize, Serialize};
+use std::{path::Path, sync::Arc};
+
+/// Value of `format` in files that this code reads and writes.
+pub(in crate::dataset) const FORMAT: &str = "haptize store 1";
+
+/// The metadata's `store`.
+#[derive(Deserialize, Serialize)]
+struct Shape {
+    levels: u32,
+    order: Order,
+}
+
+impl Dataset {
+    /// A dataset over the base of `store`, which refines it: at each point of `grid`, of which the store was made, what
+    /// its node there says, and [`Status::Outside`] where there is none. `surface`: the object's geometry; `scene`: the
+    /// scene's text.
+    #[must_use]
+    pub fn refined(
+        store: Arc<Store>,
+        grid: Grid,
+        surface: Option<Surface>,
+        scene: String,
+        provenance: Provenance,
+    ) -> Self {
+        let (space, points) = (store.space(), grid.points());
+        let (joints, wide) = (space.joints(), width(space.joints()));
+        let mut torque = vec![0.0; points * joints];
+        let (mut energy, mut gap) = (vec![0.0; points], vec![0.0_f32; points]);
+        let mut status = vec![Status::Outside as u8; points];
+        for (key, block) in store.blocks() {
+            // The base comes first.
+            let Some((0, place)) = space.block(key) else { break };
+            let nodes = block.nodes();
+            let there = space.nodes(0, &place).filter(|(at, _)| nodes.present >> at & 1 == 1);
+            for ((row, record), (_, node)) in nodes.records.chunks_exact(wide).enumerate().zip(there) {
+                let point = grid.axes.iter().zip(node).fold(0, |point, (axis, k)| point * axis.count + k as usize);
+                let root = f64::from(record[0]).max(0.0);
+                energy[point] = 0.5 * root * root;
+                (gap[point], status[point]) = (nodes.gap[row], nodes.status[row]);
+                for a in 0..joints {
+                    torque[point * joints + a] = -root * f64::from(record[slope(a)]);
+                }
+            }
+        }
+        Self {
+            torque: torque.into(),
+            energy: Some(energy.into()),
+            tangent: None,
+            gap: Some(gap.into()),
+            status: status.into(),
+            residual: None,
+            iterations: None,
+            contacts: None,
+            touches: None,
+            surface,
+            refinement: Some(store),
+            grid,
+            scene,
+            provenance,
+        }
+    }
+}
+
+/// Writes `dataset`, which `store` refines, replacing the file `target` whole or not at all.
+pub(in crate::dataset) fn save(dataset: &Dataset, store: &Store, target: Target<'_>) -> Result<(), Error> {
+    let shape = Shape { levels: store.space.levels(), order: store.order };
+    let shape = serde_json::to_string(&shape)
+        .map_err(|error| Error::Inconsistent { path: target.path().into(), reason: error.to_string() })?;
+    let blocks = store.blocks();
+    let keys: Vec<u64> = blocks.iter().map(|(key, _)| *key).collect();
+    let nodes = || blocks.iter().map(|(_, block)| block.nodes());
+    let present: Vec<u64> = nodes().map(|nodes| nodes.present).collect();
+    let records: Vec<f32> = nodes().flat_map(|nodes| nodes.records.iter().copied()).collect();
+    let gap: Vec<f32> = nodes().flat_map(|nodes| nodes.gap.iter().copied()).collect();
+    let status: Vec<u8> = nodes().flat_map(|nodes| nodes.status.iter().copied()).collect();
+    let wide = width(store.space.joints());
+    let mut tensors: Vec<Tensor<&[u8]>> = vec![
+        Tensor::new::<u64>("block_keys", vec![keys.len()], bytemuck::cast_slice(&keys)),
+        Tensor::new::<u64>("block_nodes", vec![present.len()], bytemuck::cast_slice(&present)),
+        Tensor::new::<f32>("node_records", vec![gap.len(), wide], bytemuck::cast_slice(&records)),
+        Tensor::new::<f32>("node_gap", vec![gap.len()], bytemuck::cast_slice(&gap)),
+        Tensor::new::<u8>("node_status", vec![status.len()], &status),
+    ];
+    tensors.extend(dataset.surface.iter().flat_map(surface_tensors));
+    let heading = Heading { grid: &dataset.grid, provenance: &dataset.provenance, scene: &dataset.scene };
+    write_container(target, Kind { format: FORMAT, store: Some(&shape) }, heading, tensors)
+}
+
+/// Makes a dataset of a file whose header and checksum are sound.
+pub(in crate::dataset) fn decode(path: &Path, file: Container) -> Result<Dataset, Error> {
+    read(file).map_err(|reason| Error::Damaged { path: path.into(), reason })
+}
+
+/// `Err` says what is wrong.
+fn read(mut file: Container) -> Result<Dataset, String> {
+    let (grid, provenance) = file.heading()?;
+    let scene = file.text("scene")?.to_owned();
+    let shape: Shape = serde_json::from_str(file.text("store")?).map_err(|error| format!("store: {error}"))?;
+    let space = Space::new(&grid, shape.levels).map_err(|error| error.to_string())?;
+    let (joints, wide) = (space.joints(), width(space.joints()));
+    let keys = file.take::<u64>("block_keys", &[None])?;
+    let present = file.take::<u64>("block_nodes", &[Some(keys.len())])?;
+    let records = file.take::<f32>("node_records", &[None, Some(wide)])?;
+    let count = records.len() / wide;
+    let gap = file.take::<f32>("node_gap", &[Some(count)])?;
+    let status = file.take::<u8>("node_status", &[Some(count)])?;
+    let surface = file.surface()?;
+    file.finish()?;
+    let found: usize = present.iter().map(|nodes| nodes.count_ones() as usize).sum();
+    if found != count {
+        return Err(format!("its blocks have {found} nodes where there are {count}"));
+    }
+    if let Some(k) = keys.windows(2).position(|pair| pair[0] >= pair[1]) {
+        return Err(format!("block {} is out of order", k + 1));
+    }
+    let store = Store::new(space, shape.order, keys.len());
+    let mut first = 0;
+    for (&key, &present) in keys.iter().zip(present.iter()) {
+        let Some((level, block)) = store.space.block(key) else {
+            return Err(format!("block {key:#x} lies outside its space of {joints} joints"));
+        };
+        let rows = first..first + present.count_ones() as usize;
+        first = rows.end;
+        let nodes = Nodes {
+            present,
+            records: records[wide * rows.start..wide * rows.end].to_vec(),
+            gap: gap[rows.clone()].to_vec(),
+            status: status[rows].to_vec(),
+        };
+        store.publish(level, &block, nodes).map_err(|error| error.to_string())?;
+    }
+    Ok(Dataset::refined(Arc::new(store), grid, surface, scene, provenance))
+}

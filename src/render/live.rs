@@ -1,0 +1,212 @@
+//! Contact that is solved while it is felt: the loop's end of `haptize/ahead`.
+//!
+//! The loop tells where the proxy is and goes, and feels what is there: the equilibrium solved at the proxy and its
+//! tangent, if the scene asks for that (`direct`) and it comes in time; else the store, with the finest level that is
+//! there. What others publish meanwhile changes nothing within a tick: the store is read up to one
+//! [horizon](crate::store::Store::horizon). From tick to tick the torque passes over without a jump and without energy
+//! from nowhere (`passage.rs`).
+//!
+//! Nothing here allocates, locks or waits: places and solutions go through triple buffers, of which each end has a
+//! value of its own.
+
+use super::{accounts::Accounts, passage::Passage};
+use crate::{
+    JointVector,
+    contact::Status,
+    field::{Flags, Sample, TorqueField},
+    haptize::ahead::{Solution, Whereabouts},
+    store::{Store, space::MAX_LEVELS},
+};
+use serde::Serialize;
+
+/// Ticks after which a solution is late [1]. More: the tangent is followed farther. Fewer: the store answers where the
+/// thread that solves was held up.
+const LATE: u64 = 8;
+
+/// Farthest way of a node of the proxy, by a bound, on which a tangent is followed [m]: the second order errs by some
+/// percent of the force where the way is a tenth of the length over which a dent is rounded.
+const FARTHEST: f64 = 0.003;
+
+/// Contact that is solved while it is felt.
+pub struct Live {
+    /// Levels that are wanted.
+    wanted: u32,
+    /// Greatest lever of each joint [m/rad or 1].
+    levers: JointVector,
+    whereabouts: Vec<triple_buffer::Input<Whereabouts>>,
+    /// Absent unless the scene asks for them.
+    solutions: Option<triple_buffer::Output<Solution>>,
+    tick: u64,
+    last: Option<Felt>,
+    passage: Passage,
+    answers: Answers,
+}
+
+/// The other ends of a [`Live`].
+pub struct LiveEnds {
+    /// Where the proxy is, one end for each thread that solves; the last one is that of `solutions`, if there is one.
+    pub whereabouts: Vec<triple_buffer::Output<Whereabouts>>,
+    /// Equilibria at the proxy.
+    pub solutions: Option<triple_buffer::Input<Solution>>,
+}
+
+/// What answered the ticks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Answers {
+    /// Ticks.
+    pub ticks: u64,
+    /// Those that followed a solution at the proxy.
+    pub direct: u64,
+    /// Those that the store answered by so many levels, from none on.
+    pub by_levels: [u64; MAX_LEVELS as usize + 1],
+    /// Those that the store answered by fewer levels than wanted.
+    pub coarser: u64,
+    /// Of these, those in contact.
+    pub coarser_in_contact: u64,
+    /// Ticks at which the function had changed where the proxy was.
+    pub changes: u64,
+    /// Greatest change of the torque that was passed over [N m or N].
+    pub greatest_change: f64,
+    /// Energy given by passing over, and taken [J].
+    pub given: f64,
+    /// [J]
+    pub taken: f64,
+}
+
+/// What was felt last, before any passage.
+struct Felt {
+    place: JointVector,
+    torque: JointVector,
+    energy: f64,
+    /// Tells functions apart.
+    source: (bool, u64),
+}
+
+/// The function that answers a tick.
+enum Source<'a> {
+    Store { field: &'a TorqueField, horizon: u64 },
+    Solution(&'a Solution),
+}
+
+impl Source<'_> {
+    fn id(&self) -> (bool, u64) {
+        match self {
+            Self::Store { horizon, .. } => (false, *horizon),
+            Self::Solution(solution) => (true, solution.number),
+        }
+    }
+
+    /// The field at `q`, and the levels of the store that were there.
+    fn at(&self, q: &JointVector) -> (Sample, u32) {
+        match self {
+            Self::Store { field, horizon } => field.sample_within(q, *horizon),
+            Self::Solution(solution) => {
+                let (torque, energy) = solution.at(q);
+                let contact = energy > 0.0;
+                let sample = Sample {
+                    torque,
+                    index: f64::from(u8::from(contact)),
+                    contact,
+                    contact_nodes: if contact { solution.contact_nodes } else { 0 },
+                    energy,
+                    share: 1.0,
+                    flags: Flags::empty(),
+                };
+                (sample, 0)
+            }
+        }
+    }
+}
+
+impl Live {
+    /// For a proxy that starts at `start`, with so many `levels` wanted and the greatest lever of each joint; `threads`
+    /// fill the store, and with `direct` another one solves at the proxy.
+    #[must_use]
+    pub fn new(
+        start: &JointVector,
+        levels: u32,
+        levers: &JointVector,
+        threads: usize,
+        direct: bool,
+    ) -> (Self, LiveEnds) {
+        let joints = start.len();
+        let ends = || triple_buffer::triple_buffer(&Whereabouts::at_rest(start));
+        let (inputs, outputs) = (0..threads + usize::from(direct)).map(|_| ends()).unzip();
+        let (written, read) = triple_buffer::triple_buffer(&Solution::none(joints));
+        let live = Self {
+            wanted: levels,
+            levers: *levers,
+            whereabouts: inputs,
+            solutions: direct.then_some(read),
+            tick: 0,
+            last: None,
+            passage: Passage::new(joints),
+            answers: Answers::default(),
+        };
+        (live, LiveEnds { whereabouts: outputs, solutions: direct.then_some(written) })
+    }
+
+    /// What answered so far.
+    #[must_use]
+    pub fn answers(&self) -> &Answers {
+        &self.answers
+    }
+
+    /// The contact field at `x` in a tick of `period` [s].
+    pub(super) fn sample(&mut self, field: &TorqueField, x: &JointVector, accounts: &Accounts, period: f64) -> Sample {
+        let Self { wanted, levers, solutions, tick, last, passage, answers, .. } = self;
+        let horizon = field.store().map_or(0, Store::horizon);
+        let solution = solutions.as_mut().map(|solutions| solutions.read());
+        let source = match solution.filter(|solution| serves(solution, x, *tick, levers)) {
+            Some(solution) => Source::Solution(solution),
+            None => Source::Store { field, horizon },
+        };
+        let (mut sample, levels) = source.at(x);
+        if let Some(last) = last {
+            if last.source != source.id() {
+                let (now, _) = source.at(&last.place);
+                let change = last.torque.iter().zip(now.torque.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                answers.changes += u64::from(change > 0.0);
+                answers.greatest_change = answers.greatest_change.max(change);
+                passage.take((&last.torque, last.energy), (&now.torque, now.energy));
+            }
+            passage.go(&last.place, x);
+        }
+        *last = Some(Felt { place: *x, torque: sample.torque, energy: sample.energy, source: source.id() });
+        let budget = accounts.first_stored.map_or(0.0, |first| {
+            accounts.taken_from_field() - (accounts.field_work + sample.energy + passage.energy() - first)
+        });
+        let given = passage.fade(period, budget);
+        answers.given += given.max(0.0);
+        answers.taken += (-given).max(0.0);
+        answers.ticks += 1;
+        match source {
+            Source::Solution(_) => answers.direct += 1,
+            Source::Store { .. } => {
+                answers.by_levels[levels as usize] += 1;
+                answers.coarser += u64::from(levels < *wanted);
+                answers.coarser_in_contact += u64::from(levels < *wanted && sample.contact);
+            }
+        }
+        sample.torque.iter_mut().zip(passage.torque().iter()).for_each(|(torque, rest)| *torque += rest);
+        sample.energy += passage.energy();
+        sample
+    }
+
+    /// Tells where the proxy is at the next tick, and how fast it goes.
+    pub(super) fn tell(&mut self, position: &JointVector, velocity: &JointVector) {
+        self.tick += 1;
+        let whereabouts = Whereabouts { position: *position, velocity: *velocity, tick: self.tick };
+        self.whereabouts.iter_mut().for_each(|end| end.write(whereabouts));
+    }
+}
+
+/// Whether `solution` is still good at `x` in tick `tick`.
+fn serves(solution: &Solution, x: &JointVector, tick: u64, levers: &JointVector) -> bool {
+    let ways =
+        x.iter().zip(solution.place.iter()).zip(levers.iter()).map(|((x, place), lever)| (x - place).abs() * lever);
+    solution.number > 0
+        && matches!(solution.status, Status::Free | Status::Contact)
+        && tick <= solution.tick + LATE
+        && ways.sum::<f64>() <= FARTHEST
+}

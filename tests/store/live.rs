@@ -1,0 +1,215 @@
+//! Contact that is solved while it is felt: no jump, no energy from nowhere, no allocation, and the same store whoever
+//! solved it.
+
+use assert_no_alloc::assert_no_alloc;
+use haptize::{
+    JointVector,
+    contact::{Model, Solver, Status},
+    dataset::{Dataset, Provenance, Surface},
+    device::Motion,
+    haptize::{
+        ahead::{Ahead, Follower, Whereabouts},
+        build_object, grid_of,
+    },
+    object::Object,
+    proxy::Chain,
+    render::{
+        live::{Answers, Live},
+        session::Driver,
+        setup::Setup,
+    },
+    scene::{Scene, Waypoint},
+    store::{Order, Space, Store},
+};
+use std::{sync::Arc, thread};
+
+const LEVELS: u32 = 3;
+
+struct World {
+    scene: Scene,
+    object: Object,
+    chain: Chain,
+}
+
+impl World {
+    /// Two joints beside a ball.
+    fn new() -> Self {
+        let scene = Scene::parse(include_str!("../scenes/small.toml"), "small.toml").unwrap();
+        let (object, chain) = (build_object(&scene).unwrap(), Chain::new(&scene.proxy));
+        Self { scene, object, chain }
+    }
+
+    fn model(&self) -> Model<'_> {
+        let mut model = Model::new(&self.object, &self.chain, self.scene.contact);
+        model.with_tangent = true;
+        model
+    }
+
+    fn store(&self) -> Arc<Store> {
+        Arc::new(Store::new(Space::new(&grid_of(&self.scene), LEVELS).unwrap(), Order::Potential, 4000))
+    }
+
+    fn dataset(&self, store: &Arc<Store>) -> Dataset {
+        let surface = Some(Surface::of(&self.object));
+        let (grid, text) = (grid_of(&self.scene), self.scene.text.clone());
+        Dataset::refined(Arc::clone(store), grid, surface, text, Provenance::default())
+    }
+
+    /// From one random place of the grid to another, four in a second.
+    fn motion(&self, seconds: usize) -> Motion {
+        let mut random = crate::fixture::Random(24);
+        let grid = grid_of(&self.scene);
+        let mut place = || {
+            // The slide from where contact begins on.
+            let q = grid.axes.iter().map(|axis| {
+                let (first, last) = (axis.start, axis.coordinate(axis.count - 1));
+                let least = if axis.unit == "m" { 0.8 } else { 0.0 };
+                first + (least + (1.0 - least) * 0.5 * (1.0 + random.next())) * (last - first)
+            });
+            JointVector::from_slice(&q.collect::<Vec<_>>())
+        };
+        let waypoints: Vec<Waypoint> =
+            (0..=4 * seconds).map(|k| Waypoint { time: 0.25 * k as f64, q: place() }).collect();
+        Motion::through(&waypoints, 2).unwrap()
+    }
+}
+
+/// Ticks of a session, with a batch of blocks solved after each `every`-th.
+fn session(
+    seconds: usize,
+    every: usize,
+    mut check: impl FnMut(&haptize::render::trace::Tick),
+) -> (Answers, Arc<Store>) {
+    let world = World::new();
+    let (model, store) = (world.model(), world.store());
+    let ahead = Ahead::new(&model, Arc::clone(&store));
+    let setup = Setup::new(&world.dataset(&store)).unwrap();
+    let mut hand = setup.hand(world.motion(seconds)).unwrap();
+    let start = world.motion(seconds).at(0.0).0;
+    let levers = JointVector::from_slice(&[0.1, 1.0]);
+    let (live, mut ends) = Live::new(&start, LEVELS, &levers, 1, false);
+    let mut driver = Driver::new(&setup.haptics, &mut hand).unwrap().with_live(Some(live));
+    let mut solver = ahead.solver();
+    for k in 0..1000 * seconds {
+        let (tick, _) = assert_no_alloc(|| driver.tick(1e-3, 1e-3));
+        check(&tick);
+        if k % every == every - 1 {
+            ahead.advance(&mut solver, ends.whereabouts[0].read(), true);
+        }
+    }
+    (*driver.live().unwrap().answers(), store)
+}
+
+#[test]
+fn what_arrives_while_it_is_felt_makes_no_jump_and_no_energy_from_nowhere() {
+    let mut before: Option<JointVector> = None;
+    let (mut steepest, mut contact) = (0.0_f64, 0);
+    let (answers, _) = session(20, 400, |tick| {
+        assert!(tick.contact_torque.is_finite() && tick.fault.is_none(), "{tick:?}");
+        let accounts = &tick.accounts;
+        // The field, arrivals included, gives no more than the proxy's damping takes.
+        assert!(accounts.created() <= accounts.taken_from_field() + 1e-12, "{accounts:?}");
+        assert!(accounts.residual().abs() <= 1e-10 * accounts.turnover.max(1e-6), "{accounts:?}");
+        assert!(accounts.device_port().unwrap() > -1e-9, "{accounts:?}");
+        if let Some(before) = before {
+            // The turning joint's, in N m.
+            steepest = steepest.max((tick.contact_torque[0] - before[0]).abs());
+        }
+        before = Some(tick.contact_torque);
+        contact += usize::from(tick.contact);
+    });
+    assert_eq!(answers.ticks, 20_000);
+    assert_eq!(answers.by_levels.iter().sum::<u64>(), answers.ticks);
+    assert!(contact > 2000 && answers.coarser > 1000 && answers.coarser < answers.ticks, "{contact} {answers:?}");
+    assert!(answers.changes > 20, "{answers:?}");
+    // Without the passage the torque would jump by as much, which is far more than any motion changes it by in a tick.
+    assert!(answers.greatest_change > 3.0 * steepest, "{steepest} N m in a tick, {answers:?}");
+    assert!(answers.given > 0.0 && answers.taken > 0.0, "{answers:?}");
+}
+
+#[test]
+fn solved_in_time_nothing_is_missed() {
+    let (answers, store) = session(2, 1, |_| ());
+    // The first ticks find nothing.
+    assert!(answers.coarser < 200, "{answers:?}");
+    assert!(store.horizon() > 50);
+}
+
+#[test]
+fn what_was_explored_is_what_a_bake_of_the_same_blocks_is_to_the_bit() {
+    let world = World::new();
+    let model = world.model();
+    let store = world.store();
+    let ahead = Ahead::new(&model, Arc::clone(&store));
+    // Three threads, each about its own business.
+    thread::scope(|scope| {
+        for k in 0..3 {
+            let (ahead, world) = (&ahead, &world);
+            scope.spawn(move || {
+                let mut solver = ahead.solver();
+                for step in 0..40 {
+                    let (position, velocity) = world.motion(4).at(0.1 * f64::from(step) + 0.01 * f64::from(k));
+                    ahead.advance(&mut solver, &Whereabouts { position, velocity, tick: 0 }, true);
+                }
+            });
+        }
+    });
+    let again = world.store();
+    let other = Ahead::new(&model, Arc::clone(&again));
+    let mut solver = other.solver();
+    let blocks = store.blocks();
+    assert!(blocks.len() > 60, "{}", blocks.len());
+    for (key, block) in &blocks {
+        let (level, place) = store.space().block(*key).unwrap();
+        assert!(other.solve(&mut solver, level, &place));
+        assert_eq!(again.get(level, &place).unwrap().nodes(), block.nodes());
+    }
+    assert!(blocks.iter().any(|(key, _)| store.space().block(*key).unwrap().0 == LEVELS - 1));
+    let folder = tempfile::tempdir().unwrap();
+    let files = [(&store, "explored"), (&again, "baked")].map(|(store, name)| {
+        let path = folder.path().join(name);
+        world.dataset(store).save(path.as_path()).unwrap();
+        std::fs::read(path).unwrap()
+    });
+    assert_eq!(files[0], files[1]);
+}
+
+#[test]
+fn preparing_makes_all_levels_whole_around_a_place() {
+    let world = World::new();
+    let (model, store) = (world.model(), world.store());
+    let ahead = Ahead::new(&model, Arc::clone(&store));
+    let q = world.motion(1).at(0.0).0;
+    assert_eq!(store.sample(&q).whole, 0);
+    ahead.prepare(&q, 2, std::time::Duration::from_secs(60));
+    assert_eq!(store.sample(&q).whole, LEVELS);
+    let solved = ahead.solved();
+    assert!(solved.nodes > 0 && solved.nodes >= store.blocks().len() as u64, "{solved:?}");
+}
+
+#[test]
+fn a_solution_at_the_proxy_is_followed_by_its_tangent_to_second_order() {
+    let world = World::new();
+    let model = world.model();
+    let start = JointVector::from_slice(&[0.05, 0.04]);
+    let mut follower = Follower::new(&model);
+    let mut solver = Solver::new(&model);
+    let mut torque = |q: &JointVector| solver.solve(q).torque;
+    let mut errors = Vec::new();
+    for (tick, ahead) in (1..).zip([1e-3, 5e-4]) {
+        let at = Whereabouts { position: start, velocity: JointVector::zeros(2), tick };
+        let solution = follower.solve(&at);
+        assert_eq!((solution.number, solution.place, solution.status), (tick, start, Status::Contact));
+        let here = solution.at(&start);
+        assert!((here.0[1] - torque(&start)[1]).abs() < 1e-5 * here.0.norm(), "{here:?}");
+        let mut q = start;
+        q[1] += ahead;
+        let (followed, energy) = solution.at(&q);
+        assert!(energy > solution.energy);
+        errors.push((followed[1] - torque(&q)[1]).abs() / torque(&q)[1].abs());
+        // Far out nothing is felt.
+        q[1] = -0.05;
+        assert_eq!(solution.at(&q).0.norm(), 0.0);
+    }
+    assert!(errors[0] < 0.05 && errors[1] < 0.6 * errors[0] + 1e-6, "{errors:?}");
+}
