@@ -37,7 +37,7 @@ const SCENE: &str = r#"
     kind = "prismatic"
     axis = [0.0, 0.0, -1.0]
     limits = [-0.1, 0.1]
-    nodes = [{ at = [0.0, 0.0, -0.07], radius = 0.006 }]
+    nodes = [{ at = [0.0, 0.0, -0.076] }]
 "#;
 
 struct Filled {
