@@ -1,11 +1,11 @@
-// List of the configurations in contact at rest, ascending: `list[0]` is their number, the numbers follow.
+// List of the configurations in contact at rest, ascending: `list[0]` is their number plus one, the numbers follow.
 // One workgroup; each invocation owns a run of consecutive configurations, so that the order does not depend on timing.
 
 override WORKGROUP: u32 = 256u;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
 // Smallest gap of each configuration.
-@group(0) @binding(1) var<storage, read> gaps: array<f32>;
+@group(0) @binding(1) var<storage, read> gaps: array<real>;
 @group(0) @binding(2) var<storage, read_write> list: array<u32>;
 
 // Number of contacts in the runs of all invocations so far.
@@ -40,6 +40,6 @@ fn main(@builtin(local_invocation_index) local: u32) {
         }
     }
     if local == WORKGROUP - 1u {
-        list[0] = sums[local];
+        list[0] = 1u + sums[local];
     }
 }

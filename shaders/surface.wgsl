@@ -1,31 +1,7 @@
 // Normals of the deformed faceted surface (twin: src/contact/geometry/normals.rs).
 //
-// The stage declares `parameters`, `mesh` and `node_from(j, x)`: node j's position less x. Geometry is computed relative
-// to the point in question, where f32 is finest. `mesh` holds, one behind the other, three corners a triangle, three
-// neighbours a triangle (across edge k), the starts of the lists of triangles around each node (one more than there are
-// nodes), and those lists; where the compliance leaves out surface nodes, the place of each among those that it covers.
-
-fn corner(triangle: u32, k: u32) -> u32 {
-    return mesh[3u * triangle + k];
-}
-
-fn across(triangle: u32, k: u32) -> u32 {
-    return mesh[3u * (parameters.triangles + triangle) + k];
-}
-
-fn around_start(node: u32) -> u32 {
-    return mesh[6u * parameters.triangles + node];
-}
-
-fn around(entry: u32) -> u32 {
-    return mesh[6u * parameters.triangles + parameters.surface_nodes + 1u + entry];
-}
-
-// v scaled to length one; a vector too short to have a direction becomes zero.
-fn unit_or_zero(v: vec3<f32>) -> vec3<f32> {
-    let square = dot(v, v);
-    return select(vec3<f32>(0.0), v / sqrt(max(square, LEAST_DIVISOR)), square > LEAST_DIVISOR);
-}
+// The stage declares `parameters`, `mesh` (mesh.wgsl) and `node_from(j, x)`: node j's position less x. Geometry is computed relative
+// to the point in question, where f32 is finest.
 
 // Outward unit normal of a triangle near x.
 fn face_normal(triangle: u32, x: vec3<f32>) -> vec3<f32> {
@@ -35,7 +11,7 @@ fn face_normal(triangle: u32, x: vec3<f32>) -> vec3<f32> {
 
 // Angle of a triangle at its corner `node`. It is only a weight: arctangent, good to 4096 ULP, is more than it needs.
 fn corner_angle(triangle: u32, node: u32, x: vec3<f32>) -> f32 {
-    let k = select(select(2u, 1u, corner(triangle, 1u) == node), 0u, corner(triangle, 0u) == node);
+    let k = place_of_corner(triangle, node);
     let apex = node_from(node, x);
     let left = node_from(corner(triangle, (k + 1u) % 3u), x) - apex;
     let right = node_from(corner(triangle, (k + 2u) % 3u), x) - apex;

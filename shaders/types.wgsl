@@ -1,6 +1,9 @@
 // Structs shared with Rust (src/gpu/layout.rs checks them by reflection). All positions are relative to the object's
 // centroid, in metres; forces in newtons.
 
+// Numbers that shared functions compute in.
+alias real = f32;
+
 struct Parameters {
     // Configurations of this dispatch.
     configurations: u32,

@@ -64,6 +64,7 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
         found => {
             for (rank, adapter) in found.iter().enumerate() {
                 writeln!(text, "{:<22} {adapter}", if rank == 0 { "graphics adapters" } else { "" })?;
+                writeln!(text, "{:<22} -> {}", "", tier(adapter))?;
             }
             writeln!(
                 text,
@@ -103,6 +104,15 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
     Ok(Report { text, json, whole })
 }
 
+/// What an adapter does of a bake.
+fn tier(adapter: &AdapterSummary) -> &'static str {
+    if adapter.double {
+        "decides contact or not in f64, and searches forces in f32, which the CPU settles"
+    } else {
+        "has no f64 in shaders: the CPU decides contact near none, and settles all forces"
+    }
+}
+
 fn describe(adapter: &AdapterSummary) -> serde_json::Value {
     serde_json::json!({
         "name": adapter.name,
@@ -111,6 +121,7 @@ fn describe(adapter: &AdapterSummary) -> serde_json::Value {
         "driver": adapter.driver,
         "hardware": adapter.hardware,
         "binding_limit_bytes": adapter.binding_limit,
+        "decides_in_f64": adapter.double,
     })
 }
 

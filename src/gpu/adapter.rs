@@ -65,6 +65,8 @@ pub struct AdapterSummary {
     pub hardware: bool,
     /// Largest buffer that one binding reaches [B].
     pub binding_limit: u64,
+    /// Whether shaders may compute in f64: then contact or not is decided on the device, else within a band by the CPU.
+    pub double: bool,
 }
 
 impl AdapterSummary {
@@ -84,6 +86,7 @@ impl AdapterSummary {
             kind,
             hardware: preference(info.device_type) < preference(wgpu::DeviceType::Other),
             binding_limit: adapter.limits().max_storage_buffer_binding_size,
+            double: adapter.features().contains(wgpu::Features::SHADER_F64),
         }
     }
 }
@@ -140,6 +143,7 @@ mod tests {
             kind: if hardware { "discrete GPU" } else { "software" },
             hardware,
             binding_limit: 1 << 27,
+            double: true,
         };
         let [fast, soft] = [adapter("GeForce", true), adapter("llvmpipe (LLVM)", false)];
         let taken = |choice: &AdapterChoice, part| [&fast, &soft].map(|adapter| choice.takes(adapter, part));

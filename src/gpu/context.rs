@@ -6,9 +6,11 @@
 
 use super::{
     adapter::{AdapterChoice, AdapterSummary, asked_for, candidates, instance},
+    kernel::Kernel,
     timing::Stopwatch,
 };
 use std::{
+    collections::HashMap,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
         mpsc::{self, RecvTimeoutError},
@@ -124,6 +126,8 @@ pub struct Context {
     failures: Arc<Mutex<Failures>>,
     /// Where kernels are timed.
     pub(super) stopwatch: Option<Stopwatch>,
+    /// Kernels that have been compiled, by shader, entry point and override constants.
+    pub(super) kernels: Mutex<HashMap<String, Kernel>>,
 }
 
 fn lock(failures: &Mutex<Failures>) -> MutexGuard<'_, Failures> {
@@ -179,6 +183,7 @@ impl Context {
         if !adapter.features().contains(clock) {
             return Err(GpuError::NoClock(summary.to_string()));
         }
+        let double = adapter.features() & wgpu::Features::SHADER_F64;
         let offered = adapter.limits();
         // WebGPU's defaults, which every device has, but for the two sizes that decide which objects fit.
         let limits = wgpu::Limits {
@@ -188,7 +193,7 @@ impl Context {
         };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("haptize"),
-            required_features: clock,
+            required_features: clock | double,
             required_limits: limits,
             ..Default::default()
         };
@@ -213,6 +218,7 @@ impl Context {
             adapter: summary,
             failures,
             stopwatch: timed.then(Stopwatch::default),
+            kernels: Mutex::default(),
         })
     }
 

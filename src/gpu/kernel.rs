@@ -8,9 +8,11 @@ use super::{
     shaders::Shader,
 };
 use bytemuck::Pod;
+use std::sync::PoisonError;
 
 /// Every byte of an output before the dispatch that writes it. As u32 it is no status, count or node number in use; as
 /// f32 it is -1.2e13, no length, force or energy of a haptic scene.
+#[cfg(test)]
 pub const POISON: u8 = 0xD5;
 
 /// How a kernel uses a binding.
@@ -41,6 +43,7 @@ impl Access {
 }
 
 /// A compute pipeline.
+#[derive(Clone)]
 pub struct Kernel {
     /// The shader's, and that of its entry point where it has several.
     pub(super) name: String,
@@ -49,7 +52,7 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Compiles `shader` with the given override constants.
+    /// `shader` with the given override constants: compiled when a device is first asked for it.
     ///
     /// # Errors
     /// When the device refuses the shader or runs out of memory.
@@ -59,6 +62,28 @@ impl Kernel {
         overrides: &[(&str, f64)],
         accesses: &[Access],
     ) -> Result<Self, GpuError> {
+        let name = match shader.entry {
+            "main" => shader.name.to_owned(),
+            entry => format!("{} {entry}", shader.name),
+        };
+        // The lock is held meanwhile, so that of two threads that want one kernel the second gets the first's.
+        let mut compiled = context.kernels.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = format!("{name} {overrides:?}");
+        if let Some(kernel) = compiled.get(&key) {
+            return Ok(kernel.clone());
+        }
+        let (pipeline, layout) = Self::compile(context, shader, overrides, accesses)?;
+        let kernel = Self { name, pipeline, layout };
+        compiled.insert(key, kernel.clone());
+        Ok(kernel)
+    }
+
+    fn compile(
+        context: &Context,
+        shader: &Shader,
+        overrides: &[(&str, f64)],
+        accesses: &[Access],
+    ) -> Result<(wgpu::ComputePipeline, wgpu::BindGroupLayout), GpuError> {
         context.scoped(|device| {
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(shader.name),
@@ -82,11 +107,7 @@ impl Kernel {
                 compilation_options: wgpu::PipelineCompilationOptions { constants: overrides, ..Default::default() },
                 cache: None,
             });
-            let name = match shader.entry {
-                "main" => shader.name.to_owned(),
-                entry => format!("{} {entry}", shader.name),
-            };
-            Self { name, pipeline, layout }
+            (pipeline, layout)
         })
     }
 
@@ -229,6 +250,7 @@ impl StorageBuffer {
     }
 
     /// Fills the first `bytes` bytes with [`POISON`], before the next submission.
+    #[cfg(test)]
     pub fn poison(&self, context: &Context, bytes: u64) {
         let bytes = usize::try_from(bytes.min(self.size())).unwrap_or(usize::MAX) / 4 * 4;
         context.queue.write_buffer(&self.raw, 0, &vec![POISON; bytes]);

@@ -25,6 +25,22 @@ pub struct Parameters {
     pub mobility: f32,
 }
 
+/// `DoubleParameters` of `shaders/double_types.wgsl`: the same for the stages in f64 (uniform).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented where the shader reads them")]
+pub struct DoubleParameters {
+    pub configurations: u32,
+    pub joints: u32,
+    pub proxy_nodes: u32,
+    pub surface_nodes: u32,
+    pub triangles: u32,
+    pub clusters: u32,
+    pub groups: u32,
+    pub padding: u32,
+    pub gap_band: f64,
+}
+
 /// `Joint` of `shaders/types.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -121,6 +137,7 @@ mod tests {
         let reflected = reflect();
         let expected = [
             layout!(Parameters: configurations, first, joints, proxy_nodes, surface_nodes, triangles, max_iterations, stiffness, kc, tolerance, softest, least_distance, depth_rounding, covered, clusters, mobility),
+            layout!(DoubleParameters: configurations, joints, proxy_nodes, surface_nodes, triangles, clusters, groups, padding, gap_band),
             layout!(Joint: origin, kind, axis, padding),
             layout!(ProxyNode: position, link),
             layout!(Outcome: status, iterations, residual, elastic, touches, padding_0, padding_1, padding_2),

@@ -85,7 +85,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 static LEAF_SHADER: Shader = Shader {
     name: "leaf",
     entry: "main",
-    parts: &[shaders::TYPES, shaders::CLOSEST_POINT, shaders::SURFACE, shaders::DEPTH, LEAF],
+    parts: &[shaders::TYPES, shaders::CLOSEST_POINT, shaders::MESH, shaders::SURFACE, shaders::DEPTH, LEAF],
     overrides: &[&[]],
 };
 

@@ -7,6 +7,7 @@
 //! | `layout` | structs shared with WGSL, checked against it |
 //! | `shaders` | shaders embedded, assembled from parts, with their override sets |
 //! | `model` | object, proxy and contact law as buffers |
+//! | `detection` | the stages that place the proxy and test it for contact at rest |
 //! | `pipeline` | the stages of a batch and their buffers |
 //! | `solver` | the backend of a sweep: chunks, batches, retries |
 //! | `unpack` | from what the kernels wrote to equilibria, settled in f64 by the CPU's search |
@@ -14,12 +15,15 @@
 //! | `kernel` | one compute pipeline with its bindings and dispatches; buffers, poison, read-back |
 //! | `timing` | how long each kernel takes, where that is asked for |
 //!
-//! A shader in `shaders/` and its CPU twin share names and order of statements. The GPU computes in f32 with
-//! coordinates relative to the object's centroid; what is summed over few terms (torque, forces of a node) is summed on
-//! the host in f64.
+//! A shader in `shaders/` and its CPU twin share names and order of statements. The GPU searches forces in f32 with
+//! coordinates relative to the object's centroid; the host settles them in f64. Contact or not is decided in f64 on the device, where it has
+//! that.
 
 mod adapter;
 mod context;
+mod detection;
+#[cfg(test)]
+mod facet_tests;
 mod frame;
 mod kernel;
 pub mod layout;

@@ -10,7 +10,7 @@ use super::{
     shaders::CLUSTER,
 };
 use crate::{
-    JointVector, contact, proxy,
+    contact, proxy,
     scene::{Algorithm, JointKind},
     tolerances,
 };
@@ -23,14 +23,13 @@ pub(super) const LANES: u32 = 32;
 pub struct DeviceModel {
     /// Without the configurations, which each dispatch sets.
     pub(super) parameters: Parameters,
-    kinds: Vec<JointKind>,
     pub(super) joints: StorageBuffer,
     pub(super) proxy_nodes: StorageBuffer,
     pub(super) rest: StorageBuffer,
     pub(super) mesh: StorageBuffer,
     pub(super) clusters: StorageBuffer,
     pub(super) compliance: StorageBuffer,
-    /// Gaps within this of zero are decided in f64 [m].
+    /// Gaps in f32, to the flat triangles, are those to the contact surface but for this [m].
     pub(super) gap_band: f64,
 }
 
@@ -81,7 +80,6 @@ impl DeviceModel {
                 mobility: model.mobility as f32,
                 ..bytemuck::Zeroable::zeroed()
             },
-            kinds: chain.joints.iter().map(|joint| joint.kind).collect(),
             joints: StorageBuffer::from_slice(context, "joints", &joints(chain, model.surface.centre))?,
             proxy_nodes: StorageBuffer::from_slice(context, "proxy nodes", &proxy_nodes(chain))?,
             rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, &clusters, extent))?,
@@ -110,15 +108,6 @@ impl DeviceModel {
     /// Size of what contact is solved with [B].
     pub(super) fn object_bytes(&self) -> u64 {
         self.rest.size() + self.mesh.size() + self.compliance.size()
-    }
-
-    /// (cos q, sin q) of every joint, or (q, 0) of a prismatic one: all that kinematics needs of a configuration.
-    pub(super) fn motions(&self, configurations: &[JointVector]) -> Vec<[f32; 2]> {
-        let motion = |(&kind, &q): (&JointKind, &f64)| match kind {
-            JointKind::Revolute => [q.cos() as f32, q.sin() as f32],
-            JointKind::Prismatic => [q as f32, 0.0],
-        };
-        configurations.iter().flat_map(|q| self.kinds.iter().zip(q.iter()).map(motion)).collect()
     }
 }
 

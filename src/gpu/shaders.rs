@@ -3,7 +3,10 @@
 //! WGSL has no include: a stage is the generated constants, then `types.wgsl`, then shared functions, then the stage's
 //! own file. Constants that both sides need have one source, here in Rust; sizes and switches are override constants.
 
-use crate::{contact::Status, tolerances};
+use crate::{
+    contact::{Status, geometry::facet},
+    tolerances,
+};
 
 /// One entry point with everything it needs.
 #[derive(Debug)]
@@ -19,8 +22,12 @@ pub struct Shader {
 
 pub(super) const TYPES: &str = include_str!("../../shaders/types.wgsl");
 pub(super) const CLOSEST_POINT: &str = include_str!("../../shaders/closest_point.wgsl");
+pub(super) const MESH: &str = include_str!("../../shaders/mesh.wgsl");
 pub(super) const SURFACE: &str = include_str!("../../shaders/surface.wgsl");
 pub(super) const DEPTH: &str = include_str!("../../shaders/depth.wgsl");
+pub(super) const DOUBLE_TYPES: &str = include_str!("../../shaders/double_types.wgsl");
+pub(super) const FACET: &str = include_str!("../../shaders/facet.wgsl");
+const COMPACT: &str = include_str!("../../shaders/compaction.wgsl");
 const SUPPORT: &str = include_str!("../../shaders/support.wgsl");
 const DEFORMED: &str = include_str!("../../shaders/deformed.wgsl");
 const SPRINGS: &str = include_str!("../../shaders/springs.wgsl");
@@ -42,7 +49,7 @@ pub static KINEMATICS: Shader = Shader {
 pub static DETECTION: Shader = Shader {
     name: "detection",
     entry: "main",
-    parts: &[TYPES, CLOSEST_POINT, SURFACE, include_str!("../../shaders/detection.wgsl")],
+    parts: &[TYPES, CLOSEST_POINT, MESH, SURFACE, include_str!("../../shaders/detection.wgsl")],
     overrides: &[&[]],
 };
 
@@ -55,15 +62,37 @@ pub static CLASSIFICATION: Shader = Shader {
 };
 
 /// List of the configurations in contact.
-pub static COMPACTION: Shader = Shader {
-    name: "compaction",
+pub static COMPACTION: Shader =
+    Shader { name: "compaction", entry: "main", parts: &[TYPES, COMPACT], overrides: &[&[]] };
+
+/// Node positions in f64.
+pub static DOUBLE_KINEMATICS: Shader = Shader {
+    name: "double_kinematics",
     entry: "main",
-    parts: &[TYPES, include_str!("../../shaders/compaction.wgsl")],
+    parts: &[DOUBLE_TYPES, include_str!("../../shaders/double_kinematics.wgsl")],
     overrides: &[&[]],
 };
 
+/// Smallest gap of every configuration in f64.
+pub static DOUBLE_GAP: Shader = Shader {
+    name: "double_gap",
+    entry: "main",
+    parts: &[DOUBLE_TYPES, CLOSEST_POINT, MESH, FACET, include_str!("../../shaders/double_gap.wgsl")],
+    overrides: &[&[], SMOOTH],
+};
+
+/// List of the configurations in contact, by gaps in f64.
+pub static DOUBLE_COMPACTION: Shader =
+    Shader { name: "double_compaction", entry: "main", parts: &[DOUBLE_TYPES, COMPACT], overrides: &[&[]] };
+
 /// Triangles that share a bounding sphere in searches for the closest one.
 pub(super) const CLUSTER: usize = 8;
+
+/// Clusters in a group of them, for searches in f64.
+pub(super) const GROUP: usize = 8;
+
+/// Facets are of degree four.
+const SMOOTH: &[(&str, f64)] = &[("SMOOTH", 1.0)];
 
 /// The compliance covers a part of a large object.
 const PARTIAL: &[(&str, f64)] = &[("PARTIAL", 1.0)];
@@ -78,7 +107,7 @@ const CRAMPED: &[(&str, f64)] = &[("CONTACTS", 2.0)];
 pub static ENERGY: Shader = Shader {
     name: "energy",
     entry: "main",
-    parts: &[TYPES, CLOSEST_POINT, SURFACE, DEPTH, SUPPORT, DEFORMED, SPRINGS, TRUST_REGION, ENERGY_SEARCH],
+    parts: &[TYPES, CLOSEST_POINT, MESH, SURFACE, DEPTH, SUPPORT, DEFORMED, SPRINGS, TRUST_REGION, ENERGY_SEARCH],
     overrides: &[&[], &[("FROZEN", 1.0)], PARTIAL, ISOTROPIC, CRAMPED],
 };
 
@@ -89,6 +118,7 @@ pub static PAPER: Shader = Shader {
     parts: &[
         TYPES,
         CLOSEST_POINT,
+        MESH,
         SURFACE,
         DEPTH,
         SUPPORT,
@@ -168,6 +198,9 @@ pub static ALL: &[&Shader] = &[
     &DETECTION,
     &CLASSIFICATION,
     &COMPACTION,
+    &DOUBLE_KINEMATICS,
+    &DOUBLE_GAP,
+    &DOUBLE_COMPACTION,
     &ENERGY,
     &PAPER,
     &FRAME_STIFFENING,
@@ -181,7 +214,7 @@ pub static ALL: &[&Shader] = &[
 ];
 
 /// Constants that both sides use, as WGSL.
-fn constants() -> String {
+fn constants(double: bool) -> String {
     let mut text = String::new();
     for (name, status) in [
         ("FREE", Status::Free),
@@ -191,6 +224,21 @@ fn constants() -> String {
     ] {
         text.push_str(&format!("const STATUS_{name}: u32 = {}u;\n", status as u8));
     }
+    text.push_str(&if double { double_constants() } else { single_constants() });
+    for (name, count) in [
+        ("INNER_ITERATIONS_PER_UNKNOWN", tolerances::INNER_ITERATIONS_PER_UNKNOWN),
+        ("MODEL_PASSES", tolerances::MODEL_PASSES),
+        ("FACET_ITERATIONS", facet::FACET_ITERATIONS),
+        ("CLUSTER", CLUSTER),
+        ("GROUP", GROUP),
+    ] {
+        text.push_str(&format!("const {name}: u32 = {count}u;\n"));
+    }
+    text
+}
+
+fn single_constants() -> String {
+    let mut text = String::new();
     for (name, value) in [
         ("FAR_AWAY", tolerances::GPU_FAR_AWAY),
         ("LEAST_DIVISOR", tolerances::GPU_LEAST_DIVISOR),
@@ -213,21 +261,28 @@ fn constants() -> String {
     ] {
         text.push_str(&format!("const {name}: f32 = {value:e}f;\n"));
     }
-    for (name, count) in [
-        ("INNER_ITERATIONS_PER_UNKNOWN", tolerances::INNER_ITERATIONS_PER_UNKNOWN),
-        ("MODEL_PASSES", tolerances::MODEL_PASSES),
-        ("CLUSTER", CLUSTER),
-    ] {
-        text.push_str(&format!("const {name}: u32 = {count}u;\n"));
-    }
     text
 }
 
+fn double_constants() -> String {
+    let constants = [
+        ("FAR_AWAY", f64::from(tolerances::GPU_FAR_AWAY)),
+        ("LEAST_DIVISOR", tolerances::MINIMUM_SQUARE),
+        ("FACET_STEP", facet::FACET_STEP),
+    ];
+    constants.map(|(name, value)| format!("const {name}: f64 = {value:e}lf;\n")).concat()
+}
+
 impl Shader {
+    /// Whether it computes in f64.
+    pub(super) fn is_double(&self) -> bool {
+        self.parts.contains(&DOUBLE_TYPES)
+    }
+
     /// The whole text, as the device compiles it.
     #[must_use]
     pub fn source(&self) -> String {
-        let mut text = constants();
+        let mut text = constants(self.is_double());
         for part in self.parts {
             text.push('\n');
             text.push_str(part);
@@ -261,7 +316,8 @@ mod tests {
                 shader.name,
                 shader.entry
             );
-            let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
+            let capabilities = if shader.is_double() { Capabilities::FLOAT64 } else { Capabilities::empty() };
+            let info = Validator::new(ValidationFlags::all(), capabilities)
                 .validate(&module)
                 .unwrap_or_else(|error| panic!("{}: {}", shader.name, error.emit_to_string(&shader.source())));
             assert!(!shader.overrides.is_empty(), "{}: at least the empty set", shader.name);

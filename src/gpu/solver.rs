@@ -5,8 +5,8 @@
 //! Sizes of chunks and batches follow from measured time: a dispatch should last tens of milliseconds. Results do not depend
 //! on them.
 //!
-//! What f32 or the kernel's room cannot decide is left to the CPU's f64 solver: contact within rounding of none, forces that do
-//! not settle, more contacts than the lists hold. Nothing is cut off.
+//! What f32 or the kernel's room cannot decide is left to the CPU's f64 solver: forces that do not settle, more contacts than the lists
+//! hold, and where shaders have no f64 contact within rounding of none. Nothing is cut off.
 
 use super::{
     adapter::AdapterSummary,
@@ -105,6 +105,12 @@ impl<'a> GpuSolver<'a> {
         self.context.adapter()
     }
 
+    /// Whether contact or not is decided on the device, in f64.
+    #[must_use]
+    pub fn is_exact(&self) -> bool {
+        self.pipeline.detection().is_exact()
+    }
+
     /// A good number of configurations for one call: progress is told between calls.
     #[must_use]
     pub fn chunk(&self) -> usize {
@@ -114,10 +120,9 @@ impl<'a> GpuSolver<'a> {
     /// Equilibria of one chunk.
     fn solve_chunk(&mut self, chunk: &[JointVector]) -> Result<Vec<Equilibrium>, GpuError> {
         let since = Instant::now();
-        let (gaps, touching) = self.pipeline.detect(&self.context, chunk)?;
+        let (gaps, touching) = self.pipeline.detection().detect(&self.context, chunk)?;
         self.chunk.adapt(chunk.len(), since.elapsed());
-        let mut results: Vec<Equilibrium> =
-            gaps.iter().zip(chunk).map(|(&gap, q)| free(f64::from(gap), q.len())).collect();
+        let mut results: Vec<Equilibrium> = gaps.iter().zip(chunk).map(|(&gap, q)| free(gap, q.len())).collect();
         self.decide_free(chunk, &touching, &mut results);
         let mut flight: Option<Flight> = None;
         let mut first = 0;
@@ -142,15 +147,16 @@ impl<'a> GpuSolver<'a> {
         Ok(results)
     }
 
-    /// Solves in f64 what touches nothing in f32 but lies within rounding of contact, and measures gaps to a smooth surface.
+    /// Solves on the CPU what touches nothing but lies within what its gap is known to of contact, and where gaps are those to flat triangles
+    /// measures those to a smooth surface.
     fn decide_free(&mut self, chunk: &[JointVector], touching: &[u32], results: &mut [Equilibrium]) {
         let mut free = vec![true; chunk.len()];
         touching.iter().for_each(|&member| free[member as usize] = false);
-        let smooth = self.model.surface.smooth.is_some();
+        let measured = self.pipeline.detection().is_exact() || self.model.surface.smooth.is_none();
         let (undecided, others): (Vec<usize>, Vec<usize>) =
             (0..chunk.len()).filter(|&k| free[k]).partition(|&k| self.is_undecided(&results[k]));
         self.left_to_cpu += undecided.len();
-        let open = if smooth { [undecided, others].concat() } else { undecided };
+        let open = if measured { undecided } else { [undecided, others].concat() };
         let decided = self.cpu.map(&open, |solver, &k| solver.solve(&chunk[k]));
         for (k, result) in open.into_iter().zip(decided) {
             results[k] = result;
@@ -192,7 +198,8 @@ impl<'a> GpuSolver<'a> {
     /// Whether f32 or the kernel's room left open what the equilibrium is. The paper's iteration often does not converge in
     /// any precision, and is then left at that.
     fn is_undecided(&self, result: &Equilibrium) -> bool {
-        result.gap.abs() < self.pipeline.gap_band()
+        result.gap.is_nan()
+            || result.gap.abs() <= self.pipeline.detection().gap_band()
             || match result.status {
                 Status::Contact => result.residual.is_nan() || result.residual > GPU_RESOLVED_RESIDUAL,
                 Status::Unconverged => self.model.contact.algorithm != Algorithm::Paper,

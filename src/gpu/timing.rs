@@ -132,7 +132,7 @@ mod tests {
     use super::*;
     use crate::{
         contact::Model,
-        gpu::{AdapterChoice, FrameMethod, FrameUpdate, GpuSolver},
+        gpu::{AdapterChoice, FrameMethod, FrameUpdate, GpuSolver, Room},
         haptize::{Backend, sample},
         object::Object,
         proxy::Chain,
@@ -166,7 +166,8 @@ mod tests {
         let model = Model::new(&object, &chain, scene.contact);
         let configurations = sample(&scene);
         let [timed, plain] = contexts.map(|context| {
-            let mut solver = GpuSolver::new(Arc::clone(&context), &model).unwrap();
+            let room = Room { double: false, ..Room::default() };
+            let mut solver = GpuSolver::with_room(Arc::clone(&context), &model, room).unwrap();
             let begin = Instant::now();
             let equilibria = solver.solve(&configurations).unwrap();
             let times = context.kernel_times().unwrap();

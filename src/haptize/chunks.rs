@@ -1,4 +1,5 @@
-//! The grid's points, chunk by chunk: free ones skipped, the others solved by the backend, all handed on to where they are kept.
+//! The grid's points, chunk by chunk: free ones skipped, the others solved by the backend, all handed on to where they are kept, by a thread of
+//! its own: checksums and the file wait for no solver, and no solver for them.
 
 use super::{
     Backend, Footprint, FreeSpace, Progress, Run, Sweep, SweepError,
@@ -15,8 +16,13 @@ use crate::{
 };
 use std::{
     ops::Range,
-    path::Path,
-    sync::atomic::Ordering,
+    panic::resume_unwind,
+    path::{Path, PathBuf},
+    sync::{
+        atomic::Ordering,
+        mpsc::{Receiver, SyncSender, sync_channel},
+    },
+    thread,
     time::{Duration, Instant},
 };
 
@@ -24,8 +30,11 @@ use std::{
 /// makes it longer.
 const CHUNK_TIME: Duration = Duration::from_millis(250);
 
+/// Chunks that are kept in memory at most besides the one at hand: one waits while another is written.
+pub(super) const BEHIND: usize = 2;
+
 /// Where a sweep's results go as they come.
-pub(super) trait Store {
+pub(super) trait Store: Send {
     /// Adds a chunk whose first point has number `first`.
     fn append(&mut self, first: usize, chunk: &Columns) -> Result<(), SweepError>;
     /// Adds something that provenance will tell.
@@ -63,6 +72,52 @@ impl Store for Columns {
     }
     fn path(&self) -> Option<&Path> {
         None
+    }
+}
+
+/// What a store is to take.
+#[expect(clippy::large_enum_variant, reason = "a few at a time; a box would be memory for every chunk")]
+enum Entry {
+    /// Results of the points from this number on.
+    Chunk(usize, Columns),
+    Notice(String),
+}
+
+/// Hands `entries` to `store` until there are no more, or it fails; columns that are kept are given back as `room` for others.
+fn keep(store: &mut dyn Store, entries: Receiver<Entry>, room: SyncSender<Columns>) -> Result<(), SweepError> {
+    entries.into_iter().try_for_each(|entry| match entry {
+        Entry::Chunk(first, columns) => {
+            store.append(first, &columns)?;
+            // Where no other chunk follows nobody needs it.
+            let _ = room.send(columns);
+            Ok(())
+        }
+        Entry::Notice(notice) => store.note(&notice),
+    })
+}
+
+/// Where chunks are sent to be kept, and columns come back from, a few in all.
+struct Kept {
+    entries: SyncSender<Entry>,
+    room: Receiver<Columns>,
+    columns: usize,
+}
+
+impl Kept {
+    /// Empty columns; `None` where the store has failed.
+    fn columns(&mut self) -> Option<Columns> {
+        if self.columns <= BEHIND {
+            self.columns += 1;
+            return Some(Columns::default());
+        }
+        let mut columns = self.room.recv().ok()?;
+        columns.clear();
+        Some(columns)
+    }
+
+    /// Sends an entry; `None` where the store has failed.
+    fn send(&self, entry: Entry) -> Option<()> {
+        self.entries.send(entry).ok()
     }
 }
 
@@ -127,6 +182,28 @@ impl Sweep<'_> {
         footprint: Footprint,
         store: &mut dyn Store,
     ) -> Result<Solved, SweepError> {
+        let part = store.path().map(Path::to_path_buf);
+        let ((entries, to_keep), (back, room)) = (sync_channel(1 + BEHIND), sync_channel(1 + BEHIND));
+        let kept = Kept { entries, room, columns: 0 };
+        thread::scope(|scope| {
+            let keeper = scope.spawn(move || keep(store, to_keep, back));
+            let solved = self.solve_chunks(backend, run, begun, footprint, part, kept);
+            // What a store says comes first: a sweep whose store has failed only knows that nobody takes its results.
+            keeper.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+            solved
+        })
+    }
+
+    /// Solves the points that `begun` lacks, and sends what is to be kept; `part` is where that is.
+    fn solve_chunks<B: Backend>(
+        &self,
+        backend: &mut B,
+        run: &mut Run<'_>,
+        begun: Begun,
+        footprint: Footprint,
+        part: Option<PathBuf>,
+        mut kept: Kept,
+    ) -> Result<Solved, SweepError> {
         let Begun { mut tally, mut provenance } = begun;
         let (points, resumed, start) = (self.points(), tally.points, Instant::now());
         let left_before = backend.left_to_cpu();
@@ -138,7 +215,6 @@ impl Sweep<'_> {
         tell(&tally, 0.0);
         let (free_space, mut skipped) = (self.free_space(), 0);
         let mut size = ChunkSize::new(run.chunk.clamp(1, points.max(1)));
-        let mut columns = Columns::default();
         let rest = |done| self.shard.rest(self.grid.points(), done);
         while tally.points < points {
             let whole = 0..self.grid.points();
@@ -146,9 +222,10 @@ impl Sweep<'_> {
             let gaps = free_space.as_ref().map(|free_space| self.gaps(free_space, slab.clone())).transpose()?;
             let free_gap = |point| gaps.as_ref()?.gap(point);
             while tally.points < points && rest(tally.points).start < slab.end {
-                let Range { start: first, end } = rest(tally.points);
+                let (done, Range { start: first, end }) = (tally.points, rest(tally.points));
+                let stopped = || SweepError::Stopped { done, points, part: part.clone() };
                 if run.stop.load(Ordering::Relaxed) {
-                    return Err(SweepError::Stopped { done: tally.points, points, part: store.path().map(Into::into) });
+                    return Err(stopped());
                 }
                 let chunk = self.cut(first..end.min(slab.end), size.size, free_gap);
                 let begun = Instant::now();
@@ -156,10 +233,10 @@ impl Sweep<'_> {
                 size.adapt(chunk.configurations.len(), begun.elapsed());
                 for notice in backend.notices() {
                     let notice = format!("from grid point {first} on: {notice}");
-                    store.note(&notice)?;
+                    kept.send(Entry::Notice(notice.clone())).ok_or_else(stopped)?;
                     provenance.notices.push(notice);
                 }
-                columns.clear();
+                let mut columns = kept.columns().ok_or_else(stopped)?;
                 let mut equilibria = equilibria.iter();
                 for point in chunk.points {
                     match free_gap(point) {
@@ -168,8 +245,8 @@ impl Sweep<'_> {
                     }
                 }
                 skipped += columns.points() - chunk.configurations.len();
-                store.append(first, &columns)?;
                 tally.add(&columns);
+                kept.send(Entry::Chunk(first, columns)).ok_or_else(stopped)?;
                 tell(&tally, (tally.points - resumed) as f64 / start.elapsed().as_secs_f64().max(f64::MIN_POSITIVE));
             }
         }

@@ -1,6 +1,9 @@
 //! What a sweep takes up, stated before it begins.
 
-use super::columns::{Columns, Shape};
+use super::{
+    chunks::BEHIND,
+    columns::{Columns, Shape},
+};
 use crate::{
     JointVector,
     contact::{Equilibrium, NodeForce, Touch},
@@ -40,14 +43,16 @@ pub(super) fn results(points: usize, touching: usize, shape: Shape) -> usize {
     Columns::bytes(points, shape.width(), points.saturating_mul(contacts), points.saturating_mul(touches))
 }
 
-/// A chunk on its way: `solved` configurations and their equilibria, and the columns of `points` points [bytes].
+/// A chunk on its way: `solved` configurations and their equilibria, and the columns of `points` points, and of the chunks before that are
+/// being kept [bytes].
 pub(super) fn chunk(solved: usize, points: usize, touching: usize, shape: Shape) -> usize {
     // Lists grow by doubling.
     let lists = 2 * (node_forces(touching, shape) * size_of::<NodeForce>() + touching * size_of::<Touch>());
     let each = size_of::<JointVector>() + size_of::<Equilibrium>() + lists;
     let contacts = if shape.with_forces { 2 * solved.saturating_mul(node_forces(touching, shape)) } else { 0 };
     let touches = 2 * solved.saturating_mul(touching * shape.width().touches);
-    solved.saturating_mul(each).saturating_add(Columns::bytes(points, shape.width(), contacts, touches))
+    let columns = Columns::bytes(points, shape.width(), contacts, touches);
+    solved.saturating_mul(each).saturating_add(columns.saturating_mul(1 + BEHIND))
 }
 
 /// Nodes of the object that `touching` nodes of the proxy touch.

@@ -9,7 +9,7 @@ use haptize::{
     haptize::Backend,
     object::{Compliance, Object},
     proxy::Chain,
-    scene::{Algorithm, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
+    scene::{Algorithm, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
     tolerances::GPU_SETTLED_RESIDUAL,
 };
 
@@ -129,7 +129,7 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
 fn check_scene(name: &str, material: Option<Material>, algorithm: Algorithm, stride: usize) {
     let (scene, object, chain) = load_of(name, material.clone());
     let configurations = configurations(&scene, 11, stride);
-    let model = Model::new(&object, &chain, haptize::scene::ContactSpec { algorithm, ..scene.contact });
+    let model = Model::new(&object, &chain, ContactSpec { algorithm, ..scene.contact });
     assert_eq!(model.compliance.rows_per_node, if material.is_some() { 3 } else { 1 });
     let mut cpu = Solver::new(&model);
     let mut gpu = GpuSolver::new(context(), &model).unwrap();
@@ -182,7 +182,7 @@ fn objects_that_are_not_isotropic_have_the_same_equilibria_on_gpu_and_cpu() {
 
 /// The model of the sphere that covers the nodes about its top.
 fn part<'a>((scene, object, chain): &'a (Scene, Object, Chain), algorithm: Algorithm) -> Model<'a> {
-    let contact = haptize::scene::ContactSpec { algorithm, ..scene.contact };
+    let contact = ContactSpec { algorithm, ..scene.contact };
     let mut model = Model::new(object, chain, contact);
     let reached = |node: &u32| model.surface.positions[*node as usize].dot(DVec3::new(-0.3, 0.0, 1.0)) > 0.015;
     let nodes = (0..object.surface_nodes as u32).filter(reached).collect();
@@ -238,7 +238,7 @@ fn grazing(cpu: &mut Solver, path: &[JointVector], wanted: f64) -> Vec<JointVect
     found
 }
 
-/// A gap that f32 cannot tell from none, points and balls: contact or not, and what comes of it, is the CPU's.
+/// A gap that f32 cannot tell from none, points and balls, where shaders have no f64: contact or not, and what comes of it, is the CPU's.
 #[test]
 fn contact_within_rounding_of_none_is_decided_in_f64() {
     for name in ["sphere.toml", "mesh.toml"] {
@@ -249,7 +249,8 @@ fn contact_within_rounding_of_none_is_decided_in_f64() {
         for wanted in [-1e-9, -1e-11, 1e-11, 1e-9] {
             let near = grazing(&mut cpu, &path, wanted);
             assert!(near.len() >= 5, "{name}: only {} configurations", near.len());
-            let mut gpu = GpuSolver::new(context(), &model).unwrap();
+            let room = Room { double: false, ..Room::default() };
+            let mut gpu = GpuSolver::with_room(context(), &model, room).unwrap();
             for (q, result) in near.iter().zip(gpu.solve(&near).unwrap()) {
                 let reference = cpu.solve(q);
                 let status = if wanted < 0.0 { Status::Contact } else { Status::Free };
@@ -258,6 +259,49 @@ fn contact_within_rounding_of_none_is_decided_in_f64() {
                 assert_eq!(format!("{result:?}"), format!("{reference:?}"), "the f64 result itself");
             }
             assert_eq!(gpu.left_to_cpu(), near.len(), "{name}, {wanted:e}");
+        }
+    }
+}
+
+/// Where shaders have f64 contact or not is decided on the device, to the last bits, on flat facets and on the smooth surface; none of
+/// those that are free is left to the CPU.
+#[test]
+fn contact_or_not_is_exact_on_a_device_with_f64() {
+    for (name, surface) in [
+        ("sphere.toml", ContactSurface::Facets),
+        ("sphere.toml", ContactSurface::Smooth),
+        ("mesh.toml", ContactSurface::Smooth),
+    ] {
+        let (scene, object, chain) = load(name);
+        let contact = ContactSpec { surface, ..scene.contact };
+        let model = Model::new(&object, &chain, contact);
+        let mut gpu = GpuSolver::new(context(), &model).unwrap();
+        assert_eq!(gpu.is_exact(), context().adapter().double);
+        if !gpu.is_exact() {
+            return;
+        }
+        let path = configurations(&scene, 11, 101);
+        let mut cpu = Solver::new(&model);
+        for wanted in [-1e-9, -1e-13, 1e-13, 1e-9] {
+            let near = grazing(&mut cpu, &path, wanted);
+            assert!(near.len() >= 5, "{name}: only {} configurations", near.len());
+            let before = gpu.left_to_cpu();
+            for (q, result) in near.iter().zip(gpu.solve(&near).unwrap()) {
+                let status = if wanted < 0.0 { Status::Contact } else { Status::Free };
+                assert_eq!(result.status, status, "{name}, {surface:?}, {q:?}, {wanted:e}");
+                assert!((result.gap - wanted).abs() < 1e-14, "{name}: gap {:e} for {wanted:e}", result.gap);
+            }
+            if wanted > 0.0 {
+                assert_eq!(gpu.left_to_cpu(), before, "{name}, {surface:?}, {wanted:e}");
+            }
+        }
+        // And of all that are free the gap is the CPU's.
+        let results = gpu.solve(&path).unwrap();
+        let free: Vec<_> = path.iter().zip(&results).filter(|(_, result)| result.status == Status::Free).collect();
+        assert!(free.len() >= 5, "{name}: {}", free.len());
+        for (q, result) in free {
+            let gap = cpu.gap(q);
+            assert!((result.gap - gap).abs() < 1e-14, "{name}, {surface:?}, {q:?}: {:e}, {gap:e}", result.gap);
         }
     }
 }
@@ -361,7 +405,7 @@ fn contacts_beyond_the_kernels_room_are_solved_on_the_cpu() {
     let (scene, object, chain) = load("sphere.toml");
     let configurations = configurations(&scene, 11, 131);
     for algorithm in [Algorithm::Energy, Algorithm::Paper] {
-        let model = Model::new(&object, &chain, haptize::scene::ContactSpec { algorithm, ..scene.contact });
+        let model = Model::new(&object, &chain, ContactSpec { algorithm, ..scene.contact });
         let mut cpu = Solver::new(&model);
         let mut gpu = GpuSolver::with_room(context(), &model, Room { contacts: 2, ..Room::default() }).unwrap();
         let results = gpu.solve(&configurations).unwrap();
@@ -417,7 +461,7 @@ fn a_rougher_tolerance_takes_fewer_steps_and_is_kept() {
     let (scene, object, chain) = load("sphere.toml");
     let configurations = configurations(&scene, 11, 131);
     let [fine, rough] = [1e-8, 1e-4].map(|tolerance| {
-        let model = Model::new(&object, &chain, haptize::scene::ContactSpec { tolerance, ..scene.contact });
+        let model = Model::new(&object, &chain, ContactSpec { tolerance, ..scene.contact });
         GpuSolver::new(context(), &model).unwrap().solve(&configurations).unwrap()
     });
     let steps = |results: &[Equilibrium]| results.iter().map(|result| result.iterations).sum::<u32>();
@@ -433,7 +477,7 @@ fn stiff_contact_is_as_accurate_as_soft_contact() {
     let (scene, object, chain) = load("sphere.toml");
     let configurations = configurations(&scene, 11, 131);
     for stiffness in [1e4, 3e5, f64::INFINITY] {
-        let model = Model::new(&object, &chain, haptize::scene::ContactSpec { stiffness, ..scene.contact });
+        let model = Model::new(&object, &chain, ContactSpec { stiffness, ..scene.contact });
         let mut cpu = Solver::new(&model);
         let mut gpu = GpuSolver::new(context(), &model).unwrap();
         let (mut touching, mut worst) = (0, 0.0f64);

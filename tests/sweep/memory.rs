@@ -32,8 +32,9 @@ fn a_file_takes_the_memory_stated_whatever_the_grid() {
         assert_eq!(disk.least, report.points * (2 * 8 + 29));
         peak
     };
-    let (small, large) = (peak_of([40, 50]), peak_of([400, 250]));
-    assert!(large < small + 4096, "{small} bytes for 2,000 points, {large} for 100,000");
+    // Both have chunks of full size.
+    let (small, large) = (peak_of([100, 200]), peak_of([400, 250]));
+    assert!(large < small + 4096, "{small} bytes for 20,000 points, {large} for 100,000");
 
     let in_memory = |counts: [usize; 2]| {
         let sweep = sweep_of(&scene_of(counts), "none", "");

@@ -11,7 +11,7 @@ use glam::DVec3;
 
 /// Slack of squared lower bounds in culling, relative to the square of the scene's size [1]: a squared distance between
 /// points of coordinates up to L is rounded by a few eps L^2 (eps = 2.2e-16); 64 eps covers bound and distance.
-const CULLING_SLACK: f64 = 64.0 * f64::EPSILON;
+pub const CULLING_SLACK: f64 = 64.0 * f64::EPSILON;
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug)]

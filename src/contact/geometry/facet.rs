@@ -11,11 +11,11 @@ use glam::DVec3;
 
 /// Steps of Newton's method for the closest point of a bent facet at most: from the flat triangle's closest point three
 /// or four reach rounding, and where the distance is not convex more do not help.
-const FACET_ITERATIONS: usize = 16;
+pub const FACET_ITERATIONS: usize = 16;
 
 /// Step of barycentric weights at which the search for that point ends [1]: the next step would be about its square,
 /// far below the rounding of a weight.
-const FACET_STEP: f64 = 1e-8;
+pub const FACET_STEP: f64 = 1e-8;
 
 /// A triangle of the contact surface [m].
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,191 @@
+// One facet of the contact surface: a flat triangle, or one of degree four (twins, with the formulas: src/contact/geometry/facet.rs and
+// quartic.rs). For one invocation; geometry is relative to the point in question, which is the origin.
+//
+// The stage declares SMOOTH, and `control(facet, k, x)`: control point k of a facet less x, of a flat one corner k.
+
+// Control points of the facet at hand, in the twin's order; of a flat one only the corners, in places 0, 10 and 14.
+var<private> net: array<vec3<f64>, 15>;
+
+// Directions of the weights in which a point moves over a face.
+const TOWARDS_1: vec3<f64> = vec3<f64>(-1.0, 1.0, 0.0);
+const TOWARDS_2: vec3<f64> = vec3<f64>(-1.0, 0.0, 1.0);
+
+// That in which it moves along edge k.
+fn along_edge(k: u32) -> vec3<f64> {
+    return one_hot((k + 1u) % 3u) - one_hot(k);
+}
+
+// A point with its derivatives by the weights: `slopes` by each, `bend_ij` by two of them.
+struct Jet {
+    point: vec3<f64>,
+    slopes: mat3x3<f64>,
+    bend_00: vec3<f64>,
+    bend_01: vec3<f64>,
+    bend_02: vec3<f64>,
+    bend_11: vec3<f64>,
+    bend_12: vec3<f64>,
+    bend_22: vec3<f64>,
+}
+
+fn blend(w: vec3<f64>, a: vec3<f64>, b: vec3<f64>, c: vec3<f64>) -> vec3<f64> {
+    return w.x * a + w.y * b + w.z * c;
+}
+
+// Takes `facet` for the one at hand.
+fn form(facet: u32, x: vec3<f64>) {
+    if !SMOOTH {
+        net[0] = control(facet, 0u, x);
+        net[10] = control(facet, 1u, x);
+        net[14] = control(facet, 2u, x);
+        return;
+    }
+    net[0] = control(facet, 0u, x);
+    net[1] = control(facet, 1u, x);
+    net[2] = control(facet, 2u, x);
+    net[3] = control(facet, 3u, x);
+    net[4] = control(facet, 4u, x);
+    net[5] = control(facet, 5u, x);
+    net[6] = control(facet, 6u, x);
+    net[7] = control(facet, 7u, x);
+    net[8] = control(facet, 8u, x);
+    net[9] = control(facet, 9u, x);
+    net[10] = control(facet, 10u, x);
+    net[11] = control(facet, 11u, x);
+    net[12] = control(facet, 12u, x);
+    net[13] = control(facet, 13u, x);
+    net[14] = control(facet, 14u, x);
+}
+
+// Its point at weights w, by de Casteljau's algorithm. Without loops, so that compilers keep all control points in registers.
+fn jet_at(w: vec3<f64>) -> Jet {
+    if !SMOOTH {
+        var flat = Jet();
+        flat.slopes = mat3x3<f64>(net[0], net[10], net[14]);
+        flat.point = blend(w, net[0], net[10], net[14]);
+        return flat;
+    }
+    let c0 = blend(w, net[0], net[1], net[2]);
+    let c1 = blend(w, net[1], net[3], net[4]);
+    let c2 = blend(w, net[2], net[4], net[5]);
+    let c3 = blend(w, net[3], net[6], net[7]);
+    let c4 = blend(w, net[4], net[7], net[8]);
+    let c5 = blend(w, net[5], net[8], net[9]);
+    let c6 = blend(w, net[6], net[10], net[11]);
+    let c7 = blend(w, net[7], net[11], net[12]);
+    let c8 = blend(w, net[8], net[12], net[13]);
+    let c9 = blend(w, net[9], net[13], net[14]);
+    let q0 = blend(w, c0, c1, c2);
+    let q1 = blend(w, c1, c3, c4);
+    let q2 = blend(w, c2, c4, c5);
+    let q3 = blend(w, c3, c6, c7);
+    let q4 = blend(w, c4, c7, c8);
+    let q5 = blend(w, c5, c8, c9);
+    let l0 = blend(w, q0, q1, q2);
+    let l1 = blend(w, q1, q3, q4);
+    let l2 = blend(w, q2, q4, q5);
+    return Jet(blend(w, l0, l1, l2), mat3x3<f64>(4.0 * l0, 4.0 * l1, 4.0 * l2),
+        12.0 * q0, 12.0 * q1, 12.0 * q2, 12.0 * q3, 12.0 * q4, 12.0 * q5);
+}
+
+// Derivative along d, and along d and e.
+fn tangent(jet: Jet, d: vec3<f64>) -> vec3<f64> {
+    return blend(d, jet.slopes[0], jet.slopes[1], jet.slopes[2]);
+}
+
+fn bend(jet: Jet, d: vec3<f64>, e: vec3<f64>) -> vec3<f64> {
+    return blend(e, blend(d, jet.bend_00, jet.bend_01, jet.bend_02), blend(d, jet.bend_01, jet.bend_11, jet.bend_12),
+        blend(d, jet.bend_02, jet.bend_12, jet.bend_22));
+}
+
+// Its outward unit normal; zero where it has none.
+fn normal_of(jet: Jet) -> vec3<f64> {
+    return unit_or_zero(cross(tangent(jet, TOWARDS_1), tangent(jet, TOWARDS_2)));
+}
+
+// Angle at corner k between the two edges. It is only a weight: arctangent, good to 4096 ULP in f32, is more than it needs.
+fn angle_at(jet: Jet, k: u32) -> f64 {
+    let left = unit_or_zero(tangent(jet, along_edge(k)));
+    let right = -unit_or_zero(tangent(jet, along_edge((k + 2u) % 3u)));
+    return f64(atan2(f32(length(cross(left, right))), f32(dot(left, right))));
+}
+
+// The point of the facet at hand that is closest to the origin.
+fn closest_on_facet() -> ClosestPoint {
+    let flat = closest_point(vec3<f64>(0.0), net[0], net[10], net[14]);
+    if !SMOOTH {
+        return flat;
+    }
+    let w = stationary(flat.weights);
+    if w.x >= 0.0 && w.y >= 0.0 && w.z >= 0.0 {
+        return ClosestPoint(w, FEATURE_FACE);
+    }
+    // On an edge beyond which the facet would have to go on.
+    var best = ClosestPoint(flat.weights, FEATURE_FACE);
+    var least = FAR_AWAY;
+    for (var k = 0u; k < 3u; k += 1u) {
+        if dot(w, one_hot((k + 2u) % 3u)) < 0.0 {
+            let found = closest_on_edge(k, flat.weights);
+            let point = jet_at(found.weights).point;
+            let square = dot(point, point);
+            if square < least {
+                least = square;
+                best = found;
+            }
+        }
+    }
+    return best;
+}
+
+// The weights at which the distance is least, on the facet continued beyond its edges. Far outside it stops, since Newton's method would not
+// come back.
+fn stationary(start: vec3<f64>) -> vec3<f64> {
+    var w = start;
+    for (var step_number = 0u; step_number < FACET_ITERATIONS; step_number += 1u) {
+        let jet = jet_at(w);
+        let a = tangent(jet, TOWARDS_1);
+        let b = tangent(jet, TOWARDS_2);
+        let slope = vec2<f64>(dot(jet.point, a), dot(jet.point, b));
+        let metric = vec3<f64>(dot(a, a), dot(a, b), dot(b, b));
+        let full = metric + vec3<f64>(dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_1)),
+            dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_2)), dot(jet.point, bend(jet, TOWARDS_2, TOWARDS_2)));
+        // Where the distance is not convex, the metric alone leads downhill.
+        let h = select(metric, full, full.x > 0.0 && full.x * full.z > full.y * full.y);
+        let determinant = max(h.x * h.z - h.y * h.y, LEAST_DIVISOR);
+        let step = vec2<f64>(h.y * slope.y - h.z * slope.x, h.y * slope.x - h.x * slope.y) / determinant;
+        let u = w.y + step.x;
+        let v = w.z + step.y;
+        w = vec3<f64>(1.0 - u - v, u, v);
+        if w.x < -1.0 || w.y < -1.0 || w.z < -1.0 || abs(step.x) + abs(step.y) < FACET_STEP {
+            break;
+        }
+    }
+    return w;
+}
+
+// The closest point of edge k, searched from the point of the edge that is next to `start`.
+fn closest_on_edge(k: u32, start: vec3<f64>) -> ClosestPoint {
+    let tail = one_hot(k);
+    let head = one_hot((k + 1u) % 3u);
+    let direction = head - tail;
+    let sum = dot(start, head + tail);
+    var t = select(f64(0.5), dot(start, head) / max(sum, LEAST_DIVISOR), sum > 0.0);
+    for (var step_number = 0u; step_number < FACET_ITERATIONS; step_number += 1u) {
+        let jet = jet_at((1.0 - t) * tail + t * head);
+        let along = tangent(jet, direction);
+        let metric = dot(along, along);
+        let full = metric + dot(jet.point, bend(jet, direction, direction));
+        let before = t;
+        t -= dot(jet.point, along) / max(select(metric, full, full > 0.0), LEAST_DIVISOR);
+        t = min(max(t, f64(0.0)), f64(1.0));
+        if abs(t - before) < FACET_STEP {
+            break;
+        }
+    }
+    var feature = FEATURE_EDGE + k;
+    if t == 0.0 {
+        feature = k;
+    } else if t == 1.0 {
+        feature = (k + 1u) % 3u;
+    }
+    return ClosestPoint((1.0 - t) * tail + t * head, feature);
+}
