@@ -5,7 +5,7 @@
 
 use haptize::{
     contact::Status,
-    haptize::gridize::{GridizeOptions, Interpolation, JointLabel, Samples, gridize},
+    gridize::{GridizeOptions, Interpolation, JointLabel, Samples, gridize},
 };
 use std::{path::Path, process::Command, time::Instant};
 

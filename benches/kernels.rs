@@ -10,10 +10,10 @@ use glam::DVec3;
 use haptize::{
     contact::Model,
     gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver, KernelTime},
-    haptize::{Backend, BackendChoice, Bake, sample},
     object::Object,
     proxy::Chain,
     scene::{Algorithm, GraphicsEffects, Scene, Shape},
+    sweep::{Backend, BackendChoice, Bake, sample},
 };
 use std::{
     collections::BTreeMap,

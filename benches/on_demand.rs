@@ -13,10 +13,6 @@ use haptize::{
     contact::{Model, Solver, Status},
     dataset::{Dataset, Provenance},
     device::{Device, Motion, Recorded},
-    haptize::{
-        ahead::{Ahead, Follower},
-        build_object, grid_of,
-    },
     proxy::Chain,
     render::{
         live::{Live, LiveEnds},
@@ -26,6 +22,10 @@ use haptize::{
     },
     scene::{Scene, Waypoint},
     store::{Order, Space, Store},
+    sweep::{
+        ahead::{Ahead, Follower},
+        build_object, grid_of,
+    },
 };
 use std::{path::Path, sync::Arc, time::Duration};
 

@@ -15,16 +15,16 @@ use haptize::{
     contact::{Model, Status},
     dataset::{Axis, Grid},
     field::TorqueField,
-    haptize::{
-        BackendChoice, Bake, build_object,
-        refine::{Judge, Refine},
-        sample,
-    },
     proxy::Chain,
     scene::{Interpolation, JointKind, Scene},
     store::{
         Nodes, Order, Place, Space, Store,
         record::{slope, width},
+    },
+    sweep::{
+        BackendChoice, Bake, build_object,
+        refine::{Judge, Refine},
+        sample,
     },
 };
 use std::{hint::black_box, path::Path, sync::atomic::AtomicBool, time::Instant};

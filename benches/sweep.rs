@@ -8,7 +8,6 @@ use haptize::{
     JointVector,
     contact::{Model, Proximity, Solver, Status},
     dataset::{Axis, Grid},
-    haptize::{Backend, CpuBackend, FreeSpace},
     object::Object,
     proxy::Chain,
     report::{
@@ -16,6 +15,7 @@ use haptize::{
         colour, write_both,
     },
     scene::{Algorithm, JointKind, Scene, Shape},
+    sweep::{Backend, CpuBackend, FreeSpace},
 };
 use serde_json::json;
 use std::{

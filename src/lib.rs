@@ -80,7 +80,10 @@ pub mod ros;
 pub mod dataset;
 pub use dataset::store;
 pub mod field;
-pub mod haptize;
+pub mod gridize;
+pub mod logs;
+pub mod scan;
+pub mod sweep;
 
 pub mod device;
 pub mod render;

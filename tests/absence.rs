@@ -11,11 +11,11 @@ use haptize::{
     device::{Motion, Recorded},
     field::range::HaptizedRange,
     gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver},
-    haptize::{BackendChoice, Bake},
     object::{Factor, Object},
     proxy::Chain,
     render::{coupling::Coupling, npmi, session, setup::Setup, trace::Trace},
     scene::{EFFECTS, Effect, Rendering, Scene},
+    sweep::{BackendChoice, Bake},
 };
 use std::{
     collections::{BTreeMap, BTreeSet},

@@ -9,10 +9,10 @@ use haptize::{
     contact::{Model, Proximity},
     dataset::Dataset,
     device::{LinearMap, Motion, Recorded},
-    haptize::{BackendChoice, Bake},
     proxy::Chain,
     render::{flags::Flags, session, setup::Setup},
     scene::{Rendering, Scene, Waypoint},
+    sweep::{BackendChoice, Bake},
 };
 use std::{path::Path, process::Command, sync::atomic::AtomicBool};
 

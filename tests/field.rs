@@ -11,10 +11,10 @@ use haptize::{
     contact::{Model, Solver, Status},
     dataset::{Dataset, Grid},
     field::TorqueField,
-    haptize::{BackendChoice, Bake},
     object::Object,
     proxy::Chain,
     scene::{Interpolation, Scene},
+    sweep::{BackendChoice, Bake},
 };
 use std::{path::Path, sync::atomic::AtomicBool};
 

@@ -8,10 +8,10 @@ use haptize::{
     JointVector,
     contact::Model,
     dataset::Surface,
-    haptize::Inspection,
     object::{Object, ObjectError},
     proxy::Chain,
     scene::{ElasticSpec, GroundNodes, GroundSpec, InclusionPlace, InclusionSpec, Material, ObjectSpec, Scene, Shape},
+    sweep::Inspection,
 };
 use std::fmt::Write;
 

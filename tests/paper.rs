@@ -4,15 +4,13 @@
 use haptize::{
     dataset::Dataset,
     device::Motion,
-    haptize::{
-        BackendChoice, Bake, SweepReport,
-        gridize::{GridizeOptions, Interpolation, gridize},
-        scan::{LogHeader, LogWriter, Plan, Rig, ScanLog, Session, labels, simulated::SimulatedRig},
-    },
+    gridize::{GridizeOptions, Interpolation, gridize},
     proxy::Chain,
     render::{session, setup::Setup, trace::Trace},
     report::paper::{Comparison, Row, Scanned, Scans, Sphere, Value, procedure, specimen},
+    scan::{LogHeader, LogWriter, Plan, Rig, ScanLog, Session, labels, simulated::SimulatedRig},
     scene::{Algorithm, PlanSpec, ScanScene, Scene, Waypoint},
+    sweep::{BackendChoice, Bake, SweepReport},
 };
 use std::sync::atomic::AtomicBool;
 

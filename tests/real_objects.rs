@@ -6,17 +6,15 @@ use glam::DVec3;
 use haptize::{
     dataset::Dataset,
     device::Motion,
-    haptize::{
-        gridize::{GridizeOptions, Interpolation, gridize},
-        import::{Imported, Keep, Mapping, import},
-        scan::{LogHeader, LogWriter, Plan, Rig, ScanLog, Session, labels, simulated::SimulatedRig},
-    },
+    gridize::{GridizeOptions, Interpolation, gridize},
+    logs::{Imported, Keep, Mapping, import},
     proxy::Chain,
     render::{session, setup::Setup, trace::Trace},
     report::{
         force::EndForce,
         prediction::{held_out, predict},
     },
+    scan::{LogHeader, LogWriter, Plan, Rig, ScanLog, Session, labels, simulated::SimulatedRig},
     scene::{PlanSpec, ScanScene, Waypoint, WorkspacePlan},
 };
 use std::{path::PathBuf, sync::atomic::AtomicBool};

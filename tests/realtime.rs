@@ -15,11 +15,6 @@ use haptize::{
     dataset::{Dataset, Provenance},
     device::{Device, HandError, Motion, Pointer, SimulatedHand},
     field::TorqueField,
-    haptize::{
-        BackendChoice, Bake,
-        ahead::{Ahead, Follower},
-        build_object, grid_of,
-    },
     proxy::Chain,
     render::{
         flags::Fault,
@@ -36,6 +31,11 @@ use haptize::{
         Interpolation, ProxyInertia, Scene, Waypoint,
     },
     store::{Order, Space, Store},
+    sweep::{
+        BackendChoice, Bake,
+        ahead::{Ahead, Follower},
+        build_object, grid_of,
+    },
 };
 use std::{
     sync::{Arc, atomic::AtomicBool},

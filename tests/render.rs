@@ -14,7 +14,6 @@ use haptize::{
     dataset::{Contacts, Dataset},
     device::{Applied, Device, Motion, Reading, Recorded, SimulatedHand},
     field::{TorqueField, range::HaptizedRange},
-    haptize::{BackendChoice, Bake},
     object::Object,
     proxy::Chain,
     render::{
@@ -32,6 +31,7 @@ use haptize::{
         GraphicsEffects, GraphicsSpec, GroundNodes, GroundSpec, HapticsSpec, Material, ObjectSpec, Scene, Shape,
         SpringKind, SpringSpec, Waypoint,
     },
+    sweep::{BackendChoice, Bake},
 };
 use std::sync::atomic::AtomicBool;
 use synthetic::{grid, half_space};

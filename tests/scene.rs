@@ -128,7 +128,7 @@ fn the_organ_is_a_smooth_soft_body_under_six_joints() {
     let scene = shipped("organ.toml");
     assert_eq!(scene.proxy.joints.len(), 6);
     assert_eq!(scene.contact.surface, ContactSurface::Smooth);
-    let object = haptize::haptize::build_object(&scene).unwrap();
+    let object = haptize::sweep::build_object(&scene).unwrap();
     assert_eq!((object.surface_nodes, object.triangles.len()), (1002, 2000));
     assert!(object.skin.is_some());
     // The arm is that of the Touch up to its wrist.

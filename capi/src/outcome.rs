@@ -1,6 +1,6 @@
 //! How a call ended: a code, and where there is more to say a message in the caller's buffer.
 
-use haptize::{dataset, haptize::BakeError, render::setup::SetupError, scene::SceneError};
+use haptize::{dataset, render::setup::SetupError, scene::SceneError, sweep::BakeError};
 use std::{
     ffi::{CStr, c_char},
     io::{Cursor, Write},

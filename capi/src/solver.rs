@@ -8,8 +8,8 @@ use crate::{
 use haptize::{
     JointVector,
     contact::{Solver, Status},
-    haptize::Direct,
     scene::Scene,
+    sweep::Direct,
 };
 use std::ffi::c_char;
 

@@ -6,7 +6,7 @@ mod common;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use common::{Files, PRESSED};
-use haptize::{dataset::Dataset, haptize::Direct, render::setup, scene::Scene};
+use haptize::{dataset::Dataset, render::setup, scene::Scene, sweep::Direct};
 use haptize_capi::*;
 use std::{
     ffi::{CStr, CString, c_char},

@@ -6,7 +6,7 @@
 mod common;
 
 use common::{Files, PRESSED};
-use haptize::{dataset::Dataset, haptize::Direct, render::setup, scene::Scene};
+use haptize::{dataset::Dataset, render::setup, scene::Scene, sweep::Direct};
 use std::{
     path::{Path, PathBuf},
     process::{Command, Output},

@@ -3,7 +3,7 @@
 use crate::{dataset::Dataset, errors, scene::Scene};
 use haptize::{
     dataset,
-    haptize::{BackendChoice, Bake, Progress},
+    sweep::{BackendChoice, Bake, Progress},
 };
 use pyo3::{exceptions::PyValueError, prelude::*};
 use std::{

@@ -5,7 +5,7 @@ use crate::{
     errors,
     scene::Scene,
 };
-use haptize::haptize::{Direct, Inspection};
+use haptize::sweep::{Direct, Inspection};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 

@@ -3,9 +3,10 @@
 use haptize::{
     dataset,
     field::BatchError,
-    haptize::{BakeError as BakeFailure, DirectError, gridize::GridizeError as GridizeFailure},
+    gridize::GridizeError as GridizeFailure,
     render::setup::SetupError,
     scene::SceneError as SceneFailure,
+    sweep::{BakeError as BakeFailure, DirectError},
 };
 use pyo3::{
     create_exception,

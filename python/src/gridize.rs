@@ -1,7 +1,7 @@
 //! Scattered measurements put on a grid.
 
 use crate::{arrays, dataset::Dataset, errors};
-use haptize::haptize::gridize::{self as library, GridizeOptions, Interpolation, JointLabel, Samples};
+use haptize::gridize::{self as library, GridizeOptions, Interpolation, JointLabel, Samples};
 use pyo3::{exceptions::PyValueError, prelude::*};
 use std::time::SystemTime;
 

@@ -2,9 +2,9 @@
 
 use super::{Failure, Report, output::Folder, reach, tell};
 use crate::{
-    haptize::BackendChoice,
     scene::Scene,
     studies::accuracy::{self, Extent},
+    sweep::BackendChoice,
 };
 use serde_json::Value;
 use std::path::PathBuf;

@@ -10,11 +10,11 @@ use super::{
     tell,
 };
 use crate::{
-    haptize::{
-        Aim, BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, Shard, Sweep, SweepReport,
-    },
     scene::{Algorithm, Scene},
     store::space::MAX_LEVELS,
+    sweep::{
+        Aim, BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, Shard, Sweep, SweepReport,
+    },
 };
 use std::{
     fmt::{self, Write},

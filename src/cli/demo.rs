@@ -5,7 +5,7 @@
 //! clock, which shows what a tick costs on this one and how punctual it is.
 
 use super::{Failure, Report, bake, output::Folder, play, tell};
-use crate::{dataset::Dataset, haptize::BackendChoice, render::setup::Setup, report, scene::Scene};
+use crate::{dataset::Dataset, render::setup::Setup, report, scene::Scene, sweep::BackendChoice};
 use std::{
     fmt::Write,
     path::{Path, PathBuf},

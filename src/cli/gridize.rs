@@ -8,11 +8,8 @@ use super::{
 use crate::{
     MAX_JOINTS,
     dataset::Dataset,
-    haptize::{
-        gridize::{GridizeOptions, GridizeReport, Interpolation, Samples, gridize},
-        import::{ImportProgress, ImportReport, Imported, Mapping, import, total_size},
-        scan::{RowStatus, ScanLog},
-    },
+    gridize::{GridizeOptions, GridizeReport, Interpolation, Samples, gridize},
+    logs::{ImportProgress, ImportReport, Imported, Mapping, import, total_size},
     report::{
         self,
         gridized::gridized,
@@ -20,6 +17,7 @@ use crate::{
         prediction::{Prediction, held_out, predict},
     },
     ros::{JointStateTable, is_mcap},
+    scan::{RowStatus, ScanLog},
     scene::{Rendering, ScanScene},
 };
 use std::{

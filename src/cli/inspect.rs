@@ -6,10 +6,10 @@ use crate::{
     contact::Model,
     dataset::{self, Dataset},
     field::TorqueField,
-    haptize::{Inspection, build_object},
     object::Object,
     proxy::{Chain, Joint},
     scene::{Algorithm, GridSpec, JointKind, Scene},
+    sweep::{Inspection, build_object},
     tolerances::GRID_STEP_SLACK,
 };
 use clap::ValueEnum;

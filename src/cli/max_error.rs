@@ -2,8 +2,8 @@
 
 use super::{Failure, Report, bake, tell};
 use crate::{
-    haptize::{Aim, BackendChoice, Bake, Choice, Pilot, PilotError},
     scene::Scene,
+    sweep::{Aim, BackendChoice, Bake, Choice, Pilot, PilotError},
 };
 use std::{fmt::Write, path::Path};
 

@@ -7,7 +7,7 @@ use super::{
     output::{self, Kind},
     tell,
 };
-use crate::haptize::{Merge, MergeError, Merged, Progress, Sweep, ranges};
+use crate::sweep::{Merge, MergeError, Merged, Progress, Sweep, ranges};
 use std::{
     fmt::Write,
     path::{Path, PathBuf},

@@ -54,7 +54,7 @@ mod view;
 
 pub use memory::Remembering;
 
-use crate::haptize::{OTHER_ADAPTER, remedied};
+use crate::sweep::{OTHER_ADAPTER, remedied};
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::{
     error::Error,

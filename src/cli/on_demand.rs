@@ -6,11 +6,6 @@ use crate::{
     contact::Model,
     dataset::{Dataset, Grid, Provenance, Surface},
     device::Device,
-    haptize::{
-        CpuBackend,
-        ahead::{Ahead, Solved, follow},
-        build_object, grid_of, sample,
-    },
     object::Object,
     proxy::Chain,
     render::{
@@ -21,6 +16,11 @@ use crate::{
     },
     scene::{Interpolation, Scene},
     store::{Order, Space, Store, space::MAX_LEVELS},
+    sweep::{
+        CpuBackend,
+        ahead::{Ahead, Solved, follow},
+        build_object, grid_of, sample,
+    },
 };
 use serde_json::json;
 use std::{

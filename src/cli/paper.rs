@@ -12,11 +12,7 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, replace_file},
-    haptize::{
-        BackendChoice,
-        gridize::{GridizeOptions, Interpolation},
-        scan::{ScanLog, ScanProgress},
-    },
+    gridize::{GridizeOptions, Interpolation},
     render::{setup::Setup, trace::Trace},
     report::{
         self,
@@ -29,7 +25,9 @@ use crate::{
         slices::slices,
         space::space,
     },
+    scan::{ScanLog, ScanProgress},
     scene::{ScanScene, Scene},
+    sweep::BackendChoice,
 };
 use std::{
     fmt::Write as _,

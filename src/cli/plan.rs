@@ -2,8 +2,8 @@
 
 use super::{Failure, Report, bake, interrupt};
 use crate::{
-    haptize::{BackendChoice, Plan},
     scene::Scene,
+    sweep::{BackendChoice, Plan},
 };
 use std::{
     fmt::{self, Write},

@@ -7,8 +7,8 @@ use super::{
 };
 use crate::{
     dataset::replace_file,
-    haptize::{Aim, BackendChoice, Cost, JointReach, Pilot, PilotError, Reach, ReachError},
     scene::Scene,
+    sweep::{Aim, BackendChoice, Cost, JointReach, Pilot, PilotError, Reach, ReachError},
 };
 use std::{
     fmt::{self, Write},

@@ -4,14 +4,14 @@ use super::{Failure, Report, bake::megabytes, tell};
 use crate::{
     contact::Model,
     dataset::{Dataset, Provenance, Surface},
-    haptize::{
+    proxy::Chain,
+    scene::Scene,
+    store::Order,
+    sweep::{
         Aim, CpuBackend, build_object, grid_of,
         refine::{Judge, Refine},
         sample,
     },
-    proxy::Chain,
-    scene::Scene,
-    store::Order,
 };
 use std::{
     fmt::Write,

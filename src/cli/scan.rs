@@ -12,11 +12,11 @@ use crate::{
     JointVector,
     dataset::replace_file,
     device::{Address, DeviceRig, Guard, Key, Kind as DeviceKind, attach_joints, open},
-    haptize::scan::{
+    proxy::Chain,
+    scan::{
         LogHeader, LogWriter, Plan, Rig, ScanProgress, ScanReport, ScanRow, Session, Trajectory, labels,
         simulated::{Hand, SimulatedRig},
     },
-    proxy::Chain,
     scene::ScanScene,
 };
 use std::{

@@ -1,7 +1,7 @@
 //! `--shard`: which shard of a bake this process solves, by a number or by what the job scheduler has put into the environment.
 
 use super::Failure;
-use crate::haptize::Shard;
+use crate::sweep::Shard;
 use std::str::FromStr;
 
 /// How a scheduler passes a task its number.

@@ -3,8 +3,8 @@
 use super::{Failure, Report, bar::Bar, output::Folder};
 use crate::{
     gpu::{AdapterChoice, Context},
-    haptize::{OTHER_ADAPTER, remedied},
     studies::stability::{Bound, Case, CaseResult, Effort, FILES, Setting, cases, table, write_all},
+    sweep::{OTHER_ADAPTER, remedied},
 };
 use std::{path::PathBuf, sync::Arc, time::Instant};
 

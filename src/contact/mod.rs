@@ -8,6 +8,7 @@
 use crate::{JointMatrix, JointVector};
 use glam::DVec3;
 
+mod backend;
 pub(crate) mod detection;
 pub(crate) mod equilibrium;
 pub(crate) mod geometry;
@@ -20,6 +21,7 @@ mod reach;
 mod solver;
 mod solvers;
 
+pub use backend::Backend;
 pub use mesh_ripple::MeshRipple;
 pub use model::{Model, MotionBound};
 pub use proximity::Proximity;

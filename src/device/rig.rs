@@ -7,7 +7,7 @@
 use super::{Applied, Clamps, Device, JointDevice, Key};
 use crate::{
     JointVector,
-    haptize::scan::{Rig, RigError, RigReading},
+    scan::{Rig, RigError, RigReading},
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 

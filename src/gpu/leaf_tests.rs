@@ -11,14 +11,16 @@ use super::{
     solver::GpuSolver,
 };
 use crate::{
+    contact::Backend,
     contact::{
         Model, Solver, Status,
-        geometry::closest_point::{Feature, closest_point, point_at},
-        geometry::facet::Facet,
-        geometry::normals::{area_vector, unit_or_zero},
+        geometry::{
+            closest_point::{Feature, closest_point, point_at},
+            facet::Facet,
+            normals::{area_vector, unit_or_zero},
+        },
         law::depth::{Carriers, Contact, measure},
     },
-    haptize::Backend,
     object::Object,
     proxy::Chain,
     random::sequence,

@@ -16,8 +16,7 @@ use super::{
 };
 use crate::{
     JointVector,
-    contact::{self, Equilibrium, Solvers, Status},
-    haptize::Backend,
+    contact::{self, Backend, Equilibrium, Solvers, Status},
     scene::Algorithm,
     tolerances::GPU_RESOLVED_RESIDUAL,
 };

@@ -133,10 +133,10 @@ mod tests {
     use crate::{
         contact::Model,
         gpu::{AdapterChoice, FrameMethod, FrameUpdate, GpuSolver, Room},
-        haptize::{Backend, sample},
         object::Object,
         proxy::Chain,
         scene::{GraphicsEffects, Scene},
+        sweep::{Backend, sample},
     };
     use glam::DVec3;
     use std::{sync::Arc, time::Instant};

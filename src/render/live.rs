@@ -14,8 +14,8 @@ use crate::{
     JointVector,
     contact::Status,
     field::{Flags, Sample, TorqueField},
-    haptize::ahead::{Solution, Whereabouts},
     store::{Store, space::MAX_LEVELS},
+    sweep::ahead::{Solution, Whereabouts},
 };
 use serde::Serialize;
 

@@ -12,7 +12,7 @@ use super::{
     press::{subscript, torque_unit},
     ticks,
 };
-use crate::{contact::Status, dataset::Dataset, haptize::gridize::Samples};
+use crate::{contact::Status, dataset::Dataset, gridize::Samples};
 use std::collections::BTreeMap;
 
 const WIDTH: f64 = 860.0;

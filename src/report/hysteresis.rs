@@ -8,7 +8,7 @@ use super::{
     press::{subscript, torque_unit},
     ticks,
 };
-use crate::haptize::gridize::Samples;
+use crate::gridize::Samples;
 
 const WIDTH: f64 = 760.0;
 const LANE: f64 = 210.0;

@@ -10,9 +10,9 @@ use crate::{
     contact::Model,
     dataset::{Dataset, Surface},
     gpu::{AdapterChoice, AdapterSummary, Context, GpuError, GpuSolver},
-    haptize::{BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, build_object, remedied, sample},
     proxy::Chain,
     scene::Scene,
+    sweep::{BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, build_object, remedied, sample},
 };
 use std::{
     error::Error,

@@ -4,13 +4,13 @@ use crate::{
     JointVector,
     dataset::Dataset,
     device::Motion,
-    haptize::SweepReport,
     render::{
         graphics::ContactForces,
         haptic::Haptics,
         setup::{Setup, SetupError},
     },
     scene::{HapticsSpec, Scene, Tuning},
+    sweep::SweepReport,
 };
 use std::{path::PathBuf, sync::Arc};
 

@@ -64,8 +64,8 @@ pub use window::open;
 
 use crate::{
     gpu::{ADAPTER_VARIABLE, FrameError, GpuError},
-    haptize::{OTHER_ADAPTER, remedied},
     memory,
+    sweep::{OTHER_ADAPTER, remedied},
 };
 
 /// The viewer cannot go on.

@@ -154,8 +154,8 @@ mod tests {
     use super::*;
     use crate::{
         gpu::AdapterChoice,
-        haptize::{BackendChoice, Bake},
         scene::{Interpolation, Scene},
+        sweep::{BackendChoice, Bake},
     };
     use std::sync::{atomic::AtomicBool, mpsc};
 

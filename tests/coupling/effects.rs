@@ -6,11 +6,11 @@ use haptize::{
     JointVector,
     contact::Model,
     dataset::Dataset,
-    haptize::{BackendChoice, ChosenBackend, Run, Sweep},
     object::Object,
     proxy::Chain,
     render::{accounts::Accounts, effects::Contacts, haptic::Inputs, setup::Setup},
     scene::{Rendering, ScanScene, Scene},
+    sweep::{BackendChoice, ChosenBackend, Run, Sweep},
 };
 use std::sync::atomic::AtomicBool;
 

@@ -2,12 +2,10 @@
 
 use crate::program::FINGER;
 use haptize::{
-    haptize::{
-        import::{ImportError, Mapping, import},
-        scan::{Plan, Trajectory, labels},
-    },
+    logs::{ImportError, Mapping, import},
     proxy::Chain,
     ros::{JointState, JointStateTable, JointStateWriter, RosError, is_mcap, topics},
+    scan::{Plan, Trajectory, labels},
     scene::ScanScene,
 };
 use std::{

@@ -7,11 +7,11 @@ use haptize::{
         Applied, Coordinates, Device, DeviceRig, Failure, Guard, JointDevice, Limits, LinearMap, Reading, Script,
         Simulated, Watchdog,
     },
-    haptize::scan::{
+    proxy::Chain,
+    scan::{
         LogHeader, LogWriter, Plan, Rig, RowStatus, ScanError, ScanLog, ScanRow, Session, labels,
         simulated::SimulatedRig,
     },
-    proxy::Chain,
     scene::{PlanAxis, PlanSpec, ScanScene},
 };
 use std::{path::Path, sync::atomic::AtomicBool};

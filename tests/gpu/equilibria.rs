@@ -6,10 +6,10 @@ use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Solver, Status, Touch},
     gpu::{GpuError, GpuSolver, Room},
-    haptize::Backend,
     object::{Compliance, Object},
     proxy::Chain,
     scene::{Algorithm, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
+    sweep::Backend,
     tolerances::GPU_SETTLED_RESIDUAL,
 };
 

@@ -7,10 +7,6 @@ use haptize::{
     contact::{Model, Solver, Status},
     dataset::{Dataset, Provenance, Surface},
     device::Motion,
-    haptize::{
-        ahead::{Ahead, Follower, Whereabouts},
-        build_object, grid_of,
-    },
     object::Object,
     proxy::Chain,
     render::{
@@ -20,6 +16,10 @@ use haptize::{
     },
     scene::{Scene, Waypoint},
     store::{Order, Space, Store},
+    sweep::{
+        ahead::{Ahead, Follower, Whereabouts},
+        build_object, grid_of,
+    },
 };
 use std::{sync::Arc, thread};
 

@@ -4,13 +4,13 @@ use haptize::{
     JointVector,
     contact::{Model, Status},
     dataset::{Axis, Grid},
-    haptize::{
-        build_object,
-        refine::{Judge, Refine, Refined},
-    },
     proxy::Chain,
     scene::Scene,
     store::{Order, record::width},
+    sweep::{
+        build_object,
+        refine::{Judge, Refine, Refined},
+    },
 };
 
 /// A ball of 6 mm on two joints and a slide, pressed some 8 mm into a sphere with a skin: so deep it has one equilibrium. No node lies on a

@@ -6,10 +6,10 @@ use haptize::{
     JointVector,
     contact::{Model, Solver, Status},
     dataset::Dataset,
-    haptize::{CpuBackend, Sweep},
     object::Object,
     proxy::Chain,
     scene::Scene,
+    sweep::{CpuBackend, Sweep},
 };
 
 /// Largest entry of the difference over the largest entry of `expected`.

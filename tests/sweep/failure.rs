@@ -4,9 +4,9 @@ use crate::fixture::{Folder, MadeUp, POINTS, answer, bake, scene, sweep, uninter
 use haptize::{
     contact::{Model, Solver},
     dataset::Dataset,
-    haptize::{Run, SweepError, WithFallback},
     object::Object,
     proxy::Chain,
+    sweep::{Run, SweepError, WithFallback},
 };
 use std::sync::atomic::AtomicBool;
 
@@ -84,7 +84,7 @@ fn what_is_left_to_the_cpu_is_told() {
 fn a_dataset_that_cannot_be_put_in_place_stays_in_its_part() {
     let whole = uninterrupted();
     let folder = Folder::new();
-    let mut progress = |progress: haptize::haptize::Progress| {
+    let mut progress = |progress: haptize::sweep::Progress| {
         if progress.done == POINTS {
             std::fs::create_dir(folder.output()).unwrap();
         }

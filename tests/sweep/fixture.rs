@@ -4,9 +4,9 @@ use glam::DVec3;
 use haptize::{
     JointVector,
     contact::{Equilibrium, NodeForce, Status},
-    haptize::{Backend, Progress, Run, Sweep, SweepError, SweepReport},
     object::Object,
     scene::Scene,
+    sweep::{Backend, Progress, Run, Sweep, SweepError, SweepReport},
 };
 use std::{
     alloc::{GlobalAlloc, Layout, System},

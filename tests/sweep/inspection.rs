@@ -7,9 +7,9 @@ use crate::{
 use glam::DVec3;
 use haptize::{
     contact::Model,
-    haptize::{CpuBackend, Direct, Inspection, Run},
     object::Object,
     proxy::Chain,
+    sweep::{CpuBackend, Direct, Inspection, Run},
 };
 use std::sync::atomic::AtomicBool;
 

@@ -4,10 +4,10 @@ use crate::fixture::Folder;
 use haptize::{
     contact::{Model, Status},
     dataset::Dataset,
-    haptize::{CpuBackend, Lowered, Run, Sweep, SweepError, SweepReport},
     object::Object,
     proxy::Chain,
     scene::Scene,
+    sweep::{CpuBackend, Lowered, Run, Sweep, SweepError, SweepReport},
 };
 use std::{
     path::Path,
@@ -79,7 +79,7 @@ impl World {
     fn bake(&self, output: &Path, chunk: usize, resume: bool, stops: bool) -> Result<SweepReport, SweepError> {
         self.with(true, |sweep, model| {
             let stop = AtomicBool::new(false);
-            let mut progress = |progress: haptize::haptize::Progress| {
+            let mut progress = |progress: haptize::sweep::Progress| {
                 stop.store(stops && progress.done == progress.points, Ordering::Relaxed);
             };
             let run = Run { chunk, stop: &stop, progress: &mut progress };

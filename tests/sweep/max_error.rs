@@ -4,10 +4,10 @@ use crate::fixture::{Folder, SCENE};
 use haptize::{
     dataset::Dataset,
     field::TorqueField,
-    haptize::{Aim, Backend, BackendChoice, CpuBackend, Pilot, PilotError},
     object::Object,
     proxy::Chain,
     scene::Scene,
+    sweep::{Aim, Backend, BackendChoice, CpuBackend, Pilot, PilotError},
 };
 use serde_json::Value;
 use std::{path::Path, process::Output, sync::atomic::AtomicBool};
@@ -117,7 +117,7 @@ fn an_aim_that_was_missed_is_told_and_kept_in_the_file() {
     let choice = pilot.choose(&scene, usize::MAX, BackendChoice::Cpu).unwrap();
     assert!(pilot.prospects.iter().all(|prospect| prospect.points >= pilot.prospects[0].points));
     assert!(matches!(pilot.choose(&scene, 10, BackendChoice::Cpu), Err(PilotError::OutOfReach(_))));
-    let bake = haptize::haptize::Bake {
+    let bake = haptize::sweep::Bake {
         scene: &choice.scene,
         backend: BackendChoice::Cpu,
         measured: None,

@@ -2,8 +2,8 @@
 
 use crate::fixture::{Folder, MadeUp, POINTS, SCENE, bake, peak, scene, sweep, sweep_of};
 use haptize::{
-    haptize::{Run, SweepError},
     scene::Scene,
+    sweep::{Run, SweepError},
 };
 use std::sync::atomic::AtomicBool;
 
@@ -47,7 +47,7 @@ fn a_file_takes_the_memory_stated_whatever_the_grid() {
 #[test]
 fn the_memory_stated_is_the_memory_of_the_columns() {
     let mut stated = None;
-    let mut progress = |progress: haptize::haptize::Progress| stated = Some(progress.footprint);
+    let mut progress = |progress: haptize::sweep::Progress| stated = Some(progress.footprint);
     let run = Run { chunk: 10, stop: &AtomicBool::new(false), progress: &mut progress };
     let sweep = sweep();
     let (dataset, report) = sweep.run(&mut MadeUp::default(), run).unwrap();

@@ -1,8 +1,8 @@
 //! Where contact is, against what the geometry says.
 
 use haptize::{
-    haptize::{Reach, ReachError},
     scene::Scene,
+    sweep::{Reach, ReachError},
 };
 use std::sync::atomic::AtomicBool;
 

@@ -6,10 +6,10 @@ use haptize::{
     JointVector,
     contact::{Equilibrium, Model, NodeForce, Status},
     dataset::Dataset,
-    haptize::{CpuBackend, FreeSpace, Run, Sweep},
     object::Object,
     proxy::Chain,
     scene::Scene,
+    sweep::{CpuBackend, FreeSpace, Run, Sweep},
 };
 use std::sync::atomic::AtomicBool;
 

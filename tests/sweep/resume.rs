@@ -2,9 +2,9 @@
 
 use crate::fixture::{Folder, MadeUp, POINTS, SCENE, bake, scene, stopped_after, sweep, sweep_of, uninterrupted};
 use haptize::{
-    haptize::{Run, Sweep, SweepError},
     object::Object,
     scene::Scene,
+    sweep::{Run, Sweep, SweepError},
 };
 use std::sync::atomic::AtomicBool;
 

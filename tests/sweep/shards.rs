@@ -6,11 +6,11 @@ use crate::{
 };
 use haptize::{
     dataset::Dataset,
-    haptize::{
+    scene::Scene,
+    sweep::{
         BackendChoice, Bake, BakeError, Lowered, Merge, MergeError, Plan, Progress, Run, Shard, Sweep, SweepError,
         SweepReport,
     },
-    scene::Scene,
 };
 use std::{
     fs,

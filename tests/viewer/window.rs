@@ -9,8 +9,8 @@ use egui_kittest::{
 use haptize::{
     dataset::Dataset,
     gpu::{AdapterChoice, Context},
-    haptize::{BackendChoice, Bake},
     scene::Scene,
+    sweep::{BackendChoice, Bake},
     viewer::{self, DeviceChoice, Start, TickSource, Viewer},
 };
 use std::{

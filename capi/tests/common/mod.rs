@@ -1,8 +1,8 @@
 //! A small scene and its dataset, in a folder of their own.
 
 use haptize::{
-    haptize::{BackendChoice, Bake},
     scene::Scene,
+    sweep::{BackendChoice, Bake},
 };
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 

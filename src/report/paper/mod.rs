@@ -15,7 +15,7 @@ pub use specimen::specimen;
 
 use crate::{
     dataset::Dataset,
-    haptize::gridize::Samples,
+    gridize::Samples,
     proxy::Chain,
     render::trace::Trace,
     scene::{ScanScene, Scene},

@@ -1,7 +1,7 @@
 //! For a given error: which spacing and interpolation, and what it costs.
 
 use super::{Accuracy, Row, Study};
-use crate::{haptize::spacing::order, scene::Interpolation, tolerances::FARTHEST_EXTRAPOLATION};
+use crate::{scene::Interpolation, sweep::spacing::order, tolerances::FARTHEST_EXTRAPOLATION};
 use serde::Serialize;
 
 /// Errors that are asked for, relative to the rms of the torque [1].

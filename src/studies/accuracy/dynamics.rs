@@ -11,10 +11,10 @@ use super::{Accuracy, AccuracyError, Cost, Row, Study, timed};
 use crate::{
     dataset::Dataset,
     gpu::{AdapterChoice, Context, FrameError, FrameMethod, FrameUpdate},
-    haptize::{OTHER_ADAPTER, remedied},
     object::Object,
     render::graphics::{ContactForces, ObjectMotion},
     scene::{GraphicsEffects, Scene},
+    sweep::{OTHER_ADAPTER, remedied},
 };
 use glam::DVec3;
 use std::sync::Arc;

@@ -5,12 +5,12 @@ use crate::{
     JointVector,
     dataset::Dataset,
     field::{FieldError, TorqueField},
-    haptize::{
+    scene::{Interpolation, Scene},
+    sweep::{
         Bake, SweepReport,
         reference::Reference,
         spacing::{points, spaced, spacing_of},
     },
-    scene::{Interpolation, Scene},
 };
 use std::{hint::black_box, sync::atomic::AtomicBool};
 

@@ -25,13 +25,13 @@ use crate::{
     device::MotionError,
     field::FieldError,
     gpu::FrameError,
-    haptize::{
-        BackendChoice, BackendError, BakeError, ReferenceError, build_object, reference::Reference, sample, spacing,
-    },
     object::ObjectError,
     proxy::Chain,
     render::{graphics::GraphicsError, session::SessionError, setup::SetupError},
     scene::{JointKind, Scene, SceneError},
+    sweep::{
+        BackendChoice, BackendError, BakeError, ReferenceError, build_object, reference::Reference, sample, spacing,
+    },
 };
 use serde::Serialize;
 use std::time::Instant;

@@ -11,10 +11,10 @@
 use super::{Accuracy, AccuracyError, Cost, Row, Study, timed};
 use crate::{
     contact::{Equilibrium, Model},
-    haptize::{Backend, CpuBackend, reference::Reference},
     object::Object,
     proxy::Chain,
     scene::{Scene, Shape, SkinSpec},
+    sweep::{Backend, CpuBackend, reference::Reference},
 };
 use toml::{Table, Value};
 
@@ -81,7 +81,7 @@ fn compare(
     for Variant { scene, factor, .. } in variants {
         let (object, chain) = (Object::build(&scene.object)?, Chain::new(&scene.proxy));
         let model = Model::reaching(&object, &chain, scene.contact, &reference.places)?;
-        let mut backend = CpuBackend::new(&model, 0).map_err(crate::haptize::BackendError::from)?;
+        let mut backend = CpuBackend::new(&model, 0).map_err(crate::sweep::BackendError::from)?;
         let (cost, solved) =
             timed(study.rounds, || backend.solve(&reference.places)).unwrap_or_else(|never| match never {});
         let value = if varied == Study::Mesh { model.surface.mean_edge } else { *factor };

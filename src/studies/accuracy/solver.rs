@@ -4,12 +4,12 @@ use super::{Accuracy, AccuracyError, Cost, Row, Study, timed};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},
-    haptize::{
+    scene::{Algorithm, ContactSpec, Scene},
+    sweep::{
         Backend, BackendChoice, ChosenBackend, OTHER_ADAPTER,
         reference::{Reference, equilibria},
         remedied,
     },
-    scene::{Algorithm, ContactSpec, Scene},
 };
 
 /// Relative residuals that are asked for.

@@ -7,7 +7,7 @@ use super::{Bound, Case, CaseResult, Effort, Failure, Setting};
 use crate::{
     contact::Status,
     dataset::Dataset,
-    haptize::gridize::{GridizeOptions, Interpolation, JointLabel, Samples, gridize},
+    gridize::{GridizeOptions, Interpolation, JointLabel, Samples, gridize},
 };
 use std::f64::consts::{PI, TAU};
 

@@ -9,7 +9,6 @@ use crate::{
     dataset::Dataset,
     device::{Motion, Recorded},
     gpu::{AdapterChoice, Context, FrameCost, FrameError, FrameMethod, FrameUpdate},
-    haptize::{OTHER_ADAPTER, remedied},
     render::{
         graphics::{ContactForces, Graphics, Smoothing},
         session::{self, Driver, SessionError},
@@ -17,6 +16,7 @@ use crate::{
         trace::Trace,
     },
     scene::{EFFECTS, Effect, Scene, Waypoint},
+    sweep::{OTHER_ADAPTER, remedied},
 };
 use glam::DVec3;
 use std::{collections::BTreeSet, sync::Arc, time::Instant};

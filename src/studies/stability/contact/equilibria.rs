@@ -10,11 +10,11 @@ use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Solver, Status},
-    haptize::Sweep,
     object::Object,
     proxy::Chain,
     random::Random,
     scene::Scene,
+    sweep::Sweep,
 };
 use rayon::prelude::*;
 

@@ -5,7 +5,7 @@ use crate::{
     JointVector,
     contact::{Equilibrium, Model, Solver},
     gpu::{Context, GpuError, GpuSolver},
-    haptize::Backend,
+    sweep::Backend,
 };
 use rayon::prelude::*;
 use std::sync::Arc;

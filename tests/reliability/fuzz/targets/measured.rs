@@ -2,12 +2,10 @@
 
 use super::{Random, Target, mutate, outcome, shipped, write};
 use haptize::{
-    haptize::{
-        gridize::{GridizeOptions, Interpolation, Samples, gridize},
-        import::{Mapping, import},
-        scan::ScanLog,
-    },
+    gridize::{GridizeOptions, Interpolation, Samples, gridize},
+    logs::{Mapping, import},
     ros::{JointState, JointStateTable, topics},
+    scan::ScanLog,
 };
 use std::{collections::BTreeMap, path::Path};
 

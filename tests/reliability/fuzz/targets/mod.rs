@@ -15,7 +15,6 @@ use crate::program;
 use haptize::{
     dataset::Dataset,
     device::Motion,
-    haptize::{BackendChoice, Bake},
     object::Object,
     proxy::Chain,
     render::{
@@ -24,6 +23,7 @@ use haptize::{
         setup::{Setup, labels},
     },
     scene::{Rendering, ScanScene, Scene, Shape},
+    sweep::{BackendChoice, Bake},
 };
 use std::{
     path::Path,
@@ -195,7 +195,7 @@ pub const SCENES: Target = Target {
         };
         let chain = Chain::new(&scene.proxy);
         let mut pose = chain.new_pose();
-        haptize::haptize::sample(&scene).iter().take(4).for_each(|q| chain.pose(q, &mut pose));
+        haptize::sweep::sample(&scene).iter().take(4).for_each(|q| chain.pose(q, &mut pose));
         for waypoints in [&scene.motion.press, &scene.motion.scrape] {
             let _ = Motion::through(waypoints, chain.joints.len());
         }

@@ -3,7 +3,7 @@
 
 use super::check::check;
 use crate::{
-    haptize::gridize::JointLabel,
+    gridize::JointLabel,
     scene::{self, Diagnostic},
 };
 use serde::Deserialize;

@@ -232,7 +232,7 @@ fn neighbours(grid: &Grid, point: usize) -> impl Iterator<Item = usize> + '_ {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{field::synthetic, haptize::table::Block};
+    use crate::{field::synthetic, sweep::table::Block};
 
     const SHAPE: Shape =
         Shape { joints: 1, surface_nodes: 9, with_forces: true, with_touches: false, with_tangent: false };

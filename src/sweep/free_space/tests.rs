@@ -41,7 +41,7 @@ fn with_model<T>(text: &str, look: impl FnOnce(&Model<'_>, &Grid) -> T) -> T {
     let scene = SceneFile::parse(text, "random.toml").unwrap_or_else(|error| panic!("{error}"));
     let object = Object::build(&scene.object).unwrap();
     let chain = Chain::new(&scene.proxy);
-    let sweep = crate::haptize::Sweep::new(&scene, &object, "cpu", "", "").unwrap();
+    let sweep = crate::sweep::Sweep::new(&scene, &object, "cpu", "", "").unwrap();
     look(&Model::new(&object, &chain, scene.contact), sweep.grid())
 }
 

@@ -21,7 +21,7 @@ pub use mapping::{BadRows, ColumnName, Filter, Joint, Keep, Mapping, MappingErro
 
 use crate::{
     JointVector,
-    haptize::gridize::Samples,
+    gridize::Samples,
     ros::{JointStateTable, RosError, is_mcap},
 };
 use cells::{Cells, Direction};

@@ -8,9 +8,9 @@ use super::{
     bake::{model_of, sweep_of},
     build_object,
     columns::Columns,
+    grid_sweep::Sweep,
     part::{self, Binding, Frame, Part},
     shard::{EXTENSION, ranges},
-    sweep::Sweep,
 };
 use crate::{
     JointVector,

@@ -8,7 +8,7 @@
 use super::{Plan, Stop};
 use crate::{
     JointVector,
-    haptize::gridize::JointLabel,
+    gridize::JointLabel,
     ros::{JointState, JointStateWriter},
 };
 use std::{

@@ -101,7 +101,7 @@ fn a_curved_field_on_an_exact_grid_stays_within_the_values_of_its_cell() {
 
 #[test]
 fn values_and_hull_are_scipys() {
-    let text = include_str!("../../../tests/references/gridize_scipy.csv");
+    let text = include_str!("../../tests/references/gridize_scipy.csv");
     let cases: Vec<&str> = text.split("case,").skip(1).collect();
     assert_eq!(cases.len(), 5);
     for case in cases {

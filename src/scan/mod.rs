@@ -23,7 +23,7 @@ pub use trajectory::Trajectory;
 
 use crate::{
     JointVector,
-    haptize::gridize::JointLabel,
+    gridize::JointLabel,
     proxy::{Chain, Pose},
     scene::{JointKind, PlanSpec, ScanSpec},
     tolerances,

@@ -8,7 +8,7 @@
 
 use crate::{
     JointVector, MAX_JOINTS,
-    haptize::gridize::{JointLabel, Samples},
+    gridize::{JointLabel, Samples},
 };
 use std::{
     fmt::Write as _,

@@ -260,7 +260,7 @@ mod tests {
     use crate::{
         contact::Equilibrium,
         field::synthetic,
-        haptize::{
+        sweep::{
             columns::{Columns, Shape},
             table::Block,
         },

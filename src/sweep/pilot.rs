@@ -10,9 +10,9 @@
 
 use super::{
     BackendChoice, Bake, BakeError, ChosenBackend, Footprint, Sweep, build_object,
+    grid_sweep::check_given,
     reference::{Reference, ReferenceError, equilibria},
     sample, spacing,
-    sweep::check_given,
 };
 use crate::{
     contact::Model,

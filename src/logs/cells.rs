@@ -7,7 +7,7 @@
 use super::{ImportError, mapping::Keep};
 use crate::{
     JointVector, MAX_JOINTS,
-    haptize::gridize::{JointLabel, Samples},
+    gridize::{JointLabel, Samples},
 };
 use std::collections::BTreeMap;
 
