@@ -73,7 +73,7 @@ fn main(
         }
         kc = min(kc, CONTINUATION_START / parameters.softest * greatest(radii, parameters.proxy_nodes, local));
     }
-    var outcome = Outcome();
+    var outcome = SolverResult();
     var contact = Contact();
     var row = Contact();
     var elastic = 0.0;

@@ -200,7 +200,7 @@ fn main(
     begin_trials(local);
     workgroupBarrier();
 
-    var outcome = Outcome();
+    var outcome = SolverResult();
     outcome.residual = 1.0;
     var converged = false;
     var given_up = false;

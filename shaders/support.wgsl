@@ -28,7 +28,7 @@ override ISOTROPIC: bool = false;
 @group(0) @binding(4) var<storage, read> positions: array<vec4<f32>>;
 // Number of configurations in contact, then their numbers.
 @group(0) @binding(5) var<storage, read> list: array<u32>;
-@group(0) @binding(6) var<storage, read_write> outcomes: array<Outcome>;
+@group(0) @binding(6) var<storage, read_write> outcomes: array<SolverResult>;
 // CONTACTS a configuration.
 @group(0) @binding(7) var<storage, read_write> touches: array<Touch>;
 // One configuration behind the other: what deformed.wgsl keeps of the covered surface nodes and the clusters of triangles.
@@ -145,7 +145,7 @@ fn multiply(vector: u32, slot: u32) -> vec3<f32> {
 // --- Results ---
 
 // Where room ran out, nothing of the result counts.
-fn write_outcome(place: u32, outcome: Outcome) {
+fn write_outcome(place: u32, outcome: SolverResult) {
     outcomes[place] = outcome;
     if overflow != 0u {
         outcomes[place].status = STATUS_OVERFLOW;

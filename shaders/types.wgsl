@@ -50,7 +50,7 @@ struct ProxyNode {
 }
 
 // What became of one configuration.
-struct Outcome {
+struct SolverResult {
     status: u32,
     iterations: u32,
     residual: f32,

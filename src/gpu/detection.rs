@@ -24,13 +24,13 @@ const WORKGROUP: u32 = 64;
 const IN_STEP: u32 = 32;
 
 /// A kernel and what it is bound to.
-struct Stage {
+struct BoundKernel {
     kernel: Kernel,
     bound: wgpu::BindGroup,
     workgroup: u32,
 }
 
-impl Stage {
+impl BoundKernel {
     fn new(
         context: &Context,
         (shader, workgroup): (&Shader, u32),
@@ -61,9 +61,9 @@ struct Buffers {
 
 /// The stages before and behind the distances to the flat triangles in f32, and what they read of arm and surface [B].
 struct Ends {
-    kinematics: Stage,
-    smallest: Stage,
-    compaction: Stage,
+    kinematics: BoundKernel,
+    smallest: BoundKernel,
+    compaction: BoundKernel,
     arm_bytes: u64,
     surface_bytes: u64,
 }
@@ -76,7 +76,7 @@ pub(super) struct Detection {
     kinds: Vec<JointKind>,
     buffers: Buffers,
     staging: Staging,
-    distances: Stage,
+    distances: BoundKernel,
     ends: Ends,
     /// What `distances` reads of the surface [B].
     surface_bytes: u64,
@@ -109,7 +109,7 @@ impl Detection {
         };
         let Buffers { parameters, positions, .. } = &buffers;
         let bindings = [(Uniform, parameters), (Read, rest), (Read, mesh), (Write, positions), (Read, clusters)];
-        let distances = Stage::new(context, (&shaders::DETECTION, WORKGROUP), &[], &bindings)?;
+        let distances = BoundKernel::new(context, (&shaders::DETECTION, WORKGROUP), &[], &bindings)?;
         let ends = match &buffers.double_parameters {
             Some(uniform) => Ends::double(context, model, device, (&buffers, uniform), chunk)?,
             None => Ends::single(context, device, &buffers)?,
@@ -219,9 +219,9 @@ impl Ends {
         let smallest = [(Uniform, parameters), (Read, positions), (Write, gaps)];
         let compaction = [(Uniform, parameters), (Read, gaps), (Write, list)];
         Ok(Self {
-            kinematics: Stage::new(context, (&shaders::KINEMATICS, WORKGROUP), &[], &places)?,
-            smallest: Stage::new(context, (&shaders::CLASSIFICATION, WORKGROUP), &[], &smallest)?,
-            compaction: Stage::new(context, (&shaders::COMPACTION, WORKGROUP), &[], &compaction)?,
+            kinematics: BoundKernel::new(context, (&shaders::KINEMATICS, WORKGROUP), &[], &places)?,
+            smallest: BoundKernel::new(context, (&shaders::CLASSIFICATION, WORKGROUP), &[], &smallest)?,
+            compaction: BoundKernel::new(context, (&shaders::COMPACTION, WORKGROUP), &[], &compaction)?,
             arm_bytes: device.arm_bytes(),
             surface_bytes: 0,
         })
@@ -255,9 +255,9 @@ impl Ends {
         let smooth = f64::from(u8::from(model.surface.smooth.is_some()));
         let overrides = [("WORKGROUP", f64::from(IN_STEP)), ("SMOOTH", smooth)];
         Ok(Self {
-            kinematics: Stage::new(context, (&shaders::DOUBLE_KINEMATICS, WORKGROUP), &[], &places)?,
-            smallest: Stage::new(context, (&shaders::DOUBLE_GAP, IN_STEP), &overrides, &smallest)?,
-            compaction: Stage::new(context, (&shaders::DOUBLE_COMPACTION, WORKGROUP), &[], &compaction)?,
+            kinematics: BoundKernel::new(context, (&shaders::DOUBLE_KINEMATICS, WORKGROUP), &[], &places)?,
+            smallest: BoundKernel::new(context, (&shaders::DOUBLE_GAP, IN_STEP), &overrides, &smallest)?,
+            compaction: BoundKernel::new(context, (&shaders::DOUBLE_COMPACTION, WORKGROUP), &[], &compaction)?,
             arm_bytes: chain.size(),
             surface_bytes: surface.size(),
         })

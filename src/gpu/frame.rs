@@ -81,7 +81,7 @@ pub enum FrameError {
 
 /// One dispatch of every frame.
 #[derive(Clone)]
-struct Stage {
+struct FramePass {
     kernel: Arc<Kernel>,
     bound: wgpu::BindGroup,
     workgroups: u32,
@@ -89,7 +89,7 @@ struct Stage {
     bytes: u64,
 }
 
-impl Stage {
+impl FramePass {
     fn dispatch(&self) -> Dispatch<'_> {
         let Self { kernel, bound, workgroups, bytes } = self;
         Dispatch { kernel, bound, workgroups: *workgroups, bytes: *bytes }
@@ -108,7 +108,7 @@ pub struct FrameUpdate {
     weight: Vec<DVec3>,
     /// The forces as the shader reads them.
     padded_forces: Vec<[f32; 4]>,
-    stages: Vec<Stage>,
+    stages: Vec<FramePass>,
     takes: FrameCost,
 }
 
@@ -190,7 +190,7 @@ impl FrameUpdate {
             let bound = kernel.bind(gpu, &[&even, &structure, &blocks, masses, &forces, &state, &reach, loads])?;
             // Forces and what is added to them are read and written, displacements read.
             let bytes = structure.size() + blocks.size() + reach.size() + 3 * VECTOR * nodes as u64;
-            stages.push(Stage { kernel, bound, workgroups: groups, bytes });
+            stages.push(FramePass { kernel, bound, workgroups: groups, bytes });
         }
         match method {
             FrameMethod::Inverse => {
@@ -256,7 +256,7 @@ impl FrameUpdate {
             loads.write(&self.context, &self.padded_forces);
         }
         let mut encoder = self.context.device.create_command_encoder(&Default::default());
-        self.context.record(&mut encoder, self.stages.iter().map(Stage::dispatch));
+        self.context.record(&mut encoder, self.stages.iter().map(FramePass::dispatch));
         self.context.queue.submit([encoder.finish()]);
         self.context.check()
     }
@@ -336,7 +336,7 @@ fn dense_stages(
     [inverse, right]: [&StorageBuffer; 2],
     [groups, nodes]: [u32; 2],
     overrides: &[(&str, f64)],
-) -> Result<Vec<Stage>, GpuError> {
+) -> Result<Vec<FramePass>, GpuError> {
     let buffers = [parameters, structure, blocks, inertia, forces, state, inverse, right];
     let load = structure.size() + blocks.size() + inertia.size() + forces.size() + state.size() + right.size();
     let advance = inverse.size() + right.size() + 2 * state.size();
@@ -345,7 +345,7 @@ fn dense_stages(
     {
         let kernel = Arc::new(Kernel::new(context, shader, overrides, &DENSE)?);
         let bound = kernel.bind(context, &buffers)?;
-        stages.push(Stage { kernel, bound, workgroups, bytes });
+        stages.push(FramePass { kernel, bound, workgroups, bytes });
     }
     Ok(stages)
 }
@@ -357,17 +357,17 @@ fn iterative_stages(
     [work, sums]: [&StorageBuffer; 2],
     [groups, iterations]: [u32; 2],
     overrides: &[(&str, f64)],
-) -> Result<Vec<Stage>, GpuError> {
-    let stage = |shader, bytes| -> Result<Stage, GpuError> {
+) -> Result<Vec<FramePass>, GpuError> {
+    let stage = |shader, bytes| -> Result<FramePass, GpuError> {
         let kernel = Arc::new(Kernel::new(context, shader, overrides, &ITERATIVE)?);
         let buffers = [parameters[0], structure, blocks, inertia, forces, state, work, sums];
         let bound = kernel.bind(context, &buffers)?;
-        Ok(Stage { kernel, bound, workgroups: groups, bytes })
+        Ok(FramePass { kernel, bound, workgroups: groups, bytes })
     };
     // The same kernel with the bindings of the odd iterations.
-    let odd = |stage: &Stage| -> Result<Stage, GpuError> {
+    let odd = |stage: &FramePass| -> Result<FramePass, GpuError> {
         let buffers = [parameters[1], structure, blocks, inertia, forces, state, work, sums];
-        Ok(Stage { bound: stage.kernel.bind(context, &buffers)?, ..stage.clone() })
+        Ok(FramePass { bound: stage.kernel.bind(context, &buffers)?, ..stage.clone() })
     };
     // Of the five vectors of the iteration, how many are read and written.
     let vectors = |count: u64| count * work.size() / WORK_VECTORS;

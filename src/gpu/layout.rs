@@ -61,11 +61,11 @@ pub struct ProxyNode {
     pub link: u32,
 }
 
-/// `Outcome` of `shaders/types.wgsl`.
+/// `SolverResult` of `shaders/types.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented where the shader writes them")]
-pub struct Outcome {
+pub struct SolverResult {
     pub status: u32,
     pub iterations: u32,
     pub residual: f32,
@@ -140,7 +140,7 @@ mod tests {
             layout!(DoubleParameters: configurations, joints, proxy_nodes, surface_nodes, triangles, clusters, groups, padding, gap_band),
             layout!(Joint: origin, kind, axis, padding),
             layout!(ProxyNode: position, link),
-            layout!(Outcome: status, iterations, residual, elastic, touches, padding_0, padding_1, padding_2),
+            layout!(SolverResult: status, iterations, residual, elastic, touches, padding_0, padding_1, padding_2),
             layout!(Touch: nodes, proxy_node, force_0, padding_0, force_1, padding_1, force_2, padding_2),
             layout!(FrameParameters: nodes, period, odd, groups),
         ];

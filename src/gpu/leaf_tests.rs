@@ -6,7 +6,7 @@ use super::{
     kernel::{Access, Dispatch, Kernel, StorageBuffer},
     layout::{Joint, Parameters, ProxyNode},
     model::DeviceModel,
-    pipeline::Room,
+    pipeline::BatchCapacity,
     shaders::{self, Shader},
     solver::GpuSolver,
 };
@@ -283,7 +283,9 @@ fn a_lost_device_is_opened_anew() {
     let model = Model::new(&object, &chain, scene.contact);
     // A device of its own: the other tests want theirs.
     let own = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-    let mut solver = GpuSolver::with_room(Arc::clone(&own), &model, Room { batch: 64, ..Room::default() }).unwrap();
+    let mut solver =
+        GpuSolver::with_room(Arc::clone(&own), &model, BatchCapacity { batch: 64, ..BatchCapacity::default() })
+            .unwrap();
     let middle = |axis: &crate::scene::AxisSpec| axis.start + axis.step * (axis.count / 2) as f64;
     let q = crate::JointVector::from_slice(&scene.grid.axes.iter().map(middle).collect::<Vec<_>>());
     let before = solver.solve(&[q]).unwrap();
@@ -322,15 +324,15 @@ fn what_no_kernel_wrote_is_found_out() {
     let object = Object::build(&scene.object).unwrap();
     let chain = Chain::new(&scene.proxy);
     let model = Model::new(&object, &chain, scene.contact);
-    let outcome: super::layout::Outcome = Zeroable::zeroed();
+    let outcome: super::layout::SolverResult = Zeroable::zeroed();
     let touch: super::layout::Touch = Zeroable::zeroed();
     let q = crate::JointVector::zeros(3);
     let mut solver = Solver::new(&model);
     let mut unpack = |outcome, touch| super::unpack::unpack(&model, &mut solver, &q, &outcome, &[touch]);
     assert!(unpack(outcome, touch).is_none());
-    let written = super::layout::Outcome { status: Status::Contact as u32, touches: 1, ..Zeroable::zeroed() };
+    let written = super::layout::SolverResult { status: Status::Contact as u32, touches: 1, ..Zeroable::zeroed() };
     assert!(unpack(written, touch).is_some());
-    let beyond = super::layout::Outcome { touches: 2, ..written };
+    let beyond = super::layout::SolverResult { touches: 2, ..written };
     assert!(unpack(beyond, touch).is_none(), "more touches than there is room for");
 }
 

@@ -39,6 +39,6 @@ mod unpack;
 pub use adapter::{ADAPTER_VARIABLE, AdapterChoice, AdapterSummary, adapters};
 pub use context::{Context, GpuError};
 pub use frame::{FrameCost, FrameError, FrameMethod, FrameUpdate};
-pub use pipeline::Room;
+pub use pipeline::BatchCapacity;
 pub use solver::GpuSolver;
 pub use timing::KernelTime;

@@ -4,7 +4,7 @@ use super::{
     context::{Context, GpuError},
     detection::Detection,
     kernel::{Access, Dispatch, Kernel, Staging, StorageBuffer},
-    layout::{Outcome, Parameters, Touch},
+    layout::{Parameters, SolverResult, Touch},
     model::{DeviceModel, LANES},
     shaders,
 };
@@ -12,7 +12,7 @@ use crate::{contact, scene::Algorithm};
 
 /// Bounds on what one submission holds.
 #[derive(Clone, Copy, Debug)]
-pub struct Room {
+pub struct BatchCapacity {
     /// Most configurations placed and tested for contact at a time.
     pub chunk: usize,
     /// Most configurations solved at a time.
@@ -23,7 +23,7 @@ pub struct Room {
     pub double: bool,
 }
 
-impl Default for Room {
+impl Default for BatchCapacity {
     /// Enough to keep a large GPU busy; a few tens of megabytes.
     fn default() -> Self {
         Self { chunk: 16_384, batch: 8192, contacts: 32, double: true }
@@ -33,7 +33,7 @@ impl Default for Room {
 /// Most memory that one buffer of a batch takes [B].
 const BUFFER_BUDGET: u64 = 64 << 20;
 
-impl Room {
+impl BatchCapacity {
     /// Cut to what a binding reaches.
     pub(super) fn within(self, binding_limit: u64, model: &contact::Model<'_>) -> Self {
         let budget = binding_limit.min(BUFFER_BUDGET);
@@ -69,7 +69,7 @@ struct ResultSet {
 /// All stages of a batch.
 pub(super) struct Pipeline {
     model: DeviceModel,
-    room: Room,
+    room: BatchCapacity,
     detection: Detection,
     equilibrium: Kernel,
     /// What `equilibrium` reads and writes for one configuration, besides its result [B].
@@ -78,7 +78,7 @@ pub(super) struct Pipeline {
 }
 
 impl Pipeline {
-    pub fn new(context: &Context, model: &contact::Model<'_>, room: Room) -> Result<Self, GpuError> {
+    pub fn new(context: &Context, model: &contact::Model<'_>, room: BatchCapacity) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let device = DeviceModel::new(context, model)?;
         let detection = Detection::new(context, model, &device, room.chunk, room.double && context.adapter().double)?;
@@ -105,7 +105,7 @@ impl Pipeline {
         let own_bytes = 4 + 16 * nodes + 2 * 16 * device.workspace();
         let result_set = || -> Result<ResultSet, GpuError> {
             let parameters = StorageBuffer::uniform(context, "parameters", &device.parameters)?;
-            let outcomes = buffer("outcomes", (size_of::<Outcome>() * room.batch) as u64)?;
+            let outcomes = buffer("outcomes", (size_of::<SolverResult>() * room.batch) as u64)?;
             let touches = buffer("touches", (size_of::<Touch>() * room.contacts * room.batch) as u64)?;
             let staging = Staging::new(context, outcomes.size() + touches.size())?;
             let buffers = [
@@ -154,7 +154,7 @@ impl Pipeline {
         set: usize,
         count: usize,
         submission: &wgpu::SubmissionIndex,
-    ) -> Result<(Vec<Outcome>, Vec<Touch>), GpuError> {
+    ) -> Result<(Vec<SolverResult>, Vec<Touch>), GpuError> {
         let (outcome_bytes, touch_bytes) = self.result_bytes(count);
         self.sets[set].staging.take(context, submission, outcome_bytes + touch_bytes, |bytes| {
             let (outcomes, touches) = bytes.split_at(outcome_bytes as usize);
@@ -163,6 +163,6 @@ impl Pipeline {
     }
 
     fn result_bytes(&self, count: usize) -> (u64, u64) {
-        ((size_of::<Outcome>() * count) as u64, (size_of::<Touch>() * self.room.contacts * count) as u64)
+        ((size_of::<SolverResult>() * count) as u64, (size_of::<Touch>() * self.room.contacts * count) as u64)
     }
 }

@@ -11,7 +11,7 @@
 use super::{
     adapter::AdapterSummary,
     context::{Context, GpuError},
-    pipeline::{Pipeline, Room},
+    pipeline::{BatchCapacity, Pipeline},
     unpack::unpack,
 };
 use crate::{
@@ -34,21 +34,21 @@ pub struct GpuSolver<'a> {
     context: Arc<Context>,
     model: &'a contact::Model<'a>,
     cpu: Solvers<'a>,
-    room: Room,
+    room: BatchCapacity,
     pipeline: Pipeline,
-    chunk: Pace,
-    batch: Pace,
+    chunk: AdaptiveSize,
+    batch: AdaptiveSize,
     left_to_cpu: usize,
 }
 
 /// A number of configurations that follows measured time.
 #[derive(Clone, Copy, Debug)]
-struct Pace {
+struct AdaptiveSize {
     now: usize,
     most: usize,
 }
 
-impl Pace {
+impl AdaptiveSize {
     /// Steers towards [`DISPATCH_TARGET`], at most by a factor of two up and four down.
     fn adapt(&mut self, done: usize, time: Duration) {
         // A dispatch that was cut short by the end of the list says nothing about a full one.
@@ -61,7 +61,7 @@ impl Pace {
 }
 
 /// One batch under way.
-struct Flight {
+struct PendingBatch {
     first: usize,
     count: usize,
     set: usize,
@@ -75,14 +75,18 @@ impl<'a> GpuSolver<'a> {
     /// # Errors
     /// When the object does not fit the device, or the device refuses.
     pub fn new(context: Arc<Context>, model: &'a contact::Model<'a>) -> Result<Self, GpuError> {
-        Self::with_room(context, model, Room::default())
+        Self::with_room(context, model, BatchCapacity::default())
     }
 
     /// The same with other bounds on what one submission holds.
     ///
     /// # Errors
     /// As [`GpuSolver::new`].
-    pub fn with_room(context: Arc<Context>, model: &'a contact::Model<'a>, room: Room) -> Result<Self, GpuError> {
+    pub fn with_room(
+        context: Arc<Context>,
+        model: &'a contact::Model<'a>,
+        room: BatchCapacity,
+    ) -> Result<Self, GpuError> {
         let room = room.within(context.binding_limit(), model);
         let pipeline = Pipeline::new(&context, model, room)?;
         Ok(Self {
@@ -92,8 +96,8 @@ impl<'a> GpuSolver<'a> {
             room,
             pipeline,
             // First dispatches are small: nothing is known of the device yet.
-            chunk: Pace { now: room.chunk.min(1024), most: room.chunk },
-            batch: Pace { now: room.batch.min(64), most: room.batch },
+            chunk: AdaptiveSize { now: room.chunk.min(1024), most: room.chunk },
+            batch: AdaptiveSize { now: room.batch.min(64), most: room.batch },
             left_to_cpu: 0,
         })
     }
@@ -123,15 +127,15 @@ impl<'a> GpuSolver<'a> {
         self.chunk.adapt(chunk.len(), since.elapsed());
         let mut results: Vec<Equilibrium> = gaps.iter().zip(chunk).map(|(&gap, q)| free(gap, q.len())).collect();
         self.decide_free(chunk, &touching, &mut results);
-        let mut flight: Option<Flight> = None;
+        let mut flight: Option<PendingBatch> = None;
         let mut first = 0;
         while first < touching.len() || flight.is_some() {
             let previous = flight.take();
             if first < touching.len() {
                 let count = self.batch.now.min(touching.len() - first);
-                let set = previous.as_ref().map_or(0, |flight: &Flight| 1 - flight.set);
+                let set = previous.as_ref().map_or(0, |flight: &PendingBatch| 1 - flight.set);
                 let submission = self.pipeline.solve(&self.context, first, count, set);
-                flight = Some(Flight { first, count, set, submission, since: Instant::now() });
+                flight = Some(PendingBatch { first, count, set, submission, since: Instant::now() });
                 first += count;
             }
             if let Some(done) = previous {
@@ -167,7 +171,7 @@ impl<'a> GpuSolver<'a> {
         &mut self,
         chunk: &[JointVector],
         members: &[u32],
-        flight: &Flight,
+        flight: &PendingBatch,
         results: &mut [Equilibrium],
     ) -> Result<Instant, GpuError> {
         let (outcomes, touches) = self.pipeline.collect(&self.context, flight.set, flight.count, &flight.submission)?;
@@ -215,7 +219,7 @@ impl<'a> GpuSolver<'a> {
         self.context = context;
         self.room = room;
         for (pace, most) in [(&mut self.chunk, room.chunk), (&mut self.batch, room.batch)] {
-            *pace = Pace { now: (pace.now / 2).clamp(1, most), most };
+            *pace = AdaptiveSize { now: (pace.now / 2).clamp(1, most), most };
         }
         Ok(())
     }

@@ -132,7 +132,7 @@ mod tests {
     use super::*;
     use crate::{
         contact::Model,
-        gpu::{AdapterChoice, FrameMethod, FrameUpdate, GpuSolver, Room},
+        gpu::{AdapterChoice, BatchCapacity, FrameMethod, FrameUpdate, GpuSolver},
         object::Object,
         proxy::Chain,
         scene::{GraphicsEffects, Scene},
@@ -166,7 +166,7 @@ mod tests {
         let model = Model::new(&object, &chain, scene.contact);
         let configurations = sample(&scene);
         let [timed, plain] = contexts.map(|context| {
-            let room = Room { double: false, ..Room::default() };
+            let room = BatchCapacity { double: false, ..BatchCapacity::default() };
             let mut solver = GpuSolver::with_room(Arc::clone(&context), &model, room).unwrap();
             let begin = Instant::now();
             let equilibria = solver.solve(&configurations).unwrap();

@@ -6,7 +6,7 @@
 //! that owes nothing to f32. The paper's iteration is taken as it is: what it leads to is defined by its steps.
 
 use super::{
-    layout::{Outcome, Touch},
+    layout::{SolverResult, Touch},
     model::stiffness,
     solver::free,
 };
@@ -24,7 +24,7 @@ pub(super) fn unpack(
     model: &contact::Model<'_>,
     solver: &mut contact::Solver<'_>,
     q: &[f64],
-    outcome: &Outcome,
+    outcome: &SolverResult,
     list: &[Touch],
 ) -> Option<Equilibrium> {
     let status = Status::from_number(u8::try_from(outcome.status).ok()?)?;
@@ -46,7 +46,7 @@ fn settled(
     model: &contact::Model<'_>,
     solver: &mut contact::Solver<'_>,
     q: &[f64],
-    outcome: &Outcome,
+    outcome: &SolverResult,
     list: &[Touch],
 ) -> Equilibrium {
     let nodes = |touch: &Touch| touch.nodes.into_iter().zip([touch.force_0, touch.force_1, touch.force_2]);
@@ -63,7 +63,13 @@ fn settled(
 }
 
 /// What the paper's iteration ended with: torque tau = sum_i J_i^T (force on x_i), energy and node forces summed up in f64.
-fn iterated(model: &contact::Model<'_>, q: &[f64], status: Status, outcome: &Outcome, list: &[Touch]) -> Equilibrium {
+fn iterated(
+    model: &contact::Model<'_>,
+    q: &[f64],
+    status: Status,
+    outcome: &SolverResult,
+    list: &[Touch],
+) -> Equilibrium {
     let mut pose = model.chain.new_pose();
     model.chain.pose(q, &mut pose);
     let mut result = Equilibrium {

@@ -5,7 +5,7 @@ use glam::DVec3;
 use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Solver, Status, Touch},
-    gpu::{GpuError, GpuSolver, Room},
+    gpu::{BatchCapacity, GpuError, GpuSolver},
     object::{Compliance, Object},
     proxy::Chain,
     scene::{Algorithm, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
@@ -249,7 +249,7 @@ fn contact_within_rounding_of_none_is_decided_in_f64() {
         for wanted in [-1e-9, -1e-11, 1e-11, 1e-9] {
             let near = grazing(&mut cpu, &path, wanted);
             assert!(near.len() >= 5, "{name}: only {} configurations", near.len());
-            let room = Room { double: false, ..Room::default() };
+            let room = BatchCapacity { double: false, ..BatchCapacity::default() };
             let mut gpu = GpuSolver::with_room(context(), &model, room).unwrap();
             for (q, result) in near.iter().zip(gpu.solve(&near).unwrap()) {
                 let reference = cpu.solve(q);
@@ -394,8 +394,8 @@ fn sizes_of_chunks_and_batches_leave_no_trace() {
     let configurations = configurations(&scene, 5, 211);
     let model = Model::new(&object, &chain, scene.contact);
     let solve = |room| GpuSolver::with_room(context(), &model, room).unwrap().solve(&configurations).unwrap();
-    let whole = solve(Room::default());
-    let pieces = solve(Room { chunk: 7, batch: 2, ..Room::default() });
+    let whole = solve(BatchCapacity::default());
+    let pieces = solve(BatchCapacity { chunk: 7, batch: 2, ..BatchCapacity::default() });
     assert!(whole.iter().any(|result| result.status == Status::Contact));
     assert_eq!(format!("{whole:?}"), format!("{pieces:?}"), "bit for bit");
 }
@@ -407,7 +407,8 @@ fn contacts_beyond_the_kernels_room_are_solved_on_the_cpu() {
     for algorithm in [Algorithm::Energy, Algorithm::Paper] {
         let model = Model::new(&object, &chain, ContactSpec { algorithm, ..scene.contact });
         let mut cpu = Solver::new(&model);
-        let mut gpu = GpuSolver::with_room(context(), &model, Room { contacts: 2, ..Room::default() }).unwrap();
+        let mut gpu =
+            GpuSolver::with_room(context(), &model, BatchCapacity { contacts: 2, ..BatchCapacity::default() }).unwrap();
         let results = gpu.solve(&configurations).unwrap();
         let mut crowded = 0;
         for (q, result) in configurations.iter().zip(&results) {
