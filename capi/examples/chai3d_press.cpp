@@ -59,12 +59,13 @@ int main(int count, char **arguments)
             device->getForce(force);
             if (tick % 300 == 0)
                 std::printf("%4d ms: force (%6.3f, %6.3f, %6.3f) N\n", tick, force.x(), force.y(), force.z());
-            if (tick == 300 && force.length() > 1e-3) {
+            // The proxy's damping is felt in free space, too.
+            if (tick == 300 && force.length() > 0.1) {
                 std::fprintf(stderr, "a force before the ball is touched\n");
                 return EXIT_FAILURE;
             }
         }
-        if (!(force.z() > 0.1 && force.z() > std::hypot(force.x(), force.y()))) {
+        if (!(force.z() > 0.5 && force.z() > std::hypot(force.x(), force.y()))) {
             std::fprintf(stderr, "the ball does not push the tip up\n");
             return EXIT_FAILURE;
         }
