@@ -1,6 +1,6 @@
-//! What one frame of the object in motion costs at 10,000 and 100,000 nodes. On the CPU: isotropic springs, which are solved
-//! coordinate by coordinate, beside axial ones, which need the whole matrix; and the time and memory of what is made once. On
-//! the GPU, where there is one: conjugate gradients, as many iterations as usual and a quarter of them.
+//! What one frame of the object in motion costs at 10,000 and 100,000 nodes. On the CPU: isotropic springs, which are
+//! solved coordinate by coordinate, beside axial ones, which need the whole matrix; and the time and memory of what is
+//! made once. On the GPU, where there is one: conjugate gradients, as many iterations as usual and a quarter of them.
 //!
 //!     cargo bench --bench frame
 

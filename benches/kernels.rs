@@ -1,10 +1,12 @@
-//! How long each kernel takes on the first adapter, what it moves, and what bounds it: those of a sweep of the sphere scene, by
-//! each algorithm, and those of the object's frame update. Then whole sweeps on that adapter beside the CPU backend.
+//! How long each kernel takes on the first adapter, what it moves, and what bounds it: those of a sweep of the sphere
+//! scene, by each algorithm, and those of the object's frame update. Then whole sweeps on that adapter beside the CPU
+//! backend.
 //!
 //!     cargo bench --bench kernels
 //!
-//! Kernels are timed by the device's own clock. Bytes are what a kernel reads and writes if nothing is read twice; beside them
-//! stands the rate at which the same device copies memory. Operations are counted where they do not depend on the data.
+//! Kernels are timed by the device's own clock. Bytes are what a kernel reads and writes if nothing is read twice;
+//! beside them stands the rate at which the same device copies memory. Operations are counted where they do not depend
+//! on the data.
 
 use glam::DVec3;
 use haptize::{
@@ -170,8 +172,8 @@ fn frames(context: &Arc<Context>, scene: &Scene, rings: usize, adapter: Adapter)
     Ok(())
 }
 
-/// Prints what was timed: `count` is how many configurations, or nodes and frames, a kernel was for, `operations` how many
-/// floating-point operations one dispatch does, `seconds` what all took by the clock on the wall.
+/// Prints what was timed: `count` is how many configurations, or nodes and frames, a kernel was for, `operations` how
+/// many floating-point operations one dispatch does, `seconds` what all took by the clock on the wall.
 fn table(
     kernels: &[KernelTime],
     what: &str,
@@ -234,7 +236,8 @@ fn bound(share: f64, workgroups: f64, hardware: bool) -> &'static str {
     }
 }
 
-/// Whole sweeps as `haptize bake` does them, of grids so many times as fine as the scene's, on the adapter and on the CPU.
+/// Whole sweeps as `haptize bake` does them, of grids so many times as fine as the scene's, on the adapter and on the
+/// CPU.
 fn compare(scene: &Scene, finer: &[usize]) -> Result<(), Box<dyn Error>> {
     println!(
         "\nwhole sweeps [configurations/s]\n  {:>11} {:>12} {:>12} {:>9}",

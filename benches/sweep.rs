@@ -1,8 +1,8 @@
-//! The sweep of the sphere scene: the CPU backend beside the paper's algorithm in vectorised NumPy, in one run; and what a
-//! configuration costs as objects, contacts and grids grow.
+//! The sweep of the sphere scene: the CPU backend beside the paper's algorithm in vectorised NumPy, in one run; and
+//! what a configuration costs as objects, contacts and grids grow.
 //!
-//! `bash benches/peers/setup.sh` once, then `cargo bench --bench sweep`. Without NumPy the peer is skipped, and said so. The
-//! curves are drawn into target/bench/cost.{svg,png}.
+//! `bash benches/peers/setup.sh` once, then `cargo bench --bench sweep`. Without NumPy the peer is skipped, and said
+//! so. The curves are drawn into target/bench/cost.{svg,png}.
 
 use haptize::{
     JointVector,
@@ -29,8 +29,9 @@ use std::{
 /// The peer solves every so many-th configuration: enough to know its rate to some percent.
 const PEER_STRIDE: usize = 16;
 
-/// Everything is timed so many times, the peer as well, and the fastest counts: a busy machine slows some down. Sweeps are timed for
-/// as long as the peer's turns take, since machines that lend their cores change their speed within seconds.
+/// Everything is timed so many times, the peer as well, and the fastest counts: a busy machine slows some down. Sweeps
+/// are timed for as long as the peer's turns take, since machines that lend their cores change their speed within
+/// seconds.
 const TURNS: usize = 7;
 const SWEEPS_LAST: Duration = Duration::from_secs(2);
 

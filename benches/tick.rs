@@ -1,5 +1,5 @@
-//! What one tick of the haptic loop costs, for one to six joints and each interpolation: look-up alone and the whole tick,
-//! side by side.
+//! What one tick of the haptic loop costs, for one to six joints and each interpolation: look-up alone and the whole
+//! tick, side by side.
 //!
 //!     cargo bench --bench tick
 

@@ -1,5 +1,5 @@
-//! What the haptic thread feels of the window: the jitter of its ticks while the window is drawn sixty times a second, and
-//! while it holds still, in turns, so that whatever else the machine does counts for both.
+//! What the haptic thread feels of the window: the jitter of its ticks while the window is drawn sixty times a second,
+//! and while it holds still, in turns, so that whatever else the machine does counts for both.
 //!
 //!     cargo bench --bench window
 

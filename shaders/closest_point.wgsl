@@ -1,4 +1,5 @@
-// Closest point of a triangle to a point, and the feature that it lies on (twin: src/contact/geometry/closest_point.rs).
+// Closest point of a triangle to a point, and the feature that it lies on (twin:
+// src/contact/geometry/closest_point.rs).
 
 // Features are numbers: corner k is k, edge k (from corner k to k + 1) is FEATURE_EDGE + k, the interior FEATURE_FACE.
 const FEATURE_EDGE: u32 = 3u;

@@ -1,16 +1,19 @@
-// Contacts of the proxy with the deformed surface: of each proxy node with the closest feature (twin: src/contact/detection.rs).
+// Contacts of the proxy with the deformed surface: of each proxy node with the closest feature (twin:
+// src/contact/detection.rs).
 //
-// Triangles are searched cluster by cluster. Which clusters may hold the closest triangle of a proxy node is told by their bounding
-// spheres at rest, and by how far any node can have moved. The nodes of these alone are displaced; the clusters' bounding
-// spheres where they are now leave a few triangles, which the invocations share out. What is left out cannot be closest.
+// Triangles are searched cluster by cluster. Which clusters may hold the closest triangle of a proxy node is given by
+// their bounding spheres at rest, and by how far any node can have moved. The nodes of these alone are displaced; the
+// clusters' bounding spheres where they are now leave a few triangles, which the invocations share out. What is left
+// out cannot be closest.
 //
 // The stage declares MOVING, the vector of forces on A that displaces the surface.
 
-// Number of the trial at hand, which stamps what is known of it.
+// Number of the current trial, which stamps what is known of it.
 var<private> trial_number: f32;
 
-// The workspace of a configuration: displacement of each covered node, with the number of the trial that it is for in w; then
-// the bounding sphere, where it is now, of each cluster that the search lists, and behind these, in x, the cluster's number.
+// The workspace of a configuration: displacement of each covered node, with the number of the trial that it is for in
+// w; then the bounding sphere, where it is now, of each cluster that the search lists, and behind these, in x, the
+// cluster's number.
 
 // Forgets what is known of an earlier configuration.
 fn begin_trials(local: u32) {
@@ -66,7 +69,8 @@ fn cluster_at_rest(cluster: u32) -> vec4<f32> {
     return rest[parameters.surface_nodes + parameters.triangles + parameters.proxy_nodes + cluster];
 }
 
-// Where the clusters' lists begin in `mesh`: triangles in the order of the clusters, the starts of their nodes, and these.
+// Where the clusters' lists begin in `mesh`: triangles in the order of the clusters, the starts of their nodes, and
+// these.
 fn clusters_base() -> u32 {
     return 9u * parameters.triangles + parameters.surface_nodes + 1u + select(0u, parameters.surface_nodes, PARTIAL);
 }
@@ -101,8 +105,8 @@ var<workgroup> distances: array<f32, DISTANCES>;
 // Pairs hold the near node's place above this bit.
 const PAIR_SHIFT: u32 = 27u;
 
-// The triangle closest to this invocation's near node, if it is no farther than `within`, else ABSENT; ties go to the lower number.
-// `waiting` invocations have one; no node has moved by more than `moved`.
+// The triangle closest to this invocation's near node, if it is no farther than `within`, else ABSENT; ties go to the
+// lower number. `waiting` invocations have one; no node has moved by more than `moved`.
 fn closest_triangle(within: f32, waiting: u32, moved: f32, local: u32) -> u32 {
     var least = within;
     atomicStore(&nearest[local], bitcast<u32>(within));
@@ -176,7 +180,7 @@ fn closest_triangle(within: f32, waiting: u32, moved: f32, local: u32) -> u32 {
     return atomicLoad(&closest[local]);
 }
 
-// Place, in the order of the clusters, of a candidate of the pairs at hand.
+// Place, in the order of the clusters, of a candidate of the current pairs.
 fn clustered(candidate: u32) -> u32 {
     return (passing[candidate / CLUSTER] & ((1u << PAIR_SHIFT) - 1u)) * CLUSTER + candidate % CLUSTER;
 }
@@ -193,7 +197,8 @@ fn distance_to(proxy_node: u32, triangle: u32) -> f32 {
 // Invocations that share the nodes of a cluster.
 const TEAM: u32 = 8u;
 
-// Displaces the nodes of the clusters listed. Where two clusters have a node in common, two invocations may write the same to it.
+// Displaces the nodes of the clusters listed. Where two clusters have a node in common, two invocations may write the
+// same to it.
 fn displace(listed: u32, local: u32) {
     for (var number = local / TEAM; number < listed; number += WORKGROUP / TEAM) {
         let cluster = u32(workspace[cluster_place(number)].x);
@@ -263,8 +268,8 @@ fn is_contact(proxy_node: u32, count: u32) -> bool {
     return false;
 }
 
-// Distance within which the closest triangle of a proxy node is looked for: that of a known contact wherever it is, that of
-// another node if it touches, or comes within `reach`.
+// Distance within which the closest triangle of a proxy node is looked for: that of a known contact wherever it is,
+// that of another node if it touches, or comes within `reach`.
 fn search_distance(proxy_node: u32, moved: f32, reach: f32, hint: u32) -> f32 {
     let radius = proxy_radius(proxy_node);
     let rest_distance = gap_at_rest(proxy_node) + radius;
@@ -294,9 +299,9 @@ fn take_up(waiting: u32) {
     }
 }
 
-// This invocation's contact with the surface as displaced, at most by `moved`: of every node that touches, or comes within
-// `reach`, now or did so before in this configuration (then with a depth below zero, as it may touch again). Without one,
-// depth and weights are zero.
+// This invocation's contact with the surface as displaced, at most by `moved`: of every node that touches, or comes
+// within `reach`, now or did so before in this configuration (then with a depth below zero, as it may touch again).
+// Without one, depth and weights are zero.
 fn deformed(moved: f32, reach: f32, local: u32) -> Contact {
     let known = contact_count;
     // A node outside at rest by more than the surface moves is outside still.

@@ -1,11 +1,12 @@
 // Signed distance of every proxy node to the surface at rest, less its radius: one invocation a (configuration, node).
-// Neighbouring invocations are neighbouring nodes and walk the triangles in step, but for clusters that are too far away.
+// Neighbouring invocations are neighbouring nodes and walk the triangles in step, but for clusters that are too far
+// away.
 
 override WORKGROUP: u32 = 64u;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
-// Surface nodes at rest; then the bounding sphere (centre, radius) of each triangle; then each proxy node's radius in x; then
-// the bounding sphere of each cluster of triangles.
+// Surface nodes at rest; then the bounding sphere (centre, radius) of each triangle; then each proxy node's radius in
+// x; then the bounding sphere of each cluster of triangles.
 @group(0) @binding(1) var<storage, read> rest: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> mesh: array<u32>;
 // Proxy nodes; w receives the gap.

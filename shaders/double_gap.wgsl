@@ -1,16 +1,17 @@
 // Smallest signed distance of a configuration's proxy nodes to the surface at rest, less their radii, in f64 (twin:
 // src/contact/geometry/rest.rs): one invocation a configuration. Below zero there is contact.
 //
-// Of the gaps that f32 found, to flat triangles, those that may be the smallest are measured again. Facets are searched group by group of
-// clusters, past those whose bounding sphere leaves no room for the closest one; ties go to the lower number.
+// Of the gaps that f32 found, to flat triangles, those that may be the smallest are measured again. Facets are searched
+// group by group of clusters, past those whose bounding sphere leaves no room for the closest one; ties go to the lower
+// number.
 
 override WORKGROUP: u32 = 32u;
 // Whether facets are of degree four.
 override SMOOTH: bool = false;
 
 @group(0) @binding(0) var<uniform> parameters: DoubleParameters;
-// One behind the other: the bounding spheres (centre, radius) of the clusters of facets, of the groups of clusters, and of the facets in the
-// order of the clusters; the radius of each proxy node; the control points of the facets.
+// One behind the other: the bounding spheres (centre, radius) of the clusters of facets, of the groups of clusters, and
+// of the facets in the order of the clusters; the radius of each proxy node; the control points of the facets.
 @group(0) @binding(1) var<storage, read> surface: array<f64>;
 @group(0) @binding(2) var<storage, read> mesh: array<u32>;
 // All facets, CLUSTER of them side by side in each cluster.

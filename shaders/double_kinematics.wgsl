@@ -1,9 +1,11 @@
-// Positions x_i of all proxy nodes in f64, for a batch of configurations: one invocation a (configuration, node). See kinematics.wgsl.
+// Positions x_i of all proxy nodes in f64, for a batch of configurations: one invocation a (configuration, node). See
+// kinematics.wgsl.
 
 override WORKGROUP: u32 = 64u;
 
 @group(0) @binding(0) var<uniform> parameters: DoubleParameters;
-// Of each joint its origin, axis and kind (0 revolute, 1 prismatic); then of each proxy node its position in its link's frame and that link.
+// Of each joint its origin, axis and kind (0 revolute, 1 prismatic); then of each proxy node its position in its link's
+// frame and that link.
 @group(0) @binding(1) var<storage, read> chain: array<f64>;
 // Configuration by configuration, joint fastest: (cos q, sin q), or (q, 0) of a prismatic joint.
 @group(0) @binding(2) var<storage, read> motions: array<vec2<f64>>;

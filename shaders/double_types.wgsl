@@ -1,5 +1,5 @@
-// What the stages in f64 share with Rust (src/gpu/layout.rs checks the struct by reflection). Positions are relative to the object's
-// centre [m].
+// What the stages in f64 share with Rust (src/gpu/layout.rs checks the struct by reflection). Positions are relative to
+// the object's centre [m].
 
 // Numbers that shared functions compute in.
 alias real = f64;
@@ -15,7 +15,7 @@ struct DoubleParameters {
     clusters: u32,
     groups: u32,
     padding: u32,
-    // Gaps that f32 tells are known to this [m].
+    // Gaps in f32 are known to this [m].
     gap_band: f64,
 }
 

@@ -8,7 +8,8 @@ struct View {
     light: vec4<f32>,
     // The surface's colour map from its low to its high end, at even steps.
     stops: array<vec4<f32>, 5>,
-    // Displacement [m] or contact force [N] at the top of the colour map; width of the drawn edges [pixels], 0 for none.
+    // Displacement [m] or contact force [N] at the top of the colour map; width of the drawn edges [pixels], 0 for
+    // none.
     colour_top: f32,
     edge_width: f32,
     nodes: u32,

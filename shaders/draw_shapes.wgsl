@@ -1,5 +1,5 @@
-// Links, nodes, arrows and axes: instances of one rounded cone between two ends, each end with its radius. A sphere is a
-// cone of no length, an arrow's head one with a radius of zero at its tip.
+// Links, nodes, arrows and axes: instances of one rounded cone between two ends, each end with its radius. A sphere is
+// a cone of no length, an arrow's head one with a radius of zero at its tip.
 
 // Displacements of the object's nodes: shapes that are anchored to one go with it.
 @group(0) @binding(1) var<storage, read> state: array<vec4<f32>>;

@@ -1,5 +1,5 @@
-// The deforming surface, drawn straight from the buffers that the frame update writes: three vertices a triangle, pulled
-// by number. The normal at a node is the area-weighted mean over the triangles around it, in the deformed state.
+// The deforming surface, drawn straight from the buffers that the frame update writes: three vertices a triangle,
+// pulled by number. The normal at a node is the area-weighted mean over the triangles around it, in the deformed state.
 
 // Rest positions; w is unused.
 @group(0) @binding(1) var<storage, read> rest: array<vec4<f32>>;
@@ -7,8 +7,8 @@
 @group(0) @binding(2) var<storage, read> state: array<vec4<f32>>;
 // Contact force on each node [N].
 @group(0) @binding(3) var<storage, read> forces: array<vec4<f32>>;
-// Corners of the triangles; then, per surface node, where its list begins (one more than there are nodes); then, node by
-// node, the triangles around it.
+// Corners of the triangles; then, per surface node, where its list begins (one more than there are nodes); then, node
+// by node, the triangles around it.
 @group(0) @binding(4) var<storage, read> mesh: array<u32>;
 
 struct Corner {

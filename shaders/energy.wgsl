@@ -1,11 +1,11 @@
-// The energy form: minimum of 1/2 u^T K u + 1/2 kc sum_i depth_i(u)^2 (twin: src/contact/equilibrium/energy.rs). One workgroup a
-// configuration; invocation k keeps contact k.
+// The energy form: minimum of 1/2 u^T K u + 1/2 kc sum_i depth_i(u)^2 (twin: src/contact/equilibrium/energy.rs). One
+// workgroup a configuration; invocation k keeps contact k.
 //
-// Steps are found otherwise (trust_region.wgsl), and two things more differ from the twin, both because of f32. Depths are known to some 1e-9 m, which stiff contact turns into
-// forces far above the tolerance; so a Newton step that is small itself also ends the search, and the contact forces
-// follow from it by the linear law kc (depth + N . du), in which the small numbers are not differences of large ones.
-// And where two steps in a row change no depth by more than rounding, the search ends as well: f32 can tell no more. The
-// residual says how good that is.
+// Steps are found otherwise (trust_region.wgsl), and two things more differ from the twin, both because of f32. Depths
+// are known to some 1e-9 m, which stiff contact turns into forces far above the tolerance; so a Newton step that is
+// small itself also ends the search, and the contact forces follow from it by the linear law kc (depth + N . du), in
+// which the small numbers are not differences of large ones. And where two steps in a row change no depth by more than
+// rounding, the search ends as well: f32 can tell no more. The residual says how good that is.
 
 // Geometry frozen at rest: linearised contact.
 override FROZEN: bool = false;

@@ -1,9 +1,10 @@
-// One facet of the contact surface: a flat triangle, or one of degree four (twins, with the formulas: src/contact/geometry/facet.rs and
-// quartic.rs). For one invocation; geometry is relative to the point in question, which is the origin.
+// One facet of the contact surface: a flat triangle, or one of degree four (twins, with the formulas:
+// src/contact/geometry/facet.rs and quartic.rs). For one invocation; geometry is relative to the point in question,
+// which is the origin.
 //
 // The stage declares SMOOTH, and `control(facet, k, x)`: control point k of a facet less x, of a flat one corner k.
 
-// Control points of the facet at hand, in the twin's order; of a flat one only the corners, in places 0, 10 and 14.
+// Control points of the current facet, in the twin's order; of a flat one only the corners, in places 0, 10 and 14.
 var<private> net: array<vec3<f64>, 15>;
 
 // Directions of the weights in which a point moves over a face.
@@ -31,7 +32,7 @@ fn blend(w: vec3<f64>, a: vec3<f64>, b: vec3<f64>, c: vec3<f64>) -> vec3<f64> {
     return w.x * a + w.y * b + w.z * c;
 }
 
-// Takes `facet` for the one at hand.
+// Takes `facet` for the current one.
 fn form(facet: u32, x: vec3<f64>) {
     if !SMOOTH {
         net[0] = control(facet, 0u, x);
@@ -56,7 +57,8 @@ fn form(facet: u32, x: vec3<f64>) {
     net[14] = control(facet, 14u, x);
 }
 
-// Its point at weights w, by de Casteljau's algorithm. Without loops, so that compilers keep all control points in registers.
+// Its point at weights w, by de Casteljau's algorithm. Without loops, so that compilers keep all control points in
+// registers.
 fn jet_at(w: vec3<f64>) -> Jet {
     if !SMOOTH {
         var flat = Jet();
@@ -102,14 +104,15 @@ fn normal_of(jet: Jet) -> vec3<f64> {
     return unit_or_zero(cross(tangent(jet, TOWARDS_1), tangent(jet, TOWARDS_2)));
 }
 
-// Angle at corner k between the two edges. It is only a weight: arctangent, good to 4096 ULP in f32, is more than it needs.
+// Angle at corner k between the two edges. It is only a weight: arctangent, good to 4096 ULP in f32, is more than it
+// needs.
 fn angle_at(jet: Jet, k: u32) -> f64 {
     let left = unit_or_zero(tangent(jet, along_edge(k)));
     let right = -unit_or_zero(tangent(jet, along_edge((k + 2u) % 3u)));
     return f64(atan2(f32(length(cross(left, right))), f32(dot(left, right))));
 }
 
-// The point of the facet at hand that is closest to the origin.
+// The point of the current facet that is closest to the origin.
 fn closest_on_facet() -> ClosestPoint {
     let flat = closest_point(vec3<f64>(0.0), net[0], net[10], net[14]);
     if !SMOOTH {
@@ -136,8 +139,8 @@ fn closest_on_facet() -> ClosestPoint {
     return best;
 }
 
-// The weights at which the distance is least, on the facet continued beyond its edges. Far outside it stops, since Newton's method would not
-// come back.
+// The weights at which the distance is least, on the facet continued beyond its edges. Far outside it stops, since
+// Newton's method would not come back.
 fn stationary(start: vec3<f64>) -> vec3<f64> {
     var w = start;
     for (var step_number = 0u; step_number < FACET_ITERATIONS; step_number += 1u) {

@@ -1,7 +1,8 @@
-// What both forms of the object's frame update share (non-iterative passive mechanical integration, paper's section 3.2):
+// What both forms of the object's frame update share (non-iterative passive mechanical integration, paper's section
+// 3.2):
 //     (2M/T + B + (T/2) K) v_hat = (2M/T) v_k - K u_k + f,    u_{k+1} = u_k + T v_hat,    v_{k+1} = 2 v_hat - v_k
-// with u = n - n0. Displacements are the state, not positions: f32 resolves them better. Quasi-static graphics has no M, B
-// and v, and goes half the way: u_{k+1} = u_k + (T/2) v_hat = K^-1 f.
+// with u = n - n0. Displacements are the state, not positions: f32 resolves them better. Quasi-static graphics has no
+// M, B and v, and goes half the way: u_{k+1} = u_k + (T/2) v_hat = K^-1 f.
 
 struct FrameParameters {
     nodes: u32,

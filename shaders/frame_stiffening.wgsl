@@ -1,5 +1,6 @@
-// Strain stiffening of the object's springs (twin: `Stiffening::relieve` in src/object/stiffening.rs): by how much K1 u exceeds
-// the springs' force, added to the loads. `blocks` holds K1, the springs FACTOR times as stiff; one invocation a node.
+// Strain stiffening of the object's springs (twin: `Stiffening::relieve` in src/object/stiffening.rs): by how much K1 u
+// exceeds the springs' force, added to the loads. `blocks` holds K1, the springs FACTOR times as stiff; one invocation
+// a node.
 
 // kappa [1].
 override FACTOR: f32;

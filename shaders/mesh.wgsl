@@ -1,8 +1,8 @@
 // Corners and neighbours of the surface's triangles.
 //
-// The stage declares `parameters` and `mesh`, which holds, one behind the other, three corners a triangle, three neighbours a triangle
-// (across edge k), the starts of the lists of triangles around each node (one more than there are nodes), and those lists; where the
-// compliance leaves out surface nodes, the place of each among those that it covers.
+// The stage declares `parameters` and `mesh`, which holds, one behind the other, three corners a triangle, three
+// neighbours a triangle (across edge k), the starts of the lists of triangles around each node (one more than there are
+// nodes), and those lists; where the compliance leaves out surface nodes, the place of each among those that it covers.
 
 fn corner(triangle: u32, k: u32) -> u32 {
     return mesh[3u * triangle + k];

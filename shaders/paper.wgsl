@@ -1,6 +1,6 @@
-// The paper's four-step iteration, section 2.1 (twin, with the steps: src/contact/equilibrium/paper.rs). One workgroup a
-// configuration; invocation k keeps tie k. In f32 a tie's pull is taken from the solution of step 2, not as Kc times a
-// difference of positions.
+// The paper's four-step iteration, section 2.1 (twin, with the steps: src/contact/equilibrium/paper.rs). One workgroup
+// a configuration; invocation k keeps tie k. In f32 a tie's pull is taken from the solution of step 2, not as Kc times
+// a difference of positions.
 
 const FORCES: u32 = 0u;
 const PREVIOUS_FORCES: u32 = 1u;
@@ -78,7 +78,7 @@ fn displace_all(vector: u32, local: u32) -> f32 {
 
 // Step 1: proxy nodes inside, each tied to the three closest object nodes.
 fn tie_nodes(moved: f32, local: u32) -> Tie {
-    // Ties are found anew in every pass.
+    // Ties are found again in every pass.
     if local == 0u {
         contact_count = 0u;
         support_count = 0u;

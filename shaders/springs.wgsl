@@ -1,4 +1,5 @@
-// Contact: the closest facet pushes, a spring a contact (twin: src/contact/law/springs.rs). Invocation k keeps contact k. Vectors on the support are in the workgroup's memory.
+// Contact: the closest facet pushes, a spring a contact (twin: src/contact/law/springs.rs). Invocation k keeps contact
+// k. Vectors on the support are in the workgroup's memory.
 
 // A size that follows; named, because naga 30 loses count of overrides in array sizes that are expressions.
 override VECTOR_NUMBERS: u32 = 3u * VECTORS * SUPPORT;
@@ -73,7 +74,7 @@ fn freeze(contact: Contact) -> Contact {
     return row;
 }
 
-// A frozen row's contact at the displacement at hand.
+// A frozen row's contact at the current displacement.
 fn frozen_contact(row: Contact) -> Contact {
     var contact = row;
     for (var k = 0u; k < 3u; k += 1u) {

@@ -1,10 +1,10 @@
-// What the equilibrium stages share: one workgroup a configuration, the object nodes A that carry contact force, and the
-// compliance among them (twin: src/contact/linear/support.rs).
+// What the equilibrium stages share: one workgroup a configuration, the object nodes A that carry contact force, and
+// the compliance among them (twin: src/contact/linear/support.rs).
 //
 // Forces live on A only and displacement is u = C f. Every sum runs in the same order in every invocation, so that all
 // agree to the bit on what to do next, and barriers stay in uniform control flow.
 //
-// How contacts act on A is told by springs.wgsl, which also keeps the vectors on A; what they are, by deformed.wgsl.
+// How contacts act on A stands in springs.wgsl, which also keeps the vectors on A; what they are, by deformed.wgsl.
 
 // Invocations of the workgroup, and most proxy nodes in contact at a time: invocation k keeps contact k.
 override WORKGROUP: u32 = 32u;
@@ -18,8 +18,8 @@ override PARTIAL: bool = false;
 override ISOTROPIC: bool = false;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
-// Surface nodes at rest; then the bounding sphere (centre, radius) of each triangle; then each proxy node's radius in x; then
-// the bounding sphere of each cluster of triangles.
+// Surface nodes at rest; then the bounding sphere (centre, radius) of each triangle; then each proxy node's radius in
+// x; then the bounding sphere of each cluster of triangles.
 @group(0) @binding(1) var<storage, read> rest: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> mesh: array<u32>;
 // C over the surface nodes that it covers, row-major: 3 x 3 numbers for each pair, or one [m/N].
@@ -31,7 +31,8 @@ override ISOTROPIC: bool = false;
 @group(0) @binding(6) var<storage, read_write> outcomes: array<SolverResult>;
 // CONTACTS a configuration.
 @group(0) @binding(7) var<storage, read_write> touches: array<Touch>;
-// One configuration behind the other: what deformed.wgsl keeps of the covered surface nodes and the clusters of triangles.
+// One configuration behind the other: what deformed.wgsl keeps of the covered surface nodes and the clusters of
+// triangles.
 @group(0) @binding(8) var<storage, read_write> workspace: array<vec4<f32>>;
 
 const ABSENT: u32 = 0xffffffffu;

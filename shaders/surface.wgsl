@@ -1,7 +1,7 @@
 // Normals of the deformed faceted surface (twin: src/contact/geometry/normals.rs).
 //
-// The stage declares `parameters`, `mesh` (mesh.wgsl) and `node_from(j, x)`: node j's position less x. Geometry is computed relative
-// to the point in question, where f32 is finest.
+// The stage declares `parameters`, `mesh` (mesh.wgsl) and `node_from(j, x)`: node j's position less x. Geometry is
+// computed relative to the point in question, where f32 is finest.
 
 // Outward unit normal of a triangle near x.
 fn face_normal(triangle: u32, x: vec3<f32>) -> vec3<f32> {

@@ -1,7 +1,8 @@
-// One trust-region Newton step of the energy form, by truncated conjugate gradients (Steihaug 1983, Toint 1981), for the model that
-// src/contact/equilibrium/newton.rs derives. There damping keeps steps short and a dense factor of the springs that touch preconditions them; here,
-// where a workgroup's memory has no room for the factor, C preconditions them and the ball df . C df <= radius^2 keeps them short. Negative
-// curvature and long steps go to its boundary. Both end at the same equilibria.
+// One trust-region Newton step of the energy form, by truncated conjugate gradients (Steihaug 1983, Toint 1981), for
+// the model that src/contact/equilibrium/newton.rs derives. There damping keeps steps short and a dense factor of the
+// springs that touch preconditions them; here, where a workgroup's memory has no room for the factor, C preconditions
+// them and the ball df . C df <= radius^2 keeps them short. Negative curvature and long steps go to its boundary. Both
+// end at the same equilibria.
 
 const FORCES: u32 = 0u;
 // Residual force r = c(u) - f of the current state.
@@ -43,8 +44,8 @@ fn share_to_boundary(radius: f32, step_square: f32, mixed: f32, direction_square
     return select((root - mixed) / direction_square, left / max(mixed + root, LEAST_DIVISOR), mixed > 0.0);
 }
 
-// Step for the residual force BALANCE with energy norm `square`^(1/2), within `radius`, solved to `tolerance` relative to
-// it; the step is left in STEP_FORCE and STEP.
+// Step for the residual force BALANCE with energy norm `square`^(1/2), within `radius`, solved to `tolerance` relative
+// to it; the step is left in STEP_FORCE and STEP.
 fn trust_region_step(contact: Contact, kc: f32, square: f32, radius: f32, tolerance: f32, local: u32) -> Step {
     for (var slot = local; slot < support_count; slot += WORKGROUP) {
         put(RESIDUAL, slot, entry(BALANCE, slot));

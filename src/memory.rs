@@ -1,4 +1,5 @@
-//! Memory that is left: work that is known to need more is refused before it begins, instead of being ended by the system.
+//! Memory that is left: work that is known to need more is refused before it begins, instead of being ended by the
+//! system.
 
 /// More memory is needed than there is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -27,8 +28,8 @@ pub fn check(needed: usize) -> Result<(), Shortage> {
     }
 }
 
-/// Returns the memory that this process may still take: the least of what the system has available, swap included, of what the limit on
-/// its address space leaves, and of what its control group leaves [bytes].
+/// Returns the memory that this process may still take: the least of what the system has available, swap included, of
+/// what the limit on its address space leaves, and of what its control group leaves [bytes].
 #[must_use]
 pub fn left() -> Option<usize> {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();

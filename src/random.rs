@@ -3,8 +3,8 @@
 #[cfg(test)]
 use glam::DVec3;
 
-/// A linear congruential generator, of which the upper 53 bits count (Knuth 1998, The Art of Computer Programming, volume 2,
-/// section 3.3.4).
+/// A linear congruential generator, of which the upper 53 bits count (Knuth 1998, The Art of Computer Programming,
+/// volume 2, section 3.3.4).
 pub struct Random(u64);
 
 impl Random {

@@ -1,5 +1,5 @@
-//! Numerical tolerances that several modules share, each with its derivation. Others stand beside the code that they bound;
-//! no number in the code is a bare tolerance.
+//! Numerical tolerances that several modules share, each with its derivation. Others stand beside the code that they
+//! bound; no number in the code is a bare tolerance.
 
 // --- GPU (f32 kernels) ---
 

@@ -35,11 +35,11 @@ pub struct hz_sample {
 // SAFETY: it begins with its size.
 unsafe impl Extensible for hz_sample {}
 
-/// Opens the dataset file at `path` (UTF-8) and makes the field of it in memory as its scene has it felt; without a scene it is interpolated
-/// linearly. The file is checked in full, and not needed afterwards.
+/// Opens the dataset file at `path` (UTF-8) and makes the field of it in memory as its scene has it felt; without a
+/// scene it is interpolated linearly. The file is checked in full, and not needed afterwards.
 ///
-/// On success `*field` is to be closed with hz_field_close; on failure it is NULL and `message`, `message_size` bytes that may be NULL, says
-/// why. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE, HZ_FORMAT or HZ_SCENE.
+/// On success `*field` is to be closed with hz_field_close; on failure it is NULL and `message`, `message_size` bytes
+/// that may be NULL, says why. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE, HZ_FORMAT or HZ_SCENE.
 ///
 /// # Safety
 /// All are NULL or as described.
@@ -105,10 +105,12 @@ pub unsafe extern "C" fn hz_field_bounds(field: *const hz_field, least: *mut f64
     hz_code::HZ_OK
 }
 
-/// Looks up the torque `tau` [N m; N at prismatic joints] at the configuration `q` [rad; m], one entry per joint each. Real-time safe: it
-/// allocates, locks and prints nothing, waits for nothing, and takes the same time wherever `q` is. Any number of threads may call it.
+/// Looks up the torque `tau` [N m; N at prismatic joints] at the configuration `q` [rad; m], one entry per joint each.
+/// Real-time safe: it allocates, locks and prints nothing, waits for nothing, and takes the same time wherever `q` is.
+/// Any number of threads may call it.
 ///
-/// Returns HZ_OK, HZ_OUTSIDE or HZ_UNCONVERGED; HZ_ARGUMENT for NULL or a `q` that is not finite, with zeros for a torque.
+/// Returns HZ_OK, HZ_OUTSIDE or HZ_UNCONVERGED; HZ_ARGUMENT for NULL or a `q` that is not finite, with zeros for a
+/// torque.
 ///
 /// # Safety
 /// `field` is NULL or open; `q` and `tau` are NULL or have one entry per joint.
@@ -129,7 +131,8 @@ pub unsafe extern "C" fn hz_field_torque(field: *const hz_field, q: *const f64, 
     })
 }
 
-/// Looks up all that the field knows of the configuration `q` [rad; m]. Real-time safe as hz_field_torque, with the same codes.
+/// Looks up all that the field knows of the configuration `q` [rad; m]. Real-time safe as hz_field_torque, with the
+/// same codes.
 ///
 /// # Safety
 /// `field` is NULL or open; `q` is NULL or has one entry per joint; `sample` is NULL or tells its size.
@@ -151,13 +154,14 @@ pub unsafe extern "C" fn hz_field_sample(field: *const hz_field, q: *const f64, 
     })
 }
 
-/// Looks up `count` torques on all cores: row k of `tau` at row k of `q`, rows of one entry per joint. `status`, which may be NULL, is told
-/// the status of each, as hz_sample has it. Not for the real-time thread.
+/// Looks up `count` torques on all cores: row k of `tau` at row k of `q`, rows of one entry per joint. `status`, which
+/// may be NULL, is told the status of each, as hz_sample has it. Not for the real-time thread.
 ///
 /// Returns HZ_OK; HZ_ARGUMENT for NULL or a `q` that is not finite, with zeros for all torques.
 ///
 /// # Safety
-/// `field` is NULL or open; `q` and `tau` are NULL or have `count` rows, `status` is NULL or has `count` entries. They do not overlap.
+/// `field` is NULL or open; `q` and `tau` are NULL or have `count` rows, `status` is NULL or has `count` entries. They
+/// do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hz_field_torques(
     field: *const hz_field,

@@ -16,15 +16,16 @@ use haptize::{
 };
 use std::{ffi::c_char, sync::Arc};
 
-/// A haptic loop: the virtual proxy, its coupling to the device, the torque field, and the watchdog. One thread at a time may use it.
+/// A haptic loop: the virtual proxy, its coupling to the device, the torque field, and the watchdog. One thread at a
+/// time may use it.
 pub struct hz_loop {
     haptics: Arc<Haptics>,
     state: State,
     started: bool,
 }
 
-/// Gains in the place of the scene's. Initialise all of it with zeros, set `size`, and one entry per joint of what is to change: a list of
-/// zeros leaves the scene's.
+/// Gains in the place of the scene's. Initialise all of it with zeros, set `size`, and one entry per joint of what is
+/// to change: a list of zeros leaves the scene's.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct hz_gains {
@@ -52,8 +53,9 @@ pub struct hz_tick {
     pub energy: f64,
     /// 1 in contact, else 0.
     pub contact: u32,
-    /// Remarks, as bits: 1 outside the grid, 2 beside a grid point that was not computed, 4 beside one that did not converge, 8 held by the
-    /// boundary layer, 16 a joint at its limit, 32 torque cut in size, 64 torque cut in rate, 128 held at the border of the haptized range.
+    /// Remarks, as bits: 1 outside the grid, 2 beside a grid point that was not computed, 4 beside one that did not
+    /// converge, 8 held by the boundary layer, 16 a joint at its limit, 32 torque cut in size, 64 torque cut in rate,
+    /// 128 held at the border of the haptized range.
     pub flags: u32,
 }
 
@@ -62,12 +64,12 @@ unsafe impl Extensible for hz_gains {}
 // SAFETY: as above.
 unsafe impl Extensible for hz_tick {}
 
-/// Opens the dataset file at `path` (UTF-8) and makes the haptic loop of its scene, with `gains` in the place of the scene's where that is not
-/// NULL. The file is not needed afterwards.
+/// Opens the dataset file at `path` (UTF-8) and makes the haptic loop of its scene, with `gains` in the place of the
+/// scene's where that is not NULL. The file is not needed afterwards.
 ///
-/// On success `*loop` is to be closed with hz_loop_close, and `message`, `message_size` bytes that may be NULL, names the gains that are beyond
-/// their passivity bound, each with a remedy; it is empty where there are none. On failure `*loop` is NULL and `message` says why. Returns
-/// HZ_OK, HZ_ARGUMENT, HZ_FILE, HZ_FORMAT or HZ_SCENE.
+/// On success `*loop` is to be closed with hz_loop_close, and `message`, `message_size` bytes that may be NULL, names
+/// the gains that are beyond their passivity bound, each with a remedy; it is empty where there are none. On failure
+/// `*loop` is NULL and `message` says why. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE, HZ_FORMAT or HZ_SCENE.
 ///
 /// # Safety
 /// All are NULL or as described; `gains` tells its size.
@@ -148,8 +150,9 @@ pub unsafe extern "C" fn hz_loop_period(r#loop: *const hz_loop) -> f64 {
     unsafe { r#loop.as_ref() }.map_or(0.0, |of| of.haptics.period())
 }
 
-/// Begins at the device's position `y`, one entry per joint [rad; m]: before the first tick, and to end a fault. The torque goes on from what
-/// the device is under, so that there is no jump. Real-time safe: it allocates, locks and prints nothing, and waits for nothing.
+/// Begins at the device's position `y`, one entry per joint [rad; m]: before the first tick, and to end a fault. The
+/// torque goes on from what the device is under, so that there is no jump. Real-time safe: it allocates, locks and
+/// prints nothing, and waits for nothing.
 ///
 /// Returns HZ_OK, or HZ_ARGUMENT for NULL or a position that is none; a fault then stays.
 ///
@@ -172,13 +175,14 @@ pub unsafe extern "C" fn hz_loop_start(r#loop: *mut hz_loop, y: *const f64) -> h
     })
 }
 
-/// Does one tick: `tau` is what the device is to exert until the next one [N m; N], for its position `y` [rad; m], one entry per joint each.
-/// `age` is the time since that was measured [s], `dt` the time since the tick before [s]. `tick`, which may be NULL, is told the rest.
-/// Real-time safe: it allocates, locks and prints nothing, and waits for nothing.
+/// Does one tick: `tau` is what the device is to exert until the next one [N m; N], for its position `y` [rad; m], one
+/// entry per joint each. `age` is the time since that was measured [s], `dt` the time since the tick before [s].
+/// `tick`, which may be NULL, is told the rest. Real-time safe: it allocates, locks and prints nothing, and waits for
+/// nothing.
 ///
-/// Returns HZ_OK, or HZ_LET_GO once something was wrong with a position, its age, the time between ticks or the energy at the device; the
-/// torque then goes to zero at the rate to which the scene limits it, and stays there until hz_loop_start. HZ_ARGUMENT, with zeros for a torque,
-/// for NULL or before hz_loop_start.
+/// Returns HZ_OK, or HZ_LET_GO once something was wrong with a position, its age, the time between ticks or the energy
+/// at the device; the torque then goes to zero at the rate to which the scene limits it, and stays there until
+/// hz_loop_start. HZ_ARGUMENT, with zeros for a torque, for NULL or before hz_loop_start.
 ///
 /// # Safety
 /// `loop` is NULL or open; `y` and `tau` are NULL or have one entry per joint; `tick` is NULL or tells its size.
@@ -222,7 +226,8 @@ pub unsafe extern "C" fn hz_loop_tick(
     })
 }
 
-/// Tells in `message`, `message_size` bytes, why the loop has let go and what to do about it; an empty text where it has not.
+/// Tells in `message`, `message_size` bytes, why the loop has let go and what to do about it; an empty text where it
+/// has not.
 ///
 /// Returns HZ_OK, HZ_LET_GO, or HZ_ARGUMENT for NULL.
 ///

@@ -1,7 +1,7 @@
 //! The C interface of haptize: what `include/haptize.h`, which is made of these sources, declares.
 //!
-//! Nothing is decided here. Each function checks what it is told, calls the library, and tells the outcome as an [`hz_code`]; a message
-//! goes into the caller's buffer. No panic leaves it. Types bear the names that they have in C.
+//! Nothing is decided here. Each function checks what it is told, calls the library, and tells the outcome as an
+//! [`hz_code`]; a message goes into the caller's buffer. No panic leaves it. Types bear the names that they have in C.
 
 #![allow(non_camel_case_types)]
 

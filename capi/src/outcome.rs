@@ -104,7 +104,8 @@ pub unsafe fn told(text: *mut c_char, size: usize, work: impl FnOnce() -> Result
     code
 }
 
-/// Puts what `make` makes, with its remarks, behind a new handle at `handle`, NULL where it fails, and writes the message as [`told`] does.
+/// Puts what `make` makes, with its remarks, behind a new handle at `handle`, NULL where it fails, and writes the
+/// message as [`told`] does.
 ///
 /// # Safety
 /// `handle` is NULL or a place for a pointer; `text` as for [`told`].
@@ -204,7 +205,8 @@ fn is_buffer<T>(numbers: *const T, count: usize) -> bool {
     !numbers.is_null() && numbers.is_aligned() && count <= isize::MAX as usize / size_of::<T>()
 }
 
-/// A structure whose first entry is its own size, by which a program compiled with a later header is known: such a one is only longer.
+/// A structure whose first entry is its own size, by which a program compiled with a later header is known: such a one
+/// is only longer.
 ///
 /// # Safety
 /// The structure begins with a `usize`.
@@ -213,7 +215,8 @@ pub unsafe trait Extensible: Sized {}
 /// The structure at `structure`; `None` where it is NULL or its size is not told or too small.
 ///
 /// # Safety
-/// `structure` is NULL or points to a structure of the size that it tells, which nobody else writes while the result lives.
+/// `structure` is NULL or points to a structure of the size that it tells, which nobody else writes while the result
+/// lives.
 pub unsafe fn structure<'a, T: Extensible>(structure: *mut T) -> Option<&'a mut T> {
     if structure.is_null() || !structure.is_aligned() {
         return None;

@@ -13,7 +13,8 @@ use haptize::{
 };
 use std::ffi::c_char;
 
-/// The object and the arm of a scene, ready to be solved at any configuration. Any number of threads may use it at once.
+/// The object and the arm of a scene, ready to be solved at any configuration. Any number of threads may use it at
+/// once.
 pub struct hz_solver {
     direct: Direct,
 }
@@ -55,8 +56,8 @@ pub struct hz_force {
 
 /// Reads the scene file at `path` (UTF-8) and prepares its object and arm. That takes up to some seconds.
 ///
-/// On success `*solver` is to be closed with hz_solver_close; on failure it is NULL and `message`, `message_size` bytes that may be NULL, says
-/// why, with file and line. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE or HZ_SCENE.
+/// On success `*solver` is to be closed with hz_solver_close; on failure it is NULL and `message`, `message_size` bytes
+/// that may be NULL, says why, with file and line. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE or HZ_SCENE.
 ///
 /// # Safety
 /// All are NULL or as described.
@@ -96,15 +97,15 @@ pub unsafe extern "C" fn hz_solver_joints(solver: *const hz_solver) -> u32 {
     unsafe { solver.as_ref() }.map_or(0, |solver| solver.direct.joints() as u32)
 }
 
-/// Solves the equilibrium at the configuration `q`, one entry per joint [rad; m], from the object at rest. `forces`, which may be NULL, is told
-/// as many contact forces as it has room for, `room`; `equilibrium` tells how many there are. Takes some tenths of a millisecond and more,
-/// and allocates: not for the real-time thread.
+/// Solves the equilibrium at the configuration `q`, one entry per joint [rad; m], from the object at rest. `forces`,
+/// which may be NULL, is told as many contact forces as it has room for, `room`; `equilibrium` tells how many there
+/// are. Takes some tenths of a millisecond and more, and allocates: not for the real-time thread.
 ///
 /// Returns HZ_OK, HZ_UNCONVERGED, or HZ_ARGUMENT for NULL or a `q` that is not finite.
 ///
 /// # Safety
-/// `solver` is NULL or open; `q` is NULL or has one entry per joint; `equilibrium` is NULL or tells its size; `forces` is NULL or has `room`
-/// entries.
+/// `solver` is NULL or open; `q` is NULL or has one entry per joint; `equilibrium` is NULL or tells its size; `forces`
+/// is NULL or has `room` entries.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hz_solver_solve(
     solver: *const hz_solver,

@@ -1,4 +1,5 @@
-//! Arrays in and out: configurations from whatever NumPy takes for numbers, results into the caller's array or a new one.
+//! Arrays in and out: configurations from whatever NumPy takes for numbers, results into the caller's array or a new
+//! one.
 
 use haptize::JointVector;
 use numpy::{
@@ -47,8 +48,8 @@ impl<'py> Configurations<'py> {
         self.shape().iter().product()
     }
 
-    /// Fills an array of `T`, for each configuration of the shape `row`, by `fill`. It is `out`, whose shape must be right and which must
-    /// not be `q`, or a new one. Many rows are filled while other threads of Python run.
+    /// Fills an array of `T`, for each configuration of the shape `row`, by `fill`. It is `out`, whose shape must be
+    /// right and which must not be `q`, or a new one. Many rows are filled while other threads of Python run.
     pub fn fill<T: Element + Send>(
         &self,
         row: &[usize],
@@ -129,8 +130,9 @@ pub fn vector(name: &str, values: &Bound<'_, PyAny>, joints: usize) -> PyResult<
     Ok(JointVector::from_slice(&numbers))
 }
 
-/// A NumPy vector of one f64 per joint, contiguous and aligned: what a loop is called with a thousand times a second. It is told by its
-/// flags, which takes a few nanoseconds, where NumPy's own comparison of types and the ledger of borrows take some hundred.
+/// A NumPy vector of one f64 per joint, contiguous and aligned: what a loop is called with a thousand times a second.
+/// It is told by its flags, which takes a few nanoseconds, where NumPy's own comparison of types and the ledger of
+/// borrows take some hundred.
 pub struct PlainVector<'a, 'py> {
     array: &'a Bound<'py, PyUntypedArray>,
     joints: usize,
@@ -158,7 +160,8 @@ impl<'py> PlainVector<'_, 'py> {
 
     /// Copies the numbers.
     pub fn read(&self) -> JointVector {
-        // SAFETY: there are as many numbers, aligned and side by side; they are copied while this thread holds the interpreter.
+        // SAFETY: there are as many numbers, aligned and side by side; they are copied while this thread holds the
+        // interpreter.
         JointVector::from_slice(unsafe { std::slice::from_raw_parts(self.place(), self.joints) })
     }
 }
@@ -181,8 +184,9 @@ impl<'a, 'py> Output<'a, 'py> {
     pub fn write(self, py: Python<'py>, values: &JointVector) -> Bound<'py, PyAny> {
         let Some(vector) = self.0 else { return PyArray1::from_slice(py, values).into_any() };
         let numbers = &values[..vector.joints];
-        // SAFETY: there is room for as many numbers, aligned and side by side, which NumPy lets be written. No reference to them lives: those
-        // that calls hold end with them, or while other threads run belong to a batch, whose array nobody is to write meanwhile.
+        // SAFETY: there is room for as many numbers, aligned and side by side, which NumPy lets be written. No
+        // reference to them lives: those that calls hold end with them, or while other threads run belong to a batch,
+        // whose array nobody is to write meanwhile.
         unsafe { vector.place().copy_from_nonoverlapping(numbers.as_ptr(), numbers.len()) };
         vector.array.as_any().clone()
     }

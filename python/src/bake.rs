@@ -14,11 +14,13 @@ use std::{
 
 /// Haptize a scene: solve contact at every point of its grid.
 ///
-/// output: the file to write; without one the dataset stays in memory. resume: go on with a bake into that file that was interrupted.
-/// backend: "auto", "cpu" or "gpu". measure_error: random configurations at which the dataset's error is measured; 0 leaves it out.
-/// progress: called with (points done, points) several times a second; what it raises stops the bake, as Ctrl-C does.
+/// output: the file to write; without one the dataset stays in memory. resume: go on with a bake into that file that
+/// was interrupted. backend: "auto", "cpu" or "gpu". measure_error: random configurations at which the dataset's error
+/// is measured; 0 leaves it out. progress: called with (points done, points) several times a second; what it raises
+/// stops the bake, as Ctrl-C does.
 ///
-/// Other threads run meanwhile. BakeError where the scene cannot be haptized; what a bake into a file has solved is kept.
+/// Other threads run meanwhile. BakeError where the scene cannot be haptized; what a bake into a file has solved is
+/// kept.
 #[pyfunction]
 #[pyo3(signature = (scene, output = None, *, resume = false, backend = "auto", measure_error = None, progress = None))]
 pub fn bake(

@@ -11,8 +11,8 @@ use std::path::PathBuf;
 
 /// A dataset over a grid of joint configurations, made by bake or gridize, or opened from a file.
 ///
-/// Columns are read-only NumPy arrays of the grid's shape that lie where the dataset lies, in its file or in memory; a column that the dataset
-/// does not hold is None.
+/// Columns are read-only NumPy arrays of the grid's shape that lie where the dataset lies, in its file or in memory; a
+/// column that the dataset does not hold is None.
 #[pyclass(frozen, module = "haptize")]
 pub struct Dataset {
     pub dataset: dataset::Dataset,
@@ -48,8 +48,9 @@ fn python_of<'py>(py: Python<'py>, value: &impl serde::Serialize) -> PyResult<Bo
 
 #[pymethods]
 impl Dataset {
-    /// Open the file at `path` and check all of it. Columns are read where they lie in the file: memory is taken only by what is looked at.
-    /// The file must not be cut short by another program meanwhile, which would end the process; `load` copies it.
+    /// Open the file at `path` and check all of it. Columns are read where they lie in the file: memory is taken only
+    /// by what is looked at. The file must not be cut short by another program meanwhile, which would end the process;
+    /// `load` copies it.
     #[staticmethod]
     fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let opened = py.detach(|| dataset::Dataset::open(&path));
@@ -117,7 +118,8 @@ impl Dataset {
         this.dataset.energy.as_ref().map(|column| view(slf, column, &this.shape_with(None))).transpose()
     }
 
-    /// Smallest signed distance of the arm to the surface at rest, or far from contact a lower bound of it [m]; or None.
+    /// Smallest signed distance of the arm to the surface at rest, or far from contact a lower bound of it [m]; or
+    /// None.
     #[getter]
     fn gap<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<View<'py, f32>>> {
         let this = slf.get();
@@ -145,8 +147,8 @@ impl Dataset {
         this.dataset.iterations.as_ref().map(|column| view(slf, column, &this.shape_with(None))).transpose()
     }
 
-    /// Contact forces as compressed rows, or None: those of grid point p (C order) are entries offsets[p] to offsets[p + 1] of `nodes`, the
-    /// object's node, and `forces` [N], three numbers each.
+    /// Contact forces as compressed rows, or None: those of grid point p (C order) are entries offsets[p] to
+    /// offsets[p + 1] of `nodes`, the object's node, and `forces` [N], three numbers each.
     #[getter]
     #[allow(clippy::type_complexity)]
     fn contacts<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<(View<'py, u64>, View<'py, u32>, View<'py, f32>)>> {
@@ -177,7 +179,8 @@ impl Dataset {
         &self.dataset.scene
     }
 
-    /// Where the dataset comes from: version, algorithm, tolerance [1], backend, adapter, date, and the error that the bake measured.
+    /// Where the dataset comes from: version, algorithm, tolerance [1], backend, adapter, date, and the error that the
+    /// bake measured.
     #[getter]
     fn provenance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         python_of(py, &self.dataset.provenance)

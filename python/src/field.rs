@@ -19,8 +19,9 @@ use std::path::PathBuf;
 ///
 /// Field(dataset, interpolation=None): interpolation is "linear", "gap-field" or "potential"; by default the scene's.
 ///
-/// Each look-up takes a configuration q [rad; m], an array of one entry per joint, or any array of such in its last axis, and works on all
-/// cores. Wrong shapes and numbers that are not finite raise ValueError. Threads may share a field.
+/// Each look-up takes a configuration q [rad; m], an array of one entry per joint, or any array of such in its last
+/// axis, and works on all cores. Wrong shapes and numbers that are not finite raise ValueError. Threads may share a
+/// field.
 #[pyclass(frozen, module = "haptize")]
 pub struct Field {
     field: TorqueField,
@@ -74,7 +75,8 @@ impl Field {
         self.dataset.clone_ref(py)
     }
 
-    /// Torque on the arm [N m; N at prismatic joints], of the shape of q; into `out`, an array of float64, where that is given.
+    /// Torque on the arm [N m; N at prismatic joints], of the shape of q; into `out`, an array of float64, where that
+    /// is given.
     #[pyo3(signature = (q, out = None))]
     fn torque<'py>(&self, q: &Bound<'py, PyAny>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         let joints = self.field.joints();
@@ -95,8 +97,8 @@ impl Field {
         })
     }
 
-    /// Signed distance of the arm to the surface at rest [m], interpolated linearly; far from contact a lower bound of it, and NaN outside the
-    /// grid. DatasetError where the dataset does not hold it.
+    /// Signed distance of the arm to the surface at rest [m], interpolated linearly; far from contact a lower bound of
+    /// it, and NaN outside the grid. DatasetError where the dataset does not hold it.
     fn gap<'py>(&self, py: Python<'py>, q: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let joints = self.field.joints();
         let gap = self.dataset.get().dataset.gap.as_ref().ok_or_else(|| errors::absent(py, "gap"))?;
@@ -106,8 +108,8 @@ impl Field {
         })
     }
 
-    /// Slope d tau/d q [N m/rad], a matrix for each configuration: entry [k, l] is the change of torque k with joint l. On a face of a grid
-    /// cell it is the mean of both sides.
+    /// Slope d tau/d q [N m/rad], a matrix for each configuration: entry [k, l] is the change of torque k with joint l.
+    /// On a face of a grid cell it is the mean of both sides.
     fn gradient<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let joints = self.field.joints();
         Configurations::new(q, joints)?.fill(&[joints, joints], None, |q, out: &mut [f64]| {
@@ -115,7 +117,8 @@ impl Field {
         })
     }
 
-    /// 0 free, 1 contact, 2 beside a grid point that did not converge, 4 outside the grid or beside one that was not computed.
+    /// 0 free, 1 contact, 2 beside a grid point that did not converge, 4 outside the grid or beside one that was not
+    /// computed.
     fn status<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Array<'py, u8>> {
         let joints = self.field.joints();
         Configurations::new(q, joints)?.fill(&[], None, |q, out: &mut [u8]| {

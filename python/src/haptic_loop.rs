@@ -16,12 +16,15 @@ use pyo3::{
 };
 use std::sync::Arc;
 
-/// The haptic loop of a dataset's scene: the virtual proxy, its coupling to the device, the torque field, and the watchdog.
+/// The haptic loop of a dataset's scene: the virtual proxy, its coupling to the device, the torque field, and the
+/// watchdog.
 ///
-/// Loop(dataset, gains=None): gains in the place of the scene's, a dict of what [haptics] names, one number for all joints or one each:
-/// coupling_stiffness, coupling_damping, device_damping, proxy_damping, boundary_slope, torque_limit, torque_rate_limit, speed_limit.
+/// Loop(dataset, gains=None): gains in the place of the scene's, a dict of what [haptics] names, one number for all
+/// joints or one each: coupling_stiffness, coupling_damping, device_damping, proxy_damping, boundary_slope,
+/// torque_limit, torque_rate_limit, speed_limit.
 ///
-/// Call start with the device's position, then tick once a period. Python cannot promise to come in time: the loop lets go where it does not.
+/// Call start with the device's position, then tick once a period. Python cannot promise to come in time: the loop lets
+/// go where it does not.
 #[pyclass(module = "haptize")]
 pub struct Loop {
     haptics: Arc<Haptics>,
@@ -72,7 +75,8 @@ impl Loop {
         self.haptics.period()
     }
 
-    /// Begin at the device's position y [rad; m], or begin anew after a fault; the torque goes on from what the device is under.
+    /// Begin at the device's position y [rad; m], or begin anew after a fault; the torque goes on from what the device
+    /// is under.
     fn start(&mut self, y: &Bound<'_, PyAny>) -> PyResult<()> {
         let position = arrays::vector("y", y, self.haptics.joints())?;
         let started = match &mut self.state {
@@ -83,7 +87,8 @@ impl Loop {
         started.map_err(|fault| PyValueError::new_err(fault.to_string()))
     }
 
-    /// One tick: returns the torque that the device is to exert until the next [N m; N], in `out` where that is given, an array of float64.
+    /// One tick: returns the torque that the device is to exert until the next [N m; N], in `out` where that is given,
+    /// an array of float64.
     ///
     /// y: the device's position [rad; m]. dt: time since the tick before [s]. age: time since y was measured [s].
     ///
@@ -130,9 +135,9 @@ impl Loop {
         self.last.is_some_and(|output| output.sample.contact)
     }
 
-    /// Remarks on the last tick, as bits: 1 outside the grid, 2 beside a grid point that was not computed, 4 beside one that did not converge,
-    /// 8 held by the boundary layer, 16 a joint at its limit, 32 torque cut in size, 64 torque cut in rate, 128 held at the border of the
-    /// haptized range.
+    /// Remarks on the last tick, as bits: 1 outside the grid, 2 beside a grid point that was not computed, 4 beside one
+    /// that did not converge, 8 held by the boundary layer, 16 a joint at its limit, 32 torque cut in size, 64 torque
+    /// cut in rate, 128 held at the border of the haptized range.
     #[getter]
     fn flags(&self) -> u8 {
         self.last.map_or(0, |output| output.flags.bits())

@@ -1,5 +1,5 @@
-//! The extension module beneath the Python package `haptize`: classes and functions that hand NumPy arrays to the library and its results
-//! back. Nothing is decided here.
+//! The extension module beneath the Python package `haptize`: classes and functions that hand NumPy arrays to the
+//! library and its results back. Nothing is decided here.
 
 mod arrays;
 mod bake;
@@ -31,7 +31,8 @@ mod _haptize {
         scene::Scene,
     };
 
-    /// Run the command line `arguments`, the program's name first, and return its exit code. Wrong arguments, and help, end the process.
+    /// Run the command line `arguments`, the program's name first, and return its exit code. Wrong arguments, and help,
+    /// end the process.
     #[pyfunction]
     fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
         py.detach(|| haptize::cli::run(arguments))

@@ -11,8 +11,8 @@ use std::path::PathBuf;
 
 /// A scene: what is haptized, with what, how finely, and how it is felt. datasets/README.md explains every key.
 ///
-/// Scene(text, path="scene"): from the text of a scene file, or a dict of the same tables; files that it names are relative to the folder of
-/// `path`, which messages name. SceneError says where it is not valid.
+/// Scene(text, path="scene"): from the text of a scene file, or a dict of the same tables; files that it names are
+/// relative to the folder of `path`, which messages name. SceneError says where it is not valid.
 #[pyclass(frozen, module = "haptize")]
 pub struct Scene {
     pub scene: scene::Scene,

@@ -104,7 +104,7 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
     Ok(Report { text, json, whole })
 }
 
-/// What an adapter does of a bake.
+/// Part of a bake that an adapter does.
 fn tier(adapter: &AdapterSummary) -> &'static str {
     if adapter.double {
         "decides contact or not in f64, and searches forces in f32, which the CPU settles"

@@ -35,8 +35,8 @@ Examples:
   haptize gridize log.mcap --topic /joint_states --step 0.03
   haptize gridize run1.csv run2.csv --columns instrument.toml --step 0.02,0.02,0.01 --scene arm.toml")]
 pub struct Arguments {
-    /// A log written by `haptize scan`, an MCAP file with joint states of a robot, or with --columns any tables of joint positions and
-    /// torques.
+    /// A log written by `haptize scan`, an MCAP file with joint states of a robot, or with --columns any tables of
+    /// joint positions and torques.
     #[arg(required = true)]
     logs: Vec<PathBuf>,
     /// Grid step [rad or m]: one number, or one a joint, separated by commas.
@@ -51,15 +51,15 @@ pub struct Arguments {
     /// The topic of joint states to read of an MCAP file; by default its only one.
     #[arg(long)]
     topic: Option<String>,
-    /// Meaning of the efforts of an MCAP file, without --columns: the torque of the motors, or that of the contact on the arm. They must
-    /// hold no weight of the arm.
+    /// Meaning of the efforts of an MCAP file, without --columns: the torque of the motors, or that of the contact on
+    /// the arm. They must hold no weight of the arm.
     #[arg(long, default_value = "motor", conflicts_with = "columns")]
     effort: Effort,
     /// A scene with the arm and the gains to feel the dataset with; scan logs bring theirs.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Torque above which a configuration counts as contact [N m]; by default what the scan's scene says, three standard
-    /// deviations of the samples, or a hundredth of the greatest torque.
+    /// Torque above which a configuration counts as contact [N m]; by default what the scan's scene says, three
+    /// standard deviations of the samples, or a hundredth of the greatest torque.
     #[arg(long, allow_negative_numbers = true)]
     epsilon: Option<f64>,
     /// How torques are interpolated.
@@ -68,8 +68,8 @@ pub struct Arguments {
     /// Smooth torques within their measured standard deviation first.
     #[arg(long)]
     smooth: bool,
-    /// Measure how well the dataset predicts measurements: this fraction of the samples is left out of a second one, which has to
-    /// predict them.
+    /// Measure how well the dataset predicts measurements: this fraction of the samples is left out of a second one,
+    /// which has to predict them.
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true, value_parser = super::fraction)]
     held_out: Option<f64>,
     /// Measure how well the dataset predicts other logs of the same object.

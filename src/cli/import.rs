@@ -30,7 +30,8 @@ pub struct Arguments {
     /// Folder that holds the ROS packages that `package://` names, if they are in no folder above the robot's file.
     #[arg(long, value_name = "DIR")]
     package_path: Option<PathBuf>,
-    /// The scene to write, which must not be there yet; by default the robot's file in the current folder, ending in .toml.
+    /// The scene to write, which must not be there yet; by default the robot's file in the current folder, ending in
+    /// .toml.
     #[arg(short, long)]
     output: Option<PathBuf>,
 }

@@ -28,7 +28,8 @@ Examples:
 pub struct Arguments {
     /// A scene or a dataset.
     file: PathBuf,
-    /// The configuration: one coordinate per joint [rad or m], separated by commas. Write --q=-0.3,... if the first is negative.
+    /// The configuration: one coordinate per joint [rad or m], separated by commas. Write --q=-0.3,... if the first is
+    /// negative.
     #[arg(
         long,
         value_name = "A,B,C",
@@ -40,7 +41,8 @@ pub struct Arguments {
     q: Vec<f64>,
 }
 
-/// Solves the configuration. For a dataset, also reports what it interpolates there and what it stores at the nearest grid point.
+/// Solves the configuration. For a dataset, also reports what it interpolates there and what it stores at the nearest
+/// grid point.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let q = &arguments.q;
     let (scene, object, dataset) = read(&arguments.file)?;

@@ -1,8 +1,9 @@
 //! Ctrl-C, SIGTERM and SIGHUP: honoured within a second, however long what is under way takes.
 //!
-//! Work that can stop at a good place takes [`stop_flag`] and looks at it. What has not stopped after [`GRACE`] is left: files that are
-//! half written are removed, and the program ends. A bake's part and a scan's log are on the disk by then. All other work ends at once,
-//! and so does everything at a second signal. A signal that the program was started to ignore (`nohup`) stays ignored.
+//! Work that can stop at a good place takes [`stop_flag`] and looks at it. What has not stopped after [`GRACE`] is
+//! left: files that are half written are removed, and the program ends. A bake's part and a scan's log are on the disk
+//! by then. All other work ends at once, and so does everything at a second signal. A signal that the program was
+//! started to ignore (`nohup`) stays ignored.
 
 use super::{Failure, last_words};
 use crate::dataset::discard_unfinished;
@@ -30,8 +31,8 @@ static STOP: AtomicBool = AtomicBool::new(false);
 /// Whether there is work that looks at [`STOP`].
 static IS_STOPPABLE: AtomicBool = AtomicBool::new(false);
 
-/// Listens for signals from now on. With `json` the end by a signal is reported on standard output, too; with `resumes` that `--resume`
-/// continues the work.
+/// Listens for signals from now on. With `json` the end by a signal is reported on standard output, too; with `resumes`
+/// that `--resume` continues the work.
 pub fn listen(json: bool, resumes: bool) -> Result<(), Failure> {
     let ignored = ignored();
     ctrlc::set_handler(move || {

@@ -7,8 +7,8 @@ use crate::{
 };
 use std::{fmt::Write, path::Path};
 
-/// Configurations at which the error is measured [1]: the rms is to decide whether the aim was kept, and single large errors where the
-/// torque has kinks and jumps make it vary by a third with a hundred.
+/// Configurations at which the error is measured [1]: the rms is to decide whether the aim was kept, and single large
+/// errors where the torque has kinks and jumps make it vary by a third with a hundred.
 const MEASURED: usize = 400;
 
 /// The accuracy that is asked for.
@@ -23,7 +23,8 @@ pub struct AccuracyGoal<'a> {
     pub resume: bool,
 }
 
-/// Chooses, states and bakes. Nothing is baked where no grid keeps the error; exit code 1 where the error that the bake measures is larger.
+/// Chooses, states and bakes. Nothing is baked where no grid keeps the error; exit code 1 where the error that the bake
+/// measures is larger.
 pub fn run(scene: &Scene, wanted: &AccuracyGoal<'_>, backend: BackendChoice) -> Result<Report, Failure> {
     let (pilot, choice, report) = bake::watched(scene, backend, |bake| {
         tell(format_args!("haptize: pilot: coarse grids against random configurations ..."));

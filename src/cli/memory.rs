@@ -1,7 +1,8 @@
 //! Memory that runs out: an error with the number of bytes and the remedy.
 //!
-//! Rust lets a program answer a failed allocation where it asks first. Any other one ends the process by `abort`, after a line with the
-//! number of bytes. Here the size is remembered, and the signal of `abort` is answered with what to do and exit code 1.
+//! Rust lets a program answer a failed allocation where it asks first. Any other one ends the process by `abort`, after
+//! a line with the number of bytes. Here the size is remembered, and the signal of `abort` is answered with what to do
+//! and exit code 1.
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},

@@ -27,8 +27,8 @@ pub struct Arguments {
     /// The dataset to write.
     #[arg(short, long)]
     output: PathBuf,
-    /// Number of random configurations at which the dataset's error is measured; 0 skips this. By default a tenth of the points in
-    /// contact, at least 100 and at most 1000.
+    /// Number of random configurations at which the dataset's error is measured; 0 skips this. By default a tenth of
+    /// the points in contact, at least 100 and at most 1000.
     #[arg(long, value_name = "COUNT")]
     measure_error: Option<usize>,
 }

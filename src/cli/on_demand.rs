@@ -65,7 +65,7 @@ pub struct OnDemand {
     known: u64,
 }
 
-/// What was solved, and what it answered.
+/// Work done, and answers.
 #[derive(Clone, Copy, Debug)]
 pub struct Explored {
     answers: Answers,
@@ -124,7 +124,7 @@ impl OnDemand {
         Ok(Self { scene, object, chain, store: Arc::new(store), grid, provenance, threads, began, known })
     }
 
-    /// What is known so far, as a dataset.
+    /// Returns everything known so far, as a dataset.
     pub fn dataset(&self) -> Dataset {
         let surface = Some(Surface::of(&self.object));
         let (grid, text) = (self.grid.clone(), self.scene.text.clone());

@@ -1,5 +1,5 @@
-//! What a command writes: never over one of its inputs, over a file of another kind, or over what is no regular file. What is
-//! replaced is reported.
+//! What a command writes: never over one of its inputs, over a file of another kind, or over what is no regular file.
+//! What is replaced is reported.
 
 use super::Failure;
 use crate::dataset::resolved;
@@ -105,8 +105,8 @@ impl Earlier {
 /// Checks that a file of `kind` may be written to `output` by a command that reads `inputs`.
 ///
 /// # Errors
-/// When `output` is one of the inputs, by whatever name, is there and no regular file, holds something of another kind, or lies in a
-/// folder that cannot be written to.
+/// When `output` is one of the inputs, by whatever name, is there and no regular file, holds something of another kind,
+/// or lies in a folder that cannot be written to.
 pub fn check<'a>(output: &Path, kind: Kind, inputs: impl IntoIterator<Item = &'a Path>) -> Result<Earlier, Failure> {
     let refused = |why: &str| format!("{}: {why}; nothing is written: name another file", output.display());
     let file = resolved(output).map_err(|error| refused(&error.to_string()))?;
@@ -133,8 +133,8 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Checks that a command which reads `inputs` may write files called `names` into the folder at `path`. The folder need not be
-    /// there yet.
+    /// Checks that a command which reads `inputs` may write files called `names` into the folder at `path`. The folder
+    /// need not be there yet.
     ///
     /// # Errors
     /// When the folder cannot be written to, or one of the files may not be replaced; see [`check`].
@@ -165,7 +165,8 @@ impl Folder {
         Ok(())
     }
 
-    /// Removes what an earlier run has left and this one has not `written` again, and reports what was replaced and removed.
+    /// Removes what an earlier run has left and this one has not `written` again, and reports what was replaced and
+    /// removed.
     ///
     /// # Errors
     /// When such a file cannot be removed.

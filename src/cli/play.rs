@@ -338,7 +338,7 @@ pub struct Played {
     pub trace: Trace,
     /// How punctual it was, if it ran against the clock.
     pub timing: Option<Timing>,
-    /// What was solved meanwhile, if anything.
+    /// Work done meanwhile, if any.
     pub explored: Option<Explored>,
 }
 

@@ -30,7 +30,8 @@ pub struct Arguments {
     /// Depth up to which the grid is to hold contact [m]; by default a fifth of the body's size.
     #[arg(long, value_name = "METRES", value_parser = depth)]
     depth: Option<f64>,
-    /// Rms error of the torque that the grid is for: a fraction of the torque's own rms over the grid, or a torque ("0.002 N m").
+    /// Rms error of the torque that the grid is for: a fraction of the torque's own rms over the grid, or a torque
+    /// ("0.002 N m").
     #[arg(long, value_name = "ERROR", default_value = ERROR)]
     max_error: Aim,
     /// Maximum number of points of the grid.
@@ -98,8 +99,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     Ok(Report { text, json, whole })
 }
 
-/// `scene`, with a grid where it leaves that out: over the reach of its contact, for the default error; or, where another is `chosen` later,
-/// fine enough to begin from.
+/// `scene`, with a grid where it leaves that out: over the reach of its contact, for the default error; or, where
+/// another is `chosen` later, fine enough to begin from.
 pub fn complete(scene: Scene, backend: BackendChoice, chosen: bool) -> Result<Scene, Failure> {
     if !scene.grid.axes.is_empty() {
         return Ok(scene);

@@ -24,7 +24,7 @@ use std::{
 /// with fewer the rms varies by more than a tenth.
 const JUDGED: usize = 400;
 
-/// What is asked for.
+/// Request.
 pub struct Wanted<'a> {
     /// The error to stay below.
     pub aim: Aim,

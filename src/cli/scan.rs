@@ -42,19 +42,20 @@ pub struct Arguments {
     /// Continue a log that was interrupted.
     #[arg(long)]
     resume: bool,
-    /// Scan with a real device instead of the simulated rig: KIND or KIND:PLACE, as `haptize device list` shows it. It must measure and
-    /// drive its joints. With --guided the space bar says that a hand holds it.
+    /// Scan with a real device instead of the simulated rig: KIND or KIND:PLACE, as `haptize device list` shows it. It
+    /// must measure and drive its joints. With --guided the space bar says that a hand holds it.
     #[arg(long, value_name = "NAME", conflicts_with = "plan_out")]
     device: Option<Address>,
-    /// Only write the plan as a trajectory, as CSV or, where the name ends in .mcap, as joint states in MCAP: for a robot that its own
-    /// controller moves. Its log comes back by `haptize gridize`.
+    /// Only write the plan as a trajectory, as CSV or, where the name ends in .mcap, as joint states in MCAP: for a
+    /// robot that its own controller moves. Its log comes back by `haptize gridize`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "resume", "guided"])]
     plan_out: Option<PathBuf>,
-    /// How long the trajectory of --plan-out rests at each point [s]; by default the scan's window and time of averaging.
+    /// How long the trajectory of --plan-out rests at each point [s]; by default the scan's window and time of
+    /// averaging.
     #[arg(long, requires = "plan_out", allow_negative_numbers = true)]
     dwell: Option<f64>,
-    /// Instead of going through the plan, log for so many seconds wherever a hand leads the device to and lets go of it. The
-    /// simulated rig is led by a simulated hand, to places of the plan.
+    /// Instead of going through the plan, log for so many seconds wherever a hand leads the device to and lets go of
+    /// it. The simulated rig is led by a simulated hand, to places of the plan.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     guided: Option<f64>,
 }

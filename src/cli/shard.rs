@@ -1,4 +1,5 @@
-//! `--shard`: which shard of a bake this process solves, by a number or by what the job scheduler has put into the environment.
+//! `--shard`: which shard of a bake this process solves, by a number or by what the job scheduler has put into the
+//! environment.
 
 use super::Failure;
 use crate::sweep::Shard;
@@ -103,7 +104,8 @@ mod tests {
         }
         let none = ShardChoice::Auto(4).shard(|_| None).unwrap_err().to_string();
         assert!(none.contains("SLURM_ARRAY_TASK_ID") && none.contains("--shard 0/4"), "{none}");
-        // A job of Grid Engine that is no array; and an array that was submitted again for some tasks keeps their numbers.
+        // A job of Grid Engine that is no array; and an array that was submitted again for some tasks keeps their
+        // numbers.
         assert!(ShardChoice::Auto(4).shard(|name| (name == "SGE_TASK_ID").then(|| "undefined".into())).is_err());
         assert_eq!("3/8".parse::<ShardChoice>().unwrap().shard(|_| None).unwrap(), Shard { index: 3, count: 8 });
         assert!("auto/0".parse::<ShardChoice>().is_err() && "auto".parse::<ShardChoice>().is_err());

@@ -18,7 +18,8 @@ Examples:
 pub struct Arguments {
     /// Modules to test: contact, gridization, loop, graphics; by default all.
     rooms: Vec<String>,
-    /// Run all variations of every case instead of a sample that takes a minute: hours for contact, seconds for the other modules.
+    /// Run all variations of every case instead of a sample that takes a minute: hours for contact, seconds for the
+    /// other modules.
     #[arg(long)]
     full: bool,
     /// Skip the cases that need a GPU.

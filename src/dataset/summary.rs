@@ -30,7 +30,7 @@ pub struct Summary {
     pub max_force: Option<f64>,
     /// Nodes and triangles of the object's surface.
     pub surface: Option<[usize; 2]>,
-    /// What refines the grid.
+    /// Refinement of the grid.
     pub refinement: Option<Refinement>,
     /// Memory of all columns, and of what refines them [bytes].
     pub bytes: usize,

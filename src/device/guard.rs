@@ -3,8 +3,8 @@
 //! Efforts are clamped to [`LIMIT_SHARE`] of the device's own limit and in their rate of change (but for a command of
 //! zero, which is carried out at once), rise from zero over [`RAMP_TIME`] after the start and after each interruption,
 //! and are zero
-//! - while the last measurement is older than [`LONGEST_AGE`](super::halt::LONGEST_AGE), the dead-man key is released, or the
-//!   device is not ready;
+//! - while the last measurement is older than [`LONGEST_AGE`](super::halt::LONGEST_AGE), the dead-man key is released,
+//!   or the device is not ready;
 //! - from the first error, unplugging, answer that is none, or effort that is no number on ([`Halt::is_final`]);
 //! - once motors have been warm for [`WARM_TIME`], over which efforts are scaled down;
 //! - when the layer is dropped, be it by a panic, a signal or the end of the session.

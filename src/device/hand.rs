@@ -1,9 +1,9 @@
 //! A simulated device in a simulated hand: a mass, a spring and a damper of a human arm at each joint, pulling along a
 //! motion.
 //!
-//! At each joint `(m_hand + m_device) yddot = -bd ydot + tau + Kh (r - y) + Bh (rdot - ydot)`, r the motion, tau the torque
-//! held since the last tick. Stepped by the midpoint rule, passive for any step as the proxy is; the torque is constant
-//! over a step, so that its work tau . (y_{k+1} - y_k) is exact.
+//! At each joint `(m_hand + m_device) yddot = -bd ydot + tau + Kh (r - y) + Bh (rdot - ydot)`, r the motion, tau the
+//! torque held since the last tick. Stepped by the midpoint rule, passive for any step as the proxy is; the torque is
+//! constant over a step, so that its work tau . (y_{k+1} - y_k) is exact.
 
 use super::{Applied, Device, Motion, Reading};
 use crate::{
@@ -48,8 +48,8 @@ impl SimulatedHand {
         Self::holding(&spec.hand, &spec.device_inertia, &spec.device_damping, motion)
     }
 
-    /// Returns `hand` holding a device of the given `inertia` [kg m^2] and `damping` [N m s/rad] at each joint, at rest at the
-    /// beginning of `motion`.
+    /// Returns `hand` holding a device of the given `inertia` [kg m^2] and `damping` [N m s/rad] at each joint, at rest
+    /// at the beginning of `motion`.
     ///
     /// # Errors
     /// When the joints do not fit, or hand and device have no inertia.

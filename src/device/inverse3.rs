@@ -9,8 +9,8 @@
 //! reading without force, so that a loop that hangs does not leave the last force on. Force is sent only while the
 //! device says that it is calibrated, ready and powered.
 //!
-//! The service adds to forces what its user has set: compensation of gravity, a force gate, damping. These settings stay as
-//! they are.
+//! The service adds to forces what its user has set: compensation of gravity, a force gate, damping. These settings
+//! stay as they are.
 //!
 //! Source: the maker's public documentation, version 3.5, and recorded messages of its client library. Not tried on
 //! hardware.

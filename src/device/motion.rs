@@ -1,8 +1,8 @@
 //! A motion through C-space: where a hand wants to be at each time.
 //!
 //! Scenes give waypoints, joined by minimum-jerk paths (Flash and Hogan 1985), at rest at each of them:
-//! `q(s) = q_0 + (q_1 - q_0)(10 s^3 - 15 s^4 + 6 s^5)`, s from 0 to 1. Files give samples, joined by straight lines: one
-//! row a sample, comma-separated, time in seconds and then one coordinate per joint.
+//! `q(s) = q_0 + (q_1 - q_0)(10 s^3 - 15 s^4 + 6 s^5)`, s from 0 to 1. Files give samples, joined by straight lines:
+//! one row a sample, comma-separated, time in seconds and then one coordinate per joint.
 
 use crate::{JointVector, scene::Waypoint, tolerances::GREATEST_INPUT};
 use std::{

@@ -1,8 +1,8 @@
 //! A simulated device whose hand another thread leads: the pointer of a viewer.
 //!
-//! A pointer moves by leaps, once a frame; a device cannot. So the pointer says where the hand wants to be, and the hand,
-//! a mass on a spring and a damper as in [`super::SimulatedHand`], pulls the device there against the torque that it
-//! feels. Between the pointer's reports the hand holds still. They are exchanged without a lock: the latest counts.
+//! A pointer moves by leaps, once a frame; a device cannot. So the pointer says where the hand wants to be, and the
+//! hand, a mass on a spring and a damper as in [`super::SimulatedHand`], pulls the device there against the torque that
+//! it feels. Between the pointer's reports the hand holds still. They are exchanged without a lock: the latest counts.
 
 use super::{Applied, Device, HandError, Reading, hand::Arm};
 use crate::{JointVector, scene::HapticsSpec, tolerances::GREATEST_INPUT};

@@ -1,8 +1,8 @@
 //! A real device as the rig of a scan (section 2.2), behind the same safety layer as in a session.
 //!
-//! The torque that the controller commands is taken for the measured one. So a scan ends with an error when the device holds less
-//! than that: by a clamp in size, warm motors, or a stop. The ramp at the start is over long before the first
-//! measurement.
+//! The torque that the controller commands is taken for the measured one. So a scan ends with an error when the device
+//! holds less than that: by a clamp in size, warm motors, or a stop. The ramp at the start is over long before the
+//! first measurement.
 
 use super::{Applied, Clamps, Device, JointDevice, Key};
 use crate::{

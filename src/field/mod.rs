@@ -47,7 +47,7 @@ pub struct TorqueField {
     source: Source,
 }
 
-/// What answers.
+/// Source of answers.
 enum Source {
     Grid(OnGrid),
     Store(Arc<Store>),

@@ -1,5 +1,6 @@
-//! The adapters of this machine, and which of them is taken: the one that is asked for, or a hardware GPU before a software
-//! rasteriser. Who has several names one in the environment, for drawing and for computing alike: [`ADAPTER_VARIABLE`].
+//! The adapters of this machine, and which of them is taken: the one that is asked for, or a hardware GPU before a
+//! software rasteriser. Who has several names one in the environment, for drawing and for computing alike:
+//! [`ADAPTER_VARIABLE`].
 
 use super::GpuError;
 
@@ -17,7 +18,7 @@ pub enum AdapterChoice {
 /// Environment variable, the same as wgpu's own, with a part of the name of the only adapter that is to be used.
 pub const ADAPTER_VARIABLE: &str = "WGPU_ADAPTER_NAME";
 
-/// What the environment asks for, if anything.
+/// Returns the request of the environment, if any.
 pub(super) fn asked_for() -> Option<String> {
     std::env::var(ADAPTER_VARIABLE).ok().filter(|part| !part.is_empty())
 }
@@ -115,8 +116,8 @@ pub(super) fn instance() -> wgpu::Instance {
     })
 }
 
-/// All adapters of this machine that [`ADAPTER_VARIABLE`] lets be used, best first; empty where there is no driver. Never
-/// fails.
+/// All adapters of this machine that [`ADAPTER_VARIABLE`] lets be used, best first; empty where there is no driver.
+/// Never fails.
 #[must_use]
 pub fn adapters() -> Vec<AdapterSummary> {
     let part = asked_for();

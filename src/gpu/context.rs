@@ -77,7 +77,8 @@ pub enum GpuError {
         /// The limit [B].
         limit: u64,
     },
-    /// Of a large object only a part of the compliance is formed, beyond which nobody would see the paper's iteration go.
+    /// Only a part of a large object's compliance is formed, beyond which nobody would see the paper's iteration
+    /// go.
     #[error(
         "the GPU takes objects of at most {limit} surface nodes, not {nodes}, by the paper's iteration. Use --backend cpu for \
          this scene"
@@ -93,7 +94,7 @@ pub enum GpuError {
         "adapter {0} does not stamp the time of its commands (TIMESTAMP_QUERY): its kernels cannot be timed one by one"
     )]
     NoClock(String),
-    /// What the kernels do not do.
+    /// The kernels do not do this.
     #[error("the GPU does not solve contact with {0}. Use --backend cpu, or leave `{0}` out of [contact]")]
     Unsupported(&'static str),
     /// Outputs that no invocation wrote: a dispatch was cut short.
@@ -139,8 +140,8 @@ impl Context {
     /// Opens the best adapter that qualifies.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] or [`GpuError::NotThere`] with what was found; [`GpuError::NoDevice`] when none of them gives
-    /// a device.
+    /// [`GpuError::NoAdapter`] or [`GpuError::NotThere`] with what was found; [`GpuError::NoDevice`] when none of them
+    /// gives a device.
     pub fn open(choice: AdapterChoice) -> Result<Self, GpuError> {
         Self::open_with(choice, false)
     }
@@ -254,7 +255,7 @@ impl Context {
     /// # Errors
     /// That failure.
     pub fn check(&self) -> Result<(), GpuError> {
-        // Some losses are told in a poll alone; it does not wait.
+        // Some losses show in a poll alone; it does not wait.
         let _ = self.device.poll(wgpu::PollType::Poll);
         let mut failures = lock(&self.failures);
         if let Some(message) = &failures.lost {
@@ -278,9 +279,9 @@ impl Context {
         }
     }
 
-    /// Maps the first `bytes` bytes of `buffer` for reading once `submission` is done, and waits for it. Not only for the
-    /// submission: of several threads that poll one device, the one that finds the mapping complete runs its callback,
-    /// and that may be another one, a little later.
+    /// Maps the first `bytes` bytes of `buffer` for reading once `submission` is done, and waits for it. Not only for
+    /// the submission: of several threads that poll one device, the one that finds the mapping complete runs its
+    /// callback, and that may be another one, a little later.
     ///
     /// # Errors
     /// When the device was lost, refused a command, or does not answer.

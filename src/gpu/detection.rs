@@ -1,7 +1,8 @@
 //! The stages that place the proxy and test it for contact at rest.
 //!
-//! Where shaders have f64, proxy nodes are placed and the gaps that decide are measured in it, to flat facets or to the smooth surface: contact or
-//! not is what the CPU says. Elsewhere gaps are those to flat triangles in f32, and known to a band.
+//! Where shaders have f64, proxy nodes are placed and the gaps that decide are measured in it, to flat facets or to the
+//! smooth surface: contact or not is what the CPU says. Elsewhere gaps are those to flat triangles in f32, and known to
+//! a band.
 
 use super::{
     context::{Context, GpuError},
@@ -20,7 +21,8 @@ use glam::DVec3;
 /// Invocations of a workgroup of the stages with one invocation a node or configuration; the shaders' default.
 const WORKGROUP: u32 = 64;
 
-/// Most invocations of a workgroup of the gaps in f64: as many as GPUs run in step, since more would only wait for the slowest.
+/// Most invocations of a workgroup of the gaps in f64: as many as GPUs run in step, since more would only wait for the
+/// slowest.
 const IN_STEP: u32 = 32;
 
 /// A kernel and what it is bound to.
@@ -78,7 +80,7 @@ pub(super) struct Detection {
     staging: Staging,
     distances: BoundKernel,
     ends: Ends,
-    /// What `distances` reads of the surface [B].
+    /// Bytes of the surface that `distances` reads [B].
     surface_bytes: u64,
     gap_band: f64,
 }
@@ -279,7 +281,8 @@ fn double_parameters(device: &DeviceModel) -> DoubleParameters {
     }
 }
 
-/// Origin, axis and kind of each joint, the first origin relative to the object's centre; position and link of each proxy node.
+/// Origin, axis and kind of each joint, the first origin relative to the object's centre; position and link of each
+/// proxy node.
 fn chain(model: &contact::Model<'_>) -> Vec<f64> {
     let mut numbers = Vec::new();
     for (k, joint) in model.chain.joints.iter().enumerate() {

@@ -21,7 +21,8 @@ use glam::DVec3;
 /// A point, and the control points of a facet.
 const QUESTION: usize = 3 + 3 * CONTROLS;
 
-/// Weights and feature of the closest point, and at the facet's middle: point, normal, second derivative, angle at corner 1.
+/// Weights and feature of the closest point, and at the facet's middle: point, normal, second derivative, angle at
+/// corner 1.
 const ANSWER: usize = 4 + 3 + 3 + 3 + 1;
 
 const LEAF: &str = "
@@ -83,7 +84,8 @@ fn ask(context: &Context, questions: &[f64]) -> Vec<f64> {
     output.read(context, ANSWER * count).unwrap()
 }
 
-/// Bent facets with edges of about one, each with a point near it: above and below its inside, beside its edges, beyond its corners.
+/// Bent facets with edges of about one, each with a point near it: above and below its inside, beside its edges, beyond
+/// its corners.
 fn samples(count: usize) -> Vec<(DVec3, [DVec3; CONTROLS])> {
     let mut random = Random::new(9);
     (0..count)
@@ -100,7 +102,7 @@ fn samples(count: usize) -> Vec<(DVec3, [DVec3; CONTROLS])> {
         .collect()
 }
 
-/// What may differ between numbers of about one that some hundred operations in f64 lead to [1].
+/// Greatest difference between numbers of about one after some hundred operations in f64 [1].
 const ROUNDING: f64 = 1e-13;
 
 fn differ(a: DVec3, b: DVec3) -> bool {

@@ -5,10 +5,10 @@
 //! matrix, computed once in f64; large ones, whose inverse would not fit, take a fixed number of conjugate-gradient
 //! iterations, which keeps the step passive however few they are (see `shaders/frame_iterative.wgsl`).
 //!
-//! Effects, as in `render/object_motion.rs`, which is the twin: under gravity and with stiffening the nodes' loads are a
-//! buffer of their own, forces and weight from the host; stiffening adds its part to it, in a stage of its own, and puts
-//! K1 in the place of K; quasi-static graphics is an override constant, without velocities and masses. What the scene
-//! does not name is not there.
+//! Effects, as in `render/object_motion.rs`, which is the twin: under gravity and with stiffening the nodes' loads are
+//! a buffer of their own, forces and weight from the host; stiffening adds its part to it, in a stage of its own, and
+//! puts K1 in the place of K; quasi-static graphics is an override constant, without velocities and masses. What the
+//! scene does not name is not there.
 
 use super::{
     context::{Context, GpuError},
@@ -31,21 +31,22 @@ const VECTOR: u64 = 16;
 /// Which solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameMethod {
-    /// Inverse computed beforehand: 4 N^2 bytes where springs and ground are isotropic, else 36 N^2; two dispatches a frame.
+    /// Inverse computed beforehand: 4 N^2 bytes where springs and ground are isotropic, else 36 N^2; two dispatches a
+    /// frame.
     Inverse,
     /// This many iterations of conjugate gradients a frame, at least one.
     Iterations(u32),
 }
 
 impl FrameMethod {
-    /// Most memory that an inverse is worth, which is read once a frame: that of 3,000 nodes where springs and ground are isotropic, else of
-    /// 1,000 [B].
+    /// Most memory that an inverse is worth, which is read once a frame: that of 3,000 nodes where springs and ground
+    /// are isotropic, else of 1,000 [B].
     const MOST_BYTES_INVERTED: usize = 36_000_000;
 
     /// Enough iterations for objects whose springs reach a few dozen edges in one period.
     pub const USUAL_ITERATIONS: u32 = 32;
 
-    /// What suits `object`.
+    /// Chooses the method for `object`.
     #[must_use]
     pub fn suitable(object: &Object) -> Self {
         let order = if object.stiffness.is_isotropic() { object.rest.len() } else { 3 * object.rest.len() };
@@ -112,7 +113,7 @@ pub struct FrameUpdate {
     takes: FrameCost,
 }
 
-/// What a frame update takes of the device.
+/// Resources of a frame update on the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct FrameCost {
     /// Memory of all its buffers [B].
@@ -130,8 +131,8 @@ impl FrameUpdate {
     /// frame. Smoothing is no matter of the device: forces are filtered before they come here.
     ///
     /// # Errors
-    /// When the matrix is not positive definite (masses, damping or period are not positive), its inverse would not fit in memory, or the
-    /// device refuses.
+    /// When the matrix is not positive definite (masses, damping or period are not positive), its inverse would not fit
+    /// in memory, or the device refuses.
     pub fn new(
         context: Arc<Context>,
         object: &Object,
@@ -232,13 +233,14 @@ impl FrameUpdate {
         Ok(Self { nodes, state, forces, loads, weight, padded_forces: zero, stages, takes, context })
     }
 
-    /// What the update takes of the device.
+    /// Returns the resources of the update on the device.
     #[must_use]
     pub fn takes(&self) -> FrameCost {
         self.takes
     }
 
-    /// Advances by one frame under `forces`, one per node [N]; missing ones count as zero. Does not wait for the device.
+    /// Advances by one frame under `forces`, one per node [N]; missing ones count as zero. Does not wait for the
+    /// device.
     ///
     /// # Errors
     /// When the device has failed.
@@ -261,8 +263,8 @@ impl FrameUpdate {
         self.context.check()
     }
 
-    /// Displacements u = n - n0 [m] and velocities [m/s] of all nodes; of quasi-static graphics no velocities. Waits for the
-    /// device.
+    /// Displacements u = n - n0 [m] and velocities [m/s] of all nodes; of quasi-static graphics no velocities. Waits
+    /// for the device.
     ///
     /// # Errors
     /// When the device has failed.
@@ -287,8 +289,9 @@ impl FrameUpdate {
     }
 }
 
-/// Inverse of 2M/T + B + (T/2) K, row-major; of (T/2) K in quasi-static graphics. One number for a pair of nodes where the three
-/// coordinates are alike, which the flag tells, else 3 x 3. An inverse that would not fit in memory is an error before it is begun.
+/// Inverse of 2M/T + B + (T/2) K, row-major; of (T/2) K in quasi-static graphics. One number for a pair of nodes where
+/// the three coordinates are alike, as the flag says, else 3 x 3. An inverse that would not fit in memory is an
+/// error before it is begun.
 fn inverse(
     object: &Object,
     stiffness: &Stiffness,
@@ -307,8 +310,8 @@ fn inverse(
     Ok((entries, inverse.rows_per_node == 1))
 }
 
-/// Refuses an inverse over `nodes` nodes that would not fit in the host's memory, before anything is allocated: f64 as it is solved, f32 as
-/// the device takes it, and once more on its way there.
+/// Refuses an inverse over `nodes` nodes that would not fit in the host's memory, before anything is allocated: f64 as
+/// it is solved, f32 as the device takes it, and once more on its way there.
 fn check_memory(nodes: usize, is_isotropic: bool) -> Result<(), FrameError> {
     let order = nodes.saturating_mul(if is_isotropic { 1 } else { 3 });
     let bytes = order.saturating_pow(2).saturating_mul(size_of::<f64>() + 2 * size_of::<f32>());

@@ -133,13 +133,13 @@ impl Kernel {
 /// One dispatch of a kernel.
 #[derive(Clone, Copy)]
 pub struct Dispatch<'a> {
-    /// What runs.
+    /// Kernel.
     pub kernel: &'a Kernel,
     /// On what.
     pub bound: &'a wgpu::BindGroup,
     /// Number of workgroups.
     pub workgroups: u32,
-    /// What it reads and writes, each element once, twice where it does both [B].
+    /// Bytes that it reads and writes, each element once, twice where it does both [B].
     pub bytes: u64,
 }
 

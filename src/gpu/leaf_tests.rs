@@ -45,7 +45,7 @@ struct Question {
     moves: [[f32; 4]; 3],
 }
 
-/// What the kernel makes of it.
+/// Result of the kernel.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Answer {
@@ -124,8 +124,8 @@ fn random_questions(count: usize) -> Vec<Question> {
         .collect()
 }
 
-/// Distances to plump triangles agree to 16 roundings of 6e-8 of their size: what closest_point adds up. The weights are
-/// quotients of areas, whose rounding grows with the square of the triangle's aspect.
+/// Distances to plump triangles agree to 16 roundings of 6e-8 of their size: what closest_point adds up. The weights
+/// are quotients of areas, whose rounding grows with the square of the triangle's aspect.
 const DISTANCE_ROUNDING: f64 = 1e-6 * 0.02;
 
 #[test]
@@ -197,7 +197,8 @@ fn depth_and_its_derivatives_are_the_twins() {
         let size = reference.iter().map(|v| v.length()).fold(0.0, f64::max);
         for (expected, found) in reference.iter().zip(&answer.variation) {
             let error = expected.distance(vector(found));
-            // Weights of a sliver are known to rounding over its height: 2e-8 m over 1e-5 m^2 / 0.05 m, with some margin.
+            // Weights of a sliver are known to rounding over its height: 2e-8 m over 1e-5 m^2 / 0.05 m, with some
+            // margin.
             assert!(error <= 2e-3 * size, "{number}: {expected} {found:?}");
         }
     }

@@ -16,8 +16,8 @@
 //! | `timing` | how long each kernel takes, where that is asked for |
 //!
 //! A shader in `shaders/` and its CPU twin share names and order of statements. The GPU searches forces in f32 with
-//! coordinates relative to the object's centroid; the host settles them in f64. Contact or not is decided in f64 on the device, where it has
-//! that.
+//! coordinates relative to the object's centroid; the host settles them in f64. Contact or not is decided in f64 on the
+//! device, where it has that.
 
 mod adapter;
 mod context;

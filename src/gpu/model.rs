@@ -16,7 +16,8 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Invocations of a workgroup of the equilibrium stages, one of which keeps one contact: the least that GPUs run in step.
+/// Invocations of a workgroup of the equilibrium stages, one of which keeps one contact: the least that GPUs run in
+/// step.
 pub(super) const LANES: u32 = 32;
 
 /// The device's copy of a contact model.
@@ -33,8 +34,8 @@ pub struct DeviceModel {
     pub(super) gap_band: f64,
 }
 
-/// Contact stiffness of the energy form in f32 [N/m]. The kernels give it to every proxy node; each node's own, which differs where a link
-/// has a stiffness per length, enters when the result is settled in f64.
+/// Contact stiffness of the energy form in f32 [N/m]. The kernels give it to every proxy node; each node's own, which
+/// differs where a link has a stiffness per length, enters when the result is settled in f64.
 pub(super) fn stiffness(model: &contact::Model<'_>) -> f64 {
     model.kc.min(tolerances::GPU_STIFFNESS / model.max_nodal_compliance)
 }
@@ -153,8 +154,8 @@ fn proxy_nodes(chain: &proxy::Chain) -> Vec<ProxyNode> {
     chain.nodes.iter().map(convert).collect()
 }
 
-/// Surface nodes, bounding spheres of the triangles, radii of the proxy nodes, bounding spheres of the clusters of triangles, one
-/// behind the other.
+/// Surface nodes, bounding spheres of the triangles, radii of the proxy nodes, bounding spheres of the clusters of
+/// triangles, one behind the other.
 fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 4]> {
     let around = |nodes: &[u32]| {
         let corners = nodes.iter().map(|&j| model.surface.positions[j as usize]);
@@ -174,8 +175,8 @@ fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 
     nodes.chain(spheres).chain(radii).chain(clusters.chunks(CLUSTER).map(cluster)).collect()
 }
 
-/// Corners, neighbours, lists around nodes and places, then the clusters' triangles and nodes, one behind the other: see
-/// `shaders/surface.wgsl` and `shaders/deformed.wgsl`.
+/// Corners, neighbours, lists around nodes and places, then the clusters' triangles and nodes, one behind the other:
+/// see `shaders/surface.wgsl` and `shaders/deformed.wgsl`.
 fn mesh(model: &contact::Model<'_>, clusters: &[u32]) -> Vec<u32> {
     let object = model.object;
     let topology = &object.topology;

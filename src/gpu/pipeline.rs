@@ -57,7 +57,7 @@ impl BatchCapacity {
     }
 }
 
-/// What one batch in flight writes. There are two, so that one is read while the other is written.
+/// Buffers that one pending batch writes. There are two, so that one is read while the other is written.
 struct ResultSet {
     parameters: StorageBuffer,
     outcomes: StorageBuffer,
@@ -72,7 +72,7 @@ pub(super) struct Pipeline {
     room: BatchCapacity,
     detection: Detection,
     equilibrium: Kernel,
-    /// What `equilibrium` reads and writes for one configuration, besides its result [B].
+    /// Bytes that `equilibrium` reads and writes for one configuration, besides its result [B].
     own_bytes: u64,
     sets: [ResultSet; 2],
 }

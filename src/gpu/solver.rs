@@ -1,12 +1,12 @@
 //! Equilibria of many configurations on the GPU: the backend of a sweep.
 //!
-//! A chunk of configurations is placed and tested for contact in one submission; the host then knows how many touch, and
-//! submits these in batches, one workgroup a configuration. While the device solves one batch, all cores settle the one before in f64.
-//! Sizes of chunks and batches follow from measured time: a dispatch should last tens of milliseconds. Results do not depend
-//! on them.
+//! A chunk of configurations is placed and tested for contact in one submission; the host then knows how many touch,
+//! and submits these in batches, one workgroup a configuration. While the device solves one batch, all cores settle the
+//! one before in f64. Sizes of chunks and batches follow from measured time: a dispatch should last tens of
+//! milliseconds. Results do not depend on them.
 //!
-//! What f32 or the kernel's room cannot decide is left to the CPU's f64 solver: forces that do not settle, more contacts than the lists
-//! hold, and where shaders have no f64 contact within rounding of none. Nothing is cut off.
+//! What f32 or the kernel's room cannot decide is left to the CPU's f64 solver: forces that do not settle, more
+//! contacts than the lists hold, and where shaders have no f64 contact within rounding of none. Nothing is cut off.
 
 use super::{
     adapter::AdapterSummary,
@@ -114,7 +114,7 @@ impl<'a> GpuSolver<'a> {
         self.pipeline.detection().is_exact()
     }
 
-    /// A good number of configurations for one call: progress is told between calls.
+    /// A good number of configurations for one call: progress is reported between calls.
     #[must_use]
     pub fn chunk(&self) -> usize {
         if self.adapter().hardware { self.room.chunk } else { self.room.chunk.min(1024) }
@@ -150,8 +150,8 @@ impl<'a> GpuSolver<'a> {
         Ok(results)
     }
 
-    /// Solves on the CPU what touches nothing but lies within what its gap is known to of contact, and where gaps are those to flat triangles
-    /// measures those to a smooth surface.
+    /// Solves on the CPU what touches nothing but lies within what its gap is known to of contact, and where gaps are
+    /// those to flat triangles measures those to a smooth surface.
     fn decide_free(&mut self, chunk: &[JointVector], touching: &[u32], results: &mut [Equilibrium]) {
         let mut free = vec![true; chunk.len()];
         touching.iter().for_each(|&member| free[member as usize] = false);
@@ -198,8 +198,8 @@ impl<'a> GpuSolver<'a> {
         Ok(landed)
     }
 
-    /// Whether f32 or the kernel's room left open what the equilibrium is. The paper's iteration often does not converge in
-    /// any precision, and is then left at that.
+    /// Whether f32 or the kernel's room left open what the equilibrium is. The paper's iteration often does not
+    /// converge in any precision, and is then left at that.
     fn is_undecided(&self, result: &Equilibrium) -> bool {
         result.gap.is_nan()
             || result.gap.abs() <= self.pipeline.detection().gap_band()
@@ -211,7 +211,7 @@ impl<'a> GpuSolver<'a> {
             }
     }
 
-    /// Opens the device anew, with half the room.
+    /// Opens the device again, with half the room.
     fn reopen(&mut self) -> Result<(), GpuError> {
         let context = Arc::new(self.context.reopen()?);
         let room = self.room.half();
@@ -244,7 +244,7 @@ impl Backend for GpuSolver<'_> {
     type Error = GpuError;
 
     /// Equilibria of `configurations`, in the same order. A device that is lost, hangs or runs out of memory is opened
-    /// anew, once a chunk, with half the room.
+    /// again, once a chunk, with half the room.
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, GpuError> {
         let mut results = Vec::with_capacity(configurations.len());
         while results.len() < configurations.len() {

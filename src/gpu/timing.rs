@@ -1,7 +1,7 @@
 //! How long each kernel takes, by the device's own clock, on a context that is opened for it ([`Context::open_timed`]).
 //!
-//! A timed dispatch has a pass of its own, whose begin and end the device stamps; what it has stamped is read when it is
-//! asked for. On any other context nothing of this exists: dispatches that follow each other share one pass.
+//! A timed dispatch has a pass of its own, whose begin and end the device stamps; what it has stamped is read when it
+//! is asked for. On any other context nothing of this exists: dispatches that follow each other share one pass.
 
 use super::{
     context::{Context, GpuError},
@@ -9,7 +9,7 @@ use super::{
 };
 use std::sync::{Mutex, PoisonError};
 
-/// What one kernel took, all its dispatches together.
+/// Time of one kernel, all its dispatches together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KernelTime {
     /// The shader's name, and its entry point where it has several.
@@ -20,7 +20,8 @@ pub struct KernelTime {
     pub workgroups: u64,
     /// Time by the device's clock [s].
     pub seconds: f64,
-    /// Bytes that had to be read or written, each element once a dispatch; what is read again from a cache is not counted [B].
+    /// Bytes that had to be read or written, each element once a dispatch; what is read again from a cache is not
+    /// counted [B].
     pub bytes: u64,
 }
 
@@ -96,8 +97,8 @@ impl Stopwatch {
 }
 
 impl Context {
-    /// What every kernel took since this was asked last, in the order in which they first ran; nothing where kernels are
-    /// not timed. Waits for the device.
+    /// Returns the time of every kernel since the last call, in the order in which they first ran; nothing where kernels
+    /// are not timed. Waits for the device.
     ///
     /// # Errors
     /// When the device has failed.
@@ -141,7 +142,7 @@ mod tests {
     use glam::DVec3;
     use std::{sync::Arc, time::Instant};
 
-    /// What is asked of a device, and the same on one that is not timed.
+    /// Work for a device, and the same on one that is not timed.
     fn sphere() -> (Scene, [Arc<Context>; 2]) {
         let text = include_str!("../../tests/scenes/sphere.toml").replace("count = 36", "count = 3");
         let scene = Scene::parse(&text, "sphere.toml").unwrap();
@@ -218,7 +219,7 @@ mod tests {
         }
     }
 
-    /// What is told is the time of the work, not some constant.
+    /// The reported time is that of the work, not some constant.
     #[test]
     fn a_longer_dispatch_takes_longer() {
         let (scene, [context, _]) = sphere();

@@ -1,9 +1,10 @@
 //! From what the kernels wrote of one configuration to its equilibrium, in f64.
 //!
-//! Of the energy form, and of linearised contact, the kernel tells the forces on the object's nodes. A depth in f32 is known to some
-//! nanometres, which shallow contact feels in its energy and stiff contact in its forces; worse, the kernel cannot see it. So the CPU's
-//! search settles each result from these forces on, a step or two away: with walls that the kernel did not know of, and a residual
-//! that owes nothing to f32. The paper's iteration is taken as it is: what it leads to is defined by its steps.
+//! Of the energy form, and of linearised contact, the kernel returns the forces on the object's nodes. A depth in f32 is
+//! known to some nanometres, which shallow contact feels in its energy and stiff contact in its forces; worse, the
+//! kernel cannot see it. So the CPU's search settles each result from these forces on, a step or two away: with walls
+//! that the kernel did not know of, and a residual that owes nothing to f32. The paper's iteration is taken as it is:
+//! what it leads to is defined by its steps.
 
 use super::{
     layout::{SolverResult, Touch},
@@ -17,9 +18,9 @@ use crate::{
 };
 use glam::DVec3;
 
-/// The equilibrium at `q` by what the kernel wrote; `None` when it wrote nothing: outcomes are zero before, which is the status of free
-/// configurations, and no kernel is given these. Of the paper's iteration the gap is left at zero, and
-/// what the kernel gave up is left to the CPU but for its status.
+/// The equilibrium at `q` by what the kernel wrote; `None` when it wrote nothing: outcomes are zero before, which is
+/// the status of free configurations, and no kernel is given these. Of the paper's iteration the gap is left at zero,
+/// and what the kernel gave up is left to the CPU but for its status.
 pub(super) fn unpack(
     model: &contact::Model<'_>,
     solver: &mut contact::Solver<'_>,
@@ -41,7 +42,7 @@ pub(super) fn unpack(
     })
 }
 
-/// What the CPU's search finds near the kernel's forces.
+/// Searches on the CPU from the kernel's forces.
 fn settled(
     model: &contact::Model<'_>,
     solver: &mut contact::Solver<'_>,
@@ -62,7 +63,8 @@ fn settled(
     Equilibrium { iterations: outcome.iterations + result.iterations, ..result }
 }
 
-/// What the paper's iteration ended with: torque tau = sum_i J_i^T (force on x_i), energy and node forces summed up in f64.
+/// Result of the paper's iteration: torque tau = sum_i J_i^T (force on x_i), energy and node forces summed up in
+/// f64.
 fn iterated(
     model: &contact::Model<'_>,
     q: &[f64],

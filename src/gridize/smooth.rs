@@ -136,8 +136,8 @@ fn smoothed(cloud: &Cloud, near: &[(f64, u32)], point: usize, joint: usize) -> f
     own + share * (plane[0] - own)
 }
 
-/// Solves the symmetric system of the first `count` rows, right-hand side in the last column; `None` when the neighbours
-/// span no plane.
+/// Solves the symmetric system of the first `count` rows, right-hand side in the last column; `None` when the
+/// neighbours span no plane.
 fn solve(mut rows: [[f64; MOST + 1]; MOST], count: usize) -> Option<[f64; MOST]> {
     let greatest = (0..count).map(|i| rows[i][i]).fold(0.0, f64::max);
     for step in 0..count {

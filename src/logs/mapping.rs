@@ -45,8 +45,8 @@ pub struct Table {
     pub columns: Option<usize>,
     /// Treatment of a row with a wrong number of columns, or with a field that is missing or not a finite number.
     pub bad_rows: BadRows,
-    /// The topic of joint states that is read of an MCAP file, whose columns are `time`, and `position`, `velocity` and `effort` with
-    /// each joint's name; absent: its only one. The other keys of the layout are not used then.
+    /// The topic of joint states that is read of an MCAP file, whose columns are `time`, and `position`, `velocity` and
+    /// `effort` with each joint's name; absent: its only one. The other keys of the layout are not used then.
     pub topic: Option<String>,
 }
 
@@ -240,8 +240,8 @@ impl Mapping {
         Ok(mapping)
     }
 
-    /// Returns the mapping that takes all `joints` of a topic of joint states, as angles, with `scale` times their efforts as
-    /// contact torques. Messages that leave out a joint are dropped and counted.
+    /// Returns the mapping that takes all `joints` of a topic of joint states, as angles, with `scale` times their
+    /// efforts as contact torques. Messages that leave out a joint are dropped and counted.
     #[must_use]
     pub fn of_joint_states(joints: &[String], topic: &str, scale: f64) -> Self {
         let quantity = |what: &str, joint: &String, scale| Quantity {

@@ -10,7 +10,7 @@ use super::{ObjectError, Shell, SurfaceDefect, Topology, check_count, topology};
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// Refines a closed surface until the mean length of its edges is at most `edge` [m]. What is repaired is told in
+/// Refines a closed surface until the mean length of its edges is at most `edge` [m]. Repairs are reported in
 /// `warnings`; `refuse` makes the error of a defect.
 ///
 /// # Errors

@@ -50,8 +50,8 @@ impl Chain {
     }
 }
 
-/// Returns the lower Cholesky factor of the leading `joints` rows and columns; `None` if they are not positive definite.
-/// Allocates nothing.
+/// Returns the lower Cholesky factor of the leading `joints` rows and columns; `None` if they are not positive
+/// definite. Allocates nothing.
 #[must_use]
 pub fn cholesky(matrix: &JointMatrix, joints: usize) -> Option<JointMatrix> {
     let mut factor = [[0.0; MAX_JOINTS]; MAX_JOINTS];

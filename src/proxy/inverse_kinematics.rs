@@ -25,7 +25,8 @@ pub fn reach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) -> 
     (distance < REACHED).then_some(q)
 }
 
-/// Configuration near `start` at which contact node `node` is as near to `target` as the joints let it, and how near [m].
+/// Configuration near `start` at which contact node `node` is as near to `target` as the joints let it, and how near
+/// [m].
 #[must_use]
 pub fn approach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) -> (JointVector, f64) {
     let mut q = *start;

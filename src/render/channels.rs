@@ -7,17 +7,18 @@
 //! `c2 tau_bar + c4 (m vdot + bd v)` on the device, v the proxy's velocity, and
 //! `c3 f_h + c1 (M wdot + bv w)`     on the proxy, w the device's velocity and f_h the force of the hand.
 //!
-//! *Why.* Through spring and damper alone the hand feels the object in series with Kvc, and the proxy lags by tau/Kvc. At
-//! rest with c2 = c3 = 1 the balances of both ends, `f_h = Kvc (y - x) - tau_bar` and
+//! *Why.* Through spring and damper alone the hand feels the object in series with Kvc, and the proxy lags by tau/Kvc.
+//! At rest with c2 = c3 = 1 the balances of both ends, `f_h = Kvc (y - x) - tau_bar` and
 //! `tau_bar + Kvc (y - x) + f_h = 0`, give y = x and f_h = -tau_bar: the object as it is. c1 and c4 take the inertias
-//! out of free motion; one would make the pair massless and leave nothing for the filter's delay, hence a half by default.
+//! out of free motion; one would make the pair massless and leave nothing for the filter's delay, hence a half by
+//! default.
 //!
-//! *Force of the hand.* Not measured but estimated, `f_h = m wdot + bd w - tau`, tau the torque held since the last tick;
-//! it and the accelerations pass a low-pass filter of time constant `filter`: an encoder's step, divided twice by T,
-//! would be felt as a blow.
+//! *Force of the hand.* Not measured but estimated, `f_h = m wdot + bd w - tau`, tau the torque held since the last
+//! tick; it and the accelerations pass a low-pass filter of time constant `filter`: an encoder's step, divided twice by
+//! T, would be felt as a blow.
 //!
-//! *What it costs.* The channels are not passive by themselves: they hand the object's own stiffness to the device's hold,
-//! so that Colgate's condition counts `Kvc + c2 Ks` (`passivity.rs`). The accounts book their work, the passivity
+//! *What it costs.* The channels are not passive by themselves: they hand the object's own stiffness to the device's
+//! hold, so that Colgate's condition counts `Kvc + c2 Ks` (`passivity.rs`). The accounts book their work, the passivity
 //! controller and the guard of `haptic.rs` act on it as on all else.
 
 use super::npmi::{MidpointInertia, flush};

@@ -1,7 +1,7 @@
 //! The real-time thread's clock: absolute deadlines, and what the system grants it.
 //!
-//! A deadline is slept towards with an absolute timer, which does not drift, up to [`SPIN`] before it, and then spun for:
-//! waking up takes the system some ten microseconds, spinning takes none.
+//! A deadline is slept towards with an absolute timer, which does not drift, up to [`SPIN`] before it, and then spun
+//! for: waking up takes the system some ten microseconds, spinning takes none.
 
 use std::time::Duration;
 
@@ -22,8 +22,8 @@ pub fn wait_until(deadline: Duration, spins: bool) -> Duration {
 }
 
 /// Asks the system for a real-time priority for this thread and for the process's memory to stay in place. Returns what
-/// was not granted, and how to have it. A thread that stays an ordinary one at least takes short turns at the processor,
-/// which everybody may ask for: when it wakes up it then comes before those that have longer ones.
+/// was not granted, and how to have it. A thread that stays an ordinary one at least takes short turns at the
+/// processor, which everybody may ask for: when it wakes up it then comes before those that have longer ones.
 pub fn ask_for_real_time() -> Vec<String> {
     let mut refused = Vec::new();
     if let Err(reason) = raise_priority() {
@@ -88,8 +88,8 @@ mod system {
         let mut wanted: libc::sched_attr = unsafe { std::mem::zeroed() };
         (wanted.size, wanted.sched_runtime) = (size_of::<libc::sched_attr>() as u32, TURN);
         wanted.sched_nice = getpriority_process(None).unwrap_or(0);
-        // SAFETY: `wanted` is valid for reading and holds its own size; the thread is the calling one. The policy is the
-        // ordinary one, number zero.
+        // SAFETY: `wanted` is valid for reading and holds its own size; the thread is the calling one. The policy is
+        // the ordinary one, number zero.
         unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const wanted, 0) };
     }
 

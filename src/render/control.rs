@@ -1,10 +1,10 @@
-//! The passivity controller (Hannaford and Ryu 2002), for scenes that name it: damping that takes what an observer finds
-//! to have come from nowhere, and acts only while there is such.
+//! The passivity controller (Hannaford and Ryu 2002), for scenes that name it: damping that takes what an observer
+//! finds to have come from nowhere, and acts only while there is such.
 //!
 //! With `E < 0` at the device's port, `tau = -alpha m w` on the device, w its velocity and m its inertia:
 //! `alpha = -E / (T sum m w^2)` would take it all within a tick. With energy created at the object's port, the damping
-//! `alpha M` on the proxy, implicit in its step: `alpha = E / (T v^T M v)`. Weighting by inertia gives joints of all units
-//! their share.
+//! `alpha M` on the proxy, implicit in its step: `alpha = E / (T v^T M v)`. Weighting by inertia gives joints of all
+//! units their share.
 //!
 //! `alpha <= 1/T`. On the device, the torque comes from the mean velocity of the last tick and is held over the next: a
 //! free inertia obeys `z^2 + (alpha T/2 - 1) z + alpha T/2 = 0`, stable below alpha T = 2; half of that leaves room.
@@ -48,9 +48,9 @@ impl PassivityControl {
         }
     }
 
-    /// alpha [1/s] of the damping alpha M on the proxy for a step of `interval` T [s] from `motion`. It acts until the object's
-    /// port has the energy back, not only until as much is taken: what creates energy once does so again, and a proxy that is
-    /// braked creates less (measured: a tenth).
+    /// alpha [1/s] of the damping alpha M on the proxy for a step of `interval` T [s] from `motion`. It acts until the
+    /// object's port has the energy back, not only until as much is taken: what creates energy once does so again, and
+    /// a proxy that is braked creates less (measured: a tenth).
     pub(super) fn proxy_rate(&self, accounts: &Accounts, interval: f64, motion: &Motion) -> f64 {
         rate(accounts.created(), 2.0 * motion.kinetic_energy(), interval)
     }

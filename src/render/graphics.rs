@@ -1,8 +1,9 @@
 //! The object as it is drawn: interpolated contact forces move its nodes, frame by frame (section 3.2).
 //!
-//! *Forces.* The extended contact force f_ex(q) of a grid point has f_j at its contacting nodes and zero elsewhere. Between
-//! grid points `f_ex_bar(q) = share sum_c w_c f_ex(q_c)`, with the corners and weights of the torque and the factor that
-//! boundary layer and fade put on it, so that what is seen and what is felt stay `tau_bar = -sum_i J_i^T f`.
+//! *Forces.* The extended contact force f_ex(q) of a grid point has f_j at its contacting nodes and zero elsewhere.
+//! Between grid points `f_ex_bar(q) = share sum_c w_c f_ex(q_c)`, with the corners and weights of the torque and the
+//! factor that boundary layer and fade put on it, so that what is seen and what is felt stay
+//! `tau_bar = -sum_i J_i^T f`.
 //!
 //! *Smoothing*, where the scene names it: f_ex_bar passes a low-pass filter of time constant tau_s,
 //! `f_k = f_{k-1} + (1 - exp(-T/tau_s)) (f_ex_bar - f_{k-1})`. The object is passive towards the filtered forces.

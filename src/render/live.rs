@@ -1,6 +1,6 @@
 //! Contact that is solved while it is felt: the loop's end of `haptize/ahead`.
 //!
-//! The loop tells where the proxy is and goes, and feels what is there: the equilibrium solved at the proxy and its
+//! The loop publishes where the proxy is and goes, and feels what is there: the equilibrium solved at the proxy and its
 //! tangent, if the scene asks for that (`direct`) and it comes in time; else the store, with the finest level that is
 //! there. What others publish meanwhile changes nothing within a tick: the store is read up to one
 //! [horizon](crate::store::Store::horizon). From tick to tick the torque passes over without a jump and without energy
@@ -50,7 +50,7 @@ pub struct LiveEnds {
     pub solutions: Option<triple_buffer::Input<Solution>>,
 }
 
-/// What answered the ticks.
+/// Count of answers by source.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Answers {
     /// Ticks.
@@ -61,7 +61,7 @@ pub struct Answers {
     pub by_levels: [u64; MAX_LEVELS as usize + 1],
     /// Those that the store answered by fewer levels than wanted.
     pub coarser: u64,
-    /// Of these, those in contact.
+    /// Ticks among them in contact.
     pub coarser_in_contact: u64,
     /// Ticks at which the function had changed where the proxy was.
     pub changes: u64,
@@ -73,7 +73,7 @@ pub struct Answers {
     pub taken: f64,
 }
 
-/// What was felt last, before any passage.
+/// Last answer, before any passage.
 struct Felt {
     place: JointVector,
     torque: JointVector,
@@ -146,7 +146,7 @@ impl Live {
         (live, LiveEnds { whereabouts: outputs, solutions: direct.then_some(written) })
     }
 
-    /// What answered so far.
+    /// Returns the count of answers so far.
     #[must_use]
     pub fn answers(&self) -> &Answers {
         &self.answers

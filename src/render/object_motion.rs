@@ -5,12 +5,13 @@
 //! The matrix is constant, symmetric and positive definite: factorised once. To rounding, for any T and stiffness,
 //! `Delta(1/2 v^T M v + 1/2 u^T K u) = T v_hat . f - T v_hat . B v_hat`: without forces energy never rises.
 //!
-//! *Effects*, each absent unless it is named: gravity adds the nodes' weight to f, from the equilibrium under it on, and
-//! its potential to the energy. Stiffening puts K1 in the place of K on the left and grad W(u) in that of K u on the right,
-//! which keeps the step passive (see [`Stiffening`]). Quasi-static graphics has `u = K^-1 f` and neither M, B nor v.
+//! *Effects*, each absent unless it is named: gravity adds the nodes' weight to f, from the equilibrium under it on,
+//! and its potential to the energy. Stiffening puts K1 in the place of K on the left and grad W(u) in that of K u on
+//! the right, which keeps the step passive (see [`Stiffening`]). Quasi-static graphics has `u = K^-1 f` and neither M,
+//! B nor v.
 //!
-//! A frame of an object so large that its factor does not fit a core's caches is shared out among threads of its own, so that it
-//! waits for nothing else; the result is the same for any number of them.
+//! A frame of an object so large that its factor does not fit a core's caches is shared out among threads of its own,
+//! so that it waits for nothing else; the result is the same for any number of them.
 //!
 //! `ObjectMotion::load` and `ObjectMotion::advance` are the twins of the entry points in `shaders/frame.wgsl`.
 
@@ -53,7 +54,8 @@ struct Dynamics {
 }
 
 impl<'object> ObjectMotion<'object> {
-    /// `object` in equilibrium under no forces but its weight, where there is one, to be moved by `period` T [s] at a time.
+    /// `object` in equilibrium under no forces but its weight, where there is one, to be moved by `period` T [s] at a
+    /// time.
     ///
     /// # Errors
     /// When `period` is not positive, or there is no memory for the factor or no threads for a large one.

@@ -1,8 +1,8 @@
 //! Motions for a scene that names none: a press and a scrape made from where the dataset itself is in contact.
 //!
-//! Both move along grid lines, so that everything on the way is known to be free or in contact, and both begin and end free of contact.
-//! A press moves one joint into contact and back. A scrape moves one joint into contact, then another one through as many points in
-//! contact as there are in a row, then the first one out again.
+//! Both move along grid lines, so that everything on the way is known to be free or in contact, and both begin and end
+//! free of contact. A press moves one joint into contact and back. A scrape moves one joint into contact, then another
+//! one through as many points in contact as there are in a row, then the first one out again.
 
 use crate::{
     contact::Status,
@@ -10,7 +10,8 @@ use crate::{
     scene::{MotionSpec, Rendering, Waypoint},
 };
 
-/// Torque that a motion goes up to, over the greatest of the dataset, joint by joint, or twice the device's limit where that is less [1].
+/// Torque that a motion goes up to, over the greatest of the dataset, joint by joint, or twice the device's limit where
+/// that is less [1].
 const LOAD: f64 = 0.5;
 
 /// Torque below which a scrape is hardly felt, in the same unit [1].

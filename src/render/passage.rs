@@ -17,7 +17,7 @@ use crate::JointVector;
 /// by a twentieth of the difference a millisecond.
 const TIME: f64 = 0.02;
 
-/// What is left of differences.
+/// Rest of the differences.
 #[derive(Clone, Debug)]
 pub(super) struct Passage {
     /// o [N m or N].

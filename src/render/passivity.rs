@@ -1,13 +1,13 @@
-//! Which gains are safe: passivity bounds of the loop, computed from the scene before it starts, with the value that would
-//! do.
+//! Which gains are safe: passivity bounds of the loop, computed from the scene before it starts, with the value that
+//! would do.
 //!
-//! - Boundary layer and object, per joint: `Ks <= mu bv / T` (section 3.1); by the discrete energy balance of the step it
-//!   is sharp at mu = 2 (`npmi/mod.rs`). The same bound holds for the stiffness of the dataset's torque itself. Behind a boundary
-//!   layer both act at right angles: the slope of what is rendered is at most the root of the sum of their squares
-//!   (`field/boundary.rs`), and is compared with the sharp bound 2 bv / T.
-//! - Device, per joint, against its own damping: Colgate's wall, `bd > K T/2 + |Bvc|`, with `K = Kvc`, and `Kvc + c2 Ks` where
-//!   four channels hand the object's stiffness to the device. It does without the hand; a hand that holds the device adds
-//!   its damping to bd.
+//! - Boundary layer and object, per joint: `Ks <= mu bv / T` (section 3.1); by the discrete energy balance of the step
+//!   it is sharp at mu = 2 (`npmi/mod.rs`). The same bound holds for the stiffness of the dataset's torque itself.
+//!   Behind a boundary layer both act at right angles: the slope of what is rendered is at most the root of the sum of
+//!   their squares (`field/boundary.rs`), and is compared with the sharp bound 2 bv / T.
+//! - Device, per joint, against its own damping: Colgate's wall, `bd > K T/2 + |Bvc|`, with `K = Kvc`, and
+//!   `Kvc + c2 Ks` where four channels hand the object's stiffness to the device. It does without the hand; a hand that
+//!   holds the device adds its damping to bd.
 //! - Encoder, per joint, if its step Delta is given: `K <= 2 fc / Delta`, fc the device's dry friction (Diolaiti,
 //!   Niemeyer, Barbagli and Salisbury 2006; Abbott and Okamura 2005).
 
@@ -81,8 +81,8 @@ fn handed_stiffness(spec: &HapticsSpec, joint: usize) -> f64 {
     spec.effects.four_channel.map_or(0.0, |channels| channels.channels[1] * spec.boundary_slope[joint])
 }
 
-/// Returns `spec` with its proxy damping bv raised as far as the slope Ks and the stiffness of `field` ask for; unchanged where it is
-/// passive.
+/// Returns `spec` with its proxy damping bv raised as far as the slope Ks and the stiffness of `field` ask for;
+/// unchanged where it is passive.
 #[must_use]
 pub fn damped(spec: &HapticsSpec, field: &TorqueField) -> HapticsSpec {
     let mut damped = spec.clone();
@@ -101,8 +101,8 @@ pub fn damped(spec: &HapticsSpec, field: &TorqueField) -> HapticsSpec {
 /// Keeps a bound that is met exactly from being exceeded by rounding [1].
 const ROUNDING: f64 = 1e-12;
 
-/// Returns what is wrong with the gains of `spec` in one sentence, and the values that would be passive in another; `None` where all
-/// bounds hold.
+/// Returns what is wrong with the gains of `spec` in one sentence, and the values that would be passive in another;
+/// `None` where all bounds hold.
 #[must_use]
 pub fn advice(spec: &HapticsSpec, field: &TorqueField, bounds: &[Bound]) -> Option<String> {
     let exceeded = || bounds.iter().filter(|bound| bound.is_exceeded());

@@ -1,12 +1,13 @@
-//! A session's recording: all that the haptic loop received and what it answered, tick by tick. A file of it, read back,
-//! replays the session bit for bit, whether it ran against the clock or not, and finds the first tick that differs.
+//! A session's recording: all that the haptic loop received and what it answered, tick by tick. A file of it, read
+//! back, replays the session bit for bit, whether it ran against the clock or not, and finds the first tick that
+//! differs.
 //!
-//! CSV: comments (#), one of them with the device's first position and one with the instants of the frames that were kept; a
-//! header; one row a tick. `elapsed`, `interval`, `age` and
-//! position are the tick's inputs as in [`Inputs`]; `restart` is 1 where a fault was cleared; `frames` is how many frames of
-//! the object showed this tick; torque and proxy are the answer, `held` is what the device held of the torque (as
-//! much as was asked for where a file has no such columns). Numbers are printed so that reading gives the same bits. A
-//! position of a wrong number of joints has empty fields.
+//! CSV: comments (#), one of them with the device's first position and one with the instants of the frames that were
+//! kept; a header; one row a tick. `elapsed`, `interval`, `age` and position are the tick's inputs as in [`Inputs`];
+//! `restart` is 1 where a fault was cleared; `frames` is how many frames of the object showed this tick; torque and
+//! proxy are the answer, `held` is what the device held of the torque (as much as was asked for where a file has no
+//! such columns). Numbers are printed so that reading gives the same bits. A position of a wrong number of joints has
+//! empty fields.
 
 use super::{
     graphics::Graphics,
@@ -75,7 +76,8 @@ pub enum RecordingError {
 /// Largest file that is read [bytes]: two hours of six joints at 1 kHz.
 const GREATEST_FILE: u64 = 4 << 30;
 
-/// Most frames of a tick: those of a second at the highest rate. A loop that rests longer has long missed its deadlines.
+/// Most frames of a tick: those of a second at the highest rate. A loop that rests longer has long missed its
+/// deadlines.
 const MAX_FRAMES: u32 = 10_000;
 
 /// Beginning of the comment with the first position.
@@ -186,7 +188,8 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Has the session again, with graphics where there is any, as fast as it goes; `joints` are the names in its trace.
+    /// Has the session again, with graphics where there is any, as fast as it goes; `joints` are the names in its
+    /// trace.
     ///
     /// # Errors
     /// When the recorded session could not start either, or there is no memory.

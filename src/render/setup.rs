@@ -1,5 +1,5 @@
-//! Everything that a dataset's rendering needs, built from the dataset alone: its scene's text gives chain and gains, its
-//! surface the object.
+//! Everything that a dataset's rendering needs, built from the dataset alone: its scene's text gives chain and gains,
+//! its surface the object.
 
 use super::{
     effects::{ContactEffects, EffectError},
@@ -124,8 +124,8 @@ impl Setup {
         Ok(Self { scene, chain, haptics: Arc::new(haptics), object, bounds, exceeded, advice, made_motions })
     }
 
-    /// Returns the haptic loop of `dataset`, from which this was made, with `gains` in the place of the scene's; and what is wrong with
-    /// them where they are beyond their passivity bounds.
+    /// Returns the haptic loop of `dataset`, from which this was made, with `gains` in the place of the scene's; and
+    /// what is wrong with them where they are beyond their passivity bounds.
     ///
     /// # Errors
     /// When they do not make a loop.
@@ -160,8 +160,8 @@ impl Setup {
     }
 }
 
-/// Returns the torque field of `dataset` as its scene has it felt, or interpolated as `interpolation` says. A dataset without a scene, of
-/// measurements, has the defaults of one: linear, [`THRESHOLD`], [`BOUNDARY_SLOPE`].
+/// Returns the torque field of `dataset` as its scene has it felt, or interpolated as `interpolation` says. A dataset
+/// without a scene, of measurements, has the defaults of one: linear, [`THRESHOLD`], [`BOUNDARY_SLOPE`].
 ///
 /// # Errors
 /// When its scene is not valid, or the dataset lacks what the interpolation needs.
@@ -216,8 +216,8 @@ pub fn labels(grid: &Grid) -> Vec<JointLabel> {
     grid.axes.iter().map(|axis| JointLabel { name: axis.name.clone(), unit: axis.unit.clone() }).collect()
 }
 
-/// Returns the stiffness with which the device is held at the border of the haptized range, that of the coupling (Kvc), in words: one for
-/// each unit, or one for each joint where joints of a unit differ.
+/// Returns the stiffness with which the device is held at the border of the haptized range, that of the coupling (Kvc),
+/// in words: one for each unit, or one for each joint where joints of a unit differ.
 #[must_use]
 pub fn border_stiffness(gains: &HapticsSpec, grid: &Grid) -> String {
     let mut of_units = BTreeMap::new();

@@ -1,9 +1,10 @@
-//! Which late ticks the hypervisor made late: on a virtual machine, time in which a processor was taken away counts as *steal* in
-//! /proc/stat.
+//! Which late ticks the hypervisor made late: on a virtual machine, time in which a processor was taken away counts as
+//! *steal* in /proc/stat.
 //!
-//! The counters advance by hundredths of a second, so that a short pause may show late or, of itself, not at all. A late tick counts
-//! as beside steal where the counter of its processor advanced between `BEFORE` before its deadline and `AFTER` after its
-//! beginning. The haptic thread only notes when and where a tick was late; the recorder reads the counters.
+//! The counters advance by hundredths of a second, so that a short pause may show late or, of itself, not at all. A
+//! late tick counts as beside steal where the counter of its processor advanced between `BEFORE` before its deadline
+//! and `AFTER` after its beginning. The haptic thread only notes when and where a tick was late; the recorder reads the
+//! counters.
 
 use serde::Serialize;
 use std::{collections::VecDeque, time::Duration};

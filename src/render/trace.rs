@@ -179,7 +179,8 @@ impl Trace {
     }
 
     /// Writes all ticks as CSV: one header line with units, then one row a tick, with every energy account
-    /// ([`Accounts::named`]); a field is empty where nothing is known. Numbers are printed so that reading them gives the same bits.
+    /// ([`Accounts::named`]); a field is empty where nothing is known. Numbers are printed so that reading them gives
+    /// the same bits.
     ///
     /// # Errors
     /// Those of `out`.

@@ -1,17 +1,19 @@
 //! The watchdog of the haptic loop: what a tick may receive, and what must bring the torque to zero.
 //!
 //! A tick's inputs are good if the position is one (as many joints as the dataset has, finite, within reach), is fresh,
-//! comes in time, and can have been reached: `|y_k - y_{k-1}| <= speed_limit max(T_{k-1}, T)` at each joint. The nominal T
-//! in there keeps an encoder's step from looking like a leap when two ticks follow closely. The first failure is a fault
-//! that stays, whatever comes after it, until somebody restarts the loop: a device that comes and goes must not kick.
+//! comes in time, and can have been reached: `|y_k - y_{k-1}| <= speed_limit max(T_{k-1}, T)` at each joint. The
+//! nominal T in there keeps an encoder's step from looking like a leap when two ticks follow closely. The first failure
+//! is a fault that stays, whatever comes after it, until somebody restarts the loop: a device that comes and goes must
+//! not kick.
 //!
-//! *Overruns.* A deadline that is missed once costs nothing but a longer step: the proxy is passive at any T_k, and what the
-//! longer hold gives the hand is seen at the device's port ([`Fault::Energy`]). When deadlines are missed persistently the torque
-//! rests on positions which, by the end of each hold, are as old as the time between ticks. So its mean over [`PACE_WINDOW`] may
-//! not exceed what the age of a position may not, [`GREATEST_POSITION_AGE`], or, where the loop is slow by design, 2 T: every
-//! other deadline missed. With W the window, ticks are counted by `n_k = n_{k-1} / (1 + T_{k-1}/W) + 1`, each weighing less
-//! the longer ago it was; ticks evenly T apart tend to `n = W/T + 1`, so that the mean is taken to be `W / (n_k - 1)`. One pause
-//! alone, however long it may be ([`GREATEST_INTERVAL`]), lengthens it by half and is never enough.
+//! *Overruns.* A deadline that is missed once costs nothing but a longer step: the proxy is passive at any T_k, and
+//! what the longer hold gives the hand is seen at the device's port ([`Fault::Energy`]). When deadlines are missed
+//! persistently the torque rests on positions which, by the end of each hold, are as old as the time between ticks. So
+//! its mean over [`PACE_WINDOW`] may not exceed what the age of a position may not, [`GREATEST_POSITION_AGE`], or,
+//! where the loop is slow by design, 2 T: every other deadline missed. With W the window, ticks are counted by
+//! `n_k = n_{k-1} / (1 + T_{k-1}/W) + 1`, each weighing less the longer ago it was; ticks evenly T apart tend to
+//! `n = W/T + 1`, so that the mean is taken to be `W / (n_k - 1)`. One pause alone, however long it may be
+//! ([`GREATEST_INTERVAL`]), lengthens it by half and is never enough.
 
 use super::{flags::Fault, haptic::Inputs};
 use crate::{

@@ -1,8 +1,8 @@
 //! PD control of each joint about a commanded position that moves at bounded speed (section 2.2).
 //!
 //! `tau = Kp (q_d - q) + Kd (qdot_d - qdot) + g(q)`: in steady contact the contact torque on the proxy is
-//! `-(tau - g) = Kp (q - q_d)`, so that no force sensor is needed. PD control is passive and so is the object: the contact
-//! is stable. The measured speed is the difference over a few ticks, because encoder steps drown that over one.
+//! `-(tau - g) = Kp (q - q_d)`, so that no force sensor is needed. PD control is passive and so is the object: the
+//! contact is stable. The measured speed is the difference over a few ticks, because encoder steps drown that over one.
 
 use crate::JointVector;
 use std::collections::VecDeque;

@@ -2,8 +2,8 @@
 //! all it measured and can be resumed.
 //!
 //! Comment lines say what was touched (or simulated), how the numbers are meant, and hold the scene's text (after
-//! `#>`), so that the log alone is enough to gridize and feel. Then a header line and one row a point: its number in the
-//! plan, time, measured configuration, contact torque on the proxy (minus control torque, gravity already
+//! `#>`), so that the log alone is enough to gridize and feel. Then a header line and one row a point: its number in
+//! the plan, time, measured configuration, contact torque on the proxy (minus control torque, gravity already
 //! subtracted), standard deviation of a single tick's torque, ticks averaged, status.
 
 use crate::{
@@ -248,7 +248,8 @@ impl ScanLog {
         File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == SIGNATURE.as_bytes()
     }
 
-    /// Whether the file at `path` begins like the log of a simulated scan, or is empty as one that was ended before its first line.
+    /// Whether the file at `path` begins like the log of a simulated scan, or is empty as one that was ended before its
+    /// first line.
     #[must_use]
     pub fn is_simulated(path: &Path) -> bool {
         let opening = LogHeader { simulated: true, ..LogHeader::default() }.opening();
@@ -314,7 +315,8 @@ impl ScanLog {
         Ok(log)
     }
 
-    /// The steady measurements, each with the standard deviation of its mean: that of a tick over the root of the ticks.
+    /// The steady measurements, each with the standard deviation of its mean: that of a tick over the root of the
+    /// ticks.
     #[must_use]
     pub fn samples(&self) -> Samples {
         let mut samples = Samples { joints: self.header.joints.clone(), ..Samples::default() };

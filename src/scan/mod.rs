@@ -1,7 +1,7 @@
 //! Haptization of a real object (section 2.2): a device, held by PD control, is led through a plan of configurations;
-//! where it is steady, the contact torque is minus the control torque, gravity subtracted. Or a hand leads it: the device
-//! gives way while it is held, holds on where it is let go, and is measured there, so that no row contains the hand's
-//! own torque.
+//! where it is steady, the contact torque is minus the control torque, gravity subtracted. Or a hand leads it: the
+//! device gives way while it is held, holds on where it is let go, and is measured there, so that no row contains the
+//! hand's own torque.
 //!
 //! Everything here drives a [`Rig`]. The one that ships is [`simulated`]: it touches no real object, and every log and
 //! dataset made with it says so.
@@ -178,11 +178,12 @@ impl Session<'_> {
         Ok(report)
     }
 
-    /// Logs wherever a hand leads the device to and lets go of it, for `seconds`; rows are numbered on from those `logged`.
+    /// Logs wherever a hand leads the device to and lets go of it, for `seconds`; rows are numbered on from those
+    /// `logged`.
     ///
     /// While the hand holds the device ([`RigReading::held`]), damping alone resists it, and no limit applies: nothing
-    /// drives it. Once it is let go, PD control holds it where it is, under all limits; when it is steady, it is measured. A
-    /// hand that takes hold meanwhile ends the measurement without a row.
+    /// drives it. Once it is let go, PD control holds it where it is, under all limits; when it is steady, it is
+    /// measured. A hand that takes hold meanwhile ends the measurement without a row.
     ///
     /// # Errors
     /// When the rig or the log fails, or a limit is exceeded; the log then holds all that was measured.
@@ -332,8 +333,8 @@ impl<'a> Driver<'a> {
         stop.point.map_or(Ok(None), |point| self.measure(point))
     }
 
-    /// Waits for a hand, gives way to it, and measures where it lets go; `None` where it takes hold again before that, or
-    /// the time is over.
+    /// Waits for a hand, gives way to it, and measures where it lets go; `None` where it takes hold again before that,
+    /// or the time is over.
     fn be_led(&mut self, point: usize, goes_on: &impl Fn(f64) -> bool) -> Result<Option<ScanRow>, Interruption> {
         while !self.reading.held {
             if !goes_on(self.reading.time) {

@@ -1,8 +1,8 @@
 //! The configurations that a scan visits, in order.
 //!
-//! A workspace plan goes line by line: along a line into the object, back out to the clearance, across to the next line,
-//! every other row of lines backwards so that neighbours in time are neighbours in space. A plan over joints goes through
-//! its grid row by row, every other row backwards.
+//! A workspace plan goes line by line: along a line into the object, back out to the clearance, across to the next
+//! line, every other row of lines backwards so that neighbours in time are neighbours in space. A plan over joints goes
+//! through its grid row by row, every other row backwards.
 
 use super::ScanError;
 use crate::proxy::inverse_kinematics::reach;
@@ -21,7 +21,8 @@ const SCAN_POINTS: usize = 1_000_000;
 pub struct Stop {
     /// Commanded configuration [rad or m].
     pub q: JointVector,
-    /// Number of the plan's point, in the order of the specification; `None` for a way point at which nothing is measured.
+    /// Number of the plan's point, in the order of the specification; `None` for a way point at which nothing is
+    /// measured.
     pub point: Option<usize>,
 }
 
@@ -64,8 +65,8 @@ impl Plan {
 }
 
 impl Plan {
-    /// `count` points of the plan, spread over it evenly however many follow (the golden ratio's multiples), from number
-    /// `first` of that order on: for each the way point that leads there, or itself, and its configuration.
+    /// `count` points of the plan, spread over it evenly however many follow (the golden ratio's multiples), from
+    /// number `first` of that order on: for each the way point that leads there, or itself, and its configuration.
     #[must_use]
     pub fn spread(&self, first: usize, count: usize) -> Vec<[JointVector; 2]> {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;

@@ -2,8 +2,8 @@
 
 use crate::JointVector;
 
-/// A device that can be driven, with the object it touches. A real one waits for its clock in [`Rig::hold`], a simulated
-/// one moves on.
+/// A device that can be driven, with the object it touches. A real one waits for its clock in [`Rig::hold`], a
+/// simulated one moves on.
 pub trait Rig {
     /// Holds `torque` for `period` [s], then reads the joints.
     ///
@@ -25,8 +25,8 @@ pub struct RigReading {
     pub time: f64,
     /// Measured joint positions [rad or m].
     pub position: JointVector,
-    /// Whether a hand holds the device: a button on its handle, as haptic devices have one. What is read meanwhile is not
-    /// the object's torque alone. Always false where there is no such button.
+    /// Whether a hand holds the device: a button on its handle, as haptic devices have one. What is read meanwhile is
+    /// not the object's torque alone. Always false where there is no such button.
     pub held: bool,
 }
 

@@ -99,8 +99,8 @@ impl Bench {
     }
 }
 
-/// Whether a row's torque is the block's but for dry friction of the joints, tangential friction of the tip, and what has
-/// not relaxed (a `share` of the torque).
+/// Whether a row's torque is the block's but for dry friction of the joints, tangential friction of the tip, and what
+/// has not relaxed (a `share` of the torque).
 fn is(row: &ScanRow, expected: &JointVector, share: f64) -> bool {
     let slack = 0.004 + share * expected.norm();
     row.torque.iter().zip(expected.iter()).all(|(measured, expected)| (measured - expected).abs() < slack)

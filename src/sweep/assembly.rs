@@ -1,5 +1,5 @@
-//! The dataset's file, put together from a part: column after column is copied through a buffer, so that memory does not grow
-//! with the grid.
+//! The dataset's file, put together from a part: column after column is copied through a buffer, so that memory does
+//! not grow with the grid.
 
 use super::{
     columns::{Replaced, Section, Shape},

@@ -67,8 +67,8 @@ pub struct Bake<'a> {
     pub scene: &'a Scene,
     /// Backend that solves.
     pub backend: BackendChoice,
-    /// Random configurations at which the dataset's error is measured; 0 leaves it out. By default a tenth of the points in contact, at
-    /// least 100 and at most 1,000.
+    /// Random configurations at which the dataset's error is measured; 0 leaves it out. By default a tenth of the
+    /// points in contact, at least 100 and at most 1,000.
     pub measured: Option<usize>,
     /// Rms error that the grid was chosen for, over the rms torque, where it was [1].
     pub aim: Option<f64>,
@@ -141,8 +141,8 @@ pub(super) fn model_of<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) 
     Ok(model)
 }
 
-/// The sweep of `scene`, whose object and model these are, with all that a dataset is to say; `solved` are backend, adapter and date, and
-/// `measured` is as in [`Bake::measured`].
+/// The sweep of `scene`, whose object and model these are, with all that a dataset is to say; `solved` are backend,
+/// adapter and date, and `measured` is as in [`Bake::measured`].
 pub(super) fn sweep_of<'a>(
     scene: &Scene,
     object: &Object,
@@ -158,11 +158,12 @@ pub(super) fn sweep_of<'a>(
     Ok(sweep)
 }
 
-/// Grid points at which the proxy's reach is looked up, at most: between them it grows by less than what is added to it.
+/// Grid points at which the proxy's reach is looked up, at most: between them it grows by less than what is added to
+/// it.
 const SAMPLES: usize = 1 << 16;
 
-/// Configurations spread over the scene's grid, all of them where they are few, or over the joint limits where it leaves the grid out: what
-/// [`Model::reaching`] looks at.
+/// Configurations spread over the scene's grid, all of them where they are few, or over the joint limits where it
+/// leaves the grid out: what [`Model::reaching`] looks at.
 #[must_use]
 pub fn sample(scene: &Scene) -> Vec<JointVector> {
     let joints = &scene.proxy.joints;

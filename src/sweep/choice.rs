@@ -111,7 +111,8 @@ impl<'a> ChosenBackend<'a> {
 /// Remedy for a GPU that fails, if the CPU cannot take its place.
 pub const OTHER_ADAPTER: &str = "another adapter (set WGPU_ADAPTER_NAME)";
 
-/// Returns `message`, in which a GPU's failure may name the option `--backend cpu`, with the remedy `instead` for whom has no such option.
+/// Returns `message`, in which a GPU's failure may name the option `--backend cpu`, with the remedy `instead` for whom
+/// has no such option.
 #[must_use]
 pub fn remedied(message: &str, instead: &str) -> String {
     message.replace(", for --backend gpu without a GPU", "").replace("--backend cpu", instead)

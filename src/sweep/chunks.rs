@@ -1,5 +1,5 @@
-//! The grid's points, chunk by chunk: free ones skipped, the others solved by the backend, all handed on to where they are kept, by a thread of
-//! its own: checksums and the file wait for no solver, and no solver for them.
+//! The grid's points, chunk by chunk: free ones skipped, the others solved by the backend, all handed on to where they
+//! are kept, by a thread of its own: checksums and the file wait for no solver, and no solver for them.
 
 use super::{
     Backend, Footprint, FreeSpace, Progress, Run, Sweep, SweepError,
@@ -26,11 +26,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How long a chunk is to take: so much work a killed bake loses, and so long a stop waits at most. A configuration that takes longer
-/// makes it longer.
+/// How long a chunk is to take: so much work a killed bake loses, and so long a stop waits at most. A configuration
+/// that takes longer makes it longer.
 const CHUNK_TIME: Duration = Duration::from_millis(250);
 
-/// Chunks that are kept in memory at most besides the one at hand: one waits while another is written.
+/// Chunks that are kept in memory at most besides the current one: one waits while another is written.
 pub(super) const BEHIND: usize = 2;
 
 /// Where a sweep's results go as they come.
@@ -75,7 +75,7 @@ impl Store for Columns {
     }
 }
 
-/// What a store is to take.
+/// Memory of a store.
 #[expect(clippy::large_enum_variant, reason = "a few at a time; a box would be memory for every chunk")]
 enum Entry {
     /// Results of the points from this number on.
@@ -83,7 +83,8 @@ enum Entry {
     Notice(String),
 }
 
-/// Hands `entries` to `store` until there are no more, or it fails; columns that are kept are given back as `room` for others.
+/// Hands `entries` to `store` until there are no more, or it fails; columns that are kept are given back as `room` for
+/// others.
 fn keep(store: &mut dyn Store, entries: Receiver<Entry>, room: SyncSender<Columns>) -> Result<(), SweepError> {
     entries.into_iter().try_for_each(|entry| match entry {
         Entry::Chunk(first, columns) => {
@@ -134,8 +135,8 @@ pub(super) struct Solved {
     pub provenance: Provenance,
 }
 
-/// Most points of a chunk of which `solved` are to be solved: skipped ones cost little time, but the store should not wait for
-/// millions of them.
+/// Most points of a chunk of which `solved` are to be solved: skipped ones cost little time, but the store should not
+/// wait for millions of them.
 pub(super) fn together(solved: usize) -> usize {
     solved.max(1 << 16)
 }

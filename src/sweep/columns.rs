@@ -253,9 +253,9 @@ impl Columns {
 
     /// Adds the equilibrium of the next point.
     ///
-    /// A result that no file may hold (a number that is not finite, torques of another chain, nodes that the surface does not
-    /// have or out of order) becomes an unconverged point without torque and forces, of residual 1: the empty answer, which
-    /// balances nothing.
+    /// A result that no file may hold (a number that is not finite, torques of another chain, nodes that the surface
+    /// does not have or out of order) becomes an unconverged point without torque and forces, of residual 1: the empty
+    /// answer, which balances nothing.
     pub fn push(&mut self, equilibrium: &Equilibrium, shape: Shape) {
         let Equilibrium { status, iterations, residual, energy, gap, torque, forces, tangent, touches } = equilibrium;
         let sound = torque.len() == shape.joints
@@ -321,8 +321,8 @@ impl Columns {
         Ok(())
     }
 
-    /// Takes the results of the points that are in `replaced`, the first of these points being number `first`; an error where there is
-    /// no memory for their contacts.
+    /// Takes the results of the points that are in `replaced`, the first of these points being number `first`; an error
+    /// where there is no memory for their contacts.
     pub fn replace(&mut self, first: usize, replaced: &Replaced) -> Result<(), TryReserveError> {
         let points = self.points();
         let mut rows = replaced.range(first..first + points).peekable();

@@ -8,7 +8,8 @@ use crate::{
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::convert::Infallible;
 
-/// Shares of each thread in a chunk: progress is reported several times a second, and threads rarely wait at a chunk's end.
+/// Shares of each thread in a chunk: progress is reported several times a second, and threads rarely wait at a chunk's
+/// end.
 const SHARES: usize = 32;
 
 /// Solves configurations on all cores.

@@ -1,4 +1,5 @@
-//! Equilibria solved directly, wherever they are asked for: what a program calls that has no dataset, or wants to check one.
+//! Equilibria solved directly, wherever they are asked for: what a program calls that has no dataset, or wants to check
+//! one.
 
 use super::{BakeError, Inspection, sample};
 use crate::{
@@ -44,8 +45,9 @@ pub enum DirectError {
 }
 
 impl Direct {
-    /// Builds object and proxy of `scene`. Of an object with more than [`Model::WHOLE`] surface nodes only those are prepared that the proxy
-    /// reaches within the scene's grid; a configuration that reaches farther is [`Status::Overflow`].
+    /// Builds object and proxy of `scene`. Of an object with more than [`Model::WHOLE`] surface nodes only those are
+    /// prepared that the proxy reaches within the scene's grid; a configuration that reaches farther is
+    /// [`Status::Overflow`].
     ///
     /// # Errors
     /// When the object cannot be built.
@@ -82,8 +84,8 @@ impl Direct {
         Ok(Inspection::new(self.model(), q))
     }
 
-    /// Torques and statuses of many configurations, joint fastest as they are, on all cores [N m or N]. Each is solved from rest; where
-    /// there are several equilibria, a bake may have found a lower one from neighbouring grid points.
+    /// Torques and statuses of many configurations, joint fastest as they are, on all cores [N m or N]. Each is solved
+    /// from rest; where there are several equilibria, a bake may have found a lower one from neighbouring grid points.
     ///
     /// # Errors
     /// When `configurations` are not whole rows of finite numbers.

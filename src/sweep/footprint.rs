@@ -9,14 +9,14 @@ use crate::{
     contact::{Equilibrium, NodeForce, Touch},
 };
 
-/// Memory and disk of a sweep. The object, its compliance and the backend's own buffers come on top: they do not grow with the
-/// grid.
+/// Memory and disk of a sweep. The object, its compliance and the backend's own buffers come on top: they do not grow
+/// with the grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Footprint {
     /// Memory [bytes].
     pub memory: Bounds,
-    /// The dataset on disk, its header aside; twice as much for a moment, while it is put together from its part. Zero for a sweep
-    /// in memory [bytes].
+    /// The dataset on disk, its header aside; twice as much for a moment, while it is put together from its part. Zero
+    /// for a sweep in memory [bytes].
     pub disk: Bounds,
 }
 
@@ -43,8 +43,8 @@ pub(super) fn results(points: usize, touching: usize, shape: Shape) -> usize {
     Columns::bytes(points, shape.width(), points.saturating_mul(contacts), points.saturating_mul(touches))
 }
 
-/// A chunk on its way: `solved` configurations and their equilibria, and the columns of `points` points, and of the chunks before that are
-/// being kept [bytes].
+/// A chunk on its way: `solved` configurations and their equilibria, and the columns of `points` points, and of the
+/// chunks before that are being kept [bytes].
 pub(super) fn chunk(solved: usize, points: usize, touching: usize, shape: Shape) -> usize {
     // Lists grow by doubling.
     let lists = 2 * (node_forces(touching, shape) * size_of::<NodeForce>() + touching * size_of::<Touch>());

@@ -1,7 +1,7 @@
 //! What a sweep is going to take, from a sample of its points.
 //!
-//! Points of the grid are drawn at random and solved by the sweep's own backend. The fraction of them in contact, the number of contact
-//! forces and the time per point follow.
+//! Points of the grid are drawn at random and solved by the sweep's own backend. The fraction of them in contact, the
+//! number of contact forces and the time per point follow.
 
 use super::{
     Backend, Sweep,
@@ -31,19 +31,21 @@ const SEED: u64 = 0x2545_f491_4f6c_dd1d;
 pub struct Forecast {
     /// Fraction of the points in contact [1].
     pub contact_fraction: f64,
-    /// Solving all points from rest, without the search for lower equilibria and the measurement of the error; absent for a GPU, whose
-    /// time for few points says nothing of many [s].
+    /// Solving all points from rest, without the search for lower equilibria and the measurement of the error; absent
+    /// for a GPU, whose time for few points says nothing of many [s].
     pub seconds: Option<f64>,
     /// The dataset on disk [bytes].
     pub disk: usize,
-    /// The results on disk while they are collected, with the forces from which lower equilibria are searched for [bytes].
+    /// The results on disk while they are collected, with the forces from which lower equilibria are searched for
+    /// [bytes].
     pub part: usize,
     /// Points that were sampled.
     pub sampled: usize,
 }
 
 impl Sweep<'_> {
-    /// Samples the sweep's points with `backend`, and keeps the forecast that follows. `is_timed`: whether a sample's time counts.
+    /// Samples the sweep's points with `backend`, and keeps the forecast that follows. `is_timed`: whether a sample's
+    /// time counts.
     ///
     /// # Errors
     /// Those of the backend.

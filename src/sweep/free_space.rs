@@ -1,22 +1,22 @@
 //! Grid points that need no solve, because nothing can touch there: proven block by block.
 //!
-//! Along any path of q each proxy node moves by at most `sum_j |J_ij| |dq_j|`, and its signed distance to the surface changes
-//! by no more than it moves. So over a block of grid points around its centre c, with half-widths h,
+//! Along any path of q each proxy node moves by at most `sum_j |J_ij| |dq_j|`, and its signed distance to the surface
+//! changes by no more than it moves. So over a block of grid points around its centre c, with half-widths h,
 //!
 //! ```text
 //! gap(q) >= min_i ( clearance_i(c) - sum_j m_ij |q_j - c_j| ),     |J_ij| <= m_ij over the block,
 //! m_ij = min( r_ij, |J_ij(c)| + sum_k r_i,max(j,k) h_k )
 //! ```
 //!
-//! r_ij is the greatest distance that node i can have from the origin of joint j, by the lengths of the links between (1 for a
-//! prismatic joint): it bounds |J_ij| everywhere, and the derivative of J_ij in q_k is a cross product of a unit axis with
-//! column max(j, k). Blocks that are not proven free are halved along the joint that moves the proxy most, down to some points,
-//! which are left to the solver.
+//! r_ij is the greatest distance that node i can have from the origin of joint j, by the lengths of the links between
+//! (1 for a prismatic joint): it bounds |J_ij| everywhere, and the derivative of J_ij in q_k is a cross product of a
+//! unit axis with column max(j, k). Blocks that are not proven free are halved along the joint that moves the proxy
+//! most, down to some points, which are left to the solver.
 //!
-//! A block counts as free only if it stays so when widened by [`FreeSpace::MARGIN`] grid steps all round. So every point within as many
-//! steps of a point in contact is solved for and has its exact gap; a skipped point has a positive lower bound of its gap. And so
-//! a block whose middle touches spares looking at those that are as near to it.
-//! Blocks are cut from the grid alone, so that a point is skipped or not whatever chunks, threads and backend there are.
+//! A block counts as free only if it stays so when widened by [`FreeSpace::MARGIN`] grid steps all round. So every
+//! point within as many steps of a point in contact is solved for and has its exact gap; a skipped point has a positive
+//! lower bound of its gap. And so a block whose middle touches spares looking at those that are as near to it. Blocks
+//! are cut from the grid alone, so that a point is skipped or not whatever chunks, threads and backend there are.
 
 use crate::{
     JointVector, MAX_JOINTS,
@@ -37,11 +37,12 @@ use std::{
 /// those lengths.
 const FREE_SPACE_ROUNDING: f64 = 1e-12;
 
-/// Blocks that threads take one after the other have at most as many points: many more blocks than threads, and far fewer than
-/// points.
+/// Blocks that threads take one after the other have at most as many points: many more blocks than threads, and far
+/// fewer than points.
 const SHARE: usize = 4096;
 
-/// Blocks of as many points are not cut any further, and not looked at: of so few, too few are free to save what that takes.
+/// Blocks of as many points are not cut any further, and not looked at: of so few, too few are free to save what that
+/// takes.
 const SMALLEST: usize = 8;
 
 /// Most points for which bounds are kept at a time: four megabytes.
@@ -93,8 +94,8 @@ impl<'a> FreeSpace<'a> {
         Self { model, grid, jacobians: JacobianBounds::new(model.chain, grid), most: SLAB }
     }
 
-    /// The slab with `point`: whole lines of the grid that follow each other, cut from the grid alone, so that bounds can be
-    /// found slab by slab in bounded memory.
+    /// The slab with `point`: whole lines of the grid that follow each other, cut from the grid alone, so that bounds
+    /// can be found slab by slab in bounded memory.
     #[must_use]
     pub fn slab(&self, point: usize) -> Range<usize> {
         // Trailing axes whose lines all fit, and the axis before them, of whose lines some fit.

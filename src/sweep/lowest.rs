@@ -1,17 +1,19 @@
 //! The lowest equilibrium: of those reached from rest and from the equilibria of the neighbouring grid points.
 //!
-//! Equilibrium (2) may have several solutions, and the search from rest finds one of them. If neighbouring points hold different ones,
-//! U jumps between them, and a torque that follows a jump is not passive. The minimum of U over the solutions has no jumps.
+//! Equilibrium (2) may have several solutions, and the search from rest finds one of them. If neighbouring points hold
+//! different ones, U jumps between them, and a torque that follows a jump is not passive. The minimum of U over the
+//! solutions has no jumps.
 //!
-//! After the sweep from rest, corrections go in rounds. For each point p in contact and each of its neighbours n on the grid, n predicts
-//! the energy of its own equilibrium at p by the trapezoidal rule, `U_n - 1/2 (tau_n + tau_p) . (q_p - q_n)`. If U_p exceeds that by more
-//! than [`EDGE_TOLERANCE`] times the work of one grid step, or if p did not converge, p is solved again from the forces of n. The lowest
-//! converged result replaces that of p if it is lower by more than the solver's own error. The first round looks at all neighbours, later
-//! ones at those that changed in the round before, until nothing changes.
+//! After the sweep from rest, corrections go in rounds. For each point p in contact and each of its neighbours n on the
+//! grid, n predicts the energy of its own equilibrium at p by the trapezoidal rule,
+//! `U_n - 1/2 (tau_n + tau_p) . (q_p - q_n)`. If U_p exceeds that by more than [`EDGE_TOLERANCE`] times the work of one
+//! grid step, or if p did not converge, p is solved again from the forces of n. The lowest converged result replaces
+//! that of p if it is lower by more than the solver's own error. The first round looks at all neighbours, later ones at
+//! those that changed in the round before, until nothing changes.
 //!
-//! All reads of a round are of the state before it, and the starts of a point are taken in the order of their numbers. So the result
-//! depends on the results from rest alone: not on threads, chunks, or an interruption. Starts are the stored forces, in f32, in memory as
-//! in a part. The correction runs on the CPU, whatever backend solved from rest.
+//! All reads of a round are of the state before it, and the starts of a point are taken in the order of their numbers.
+//! So the result depends on the results from rest alone: not on threads, chunks, or an interruption. Starts are the
+//! stored forces, in f32, in memory as in a part. The correction runs on the CPU, whatever backend solved from rest.
 //!
 //! Memory: the new results, and one stretch of points at a time.
 
@@ -50,7 +52,8 @@ const EDGE_TOLERANCE: f64 = 0.1;
 /// being least at the equilibrium.
 const ENERGY_ERROR: f64 = 1e-10;
 
-/// Points that are looked at together [1]: enough for all threads, few enough that what is known of them takes little memory.
+/// Points that are looked at together [1]: enough for all threads, few enough that what is known of them takes little
+/// memory.
 const STRETCH: usize = 1 << 14;
 
 /// Report of the correction.
@@ -76,8 +79,8 @@ pub(super) struct Neighbourhood<'a> {
     table: &'a Table<'a>,
 }
 
-/// Whether `scene`s of this algorithm have several equilibria of which the lowest counts: the paper's steps define its result, and
-/// contact with the geometry at rest has one equilibrium.
+/// Whether `scene`s of this algorithm have several equilibria of which the lowest counts: the paper's steps define its
+/// result, and contact with the geometry at rest has one equilibrium.
 pub(super) fn applies(algorithm: Algorithm) -> bool {
     algorithm == Algorithm::Energy
 }
@@ -154,8 +157,8 @@ pub(super) fn correct(
     Some(lowered)
 }
 
-/// Searches at `q` from each of `starts`, forces on the object's nodes, in order. Returns the lowest equilibrium that is lower than
-/// `known`, the result there is, by more than the errors of both.
+/// Searches at `q` from each of `starts`, forces on the object's nodes, in order. Returns the lowest equilibrium that
+/// is lower than `known`, the result there is, by more than the errors of both.
 pub(super) fn lower(
     solver: &mut Solver<'_>,
     q: &JointVector,

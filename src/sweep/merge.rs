@@ -1,7 +1,8 @@
 //! The shards of a sweep, read, compared, and put together into the dataset that one bake would have made.
 //!
-//! Blocks of points are copied in the order of the grid into the part of the output, which then lacks nothing: what follows (the lowest
-//! equilibria, the error, the file) is what a bake does that is continued after its last point. So the dataset has the same bits.
+//! Blocks of points are copied in the order of the grid into the part of the output, which then lacks nothing: what
+//! follows (the lowest equilibria, the error, the file) is what a bake does that is continued after its last point. So
+//! the dataset has the same bits.
 
 use super::{
     Backend, Progress, Run, SceneObjectError, Shard, SweepError, SweepReport,
@@ -48,8 +49,8 @@ impl Contents {
     pub fn read(path: &Path) -> Result<Self, SweepError> {
         let failed = |source| SweepError::Part { path: path.into(), source };
         let file = File::open(path).map_err(failed)?;
-        // SAFETY: the mapping is read-only, and a shard that has its name is not written to any more. Another program that truncates
-        // it ends this process, as it would with any mapped file; no haptic loop reads it.
+        // SAFETY: the mapping is read-only, and a shard that has its name is not written to any more. Another program
+        // that truncates it ends this process, as it would with any mapped file; no haptic loop reads it.
         let map = unsafe { Mmap::map(&file) }.map_err(failed)?;
         let foreign = |reason: &str| SweepError::ForeignPart { path: path.into(), reason: reason.into() };
         let (binding, mut place) = part::binding(&map).map_err(|reason| foreign(&reason))?;
@@ -230,8 +231,8 @@ impl Merge {
         (0..self.count).filter(|index| !self.shards.contains_key(index)).collect()
     }
 
-    /// Puts the dataset `output` together, with its error measured at `measured` configurations as in [`super::Bake::measured`]. What an
-    /// interrupted merge has left is continued.
+    /// Puts the dataset `output` together, with its error measured at `measured` configurations as in
+    /// [`super::Bake::measured`]. What an interrupted merge has left is continued.
     ///
     /// # Errors
     /// Any [`MergeError`]; an earlier file `output` is then untouched.
@@ -292,7 +293,8 @@ impl Merge {
         Ok(())
     }
 
-    /// Returns the notices of the merged dataset: shards solved by another backend than the first one, then the shards' own notices.
+    /// Returns the notices of the merged dataset: shards solved by another backend than the first one, then the shards'
+    /// own notices.
     fn notices(&self) -> Vec<String> {
         let mut solved_by = BTreeMap::<_, Vec<usize>>::new();
         for (&index, shard) in &self.shards {

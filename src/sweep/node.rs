@@ -47,13 +47,13 @@ pub struct Solved {
     pub torque: JointVector,
     /// See [`crate::contact::Equilibrium::gap`] [m].
     pub gap: f32,
-    /// What became of it.
+    /// Status.
     pub status: Status,
     /// Equilibria that were solved for it: none where nothing is near, two at most.
     pub equilibria: u32,
 }
 
-/// What a node depends on beside its configuration.
+/// Everything on which a node depends beside its configuration.
 pub(super) struct Scale {
     /// Spacing of the base along each axis [rad or m].
     steps: Vec<f64>,

@@ -4,9 +4,10 @@
 //! "haptize part 5\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
 //! ```
 //!
-//! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`], or [`NOTICE`] and a text. Frames are only
-//! ever appended. What a crash leaves at the end (half a frame, or a wrong checksum) is cut off and computed again: a part never adds a wrong
-//! number to a dataset, and the finished file is the same, bit for bit, as without the interruption.
+//! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`], or [`NOTICE`] and a text. Frames
+//! are only ever appended. What a crash leaves at the end (half a frame, or a wrong checksum) is cut off and computed
+//! again: a part never adds a wrong number to a dataset, and the finished file is the same, bit for bit, as without the
+//! interruption.
 
 use super::{
     Shard, SweepError,
@@ -44,8 +45,8 @@ pub(super) struct Binding {
     pub scene: String,
     /// Where the scene was read from, absolute: what it names lies beside it.
     pub scene_path: String,
-    /// CRC-32 of the object: all its nodes at rest, its surface and its stiffness. It may come from a mesh file, whose contents the
-    /// scene does not hold.
+    /// CRC-32 of the object: all its nodes at rest, its surface and its stiffness. It may come from a mesh file, whose
+    /// contents the scene does not hold.
     pub object: u32,
     /// Whether tangents are stored.
     pub with_tangent: bool,
@@ -88,7 +89,8 @@ impl Binding {
         self.other_sweep(other).or(different)
     }
 
-    /// Returns the first difference from `other` that makes them parts of different datasets, whatever solves them and whichever points they hold.
+    /// Returns the first difference from `other` that makes them parts of different datasets, whatever solves them and
+    /// whichever points they hold.
     pub fn other_sweep(&self, other: &Self) -> Option<&'static str> {
         let (mine, its) = (&self.provenance, &other.provenance);
         let differences = [
@@ -116,8 +118,8 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// Begins a part at `path`, or with `resume` continues the one that is there, and counts its points; `binding` then takes its
-    /// date and notices. Results that are there are never thrown away: without `resume` they are an error.
+    /// Begins a part at `path`, or with `resume` continues the one that is there, and counts its points; `binding` then
+    /// takes its date and notices. Results that are there are never thrown away: without `resume` they are an error.
     pub fn open(path: &Path, resume: bool, binding: &mut Binding) -> Result<(Self, Tally), SweepError> {
         let failed = |source| SweepError::Part { path: path.into(), source };
         let file = OpenOptions::new()
@@ -201,8 +203,8 @@ impl Part {
         body.iter().try_for_each(|piece| self.file.write_all(piece))
     }
 
-    /// Passes the bytes of one column of all points, block by block, to `take`, which reads all of them. Points in `replaced` have the
-    /// results given there.
+    /// Passes the bytes of one column of all points, block by block, to `take`, which reads all of them. Points in
+    /// `replaced` have the results given there.
     pub fn column(
         &self,
         section: Section,
@@ -247,8 +249,8 @@ impl Part {
 
     /// Maps the part's file into memory. The file is locked: no other bake changes it.
     pub fn map(&self) -> io::Result<Mmap> {
-        // SAFETY: the mapping is read-only. Another program that truncates the file ends this process, as it would with any
-        // mapped file; the part is this bake's own, and no haptic loop reads it.
+        // SAFETY: the mapping is read-only. Another program that truncates the file ends this process, as it would with
+        // any mapped file; the part is this bake's own, and no haptic loop reads it.
         unsafe { Mmap::map(&self.file) }
     }
 
@@ -269,8 +271,8 @@ impl Part {
         Ok(Table::new(width.joints, blocks))
     }
 
-    /// The binding of the file that is there, which `reader` then stands behind with `left` bytes left; `None` when the file
-    /// ends before its binding does.
+    /// The binding of the file that is there, which `reader` then stands behind with `left` bytes left; `None` when the
+    /// file ends before its binding does.
     fn opening(&self, reader: &mut impl Read, left: &mut u64) -> Result<Option<Binding>, SweepError> {
         let failed = |source| SweepError::Part { path: self.path.clone(), source };
         let mut magic = Vec::new();
@@ -363,7 +365,8 @@ pub(super) fn binding(bytes: &[u8]) -> Result<(Binding, usize), String> {
     Ok((binding, place))
 }
 
-/// The frame at `place` in the part `bytes`, behind which `place` then is, and where its body lies; `None` when there is no whole one.
+/// The frame at `place` in the part `bytes`, behind which `place` then is, and where its body lies; `None` when there
+/// is no whole one.
 pub(super) fn next(bytes: &[u8], place: &mut usize) -> Option<(Frame, Range<usize>)> {
     let body = body(bytes, place)?;
     let notice = bytes.get(body.clone())?.strip_prefix(&NOTICE);

@@ -1,12 +1,12 @@
 //! What to bake for a given error: spacing, interpolation and tolerance of the solver, from a pilot.
 //!
-//! The pilot bakes some coarse grids over the scene's region, holds them against directly solved random configurations, and
-//! measures how the error falls with the spacing: `error ~ h^p`. The spacing that is needed follows, for each interpolation; the
-//! one with the fewest grid points is taken.
+//! The pilot bakes some coarse grids over the scene's region, holds them against directly solved random configurations,
+//! and measures how the error falls with the spacing: `error ~ h^p`. The spacing that is needed follows, for each
+//! interpolation; the one with the fewest grid points is taken.
 //!
-//! *The error* is the rms of the torque's over the region, in contact or not, as in `haptize accuracy`; relative ones are relative to
-//! the rms of the torque itself. Where torque jumps, the worst error is as large as the jump on any grid: it is reported, and
-//! not promised.
+//! *The error* is the rms of the torque's over the region, in contact or not, as in `haptize accuracy`; relative ones
+//! are relative to the rms of the torque itself. Where torque jumps, the worst error is as large as the jump on any
+//! grid: it is reported, and not promised.
 
 use super::{
     BackendChoice, Bake, BakeError, ChosenBackend, Footprint, Sweep, build_object,
@@ -261,8 +261,8 @@ impl Pilot {
         })
     }
 
-    /// Returns the cost of an rms error of `relative` of the rms torque with the interpolation of `scene`, which was tried; `None` if its error does
-    /// not fall.
+    /// Returns the cost of an rms error of `relative` of the rms torque with the interpolation of `scene`, which was
+    /// tried; `None` if its error does not fall.
     #[must_use]
     pub fn cost(&self, scene: &Scene, relative: f64) -> Option<Cost> {
         let all = prospects(&self.trials, SPACING_SHARE * relative * self.torque, scene.grid.axes.len());
@@ -340,7 +340,8 @@ fn percent(share: f64) -> impl fmt::Display {
     if percent < 1.0 { format!("{percent:.2}") } else { format!("{percent:.1}") }
 }
 
-/// Returns the cost of the error `aim` for each interpolation, fewest points first; no coarser grid than the coarsest that was tried.
+/// Returns the cost of the error `aim` for each interpolation, fewest points first; no coarser grid than the coarsest
+/// that was tried.
 fn prospects(trials: &[Trial], aim: f64, joints: usize) -> Vec<Prospect> {
     let of = |interpolation: Interpolation| {
         let rows = || trials.iter().filter(move |trial| trial.interpolation == interpolation.name());

@@ -1,7 +1,7 @@
 //! What each shard of a bake is going to take, before anything is baked.
 //!
-//! Which points are skipped is found out for the whole grid, as each shard does. The time of the others follows from a sample, solved on
-//! this machine.
+//! Which points are skipped is found out for the whole grid, as each shard does. The time of the others follows from a
+//! sample, solved on this machine.
 
 use super::{Backend, BackendChoice, Bake, BakeError, ChosenBackend, Forecast, Run, Shard, Sweep};
 use crate::{JointVector, memory, scene::Scene};

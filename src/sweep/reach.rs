@@ -1,9 +1,9 @@
 //! Where contact is in C-space, before anything is baked, and the grid that follows.
 //!
-//! Random configurations within the joint limits are measured against the surface at rest, and nothing is solved. A configuration whose
-//! deepest proxy node is d below the surface counts as contact of depth d. *Shallow* contact is at most as deep as asked for; the grid's
-//! ranges are the least box that holds all of it that was met. Its lines are so far apart that a step along any axis moves the proxy by
-//! about as much as along any other.
+//! Random configurations within the joint limits are measured against the surface at rest, and nothing is solved. A
+//! configuration whose deepest proxy node is d below the surface counts as contact of depth d. *Shallow* contact is at
+//! most as deep as asked for; the grid's ranges are the least box that holds all of it that was met. Its lines are so
+//! far apart that a step along any axis moves the proxy by about as much as along any other.
 
 use super::{BakeError, build_object, spacing};
 use crate::{
@@ -30,12 +30,12 @@ const CONTACTS: usize = 4000;
 /// Seed of the random configurations.
 const SEED: u64 = 0xd1b5_4a32_d192_ed03;
 
-/// Depth up to which contact counts as shallow, over the body's size [1]: from about a fifth on a soft body has several equilibria, between
-/// which torque jumps on any grid.
+/// Depth up to which contact counts as shallow, over the body's size [1]: from about a fifth on a soft body has several
+/// equilibria, between which torque jumps on any grid.
 const SHALLOW: f64 = 0.2;
 
-/// By how much a range is widened on either side, over its width [1]: what lies between the outermost contacts that were met and the
-/// outermost ones there are.
+/// By how much a range is widened on either side, over its width [1]: what lies between the outermost contacts that
+/// were met and the outermost ones there are.
 const MARGIN: f64 = 0.02;
 
 /// Parts of a joint's limits for which contact is listed separately [1].
@@ -50,7 +50,8 @@ const LINES: f64 = 64.0;
 /// Fewest steps along an axis [1]: interpolation takes differences over two.
 const FEWEST_STEPS: f64 = 2.0;
 
-/// How far the proxy moves along an axis at least, over the farthest [1]: a joint that hardly moves it still has its lines.
+/// How far the proxy moves along an axis at least, over the farthest [1]: a joint that hardly moves it still has its
+/// lines.
 const LEAST_WAY: f64 = 1e-3;
 
 /// To what ends of ranges are rounded, outwards [rad or m].
@@ -141,8 +142,8 @@ struct Met {
 }
 
 impl Reach {
-    /// Measures `scene`, whose grid does not matter; `depth` is that of the contact that the ranges are to hold, by default a fifth of the
-    /// body's size [m].
+    /// Measures `scene`, whose grid does not matter; `depth` is that of the contact that the ranges are to hold, by
+    /// default a fifth of the body's size [m].
     ///
     /// # Errors
     /// Any [`ReachError`].
@@ -218,7 +219,8 @@ impl Reach {
         )
     }
 
-    /// `scene` with a grid over the ranges, its text too. It is as fine as a pilot wants it to begin with, not as fine as any error wants it.
+    /// `scene` with a grid over the ranges, its text too. It is as fine as a pilot wants it to begin with, not as fine
+    /// as any error wants it.
     ///
     /// # Errors
     /// [`ReachError::Scene`].
@@ -228,7 +230,8 @@ impl Reach {
         for bound in Chain::new(&scene.proxy).jacobian_bounds(&ranges) {
             motion.iter_mut().zip(bound.iter()).for_each(|(motion, r)| *motion = motion.max(*r));
         }
-        // How far the proxy moves along each axis, and the step at which the grid has about the wanted number of points.
+        // How far the proxy moves along each axis, and the step at which the grid has about the wanted number of
+        // points.
         let ways: Vec<f64> = ranges.iter().zip(motion).map(|(range, r)| (range[1] - range[0]) * r).collect();
         let longest = ways.iter().copied().fold(0.0, f64::max);
         let ways: Vec<f64> = ways.into_iter().map(|way| way.max(LEAST_WAY * longest)).collect();

@@ -9,7 +9,8 @@ use crate::{
     tolerances::{LEVER_ARM, REFERENCE_TOLERANCE},
 };
 
-/// Most configurations that are drawn to find some in contact: a region in contact at a few in a thousand is still seen.
+/// Most configurations that are drawn to find some in contact: a region in contact at a few in a thousand is still
+/// seen.
 const MOST_DRAWN: usize = 1 << 16;
 
 /// Random configurations and their torques.
@@ -90,8 +91,8 @@ impl Reference {
         Ok(reference)
     }
 
-    /// As [`Reference::solve`], with twice as many configurations again and again until `contacts` of them are in contact, or no
-    /// more are drawn.
+    /// As [`Reference::solve`], with twice as many configurations again and again until `contacts` of them are in
+    /// contact, or no more are drawn.
     pub fn in_contact(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, ReferenceError> {
         let mut count = contacts;
         loop {

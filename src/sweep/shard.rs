@@ -1,11 +1,12 @@
 //! A shard: every n-th stretch of a grid's points, solved by a process of its own, on whatever machine.
 //!
-//! The grid's points are cut into stretches of equal length, and n consecutive stretches make a round. A shard has one stretch of each
-//! round. Its place within the round is drawn again from round to round: contact is clustered in C-space, and a fixed place could fall on
-//! the same lines of the grid every time. The cut depends on the grid and on n alone.
+//! The grid's points are cut into stretches of equal length, and n consecutive stretches make a round. A shard has one
+//! stretch of each round. Its place within the round is drawn again from round to round: contact is clustered in
+//! C-space, and a fixed place could fall on the same lines of the grid every time. The cut depends on the grid and on n
+//! alone.
 //!
-//! A shard's file is a part (`part.rs`) of its points. It is called `.part` until it is whole, so that whoever finds the name without it
-//! finds all of its points.
+//! A shard's file is a part (`part.rs`) of its points. It is called `.part` until it is whole, so that whoever finds
+//! the name without it finds all of its points.
 
 use super::{Backend, Run, Sweep, SweepError, SweepReport, chunks::Begun, merge::Contents, part::Part};
 use crate::random::Random;
@@ -17,7 +18,8 @@ use std::{
     str::FromStr,
 };
 
-/// Stretches of a shard where the grid has points enough [1]: the points in contact then differ from shard to shard by about a tenth.
+/// Stretches of a shard where the grid has points enough [1]: the points in contact then differ from shard to shard by
+/// about a tenth.
 const STRETCHES: usize = 64;
 
 /// Fewest points of a stretch [1]: enough for the threads of a machine to share them.
@@ -128,7 +130,8 @@ pub fn ranges(numbers: &[usize]) -> String {
 }
 
 impl Sweep<'_> {
-    /// Number of points that are not skipped, of each of `count` shards, and a random sample of at most `most` of these points.
+    /// Number of points that are not skipped, of each of `count` shards, and a random sample of at most `most` of these
+    /// points.
     pub(super) fn solved_of_shards(&self, count: usize, most: usize) -> Result<(Vec<usize>, Vec<usize>), SweepError> {
         let (points, any) = (self.grid.points(), Shard { index: 0, count });
         let (mut solved, mut done) = (vec![0; count], 0);
@@ -153,8 +156,8 @@ impl Sweep<'_> {
         Ok((solved, sample))
     }
 
-    /// Solves the points of `shard` into a file in `folder`, which is made where it is missing, and returns its path. What an interrupted
-    /// run has left there is continued; a whole file is left as it is, and `None` returned with it.
+    /// Solves the points of `shard` into a file in `folder`, which is made where it is missing, and returns its path.
+    /// Continues an interrupted run; a whole file is left as it is, and `None` returned with it.
     ///
     /// # Errors
     /// Any [`SweepError`]; the part then keeps what is done.
@@ -180,7 +183,8 @@ impl Sweep<'_> {
             removed.map_err(failed)?;
         }
         let (mut part, tally) = Part::open(&part_path, true, &mut binding)?;
-        // Whoever held the lock before may just have finished: what was opened is then the whole file, or a new one that nobody needs.
+        // Whoever held the lock before may just have finished: what was opened is then the whole file, or a new one
+        // that nobody needs.
         if file.exists() {
             let _ = fs::remove_file(&part_path);
             return Ok((file, None));

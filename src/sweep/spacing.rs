@@ -24,8 +24,8 @@ pub(crate) fn spacing_of(scene: &Scene) -> f64 {
     (axes.iter().map(|axis| axis.step.ln()).sum::<f64>() / axes.len().max(1) as f64).exp()
 }
 
-/// Order p of `errors` that belong to spacings, error ~ h^p: the slope of a line through the logarithms. `None` for less
-/// than two spacings with an error.
+/// Order p of `errors` that belong to spacings, error ~ h^p: the slope of a line through the logarithms. `None` for
+/// less than two spacings with an error.
 pub(crate) fn order(errors: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
     let points: Vec<(f64, f64)> =
         errors.filter(|(_, error)| *error > 0.0).map(|(spacing, error)| (spacing.ln(), error.ln())).collect();

@@ -1,5 +1,5 @@
-//! The viewer: its state, and what happens in a frame. It knows neither window nor clock: `window.rs` and `offscreen.rs` tell
-//! [`Viewer::advance`] the time that went by, and call [`Viewer::ui`], which is in `panels.rs`.
+//! The viewer: its state, and what happens in a frame. It knows neither window nor clock: `window.rs` and
+//! `offscreen.rs` tell [`Viewer::advance`] the time that went by, and call [`Viewer::ui`], which is in `panels.rs`.
 
 use super::{
     ViewError,
@@ -108,8 +108,8 @@ const LONGEST_FRAME: f64 = 1.0;
 const LATEST: f64 = 0.1;
 
 impl Viewer {
-    /// A viewer that draws through `render`, whose device is that of `context`; files go to `folder`. Its windows want to
-    /// be [`dress`]ed.
+    /// A viewer that draws through `render`, whose device is that of `context`; files go to `folder`. Its windows want
+    /// to be [`dress`]ed.
     ///
     /// # Errors
     /// When the device refuses the drawing shaders.
@@ -165,8 +165,8 @@ impl Viewer {
         }
     }
 
-    /// Goes on where another window had to stop because its device was lost, and says `why`. What was being made is begun
-    /// again.
+    /// Goes on where another window had to stop because its device was lost, and says `why`. What was being made is
+    /// begun again.
     pub fn resume(&mut self, rescue: Rescue, why: &str, egui: &egui::Context) {
         egui.set_theme(rescue.theme);
         (self.session, self.device) = (rescue.session, rescue.device);

@@ -50,7 +50,8 @@ impl<T: Send + 'static> Pending<T> {
     }
 }
 
-/// Something that is made again in the background whenever something else is wanted of it; what there is stays in use until then.
+/// Something that is made again in the background whenever something else is wanted of it; what there is stays in use
+/// until then.
 pub struct Following<W, T> {
     /// The result, or why there is none; absent before the first.
     last: Option<W>,
@@ -68,8 +69,8 @@ impl<W: Clone + PartialEq + Send + 'static, T: Send + 'static> Following<W, T> {
         self.coming.is_some()
     }
 
-    /// Begins to make another one where another is `wanted`, in a thread called `name`, one at a time; answers with one that
-    /// is there. `wake` is called once it is.
+    /// Begins to make another one where another is `wanted`, in a thread called `name`, one at a time; answers with one
+    /// that is there. `wake` is called once it is.
     ///
     /// # Errors
     /// In words, once, when there is no thread or it ended without its result.

@@ -21,8 +21,8 @@ pub struct Body {
     pub surface: Surface,
     /// n0 [m].
     rest: Vec<Vec3>,
-    /// Largest displacement at rest [m] and contact force on a node [N] of the motions that can be played; of the whole dataset where
-    /// these touch nothing.
+    /// Largest displacement at rest [m] and contact force on a node [N] of the motions that can be played; of the whole
+    /// dataset where these touch nothing.
     pub extremes: [f64; 2],
 }
 
@@ -39,7 +39,8 @@ pub struct Nodes {
     owed: f64,
 }
 
-/// Frames of the object that one frame of the window makes up for: a window at 10 frames a second still shows an object at
+/// Frames of the object that one frame of the window makes up for: a window at 10 frames a second still shows an object
+/// at
 /// 60. A slower one shows it slowed down.
 const MOST_FRAMES: usize = 6;
 

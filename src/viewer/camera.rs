@@ -98,7 +98,8 @@ impl Camera {
         self.elevation = (self.elevation + TURN * movement.y).clamp(-limit, limit);
     }
 
-    /// Shifts the target by a pointer movement, in fractions of the picture's height: what is under the pointer follows.
+    /// Shifts the target by a pointer movement, in fractions of the picture's height: what is under the pointer
+    /// follows.
     pub fn pan(&mut self, movement: Vec2) {
         let [right, up] = self.right_and_up();
         self.target += self.height_at_target() * (movement.y * up - movement.x * right);

@@ -1,6 +1,6 @@
-//! The haptized data as a cloud of points in C-space (paper's Fig. 3): every configuration in contact, coloured by the size
-//! of its torque, over the first three joints. It turns with the pointer. With more than three joints the others stay at
-//! the grid line nearest to the configuration.
+//! The haptized data as a cloud of points in C-space (paper's Fig. 3): every configuration in contact, coloured by the
+//! size of its torque, over the first three joints. It turns with the pointer. With more than three joints the others
+//! stay at the grid line nearest to the configuration.
 
 use super::{
     camera::Camera,

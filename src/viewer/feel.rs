@@ -1,6 +1,6 @@
-//! The haptic loop beside the window, and what the window sees of it. The haptic thread waits for nobody: the hand's goal,
-//! ticks and costs cross through wait-free buffers; a second, ordinary thread moves the hand's goal at 500 Hz, so that a
-//! motion does not depend on the window's frame rate.
+//! The haptic loop beside the window, and what the window sees of it. The haptic thread waits for nobody: the hand's
+//! goal, ticks and costs cross through wait-free buffers; a second, ordinary thread moves the hand's goal at 500 Hz, so
+//! that a motion does not depend on the window's frame rate.
 //!
 //! A picture without a window has no time of its own: there the same loop runs by steps of given length
 //! ([`TickSource::Steps`]), and gives the same numbers on every machine.
@@ -57,8 +57,8 @@ const GUIDE_PERIOD: Duration = Duration::from_millis(2);
 /// How often a goal at rest is looked at: what moves it again is felt after a hundredth of a second.
 const GUIDE_AT_REST: Duration = Duration::from_millis(10);
 
-/// Ticks and costs that wait for the window: sixteen seconds at 1 kHz. A window at rest looks at them once a minute; what
-/// does not fit then is a hand that has not moved.
+/// Ticks and costs that wait for the window: sixteen seconds at 1 kHz. A window at rest looks at them once a minute;
+/// what does not fit then is a hand that has not moved.
 const RING: usize = 1 << 14;
 
 /// Everything that the haptic thread owns.

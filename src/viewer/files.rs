@@ -1,5 +1,5 @@
-//! The chooser of scenes and datasets: what was opened before, and the folders of this machine. Files can be dropped on the
-//! window as well.
+//! The chooser of scenes and datasets: what was opened before, and the folders of this machine. Files can be dropped on
+//! the window as well.
 
 use super::theme::{CHOOSER, FIELD_WIDTH, GROUP_GAP, LIST_HEIGHT};
 use eframe::egui::{self, Key, RichText, ScrollArea, TextEdit, Ui};
@@ -48,8 +48,8 @@ impl Files {
         &self.folder
     }
 
-    /// Returns a file of the folder that is not there yet: `name` and the extension, with a number between them where needed.
-    /// Returns `name` with a hyphen for every character that is no letter, digit, dot or underscore.
+    /// Returns a file of the folder that is not there yet: `name` and the extension, with a number between them where
+    /// needed. Returns `name` with a hyphen for every character that is no letter, digit, dot or underscore.
     #[must_use]
     pub fn fresh(&self, name: &str, extension: &str) -> PathBuf {
         fresh(&self.folder, name, extension)

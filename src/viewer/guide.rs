@@ -55,8 +55,8 @@ const SPEED: f64 = 0.25;
 /// Longest time that a joint is moved for at once [s]: who stood still meanwhile must not throw the arm.
 const LONGEST: f64 = 0.1;
 
-/// Longest time that a window says nothing and still has the keyboard [s]: one that is hidden or hangs must not hold a key
-/// down, while a slow rasteriser's draws a frame in a fifth of that.
+/// Longest time that a window says nothing and still has the keyboard [s]: one that is hidden or hangs must not hold a
+/// key down, while a slow rasteriser's draws a frame in a fifth of that.
 const LONGEST_SILENCE: f64 = 1.0;
 
 /// Least time between two frames that a moving hand asks for [s].
@@ -167,7 +167,8 @@ impl Guide {
         self.window.get_or_insert_with(|| window.clone());
     }
 
-    /// The hand moves the first joints at `speeds`, from -1 to 1 each, for `elapsed` [s]; nobody takes the lead where all are 0.
+    /// The hand moves the first joints at `speeds`, from -1 to 1 each, for `elapsed` [s]; nobody takes the lead where
+    /// all are 0.
     fn steer(&mut self, speeds: &[f64], elapsed: f64) {
         if speeds.iter().all(|speed| *speed == 0.0) {
             return;
@@ -186,7 +187,8 @@ impl Guide {
         self.way_home = Motion::through(&ends, self.goal.len()).ok().map(|way| (way, 0.0));
     }
 
-    /// Moves the hand by the keys that are held and the motion that plays, over `elapsed` [s]. Returns where it is led now.
+    /// Moves the hand by the keys that are held and the motion that plays, over `elapsed` [s]. Returns where it is led
+    /// now.
     pub fn follow(&mut self, elapsed: f64) -> JointVector {
         let before = self.goal;
         self.silence += elapsed;
@@ -242,8 +244,8 @@ impl Guide {
 mod tests {
     use super::*;
 
-    /// A hand at rest in the middle of two joints, of whose limits the second's are closer; the window has the keyboard and
-    /// says so.
+    /// A hand at rest in the middle of two joints, of whose limits the second's are closer; the window has the keyboard
+    /// and says so.
     fn guide() -> Guide {
         let [start, home] = [[0.0, 0.0], [0.5, 0.1]].map(|q| JointVector::from_slice(&q));
         Guide {

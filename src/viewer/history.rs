@@ -55,8 +55,8 @@ impl History {
         self.take(feel, |history| &mut history.jitter);
     }
 
-    /// Lets the window hold still for some seconds, the loop going on, so that what is left of its jitter is the machine's
-    /// own.
+    /// Lets the window hold still for some seconds, the loop going on, so that what is left of its jitter is the
+    /// machine's own.
     pub fn hold_still(&mut self, feel: &mut Feel) {
         // What has been drawn is let through.
         thread::sleep(SETTLING);

@@ -1,5 +1,5 @@
-//! Work in the background, so that the window never freezes: opening a file, baking a scene. It reports progress, can be
-//! cancelled, and ends with something [`Loaded`] or with the reason in words.
+//! Work in the background, so that the window never freezes: opening a file, baking a scene. It reports progress, can
+//! be cancelled, and ends with something [`Loaded`] or with the reason in words.
 
 use super::{
     background::{ENDED, spawn},
@@ -32,7 +32,8 @@ use std::{
 pub enum Task {
     /// Open a scene, and bake it, or a dataset.
     Open(PathBuf),
-    /// Bake a scene, on the geometry that a dataset holds of its object where there is one: its mesh is not read again then.
+    /// Bake a scene, on the geometry that a dataset holds of its object where there is one: its mesh is not read again
+    /// then.
     Bake(Arc<Scene>, Option<Surface>),
 }
 
@@ -122,7 +123,8 @@ enum Report {
 }
 
 impl Job {
-    /// Begins `task`; a bake is done by `solver`. `context` is the window's device. `wake` is called whenever there is news.
+    /// Begins `task`; a bake is done by `solver`. `context` is the window's device. `wake` is called whenever there is
+    /// news.
     ///
     /// # Errors
     /// In words, when the system gives no thread.

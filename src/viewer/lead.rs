@@ -12,19 +12,19 @@ pub struct DeviceChoice {
     pub hold_key: bool,
 }
 
-/// What the window says of the device that leads.
+/// Description of the device that leads, for the window.
 pub struct Lead {
     /// Its name, in one line.
     pub description: String,
-    /// What its user should know.
+    /// Caution for its user.
     pub caution: Option<&'static str>,
     /// The dead-man key, where it is asked for.
     pub key: Option<KeyInput>,
 }
 
 impl DeviceChoice {
-    /// Opens the device behind its safety layer and switches its motors on, for the arm of `loaded`. The simulated one is led along the first
-    /// motion of the scene.
+    /// Opens the device behind its safety layer and switches its motors on, for the arm of `loaded`. The simulated one
+    /// is led along the first motion of the scene.
     ///
     /// # Errors
     /// In words, when it cannot be opened or does not fit the arm.

@@ -3,8 +3,8 @@
 use super::theme::{self, GAP};
 use eframe::egui::{Rect, Role, Sense, Ui, Vec2, WidgetInfo, pos2, vec2};
 
-/// Room for a sample of `size`, with `name` behind it: one thing, so that no line ends between them or within the name. Answers
-/// with where the sample goes.
+/// Room for a sample of `size`, with `name` behind it: one thing, so that no line ends between them or within the name.
+/// Answers with where the sample goes.
 pub fn entry(ui: &mut Ui, size: Vec2, name: &str) -> Rect {
     let text = ui.painter().layout_no_wrap(name.to_owned(), theme::small(), ui.visuals().text_color());
     let whole = vec2(size.x + GAP + text.size().x, size.y.max(text.size().y));

@@ -1,5 +1,5 @@
-//! The pointer's grip on the proxy: which node it holds, and where it takes it. The ray through the pointer meets the plane
-//! through the node that faces the eye; inverse kinematics turns that place into joint coordinates.
+//! The pointer's grip on the proxy: which node it holds, and where it takes it. The ray through the pointer meets the
+//! plane through the node that faces the eye; inverse kinematics turns that place into joint coordinates.
 
 use super::camera::Camera;
 use crate::{
@@ -41,7 +41,8 @@ impl NodeDrag {
         Some(Self { node, anchor, offset: anchor - met })
     }
 
-    /// Configuration that brings the node to the picture point `at`, as far as the joints let it; `from` is where they are.
+    /// Configuration that brings the node to the picture point `at`, as far as the joints let it; `from` is where they
+    /// are.
     #[must_use]
     pub fn lead(
         &self,

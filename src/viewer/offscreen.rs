@@ -1,4 +1,5 @@
-//! The window's picture without a window: the same panels, laid out and painted by egui into a texture that is read back.
+//! The window's picture without a window: the same panels, laid out and painted by egui into a texture that is read
+//! back.
 
 use super::{Start, TickSource, ViewError, Viewer, dress, guide::LEAD_IN, pixels, theme};
 use crate::{

@@ -14,9 +14,9 @@ use crate::report::colour::ColourMap;
 use eframe::egui::{Align2, Painter, Rect, Stroke, Ui, Vec2, vec2};
 use glam::Vec3;
 
-// From the picture's lower left corner [points]: axes, how long they are and where their names are over that [1], the scale
-// and how long it is at most. From its lower right: the end of the bar of colours, and how long that is. In a narrow picture
-// both are shorter.
+// From the picture's lower left corner [points]: axes, how long they are and where their names are over that [1], the
+// scale and how long it is at most. From its lower right: the end of the bar of colours, and how long that is. In a
+// narrow picture both are shorter.
 const AXES_AT: Vec2 = vec2(34.0, -34.0);
 const AXES_LENGTH: f32 = 22.0;
 const AXES_NAMES: f32 = 1.38;

@@ -43,8 +43,8 @@ pub fn egui_colour(colour: Colour) -> Color32 {
     Color32::from_rgb(red, green, blue).gamma_multiply(colour.opacity)
 }
 
-/// Colour of series `number` in a plot: Okabe and Ito's, on dark ground the blue in its lighter shade, on light ground the light ones
-/// in a darker shade, since a line is thin. The fifth is a grey instead of their second blue.
+/// Colour of series `number` in a plot: Okabe and Ito's, on dark ground the blue in its lighter shade, on light ground
+/// the light ones in a darker shade, since a line is thin. The fifth is a grey instead of their second blue.
 #[must_use]
 pub fn series(number: usize, dark: bool) -> Color32 {
     const LIGHT: [u32; 6] = [0x00_72_b2, 0xd5_5e_00, 0x00_9e_73, 0xb0_52_8a, 0x3f_48_54, 0x8f_7a_00];

@@ -47,7 +47,8 @@ impl Viewer {
         self.complaint(ui);
     }
 
-    /// Title, opening, motions, theme. In a narrow window the name and the motion's slider make room for all that is beside them.
+    /// Title, opening, motions, theme. In a narrow window the name and the motion's slider make room for all that is
+    /// beside them.
     fn bar(&mut self, ui: &mut Ui) {
         let name_width = NAME_SHARE * ui.available_width();
         ui.horizontal(|ui| {

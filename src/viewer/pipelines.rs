@@ -1,5 +1,5 @@
-//! The two drawing pipelines: the object's surface, pulled from the frame update's buffers, and instances of one rounded
-//! cone. Both share view and light (`shaders/draw_common.wgsl`), samples a pixel, and a depth buffer.
+//! The two drawing pipelines: the object's surface, pulled from the frame update's buffers, and instances of one
+//! rounded cone. Both share view and light (`shaders/draw_common.wgsl`), samples a pixel, and a depth buffer.
 
 use super::shapes::Shape;
 use crate::tolerances::GPU_LEAST_DIVISOR;

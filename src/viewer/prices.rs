@@ -1,10 +1,11 @@
 //! The cost of each effect and of each way to interpolate, measured on this machine for what is open.
 //!
-//! A tick: the scene's first motion is played by a simulated hand as fast as it goes. A frame: the object is advanced on
-//! the window's device, and waited for after some frames. Both are timed in short blocks, again and again, in the background,
-//! and of each block the fastest time counts, because everything else that a machine does only adds to it. The price of an
-//! effect is the difference in cost with it and without it, which take turns. All of that is done [`REPEATS`] times: the
-//! median is shown with its spread, and a difference whose sign varies is shown as below the noise.
+//! A tick: the scene's first motion is played by a simulated hand as fast as it goes. A frame: the object is advanced
+//! on the window's device, and waited for after some frames. Both are timed in short blocks, again and again, in the
+//! background, and of each block the fastest time counts, because everything else that a machine does only adds to it.
+//! The price of an effect is the difference in cost with it and without it, which take turns. All of that is done
+//! [`REPEATS`] times: the median is shown with its spread, and a difference whose sign varies is shown as below the
+//! noise.
 
 use super::{background::spawn, body::Nodes, loaded::Loaded};
 use crate::{
@@ -38,8 +39,8 @@ pub struct Estimate {
     greatest: f64,
 }
 
-/// Times that everything is measured. What costs nothing has the same sign every time, and so is shown with a price, once in
-/// 64.
+/// Times that everything is measured. What costs nothing has the same sign every time, and so is shown with a price,
+/// once in 64.
 const REPEATS: usize = 7;
 
 /// Time from which on it is shown without decimals [us].
@@ -126,8 +127,8 @@ pub struct Prices {
     news: Option<mpsc::Receiver<(Item, Price)>>,
 }
 
-/// Times that a block is timed in each measurement: on a machine that is busy twice over, where every second one is disturbed,
-/// one block in thirty never comes through alone.
+/// Times that a block is timed in each measurement: on a machine that is busy twice over, where every second one is
+/// disturbed, one block in thirty never comes through alone.
 const ROUNDS: usize = 5;
 
 /// Blocks of the loop, and ticks of one: two seconds of the motion at 1 kHz, in pieces far shorter than the turn that a
@@ -139,8 +140,8 @@ const TICKS: usize = 50;
 const FRAMES: usize = 4;
 
 impl Prices {
-    /// Begins to measure interpolations, and the effects that the scene of `loaded` names. `wake` is called whenever there
-    /// is news.
+    /// Begins to measure interpolations, and the effects that the scene of `loaded` names. `wake` is called whenever
+    /// there is news.
     #[must_use]
     pub fn measure(loaded: &Loaded, context: &Arc<Context>, wake: impl Fn() + Send + 'static) -> Self {
         let scene = loaded.tuning();
@@ -266,8 +267,8 @@ fn frame_costs<const N: usize>(
     })
 }
 
-/// Costs of `N` kinds of work, of which `work` does one in blocks and answers with the time of each [us]: the sum over blocks,
-/// each the fastest of some rounds; and that again and again.
+/// Costs of `N` kinds of work, of which `work` does one in blocks and answers with the time of each [us]: the sum over
+/// blocks, each the fastest of some rounds; and that again and again.
 fn in_turns<const N: usize>(mut work: impl FnMut(usize) -> Option<Vec<f64>>) -> Option<[[f64; REPEATS]; N]> {
     let mut costs = [[0.0; REPEATS]; N];
     for repeat in 0..REPEATS {

@@ -116,8 +116,8 @@ impl SceneView {
         self.steering = Steering::new(Camera::looking_at(0.5 * (least + greatest), SEEN * self.extent));
     }
 
-    /// Lets the object of `loaded` follow `effects`. It is set up in the background; what is drawn stays until then. `wake` is
-    /// called when there is news.
+    /// Lets the object of `loaded` follow `effects`. It is set up in the background; what is drawn stays until then.
+    /// `wake` is called when there is news.
     ///
     /// # Errors
     /// When there is no thread or the device refuses it; the last one goes on.

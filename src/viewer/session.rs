@@ -71,8 +71,8 @@ impl Session {
         Ok(Self { loaded, feel, history, lead, pace, retuning, slices, cloud, controls, advice, cloud_first: false })
     }
 
-    /// Makes again what belongs to a window and a device that are gone; the loop goes on. `context` is the new one, `wake` is called
-    /// when there is news.
+    /// Makes again what belongs to a window and a device that are gone; the loop goes on. `context` is the new one,
+    /// `wake` is called when there is news.
     pub fn move_to(&mut self, context: &Arc<Context>, wake: impl Fn() + Send + 'static) {
         self.slices.forget_picture();
         self.controls.price_anew(&self.loaded, context, wake);
@@ -105,8 +105,8 @@ impl Session {
         self.retuning.is_busy()
     }
 
-    /// Lets the loop follow gains and effects of the controls. It is made in the background, for the energies of a million
-    /// points take seconds to interpolate; what is felt stays until then. `wake` is called when there is news.
+    /// Lets the loop follow gains and effects of the controls. It is made in the background, for the energies of a
+    /// million points take seconds to interpolate; what is felt stays until then. `wake` is called when there is news.
     ///
     /// # Errors
     /// In words, when they do not make a loop; the last one goes on.

@@ -16,8 +16,8 @@ pub struct Shape {
     anchor: u32,
 }
 
-/// An arrow over the radius of its shaft [1]: length below which it is not seen for the ball at its tail; length and radius
-/// of its head. And the head's greatest share of the whole [1].
+/// An arrow over the radius of its shaft [1]: length below which it is not seen for the ball at its tail; length and
+/// radius of its head. And the head's greatest share of the whole [1].
 const LEAST_ARROW: f32 = 2.0;
 const HEAD_LENGTH: f32 = 5.0;
 const HEAD_RADIUS: f32 = 2.2;

@@ -29,8 +29,8 @@ use egui_plot::{HoverPosition, Line, MarkerShape, Plot, PlotImage, PlotPoint, Po
 const TRAIL: f64 = 2.0;
 const TRAIL_POINTS: usize = 200;
 
-/// Width left for name and value beside a slider, and for the ends of the range beside a colour bar; least width of slider
-/// and bar [points].
+/// Width left for name and value beside a slider, and for the ends of the range beside a colour bar; least width of
+/// slider and bar [points].
 const NAMES_WIDTH: f32 = 150.0;
 const RANGE_WIDTH: f32 = 60.0;
 const LEAST_WIDTH: f32 = 40.0;
@@ -71,8 +71,8 @@ impl Slices {
         self.drawn = None;
     }
 
-    /// The panel, `height` points of it. The heat map has what the sliders of many joints leave of that; where it would be too low
-    /// one scrolls.
+    /// The panel, `height` points of it. The heat map has what the sliders of many joints leave of that; where it would
+    /// be too low one scrolls.
     pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, q: &JointVector, history: &History, height: f32) {
         let scrolled = ScrollArea::vertical().id_salt("plane").max_height(height).min_scrolled_height(height);
         scrolled.show(ui, |ui| self.widgets(ui, loaded, q, history, height));

@@ -1,5 +1,5 @@
-//! Whence the 3-D scene is seen, and the hand in it: orbit, pan, zoom, reset; the pointer takes the proxy by a node and drags
-//! it; keys move joints.
+//! Whence the 3-D scene is seen, and the hand in it: orbit, pan, zoom, reset; the pointer takes the proxy by a node and
+//! drags it; keys move joints.
 
 use super::{
     camera::Camera,
@@ -31,8 +31,8 @@ pub const HELP: [(&str, &str); 8] = [
     ("Double-click", "reset the view"),
 ];
 
-/// Zoom for each point that the wheel turns, as a logarithm [1/point]: a notch, some 50 points, brings the eye nearer by a
-/// tenth.
+/// Zoom for each point that the wheel turns, as a logarithm [1/point]: a notch, some 50 points, brings the eye nearer
+/// by a tenth.
 const ZOOM_PER_POINT: f32 = 0.002;
 
 impl Steering {
@@ -47,8 +47,8 @@ impl Steering {
         self.camera = self.home;
     }
 
-    /// Does what pointer and keys ask for over the picture in `rect`: `response` is that of the picture, `pose` the proxy's as
-    /// it is shown there.
+    /// Does what pointer and keys ask for over the picture in `rect`: `response` is that of the picture, `pose` the
+    /// proxy's as it is shown there.
     pub fn steer(&mut self, ui: &Ui, response: &Response, rect: Rect, chain: &Chain, pose: &Pose, guide: &mut Guide) {
         let aspect = rect.width() / rect.height().max(1.0);
         let at = |p: Pos2| {

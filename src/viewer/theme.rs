@@ -85,7 +85,8 @@ pub const CHOICE_WIDTH: f32 = 92.0;
 pub const COLUMN_WIDTH: f32 = 150.0;
 /// See [`JOINT_WIDTH`].
 pub const SPAN_WIDTH: f32 = 56.0;
-/// Width of the slider of a motion, where there is room and at least, and of the button that pauses it, whatever it says.
+/// Width of the slider of a motion, where there is room and at least, and of the button that pauses it, whatever it
+/// says.
 pub const MOTION_WIDTH: f32 = 120.0;
 /// See [`MOTION_WIDTH`].
 pub const LEAST_MOTION: f32 = 40.0;
@@ -159,7 +160,8 @@ pub fn units(all: impl Iterator<Item = String>) -> String {
     units.join(" or ")
 }
 
-/// Returns the joints of each unit, in the order in which units first occur: quantities of different units share no axis.
+/// Returns the joints of each unit, in the order in which units first occur: quantities of different units share no
+/// axis.
 #[must_use]
 pub fn by_unit(units: impl Iterator<Item = String>) -> Vec<(String, Vec<usize>)> {
     let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
@@ -193,7 +195,8 @@ const MARKS: f64 = 6.0;
 /// Least distance of two marks over the least distance of grid lines [1]: room for a line of small letters.
 const LEGIBLE: f64 = 2.0;
 
-/// Returns the marks of an axis up: 1, 2 or 5 times a power of ten apart, so that every range has several with their numbers.
+/// Returns the marks of an axis up: 1, 2 or 5 times a power of ten apart, so that every range has several with their
+/// numbers.
 #[must_use]
 pub fn marks(input: GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;

@@ -1,5 +1,5 @@
-//! The 3-D picture: the surface straight from the frame update's buffers, and [`Shape`]s, drawn into a texture of its own
-//! with depth and several samples a pixel. The window shows the texture; a screenshot reads it.
+//! The 3-D picture: the surface straight from the frame update's buffers, and [`Shape`]s, drawn into a texture of its
+//! own with depth and several samples a pixel. The window shows the texture; a screenshot reads it.
 
 use super::{
     camera::Camera,
@@ -186,8 +186,8 @@ fn filled(
     buffer
 }
 
-/// Whence the light comes, to the right of the eye, above and behind it, in any unit: over its right shoulder. It goes with
-/// the eye.
+/// Whence the light comes, to the right of the eye, above and behind it, in any unit: over its right shoulder. It goes
+/// with the eye.
 const LIGHT: [f32; 3] = [0.45, 0.75, 0.65];
 
 fn view(size: [u32; 2], camera: &Camera, look: &Look, surface: Option<&Surface>) -> View {

@@ -18,21 +18,20 @@ use std::{
 /// Time between two frames where nothing but the loop moves [s]: 60 a second.
 const FRAME: Duration = Duration::from_micros(16_667);
 
-/// Time between two frames of a window at rest [s]: pointer, keys, a hand that moves and background work ask for one at once, and what
-/// is left is a fault of the loop or a late tick.
+/// Time between two frames of a window at rest [s]: pointer, keys, a hand that moves and background work ask for one at
+/// once, and what is left is a fault of the loop or a late tick.
 const AT_REST: Duration = Duration::from_secs(60);
 
-/// Least time that a window lasts which was opened again, for another one to be opened when its device is lost, too [s]: one that
-/// is lost again and again is no use.
+/// Least time that a window lasts which was opened again, for another one to be opened when its device is lost, too
+/// [s]: one that is lost again and again is no use.
 const LEAST_LIFE: Duration = Duration::from_secs(30);
 
 /// Longest wait for the last frame of a window that is closed.
 const LAST_WORK: Duration = Duration::from_secs(1);
 
-/// Opens a window on `start`, led by `device` where there is one, and returns when it is closed. A file that cannot be read is reported before
-/// there is a window;
-/// what is wrong within it, in the window, where another one can be opened. A window whose device is lost cannot draw any
-/// more: it is closed, and another one opened on a new device.
+/// Opens a window on `start`, led by `device` where there is one, and returns when it is closed. A file that cannot be
+/// read is reported before there is a window; what is wrong within it, in the window, where another one can be opened.
+/// A window whose device is lost cannot draw any more: it is closed, and another one opened on a new device.
 ///
 /// # Errors
 /// When the file cannot be read, there is no device or no display, or the device is lost again and again.
@@ -57,7 +56,8 @@ enum Begin {
     Resume(Box<Rescue>, String),
 }
 
-/// A window on the device of `context`, until it is closed; answers with what is left where the device was lost, and why.
+/// A window on the device of `context`, until it is closed; answers with what is left where the device was lost, and
+/// why.
 fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<(Rescue, String)>, ViewError> {
     let (instance, adapter, device, queue) = context.shared();
     let options = eframe::NativeOptions {
@@ -92,8 +92,8 @@ fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<(Rescue, String)>
         }
         Ok(Box::new(App { viewer, last: Instant::now(), egui: creation.egui_ctx.clone(), leave }))
     });
-    // egui's renderer panics where its device is lost while it paints; winit, where the display is. After that there is no
-    // other window to be had from them.
+    // egui's renderer panics where its device is lost while it paints; winit, where the display is. After that there is
+    // no other window to be had from them.
     let shown = catch_unwind(AssertUnwindSafe(|| eframe::run_native("haptize", options, create)));
     // Once it has nothing to do any more, a lost device says so.
     let _ = context.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(LAST_WORK) });
@@ -132,7 +132,8 @@ impl eframe::App for App {
             self.viewer.ui(ui);
         }
         if self.viewer.is_lost().is_some() {
-            // Before this frame or in it: there is nothing left to paint with, and egui's renderer panics where it tries.
+            // Before this frame or in it: there is nothing left to paint with, and egui's renderer panics where it
+            // tries.
             ui.ctx().graphics_mut(|painted| *painted = egui::layers::GraphicLayers::default());
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
             return;

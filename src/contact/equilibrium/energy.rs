@@ -436,8 +436,8 @@ impl EnergySearch {
     }
 }
 
-/// Sets the multipliers of `contacts` to the forces that `force` predicts for the rows `before`, by their place; zero for
-/// a proxy node that had no row. Both lists ascend by proxy node [N].
+/// Sets the multipliers of `contacts` to the forces that `force` predicts for the rows `before`, by their place; zero
+/// for a proxy node that had no row. Both lists ascend by proxy node [N].
 fn predict_multipliers(contacts: &mut [Contact], before: &[Contact], force: impl Fn(usize) -> f64) {
     let mut k = 0;
     for contact in contacts {

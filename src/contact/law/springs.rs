@@ -19,8 +19,8 @@ pub struct Springs<'a> {
 }
 
 impl<'a> Springs<'a> {
-    /// Returns the reaction with which row `k` resists the variation `v`: the Hessian of its energy, with its multiplier
-    /// as it is [N]. `None` if it is zero because the row is neither `active` nor bent.
+    /// Returns the reaction with which row `k` resists the variation `v`: the Hessian of its energy, with its
+    /// multiplier as it is [N]. `None` if it is zero because the row is neither `active` nor bent.
     #[must_use]
     pub fn resist(self, k: usize, active: bool, v: &Variation) -> Option<Variation> {
         let row = &self.contacts[k];
@@ -77,7 +77,8 @@ pub fn add_contact_hessian(springs: Springs, active: &[bool], p: &[f64], product
     }
 }
 
-/// Adds the forces of the contact springs on the object's nodes, -kc share_i max(0, depth_i) w_ij N_i, to `forces` on the support.
+/// Adds the forces of the contact springs on the object's nodes, -kc share_i max(0, depth_i) w_ij N_i, to `forces` on
+/// the support.
 pub fn add_contact_forces(springs: Springs, forces: &mut [f64]) {
     for (k, contact) in springs.contacts.iter().enumerate() {
         springs.add_reaction(k, &contact.spread(-springs.kc * contact.force_over_kc()), forces);

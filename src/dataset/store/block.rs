@@ -6,7 +6,7 @@ use crate::{MAX_JOINTS, contact::Status};
 /// Solved nodes of a block, ascending by their place in it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Nodes {
-    /// Bit p tells that the node at place p was solved.
+    /// Bit p says that the node at place p was solved.
     pub present: u64,
     /// w, its gradient and mixed derivatives at each [sqrt(J), by rad or m]; see [`super::record`].
     pub records: Vec<f32>,
@@ -61,7 +61,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// What was solved.
+    /// Returns the solved nodes.
     #[must_use]
     pub fn nodes(&self) -> &Nodes {
         &self.nodes

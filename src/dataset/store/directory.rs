@@ -14,7 +14,7 @@ use std::{marker::PhantomData, ptr};
 /// Most slots that are tried. Runs of taken slots fall off like 0.82^n where half are taken: none is as long as this.
 const MOST_PROBES: usize = 256;
 
-/// What a slot points to.
+/// Target of a slot.
 struct Entry<T> {
     key: u64,
     value: T,

@@ -111,7 +111,7 @@ pub struct Root {
     pub failed: bool,
 }
 
-/// What was found at the corners of a cell.
+/// Values at the corners of a cell.
 struct Gathered {
     /// A block.
     found: bool,
@@ -291,7 +291,7 @@ impl Store {
         surplus
     }
 
-    /// What the levels below `level` give at one of its nodes, lengths in steps of the base.
+    /// Interpolates the levels below `level` at one of its nodes, lengths in steps of the base.
     fn record(&self, level: u32, node: &Place) -> [f64; MAX_WIDTH] {
         let joints = self.space.joints();
         let (corners, wide) = (1_usize << joints, width(joints));

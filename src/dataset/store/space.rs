@@ -176,7 +176,7 @@ impl Space {
         block[..self.joints].iter().fold(u64::from(level), |key, &k| key << self.bits | u64::from(k))
     }
 
-    /// What the key of a block's neighbour along `axis` has more.
+    /// Returns the difference of keys between a block and its neighbour along `axis`.
     #[inline]
     pub(super) fn stride(&self, axis: usize) -> u64 {
         1 << (self.bits * (self.joints - 1 - axis) as u32)

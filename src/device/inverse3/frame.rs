@@ -10,7 +10,7 @@ pub struct Frame {
     inverse3: Vec<DeviceState>,
 }
 
-/// What a frame says of one device.
+/// One device in a frame.
 #[derive(Debug, Deserialize)]
 pub struct DeviceState {
     device_id: String,
@@ -47,7 +47,7 @@ impl Frame {
         serde_json::from_str(text).map_err(|_| Halt::Garbage)
     }
 
-    /// Returns the devices that the frame tells of, in its order.
+    /// Returns the devices in the frame, in its order.
     pub fn devices(&self) -> impl Iterator<Item = &DeviceState> {
         self.inverse3.iter()
     }
@@ -67,7 +67,8 @@ impl DeviceState {
         Some([x, y, z])
     }
 
-    /// Returns whether the device is calibrated, ready and powered, if the frame says so; what it leaves out counts as not.
+    /// Returns whether the device is calibrated, ready and powered, if the frame says so; what it leaves out counts as
+    /// not.
     #[must_use]
     pub fn is_ready(&self) -> Option<bool> {
         self.status.map(|Status { calibrated, ready, power_supply }| calibrated && ready && power_supply)

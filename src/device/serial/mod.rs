@@ -269,7 +269,8 @@ impl<P: Protocol> Hardware for SerialDevice<P> {
     }
 
     fn enable(&mut self) -> Result<(), Halt> {
-        // These devices have no switch: commands do it. The position is a new one, however long ago the device was opened.
+        // These devices have no switch: commands do it. The position is a new one, however long ago the device was
+        // opened.
         self.driven = true;
         self.exchange()
     }

@@ -27,8 +27,8 @@ impl LibraryFiles {
         let candidates = place.map_or_else(|| self.candidates.clone(), |place| vec![place.into()]);
         let mut reasons = Vec::new();
         for candidate in &candidates {
-            // SAFETY: opening a library runs its initialisers. This is the maker's library for the device that the user named, as
-            // any program for it would open it.
+            // SAFETY: opening a library runs its initialisers. This is the maker's library for the device that the user
+            // named, as any program for it would open it.
             match unsafe { Library::new(candidate) } {
                 Ok(library) => return Ok(library),
                 Err(error) => reasons.push(error.to_string()),

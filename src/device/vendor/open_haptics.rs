@@ -261,7 +261,8 @@ impl Hardware for OpenHaptics {
     }
 
     fn limits(&self) -> Limits {
-        // The scheduler stops calling when the process ends; the library then lets go, after a time that it does not tell.
+        // The scheduler stops calling when the process ends; the library then lets go, after a time that it does not
+        // tell.
         Limits { effort: JointVector::from_slice(&MOST_TORQUE), watchdog: Watchdog::Unstated }
     }
 
@@ -343,8 +344,8 @@ struct Session<'a> {
 
 unsafe extern "C" fn called(session: *mut c_void) -> c_uint {
     let session = session.cast::<Session<'_>>();
-    // SAFETY: `session` is that of `run`, which lives until `over` is set below. `run` looks at `calls` and `over` alone meanwhile,
-    // which are atomic; each field is borrowed by itself.
+    // SAFETY: `session` is that of `run`, which lives until `over` is set below. `run` looks at `calls` and `over`
+    // alone meanwhile, which are atomic; each field is borrowed by itself.
     unsafe {
         (*session).calls.fetch_add(1, Ordering::Relaxed);
         IN_CALLBACK.set(true);
@@ -365,8 +366,8 @@ impl Scheduler for Api {
     fn run(&self, tick: &mut (dyn FnMut() -> bool + Send)) -> Result<(), Halt> {
         let mut session = Session { tick, calls: AtomicU64::new(0), over: AtomicBool::new(false), panic: None };
         let place = &raw mut session;
-        // SAFETY: the session outlives the callback: this returns once `over` is set, which is the callback's last act, or after
-        // the scheduler, and with it the callback, has been stopped.
+        // SAFETY: the session outlives the callback: this returns once `over` is set, which is the callback's last act,
+        // or after the scheduler, and with it the callback, has been stopped.
         let handle = unsafe { (self.functions.hdScheduleAsynchronous)(called, place.cast(), HIGHEST_PRIORITY) };
         let mut seen = 0;
         // SAFETY: both fields are atomic.

@@ -1,4 +1,5 @@
-//! Where the proxy is touched, and how hard: the dataset's contact forces on the proxy's nodes, interpolated like the torque.
+//! Where the proxy is touched, and how hard: the dataset's contact forces on the proxy's nodes, interpolated like the
+//! torque.
 //!
 //! Between grid points `F_i(q) = share sum_c w_c F_i(q_c)`, with the weights of the torque and the factor of boundary
 //! layer and fade; likewise the share of the corners at which node i is touched. Both are continuous in q.
@@ -41,8 +42,8 @@ impl Touch {
 }
 
 impl Contacts {
-    /// The contacts of `dataset` with a proxy of `nodes` nodes; `None` where the dataset does not hold them, or holds those of another
-    /// proxy.
+    /// The contacts of `dataset` with a proxy of `nodes` nodes; `None` where the dataset does not hold them, or holds
+    /// those of another proxy.
     ///
     /// # Errors
     /// When its grid is none.

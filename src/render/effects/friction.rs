@@ -1,20 +1,20 @@
 //! Coulomb friction of the proxy: an elastic-plastic bristle at each proxy node in contact (Dupont et al. 2002; of the
-//! family of Dahl and LuGre), inside the cone `|friction| <= mu |normal force|` of the dataset's forces: mu is static for
-//! a node that stuck in the last step, which makes a soft hand drag the finger along in jerks, kinetic for one that slipped.
+//! family of Dahl and LuGre), inside the cone `|friction| <= mu |normal force|` of the dataset's forces: mu is static
+//! for a node that stuck in the last step, which makes a soft hand drag the finger along in jerks, kinetic for one that
+//! slipped.
 //!
 //! *Stick.* The bristle of deflection z (tangential) is a spring k and a damper s along the tangential way
 //! `dx = P J T v_hat`, implicit in the step: friction `-(k (z + dx/2) + s dx/T)`, afterwards `z + dx`. Its work is
-//! minus the change of `1/2 k |z|^2` less what s takes, exactly.
-//! *Slip.* Where that leaves the cone, friction is `-mu N d` along d, the direction of the sticking force, and the step is
-//! solved again. It does the work `-mu N d . dx`; the bristle keeps of it what the cone lets it keep, the rest is heat.
-//! A node that comes out moving against d has not slipped: it is held by its bristle, as in stick.
-//! *Loss of pressure.* At the beginning of a tick each bristle is turned into the new tangent plane and shortened to the new
-//! cone: both only take energy.
+//! minus the change of `1/2 k |z|^2` less what s takes, exactly. *Slip.* Where that leaves the cone, friction is
+//! `-mu N d` along d, the direction of the sticking force, and the step is solved again. It does the work
+//! `-mu N d . dx`; the bristle keeps of it what the cone lets it keep, the rest is heat. A node that comes out moving
+//! against d has not slipped: it is held by its bristle, as in stick. *Loss of pressure.* At the beginning of a tick
+//! each bristle is turned into the new tangent plane and shortened to the new cone: both only take energy.
 //!
 //! Every branch takes energy or keeps it, whatever T: friction is dissipative in every step, not on average. Each solve
-//! turns at least one node from stick to slip or from slip to held; in practice there are one or two. After [`MOST_SOLVES`] all
-//! nodes are held by their bristles for this step, so that the time of a tick is bounded: a held bristle takes energy whatever
-//! its force, and is shortened to the cone at the next tick.
+//! turns at least one node from stick to slip or from slip to held; in practice there are one or two. After
+//! [`MOST_SOLVES`] all nodes are held by their bristles for this step, so that the time of a tick is bounded: a held
+//! bristle takes energy whatever its force, and is shortened to the cone at the next tick.
 
 use super::{Bristle, EffectState, Patch, Pending, add};
 use crate::{
@@ -190,7 +190,8 @@ mod tests {
 
     const INTERVAL: f64 = 1e-3;
 
-    /// So many bristles that hold one joint. Each one's cone is just wide enough to hold until the one before has slipped.
+    /// So many bristles that hold one joint. Each one's cone is just wide enough to hold until the one before has
+    /// slipped.
     fn ladder(friction: &Friction, pending: &Pending<'_>, motion: &Motion, count: usize) -> Vec<Patch> {
         let mut columns = [DVec3::ZERO; MAX_JOINTS];
         columns[0] = DVec3::X;

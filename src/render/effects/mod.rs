@@ -1,6 +1,7 @@
 //! Effects on the proxy that need to know where it is touched: contact friction and contact damping (beyond the paper).
 //!
-//! They are built for scenes that name one of them, and for no others there is neither a contact list nor a pass over it.
+//! They are built for scenes that name one of them, and for no others there is neither a contact list nor a pass over
+//! it.
 
 mod contacts;
 mod friction;
@@ -96,8 +97,8 @@ pub enum EffectError {
 }
 
 impl ContactEffects {
-    /// The effects of `spec` over `dataset`, felt by `chain`; `None` where the scene names none. `text` and `path` are the
-    /// scene's, for messages.
+    /// The effects of `spec` over `dataset`, felt by `chain`; `None` where the scene names none. `text` and `path` are
+    /// the scene's, for messages.
     ///
     /// # Errors
     /// When the dataset lacks the contact forces.
@@ -135,8 +136,8 @@ impl ContactEffects {
         }
     }
 
-    /// The `pending` step of the proxy with the effects, where the field puts `share` on the dataset's torque; zero out of
-    /// contact. Books into `extra`. Never allocates.
+    /// The `pending` step of the proxy with the effects, where the field puts `share` on the dataset's torque; zero out
+    /// of contact. Books into `extra`. Never allocates.
     pub(super) fn step(
         &self,
         mut pending: Pending<'_>,

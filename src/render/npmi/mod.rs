@@ -2,9 +2,9 @@
 //! with inertia that depends on the configuration.
 //!
 //! *Coordinates.* `M = L L^T`, and `p = L^T v` is kept from step to step: the kinetic energy is `1/2 |p|^2`. The
-//! continuous motion `M vdot + C v = f` becomes `pdot = L^-1 (f - S v)` with `S = C - L Ldot^T`, which is skew because C
-//! is Christoffel's. It is made exactly skew in numbers, and takes no part in the energy. Where M is constant, S is zero.
-//! S is linear in the velocity and taken at v_k: the path is first order in T, the energy exact.
+//! continuous motion `M vdot + C v = f` becomes `pdot = L^-1 (f - S v)` with `S = C - L Ldot^T`, which is skew because
+//! C is Christoffel's. It is made exactly skew in numbers, and takes no part in the energy. Where M is constant, S is
+//! zero. S is linear in the velocity and taken at v_k: the path is first order in T, the energy exact.
 //!
 //! *Step.* With `v_hat = (x_{k+1} - x_k)/T` and `x_hat = (x_k + x_{k+1})/2`, L and S at the predicted midpoint
 //! `x_k + (T/2) v_k`, both constant over the step:
@@ -16,14 +16,15 @@
 //! `Delta(1/2 |p|^2) = T v_hat . f - T v_hat . D v_hat - Delta(1/2 |x - target|_K^2) + T v_hat . lambda`.
 //!
 //! *Torque of the contact field.* f holds tau_bar(x_k), the torque at the current configuration as in the paper. If
-//! tau_bar = -grad U and U curves by at most K_tau, then `T v_hat . tau_bar(x_k) <= -Delta U + (T^2/2) v_hat . K_tau v_hat`:
-//! the explicit torque acts like an implicit one with damping D - (T/2) K_tau, so that `b >= (T/2) K_tau` keeps the step
-//! passive, and no smaller b does for a linear spring. That is the paper's condition Ks <= mu bv / T with mu <= 2.
+//! tau_bar = -grad U and U curves by at most K_tau, then
+//! `T v_hat . tau_bar(x_k) <= -Delta U + (T^2/2) v_hat . K_tau v_hat`: the explicit torque acts like an implicit one
+//! with damping D - (T/2) K_tau, so that `b >= (T/2) K_tau` keeps the step passive, and no smaller b does for a linear
+//! spring. That is the paper's condition Ks <= mu bv / T with mu <= 2.
 //!
-//! *Stops.* lambda are the torques of unilateral stops (`stops.rs`): v_hat keeps x_{k+1} within the stops of the step, the
-//! joint limits or, nearer, the border of the haptized range (`field/range.rs`). lambda acts inwards at stops that are reached,
-//! so that `v_hat . lambda <= 0`. The impact is plastic: afterwards v is projected, orthogonally in M, on zero speed of the
-//! stopped joints. Both only take energy, whatever the stops, as long as x_k lies between them.
+//! *Stops.* lambda are the torques of unilateral stops (`stops.rs`): v_hat keeps x_{k+1} within the stops of the step,
+//! the joint limits or, nearer, the border of the haptized range (`field/range.rs`). lambda acts inwards at stops that
+//! are reached, so that `v_hat . lambda <= 0`. The impact is plastic: afterwards v is projected, orthogonally in M, on
+//! zero speed of the stopped joints. Both only take energy, whatever the stops, as long as x_k lies between them.
 
 mod linear;
 mod stops;
@@ -153,7 +154,8 @@ impl Npmi {
     /// A proxy with the inertia and the joint limits of `chain`, configuration by configuration.
     ///
     /// # Errors
-    /// When the inertia is not positive definite in every configuration, for want of a rotor inertia, or a limit is none.
+    /// When the inertia is not positive definite in every configuration, for want of a rotor inertia, or a limit is
+    /// none.
     pub fn of_chain(chain: &Chain) -> Result<Self, InertiaError> {
         let limits: Vec<[f64; 2]> = chain.joints.iter().map(|joint| joint.limits).collect();
         let (joints, limits) = checked(&limits)?;

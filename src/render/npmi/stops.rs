@@ -1,9 +1,9 @@
 //! The linear complementarity problem of the stops: the v with `A v = r + f`, each v_a within its bounds, and f_a
 //! zero inside, pushing inwards at a bound. A is positive definite, so that the solution is unique.
 //!
-//! Principal pivoting by one joint at a time, always the last that is wrong: it never comes to the same set of stops twice
-//! (Murty 1974; with two bounds a variable Judice and Pires 1992). One pivot without a stop, in practice one more for
-//! each stop that is reached.
+//! Principal pivoting by one joint at a time, always the last that is wrong: it never comes to the same set of stops
+//! twice (Murty 1974; with two bounds a variable Judice and Pires 1992). One pivot without a stop, in practice one more
+//! for each stop that is reached.
 
 use super::linear::solve_held;
 use crate::{JointVector, MAX_JOINTS, proxy::JointMatrix};

@@ -1,8 +1,8 @@
 //! A simulated person's hand that leads the device from place to place and lets go at each.
 //!
-//! `tau = grip (K (q_wanted - q) - B qdot)`: a grip as stiff as a relaxed hand's, around a wanted position that goes from
-//! where the device was taken, back out of the object, across, into it at the next place, and rests there. Then the
-//! button comes up, and the fingers open, more slowly: what a measurement must not contain.
+//! `tau = grip (K (q_wanted - q) - B qdot)`: a grip as stiff as a relaxed hand's, around a wanted position that goes
+//! from where the device was taken, back out of the object, across, into it at the next place, and rests there. Then
+//! the button comes up, and the fingers open, more slowly: what a measurement must not contain.
 
 use crate::JointVector;
 
@@ -13,8 +13,8 @@ const INTERVAL: f64 = 2.0;
 const SHARES: [f64; 5] = [0.0, 0.14, 0.30, 0.44, 0.50];
 /// Time in which the fingers close or open [s].
 const CLOSING: f64 = 0.15;
-/// Stiffness and damping of the grip [N m/rad or N/m, N m s/rad or N s/m]: a hand's is a few hundred N/m (Kuchenbecker, Park and Niemeyer 2003),
-/// at a tenth of a metre.
+/// Stiffness and damping of the grip [N m/rad or N/m, N m s/rad or N s/m]: a hand's is a few hundred N/m (Kuchenbecker,
+/// Park and Niemeyer 2003), at a tenth of a metre.
 const STIFFNESS: f64 = 10.0;
 const DAMPING: f64 = 0.3;
 

@@ -1,11 +1,11 @@
 //! A simulated rig: the proxy's chain as a driven device, and a spongy block that it touches. Nothing here is real, and
 //! every log says so.
 //!
-//! `M(q) qddot = tau + noise + g(q) - b qdot - dry friction + sum_i J_i^T f_i`, M and g of the chain, f_i the forces of the
-//! sponge on its contact nodes, plus a hand's torque where one leads the device. Coriolis terms are left out: at the speeds of a
-//! scan (0.5 rad/s, links of 0.14 m and 0.1 kg) they are below 1e-3 N m. Stepped by semi-implicit Euler at a quarter of the
-//! control period; dry friction is bounded by what stops the joint within a step, so that it never drives it.
-//! Positions are read in whole encoder counts.
+//! `M(q) qddot = tau + noise + g(q) - b qdot - dry friction + sum_i J_i^T f_i`, M and g of the chain, f_i the forces of
+//! the sponge on its contact nodes, plus a hand's torque where one leads the device. Coriolis terms are left out: at
+//! the speeds of a scan (0.5 rad/s, links of 0.14 m and 0.1 kg) they are below 1e-3 N m. Stepped by semi-implicit Euler
+//! at a quarter of the control period; dry friction is bounded by what stops the joint within a step, so that it never
+//! drives it. Positions are read in whole encoder counts.
 
 mod hand;
 mod noise;

@@ -1,20 +1,20 @@
-//! A simulated spongy block, fixed to the ground: the stand-in for the paper's real one (section 4.2). Its physics is its
-//! own: no mesh, no springs between nodes, nothing of `object/` or `contact/`.
+//! A simulated spongy block, fixed to the ground: the stand-in for the paper's real one (section 4.2). Its physics is
+//! its own: no mesh, no springs between nodes, nothing of `object/` or `contact/`.
 //!
-//! **Elastic.** The block is a bed of independent foam columns under the pressed face. A column of height H compressed by
-//! d has strain e = d / H and pressure
-//! `p(e) = pc (1 - exp(-E e / pc)) + pd e^3 / (1 - e)^2`:
-//! linear at first, a plateau where the cell walls buckle, then densification (the three regimes of Gibson and Ashby,
-//! Cellular Solids, 1997). A proxy node is a rod with a hemispherical end of radius r; its pressure is integrated over
-//! rings of its shadow on the face, as far as the block reaches there.
-//! What surrounds the node is dragged along like a taut sheet of tension S held at distance R:
-//! `F = 2 pi S d / ln(R / r)`: small for foam alone, large for a fabric. That is what makes the cover stiffer.
+//! **Elastic.** The block is a bed of independent foam columns under the pressed face. A column of height H compressed
+//! by d has strain e = d / H and pressure `p(e) = pc (1 - exp(-E e / pc)) + pd e^3 / (1 - e)^2`: linear at first, a
+//! plateau where the cell walls buckle, then densification (the three regimes of Gibson and Ashby, Cellular Solids,
+//! 1997). A proxy node is a rod with a hemispherical end of radius r; its pressure is integrated over rings of its
+//! shadow on the face, as far as the block reaches there. What surrounds the node is dragged along like a taut sheet of
+//! tension S held at distance R: `F = 2 pi S d / ln(R / r)`: small for foam alone, large for a fabric. That is what
+//! makes the cover stiffer.
 //!
 //! **Viscous.** Overstress relaxes: two Maxwell branches, `dq_k/dt = g_k dFe/dt - q_k / theta_k` (quasi-linear
 //! viscoelasticity, Fung 1981). A node that retracts faster than the foam recovers loses contact: force is never
 //! negative.
 //!
-//! **Friction.** Where a node first touches a face it sticks; the tangential spring slides at mu times the normal force.
+//! **Friction.** Where a node first touches a face it sticks; the tangential spring slides at mu times the normal
+//! force.
 //!
 //! A node presses the face through which it came in until it leaves the block, however deep it goes: distance to
 //! the nearest face would let it slip out sideways.

@@ -25,7 +25,7 @@ pub struct Solution {
     pub tick: u64,
     /// Configuration [rad or m].
     pub place: JointVector,
-    /// What became of it.
+    /// Status.
     pub status: Status,
     /// Contact torque [N m or N].
     pub torque: JointVector,
@@ -111,7 +111,7 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// Solves the equilibrium where `whereabouts` tells that the proxy is, again and again, until `over` is raised.
+/// Solves the equilibrium at the proxy's place in `whereabouts`, again and again, until `over` is raised.
 pub fn follow(
     model: &Model<'_>,
     mut whereabouts: triple_buffer::Output<Whereabouts>,

@@ -103,7 +103,7 @@ impl<'a> Ahead<'a> {
         Solver::new(self.model)
     }
 
-    /// What has been solved so far.
+    /// Work done so far.
     #[must_use]
     pub fn solved(&self) -> Solved {
         let [nodes, equilibria] = [&self.nodes, &self.equilibria].map(|count| count.load(Ordering::Relaxed));
@@ -116,7 +116,7 @@ impl<'a> Ahead<'a> {
         self.full.load(Ordering::Relaxed)
     }
 
-    /// Solves for the proxy that `whereabouts` tells of, until `over` is raised.
+    /// Solves for the proxy in `whereabouts`, until `over` is raised.
     pub fn serve(&self, mut whereabouts: triple_buffer::Output<Whereabouts>, over: &AtomicBool) {
         let mut solver = self.solver();
         while !over.load(Ordering::Acquire) {

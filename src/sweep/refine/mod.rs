@@ -50,7 +50,7 @@ const LEAST_FALL: f64 = 0.35;
 /// contact near few corners is missed.
 const UNSEEN: f64 = 0.3;
 
-/// What a store is to be.
+/// Options of a store.
 pub struct Refine<'a> {
     /// Object and proxy; with tangents for [`Order::Potential`].
     pub model: &'a Model<'a>,
