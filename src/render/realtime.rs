@@ -15,7 +15,7 @@ use super::{
     timing::{Durations, Percentiles, Timing},
     trace::{Frame, Tick, Trace},
 };
-use crate::device::{Device, Halt};
+use crate::device::{Device, Halt, Scheduler};
 use std::{
     sync::{
         Arc,
@@ -158,6 +158,23 @@ impl<'session> HapticLoop<'session> {
         self.tick_at(now, deadline);
     }
 
+    /// Ticks against the clock, or as `scheduler` calls, while `goes_on`. Returns what the system refused or what stopped
+    /// the scheduler.
+    fn pace(&mut self, scheduler: Option<Arc<dyn Scheduler>>, goes_on: impl Fn(&Self) -> bool + Sync) -> Vec<String> {
+        let Some(scheduler) = scheduler else {
+            let refused = self.begin();
+            while goes_on(self) {
+                self.tick();
+            }
+            return refused;
+        };
+        let run = scheduler.run(&mut || {
+            self.tick_now();
+            goes_on(self)
+        });
+        run.err().map(|halt| format!("the device's own thread stopped: {halt}")).into_iter().collect()
+    }
+
     fn tick_at(&mut self, now: Duration, deadline: Duration) {
         let by = now - deadline;
         self.lateness.record(by);
@@ -239,22 +256,7 @@ pub fn run_live(
         let drawing = drawing.transpose().map_err(resources)?;
         let feeling = thread::Builder::new().name("haptic".into()).spawn_scoped(scope, move || {
             let goes_on = |body: &HapticLoop<'_>| !body.is_over(plan.ticks) && !stop.load(Ordering::Relaxed);
-            let refused = match scheduler {
-                None => {
-                    let refused = body.begin();
-                    while goes_on(&body) {
-                        body.tick();
-                    }
-                    refused
-                }
-                Some(scheduler) => {
-                    let run = scheduler.run(&mut || {
-                        body.tick_now();
-                        goes_on(&body)
-                    });
-                    run.err().map(|halt| format!("the device's own thread stopped: {halt}")).into_iter().collect()
-                }
-            };
+            let refused = body.pace(scheduler, goes_on);
             let answers = body.driver.live().map(|live| *live.answers());
             (refused, body.lateness, body.cost, body.missed, body.unrecorded, answers)
         });
