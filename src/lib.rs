@@ -19,10 +19,10 @@
 //! use haptize::{
 //!     contact::Model,
 //!     field::TorqueField,
-//!     haptize::{BackendChoice, ChosenBackend, Run, Sweep},
 //!     object::Object,
 //!     proxy::Chain,
 //!     scene::Scene,
+//!     sweep::{BackendChoice, ChosenBackend, Run, Sweep},
 //! };
 //! use std::sync::atomic::AtomicBool;
 //!

@@ -293,6 +293,8 @@ fn on_the_gpu_each_effect_makes_its_own_buffers_and_pipelines_and_no_others() {
     for method in [FrameMethod::Inverse, FrameMethod::Iterations(3)] {
         let mut update = |effects: &[Effect]| {
             let effects = sphere().with_effects(true, effects).unwrap().graphics.unwrap().effects;
+            // A device compiles a kernel once: each update has one of its own.
+            let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
             let new = || FrameUpdate::new(Arc::clone(&context), &object, 1.0 / 60.0, method, &effects).unwrap();
             let (update, (labels, pipelines)) = made(&context, new);
             let takes = update.takes();
@@ -321,6 +323,7 @@ fn on_the_gpu_each_effect_makes_its_own_buffers_and_pipelines_and_no_others() {
         let scene = sphere().with_effects(false, effects).unwrap();
         let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
         let model = Model::new(&object, &chain, scene.contact);
+        let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
         let (solver, found) = made(&context, || GpuSolver::new(Arc::clone(&context), &model).unwrap());
         drop(solver);
         found

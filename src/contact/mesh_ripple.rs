@@ -51,7 +51,7 @@ impl MeshRipple {
         Some(Self { median, worst, edge: model.surface.mean_edge, skin: model.object.skin.is_some() })
     }
 
-    /// Returns the remedy if the ripple exceeds [`RIPPLE_WARNING`].
+    /// Returns the remedy if the ripple exceeds `RIPPLE_WARNING`.
     #[must_use]
     pub fn remedy(&self) -> Option<&'static str> {
         (self.median > RIPPLE_WARNING).then_some(if self.skin {

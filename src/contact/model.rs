@@ -28,7 +28,7 @@ pub struct Model<'a> {
     pub contact: ContactSpec,
     /// Stiffness kc = 3 Kc at a contact point of the energy form: three springs Kc on the nodes of a triangle act along
     /// the normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
-    /// [`RIGID_STIFFNESS`] [N/m].
+    /// `RIGID_STIFFNESS` [N/m].
     pub kc: f64,
     /// Stiffness of each proxy node's spring over kc, in the algorithms but `paper`, whose springs are all alike: more
     /// than one where the node stands for more than the mean length of link, see [`ContactSpec::node_stiffness`] [1].

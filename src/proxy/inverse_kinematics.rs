@@ -17,7 +17,7 @@ const REACH_DAMPING: f64 = 0.01;
 /// Steps of inverse kinematics: converging ones take about ten, the rest allows for joint limits on the way.
 const REACH_STEPS: usize = 200;
 
-/// Configuration near `start` at which contact node `node` is at `target`, to [`REACHED`]; `None` where
+/// Configuration near `start` at which contact node `node` is at `target`, to `REACHED`; `None` where
 /// the joints do not reach it.
 #[must_use]
 pub fn reach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) -> Option<JointVector> {

@@ -9,7 +9,7 @@
 //! *Overruns.* A deadline that is missed once costs nothing but a longer step: the proxy is passive at any T_k, and
 //! what the longer hold gives the hand is seen at the device's port ([`Fault::Energy`]). When deadlines are missed
 //! persistently the torque rests on positions which, by the end of each hold, are as old as the time between ticks. So
-//! its mean over [`PACE_WINDOW`] may not exceed what the age of a position may not, [`GREATEST_POSITION_AGE`], or,
+//! its mean over `PACE_WINDOW` may not exceed what the age of a position may not, [`GREATEST_POSITION_AGE`], or,
 //! where the loop is slow by design, 2 T: every other deadline missed. With W the window, ticks are counted by
 //! `n_k = n_{k-1} / (1 + T_{k-1}/W) + 1`, each weighing less the longer ago it was; ticks evenly T apart tend to
 //! `n = W/T + 1`, so that the mean is taken to be `W / (n_k - 1)`. One pause alone, however long it may be
