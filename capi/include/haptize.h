@@ -59,10 +59,12 @@ typedef int32_t hz_code;
 // The torque field of a dataset. Any number of threads may look it up at once.
 typedef struct hz_field hz_field;
 
-// A haptic loop: the virtual proxy, its coupling to the device, the torque field, and the watchdog. One thread at a time may use it.
+// A haptic loop: the virtual proxy, its coupling to the device, the torque field, and the watchdog. One thread at a
+// time may use it.
 typedef struct hz_loop hz_loop;
 
-// The object and the arm of a scene, ready to be solved at any configuration. Any number of threads may use it at once.
+// The object and the arm of a scene, ready to be solved at any configuration. Any number of threads may use it at
+// once.
 typedef struct hz_solver hz_solver;
 
 // A look-up in full. Set `size` before the call.
@@ -81,8 +83,8 @@ typedef struct hz_sample {
   uint32_t contact_nodes;
 } hz_sample;
 
-// Gains in the place of the scene's. Initialise all of it with zeros, set `size`, and one entry per joint of what is to change: a list of
-// zeros leaves the scene's.
+// Gains in the place of the scene's. Initialise all of it with zeros, set `size`, and one entry per joint of what is
+// to change: a list of zeros leaves the scene's.
 typedef struct hz_gains {
   // sizeof(hz_gains).
   size_t size;
@@ -106,8 +108,9 @@ typedef struct hz_tick {
   double energy;
   // 1 in contact, else 0.
   uint32_t contact;
-  // Remarks, as bits: 1 outside the grid, 2 beside a grid point that was not computed, 4 beside one that did not converge, 8 held by the
-  // boundary layer, 16 a joint at its limit, 32 torque cut in size, 64 torque cut in rate, 128 held at the border of the haptized range.
+  // Remarks, as bits: 1 outside the grid, 2 beside a grid point that was not computed, 4 beside one that did not
+  // converge, 8 held by the boundary layer, 16 a joint at its limit, 32 torque cut in size, 64 torque cut in rate,
+  // 128 held at the border of the haptized range.
   uint32_t flags;
 } hz_tick;
 
@@ -149,11 +152,11 @@ uint32_t hz_abi(void);
 // Returns the library's version, such as "0.1.0". The text is never freed.
 const char *hz_version(void);
 
-// Opens the dataset file at `path` (UTF-8) and makes the field of it in memory as its scene has it felt; without a scene it is interpolated
-// linearly. The file is checked in full, and not needed afterwards.
+// Opens the dataset file at `path` (UTF-8) and makes the field of it in memory as its scene has it felt; without a
+// scene it is interpolated linearly. The file is checked in full, and not needed afterwards.
 //
-// On success `*field` is to be closed with hz_field_close; on failure it is NULL and `message`, `message_size` bytes that may be NULL, says
-// why. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE, HZ_FORMAT or HZ_SCENE.
+// On success `*field` is to be closed with hz_field_close; on failure it is NULL and `message`, `message_size` bytes
+// that may be NULL, says why. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE, HZ_FORMAT or HZ_SCENE.
 //
 // Pointers:
 // All are NULL or as described.
@@ -177,44 +180,44 @@ uint32_t hz_field_joints(const struct hz_field *field);
 // `field` is NULL or open; `least` and `greatest` are NULL or have one entry per joint.
 hz_code hz_field_bounds(const struct hz_field *field, double *least, double *greatest);
 
-// Looks up the torque `tau` [N m; N at prismatic joints] at the configuration `q` [rad; m], one entry per joint each. Real-time safe: it
-// allocates, locks and prints nothing, waits for nothing, and takes the same time wherever `q` is. Any number of threads may call it.
+// Looks up the torque `tau` [N m; N at prismatic joints] at the configuration `q` [rad; m], one entry per joint each.
+// Real-time safe: it allocates, locks and prints nothing, waits for nothing, and takes the same time wherever `q` is.
+// Any number of threads may call it.
 //
-// Returns HZ_OK, HZ_OUTSIDE or HZ_UNCONVERGED; HZ_ARGUMENT for NULL or a `q` that is not finite, with zeros for a torque.
+// Returns HZ_OK, HZ_OUTSIDE or HZ_UNCONVERGED; HZ_ARGUMENT for NULL or a `q` that is not finite, with zeros for a
+// torque.
 //
 // Pointers:
 // `field` is NULL or open; `q` and `tau` are NULL or have one entry per joint.
 hz_code hz_field_torque(const struct hz_field *field, const double *q, double *tau);
 
-// Looks up all that the field knows of the configuration `q` [rad; m]. Real-time safe as hz_field_torque, with the same codes.
+// Looks up all that the field knows of the configuration `q` [rad; m]. Real-time safe as hz_field_torque, with the
+// same codes.
 //
 // Pointers:
 // `field` is NULL or open; `q` is NULL or has one entry per joint; `sample` is NULL or tells its size.
 hz_code hz_field_sample(const struct hz_field *field, const double *q, struct hz_sample *sample);
 
-// Looks up `count` torques on all cores: row k of `tau` at row k of `q`, rows of one entry per joint. `status`, which may be NULL, is told
-// the status of each, as hz_sample has it. Not for the real-time thread.
+// Looks up `count` torques on all cores: row k of `tau` at row k of `q`, rows of one entry per joint. `status`, which
+// may be NULL, is told the status of each, as hz_sample has it. Not for the real-time thread.
 //
 // Returns HZ_OK; HZ_ARGUMENT for NULL or a `q` that is not finite, with zeros for all torques.
 //
 // Pointers:
-// `field` is NULL or open; `q` and `tau` are NULL or have `count` rows, `status` is NULL or has `count` entries. They do not overlap.
+// `field` is NULL or open; `q` and `tau` are NULL or have `count` rows, `status` is NULL or has `count` entries. They
+// do not overlap.
 hz_code hz_field_torques(const struct hz_field *field, size_t count, const double *q, double *tau, uint8_t *status);
 
-// Opens the dataset file at `path` (UTF-8) and makes the haptic loop of its scene, with `gains` in the place of the scene's where that is not
-// NULL. The file is not needed afterwards.
+// Opens the dataset file at `path` (UTF-8) and makes the haptic loop of its scene, with `gains` in the place of the
+// scene's where that is not NULL. The file is not needed afterwards.
 //
-// On success `*loop` is to be closed with hz_loop_close, and `message`, `message_size` bytes that may be NULL, names the gains that are beyond
-// their passivity bound, each with a remedy; it is empty where there are none. On failure `*loop` is NULL and `message` says why. Returns
-// HZ_OK, HZ_ARGUMENT, HZ_FILE, HZ_FORMAT or HZ_SCENE.
+// On success `*loop` is to be closed with hz_loop_close, and `message`, `message_size` bytes that may be NULL, names
+// the gains that are beyond their passivity bound, each with a remedy; it is empty where there are none. On failure
+// `*loop` is NULL and `message` says why. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE, HZ_FORMAT or HZ_SCENE.
 //
 // Pointers:
 // All are NULL or as described; `gains` tells its size.
-hz_code hz_loop_open(const char *path,
-                     const struct hz_gains *gains,
-                     struct hz_loop **loop,
-                     char *message,
-                     size_t message_size);
+hz_code hz_loop_open(const char *path, const struct hz_gains *gains, struct hz_loop **loop, char *message, size_t message_size);
 
 // Closes a loop; NULL is left alone. No other call may be using it.
 //
@@ -234,34 +237,31 @@ uint32_t hz_loop_joints(const struct hz_loop *loop);
 // `loop` is NULL or open.
 double hz_loop_period(const struct hz_loop *loop);
 
-// Begins at the device's position `y`, one entry per joint [rad; m]: before the first tick, and to end a fault. The torque goes on from what
-// the device is under, so that there is no jump. Real-time safe: it allocates, locks and prints nothing, and waits for nothing.
+// Begins at the device's position `y`, one entry per joint [rad; m]: before the first tick, and to end a fault. The
+// torque goes on from what the device is under, so that there is no jump. Real-time safe: it allocates, locks and
+// prints nothing, and waits for nothing.
 //
 // Returns HZ_OK, or HZ_ARGUMENT for NULL or a position that is none; a fault then stays.
 //
 // Pointers:
 // `loop` is NULL or open; `y` is NULL or has one entry per joint.
-hz_code hz_loop_start(struct hz_loop *loop,
-                      const double *y);
+hz_code hz_loop_start(struct hz_loop *loop, const double *y);
 
-// Does one tick: `tau` is what the device is to exert until the next one [N m; N], for its position `y` [rad; m], one entry per joint each.
-// `age` is the time since that was measured [s], `dt` the time since the tick before [s]. `tick`, which may be NULL, is told the rest.
-// Real-time safe: it allocates, locks and prints nothing, and waits for nothing.
+// Does one tick: `tau` is what the device is to exert until the next one [N m; N], for its position `y` [rad; m], one
+// entry per joint each. `age` is the time since that was measured [s], `dt` the time since the tick before [s].
+// `tick`, which may be NULL, is told the rest. Real-time safe: it allocates, locks and prints nothing, and waits for
+// nothing.
 //
-// Returns HZ_OK, or HZ_LET_GO once something was wrong with a position, its age, the time between ticks or the energy at the device; the
-// torque then goes to zero at the rate to which the scene limits it, and stays there until hz_loop_start. HZ_ARGUMENT, with zeros for a torque,
-// for NULL or before hz_loop_start.
+// Returns HZ_OK, or HZ_LET_GO once something was wrong with a position, its age, the time between ticks or the energy
+// at the device; the torque then goes to zero at the rate to which the scene limits it, and stays there until
+// hz_loop_start. HZ_ARGUMENT, with zeros for a torque, for NULL or before hz_loop_start.
 //
 // Pointers:
 // `loop` is NULL or open; `y` and `tau` are NULL or have one entry per joint; `tick` is NULL or tells its size.
-hz_code hz_loop_tick(struct hz_loop *loop,
-                     const double *y,
-                     double age,
-                     double dt,
-                     double *tau,
-                     struct hz_tick *tick);
+hz_code hz_loop_tick(struct hz_loop *loop, const double *y, double age, double dt, double *tau, struct hz_tick *tick);
 
-// Tells in `message`, `message_size` bytes, why the loop has let go and what to do about it; an empty text where it has not.
+// Tells in `message`, `message_size` bytes, why the loop has let go and what to do about it; an empty text where it
+// has not.
 //
 // Returns HZ_OK, HZ_LET_GO, or HZ_ARGUMENT for NULL.
 //
@@ -271,15 +271,12 @@ hz_code hz_loop_fault(const struct hz_loop *loop, char *message, size_t message_
 
 // Reads the scene file at `path` (UTF-8) and prepares its object and arm. That takes up to some seconds.
 //
-// On success `*solver` is to be closed with hz_solver_close; on failure it is NULL and `message`, `message_size` bytes that may be NULL, says
-// why, with file and line. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE or HZ_SCENE.
+// On success `*solver` is to be closed with hz_solver_close; on failure it is NULL and `message`, `message_size` bytes
+// that may be NULL, says why, with file and line. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE or HZ_SCENE.
 //
 // Pointers:
 // All are NULL or as described.
-hz_code hz_solver_open(const char *path,
-                       struct hz_solver **solver,
-                       char *message,
-                       size_t message_size);
+hz_code hz_solver_open(const char *path, struct hz_solver **solver, char *message, size_t message_size);
 
 // Closes a solver; NULL is left alone. No other call may be using it.
 //
@@ -293,15 +290,15 @@ void hz_solver_close(struct hz_solver *solver);
 // `solver` is NULL or open.
 uint32_t hz_solver_joints(const struct hz_solver *solver);
 
-// Solves the equilibrium at the configuration `q`, one entry per joint [rad; m], from the object at rest. `forces`, which may be NULL, is told
-// as many contact forces as it has room for, `room`; `equilibrium` tells how many there are. Takes some tenths of a millisecond and more,
-// and allocates: not for the real-time thread.
+// Solves the equilibrium at the configuration `q`, one entry per joint [rad; m], from the object at rest. `forces`,
+// which may be NULL, is told as many contact forces as it has room for, `room`; `equilibrium` tells how many there
+// are. Takes some tenths of a millisecond and more, and allocates: not for the real-time thread.
 //
 // Returns HZ_OK, HZ_UNCONVERGED, or HZ_ARGUMENT for NULL or a `q` that is not finite.
 //
 // Pointers:
-// `solver` is NULL or open; `q` is NULL or has one entry per joint; `equilibrium` is NULL or tells its size; `forces` is NULL or has `room`
-// entries.
+// `solver` is NULL or open; `q` is NULL or has one entry per joint; `equilibrium` is NULL or tells its size; `forces`
+// is NULL or has `room` entries.
 hz_code hz_solver_solve(const struct hz_solver *solver,
                         const double *q,
                         struct hz_equilibrium *equilibrium,
