@@ -31,7 +31,7 @@ use std::{
         atomic::{AtomicBool, Ordering},
     },
     thread,
-    time::{Duration, Instant, SystemTime},
+    time::{Duration, Instant},
 };
 
 /// Blocks for which there is room beside those that are known [1]: some 0.7 GB with six joints, hours of touching.
@@ -93,15 +93,7 @@ impl OnDemand {
         let object = build_object(&scene)?;
         let chain = Chain::new(&scene.proxy);
         let grid = grid_of(&scene);
-        let provenance = Provenance {
-            version: env!("CARGO_PKG_VERSION").into(),
-            algorithm: "energy".into(),
-            tolerance: scene.contact.tolerance,
-            backend: "cpu".into(),
-            adapter: CpuBackend::adapter(),
-            date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
-            ..Provenance::default()
-        };
+        let provenance = CpuBackend::provenance(&scene);
         let mut store = Store::new(Space::new(&grid, choices.levels)?, Order::Potential, 0);
         if file.exists() {
             let earlier = Dataset::load(file)?;

@@ -13,19 +13,14 @@ use crate::{
         sample,
     },
 };
-use std::{
-    fmt::Write,
-    path::Path,
-    sync::Arc,
-    time::{Instant, SystemTime},
-};
+use std::{fmt::Write, path::Path, sync::Arc, time::Instant};
 
 /// Configurations in contact by which the refinement is stopped, and as many others at which its error is measured [1]:
 /// with fewer the rms varies by more than a tenth.
 const JUDGED: usize = 400;
 
-/// Request.
-pub struct Wanted<'a> {
+/// Request of a refined bake.
+pub struct RefinementGoal<'a> {
     /// The error to stay below.
     pub aim: Aim,
     /// Most levels, the scene's grid included.
@@ -37,7 +32,7 @@ pub struct Wanted<'a> {
 }
 
 /// Refines, measures and writes. Exit code 1 where the error that is measured is larger than asked for.
-pub fn run(scene: &Scene, wanted: &Wanted<'_>) -> Result<Report, Failure> {
+pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure> {
     let began = Instant::now();
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
@@ -71,16 +66,7 @@ pub fn run(scene: &Scene, wanted: &Wanted<'_>) -> Result<Report, Failure> {
         "refined for an rms error of {percent:.2} %: {:.2} % at {JUDGED} configurations in contact that were not used",
         100.0 * measured
     );
-    let provenance = Provenance {
-        version: env!("CARGO_PKG_VERSION").into(),
-        algorithm: "energy".into(),
-        tolerance: scene.contact.tolerance,
-        backend: "cpu".into(),
-        adapter: CpuBackend::adapter(),
-        date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
-        notices: vec![notice],
-        ..Provenance::default()
-    };
+    let provenance = Provenance { notices: vec![notice], ..CpuBackend::provenance(scene) };
     let (nodes, equilibria, by_level, rounds) =
         (refined.nodes, refined.equilibria, refined.by_level.clone(), refined.rounds);
     let surface = Some(Surface::of(&object));

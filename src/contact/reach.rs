@@ -109,7 +109,7 @@ mod tests {
 
     const SCENE: &str = r#"
         [object]
-        sphere = { radius = 0.05, rings = 15, segments = 16 }
+        sphere = { radius = 0.05, rings = 25, segments = 26 }
         springs = { kind = "isotropic", stiffness = 300.0 }
         ground = { stiffness = 100.0 }
         [contact]
@@ -140,7 +140,7 @@ mod tests {
             }
         }
         let nodes = reached(&whole, &configurations);
-        assert!(nodes.len() > 10 && 3 * nodes.len() < 2 * object.surface_nodes, "{} nodes", nodes.len());
+        assert!(nodes.len() > 10 && 2 * nodes.len() < object.surface_nodes, "{} nodes", nodes.len());
         let mut some = Model::new(&object, &chain, scene.contact);
         some.take_compliance(Compliance::on(&object, nodes).unwrap());
         let (mut solver, mut reference) = (Solver::new(&some), Solver::new(&whole));

@@ -1,6 +1,6 @@
 //! Datasets of fields that are known in closed form: for hard cases, tests and benches. No bake, no file.
 
-use super::{Dataset, Grid, Provenance};
+use super::{Dataset, Grid};
 use crate::{JointVector, contact::Status};
 
 impl Dataset {
@@ -15,22 +15,7 @@ impl Dataset {
             energy.push(u);
             status.push(s as u8);
         }
-        Self {
-            grid,
-            torque: torque.into(),
-            energy: Some(energy.into()),
-            gap: None,
-            status: status.into(),
-            residual: None,
-            iterations: None,
-            tangent: None,
-            contacts: None,
-            touches: None,
-            surface: None,
-            refinement: None,
-            scene: String::new(),
-            provenance: Provenance::default(),
-        }
+        Self { energy: Some(energy.into()), ..Self::bare(grid, torque, status) }
     }
 
     /// A half space `n . q > 0` of C-space that pushes back with `U = 1/2 k (n . q)^2`, n the unit vector `normal` and

@@ -134,6 +134,27 @@ pub struct Provenance {
 }
 
 impl Dataset {
+    /// Torque and status at every point of `grid`, and nothing else: no energy, no contacts, no surface, no scene.
+    #[must_use]
+    pub fn bare(grid: Grid, torque: Vec<f64>, status: Vec<u8>) -> Self {
+        Self {
+            grid,
+            torque: torque.into(),
+            energy: None,
+            gap: None,
+            status: status.into(),
+            residual: None,
+            iterations: None,
+            tangent: None,
+            contacts: None,
+            touches: None,
+            surface: None,
+            refinement: None,
+            scene: String::new(),
+            provenance: Provenance::default(),
+        }
+    }
+
     /// Status of grid point `point`.
     #[must_use]
     pub fn status(&self, point: usize) -> Status {

@@ -98,6 +98,15 @@ pub enum OpenError {
     /// A Cartesian device needs a node to lead.
     #[error("the scene's arm has no contact node that the device's tip could lead: give it one")]
     NoNode,
+    /// A joint-true device, whose joints are no one's guess.
+    #[error(
+        "the scene does not say how the joints of {device} drive its arm: give [device] a map, q = map * (coordinates of the \
+         device), with one row for each joint of the scene, or take a scene that has one"
+    )]
+    NoMap {
+        /// Its address.
+        device: String,
+    },
     /// The scene's map does not fit.
     #[error("[device] in the scene: {0}")]
     Map(#[from] MapError),
@@ -360,6 +369,9 @@ fn mapped(mut guard: Guard, address: &Address, spec: &DeviceSpec) -> Result<(Gua
     let offset = spec.offset.unwrap_or(JointVector::zeros(count));
     let map = match &spec.map {
         Some(rows) => LinearMap::new(rows, &offset, count)?,
+        None if guard.coordinates() != Coordinates::Tip && address.kind != Kind::Simulated => {
+            return Err(OpenError::NoMap { device: address.to_string() });
+        }
         None => LinearMap::identity(count).moved(&offset)?,
     };
     guard.enable().map_err(|halt| OpenError::Halt { device: address.to_string(), halt })?;

@@ -229,24 +229,12 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
         Interpolation::Natural => "gridized, natural neighbours",
     };
     let dataset = Dataset {
-        grid,
-        torque: torque.into(),
-        energy: None,
-        gap: None,
-        status: status.into(),
-        residual: None,
-        iterations: None,
-        tangent: None,
-        contacts: None,
-        touches: None,
-        surface: None,
-        refinement: None,
-        scene: String::new(),
         provenance: Provenance {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             algorithm: algorithm.to_owned(),
             ..Provenance::default()
         },
+        ..Dataset::bare(grid, torque, status)
     };
     Ok((dataset, report))
 }

@@ -25,7 +25,7 @@ use std::{
     time::Duration,
 };
 
-/// Ticks that the ring to the recorder holds: sixteen seconds at 1 kHz, for a window at rest reads them every ten.
+/// Ticks that the ring to the recorder holds: sixteen seconds at 1 kHz. A window at rest reads them once a minute.
 const RING: usize = 1 << 14;
 
 /// Late ticks that the ring to the recorder holds.

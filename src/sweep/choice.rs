@@ -41,10 +41,17 @@ pub enum BackendError {
     /// The system gives no threads.
     #[error("no threads to solve on: {0}; close other programs or raise the limit on processes (ulimit -u)")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// There is no memory for the threads.
+    #[error("no memory for threads to solve on: {0}")]
+    Memory(#[from] memory::Shortage),
     /// There is no adapter, or it cannot take the scene.
     #[error("{}{}", .0, memory::scarcity())]
     Gpu(#[from] GpuError),
 }
+
+/// Memory of a thread [bytes]: the 2 MiB of its stack, and half as much for what the system and Rust add at its start,
+/// which ends the process where it does not fit.
+const THREAD_MEMORY: usize = 3 << 20;
 
 impl<'a> ChosenBackend<'a> {
     /// Opens the backend that `choice` asks for, to solve `model`.
@@ -65,6 +72,8 @@ impl<'a> ChosenBackend<'a> {
     }
 
     fn cpu(model: &'a Model<'a>) -> Result<Self, BackendError> {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        memory::check(threads * THREAD_MEMORY)?;
         Ok(Self::Cpu(CpuBackend::new(model, 0)?))
     }
 

@@ -4,9 +4,11 @@ use super::Backend;
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, SHARE, Solvers},
+    dataset::Provenance,
+    scene::Scene,
 };
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::convert::Infallible;
+use std::{convert::Infallible, time::SystemTime};
 
 /// Shares of each thread in a chunk: progress is reported several times a second, and threads rarely wait at a chunk's
 /// end.
@@ -41,6 +43,20 @@ impl<'a> CpuBackend<'a> {
         SHARE * SHARES * self.threads()
     }
 
+    /// Returns the provenance of what this backend solves now of `scene`.
+    #[must_use]
+    pub fn provenance(scene: &Scene) -> Provenance {
+        Provenance {
+            version: env!("CARGO_PKG_VERSION").into(),
+            algorithm: "energy".into(),
+            tolerance: scene.contact.tolerance,
+            backend: "cpu".into(),
+            adapter: Self::adapter(),
+            date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
+            ..Provenance::default()
+        }
+    }
+
     /// Returns the name of this backend in [`crate::dataset::Provenance::adapter`].
     #[must_use]
     pub fn adapter() -> String {
@@ -59,7 +75,7 @@ impl Backend for CpuBackend<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{object::Object, proxy::Chain, scene::Scene};
+    use crate::{object::Object, proxy::Chain};
     use std::panic::{AssertUnwindSafe, catch_unwind};
 
     #[test]

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     JointVector,
     contact::{Model, Solvers, Status},
-    dataset::{Dataset, Grid, InterpolationError, MeasuredError, Provenance},
+    dataset::{Dataset, Grid, InterpolationError, MeasuredError},
     field::{FieldError, TorqueField},
     random::Random,
     scene::Interpolation,
@@ -236,22 +236,7 @@ fn window(grid: &Grid, table: &Table<'_>, lines: &[Range<usize>]) -> Dataset {
         gap.push(result.gap);
         status.push(result.status as u8);
     }
-    Dataset {
-        grid: part,
-        torque: torque.into(),
-        energy: Some(energy.into()),
-        gap: Some(gap.into()),
-        status: status.into(),
-        residual: None,
-        iterations: None,
-        tangent: None,
-        contacts: None,
-        touches: None,
-        surface: None,
-        refinement: None,
-        scene: String::new(),
-        provenance: Provenance::default(),
-    }
+    Dataset { energy: Some(energy.into()), gap: Some(gap.into()), ..Dataset::bare(part, torque, status) }
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use std::{collections::VecDeque, thread, time::Duration};
 /// Ticks that are kept: twenty seconds at 1 kHz.
 const KEPT: usize = 20_000;
 
-/// How long the window holds still, and what it gives its last frame before; the ring of ticks holds four seconds.
+/// How long the window holds still, and what it gives its last frame before; the ring of ticks holds sixteen seconds.
 const STILL: Duration = Duration::from_secs(2);
 const SETTLING: Duration = Duration::from_millis(200);
 

@@ -19,7 +19,7 @@ finish() {
     local code=$?
     kill "${pids[@]}" $node 2>/dev/null || true
     wait "${pids[@]}" $node 2>/dev/null || true
-    if [ $code -ne 0 ]; then tail -n 20 "$root"/*.log "$root"/work/*.out 2>/dev/null || true; fi
+    if [ $code -ne 0 ]; then tail -n 20 "$root"/*.log "$root"/folder/*.out 2>/dev/null || true; fi
     rm -rf "$root"
     exit $code
 }
@@ -33,7 +33,7 @@ apt-get download slurmctld slurmd slurm-client slurm-wlm-basic-plugins "${slurm:
 for package in *.deb; do dpkg -x "$package" slurm; done
 library=$root/slurm/usr/lib/$(uname -m)-linux-gnu
 export LD_LIBRARY_PATH=$library:$library/slurm-wlm SLURM_CONF=$root/slurm.conf PATH=$root/slurm/usr/bin:$PATH
-mkdir state spool work
+mkdir state spool folder
 cores=$(nproc)
 cat >slurm.conf <<CONF
 ClusterName=one
@@ -75,7 +75,7 @@ sinfo
 # The shell's own commands, where the packages give them other names.
 sbatch --version
 
-cd work
+cd folder
 cp "$here/../scenes/sphere.toml" scene.toml
 count=8
 bake="$program bake scene.toml --shard auto/$count --backend cpu -o parts"

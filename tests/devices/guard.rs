@@ -4,10 +4,12 @@ use crate::felt::{PERIOD, accounts_close, all, half_space_loop, pressing, run};
 use haptize::{
     JointVector,
     device::{
-        Applied, Clamps, Coordinates, Device, Failure, Guard, Halt, JointDevice, Key, LIMIT_SHARE, Limits, LinearMap,
-        RAMP_TIME, RISE_TIME, Reading, Script, Simulated, SimulatedHand, WARM_TIME, Watchdog,
+        Address, Applied, Clamps, Coordinates, Device, Failure, Guard, Halt, JointDevice, Key, LIMIT_SHARE, Limits,
+        LinearMap, OpenError, RAMP_TIME, RISE_TIME, Reading, Script, Simulated, SimulatedHand, WARM_TIME, Watchdog,
+        attach_joints, open,
     },
     render::{recording::Recording, trace::Trace},
+    scene::DeviceSpec,
 };
 use std::sync::{Arc, Mutex};
 
@@ -299,4 +301,18 @@ fn hardware_is_released_once_and_nothing_is_driven_before_it_is_enabled() {
     assert_eq!(torque.lock().unwrap()[0], 7.0, "no command has reached it");
     drop(guard);
     assert_eq!(torque.lock().unwrap()[0], 0.0);
+}
+
+/// A five-bar under a serial arm: whose joint is whose, no program can know.
+#[test]
+fn a_joint_true_device_leads_no_arm_whose_map_the_scene_does_not_give() {
+    let simulated: Address = "simulated".parse().unwrap();
+    let guard = || Guard::new(open(&simulated, None).unwrap(), None).unwrap();
+    let real: Address = "2diy:/dev/null".parse().unwrap();
+    let refused = attach_joints(guard(), &real, 3, &DeviceSpec::default()).err().unwrap();
+    assert!(matches!(refused, OpenError::NoMap { .. }) && refused.to_string().contains("map"), "{refused}");
+    let rows = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 1.0]].map(|row| JointVector::from_slice(&row));
+    let spec = DeviceSpec { map: Some(rows.into()), ..DeviceSpec::default() };
+    assert!(attach_joints(guard(), &real, 3, &spec).is_ok());
+    assert!(attach_joints(guard(), &simulated, 3, &DeviceSpec::default()).is_ok());
 }

@@ -204,8 +204,9 @@ impl Refine<'_> {
         let mut rounds = 0;
         loop {
             rounds += 1;
-            let (store, estimated) = self.round(&mut book, aim)?;
-            let measured = reference.errors(|q| store.sample(q).torque()).0 / reference.torque;
+            let measure = |store: &Store| reference.errors(|q| store.sample(q).torque()).0 / reference.torque;
+            let (store, estimated) = self.round(&mut book, aim, &measure)?;
+            let measured = measure(&store);
             let done = measured <= self.aim || rounds == ROUNDS || book.solved.len() >= self.most;
             if done {
                 return Ok(self.report(store, &book, measured, estimated / reference.torque, rounds));
@@ -233,8 +234,14 @@ impl Refine<'_> {
         }
     }
 
-    /// Fills a store for an rms error of `aim` [N m]; also the error that is expected of it.
-    fn round(&self, book: &mut Nodebook<'_>, aim: f64) -> Result<(Store, f64), RefineError> {
+    /// Fills a store for an rms error of `aim` [N m], level by level until `measure` says that it is kept; also the error
+    /// that is expected of it.
+    fn round(
+        &self,
+        book: &mut Nodebook<'_>,
+        aim: f64,
+        measure: &impl Fn(&Store) -> f64,
+    ) -> Result<(Store, f64), RefineError> {
         let space = book.space.clone();
         let mut store = Store::new(space.clone(), self.order, 0);
         let base = lattice(&space, |last| last);
@@ -259,6 +266,11 @@ impl Refine<'_> {
             // Volume of a cell of the level below, over that of the grid.
             let share = 0.5_f64.powi((space.joints() as u32 * (level - 1)) as i32) / count;
             let budget = 0.5 * (aim * aim - left).max(0.0);
+            // Expectations of a level that is not there yet may be far too high.
+            if measure(&store) <= self.aim {
+                let rest = leaves.iter().map(|cell| cell.error.powi(2)).sum::<f64>();
+                return Ok((store, (left + SPREAD * share * rest).sqrt()));
+            }
             let (marked, unmarked) = mark(leaves, budget / (SPREAD * share));
             left += SPREAD * share * unmarked;
             if marked.is_empty() || book.solved.len() >= self.most {
