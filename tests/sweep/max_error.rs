@@ -150,3 +150,53 @@ fn an_error_that_was_not_measured_is_said_to_be_so() {
     }
     assert_eq!(Dataset::open(&folder.output()).unwrap().provenance.error, None);
 }
+
+/// Rms error of the refined dataset in `file` between its nodes, over the rms torque, against equilibria solved here.
+fn error_between(file: &Path) -> f64 {
+    let dataset = Dataset::open(file).unwrap();
+    let scene = Scene::parse(&dataset.scene, "a.toml").unwrap();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = haptize::contact::Model::new(&object, &chain, scene.contact);
+    let mut between = dataset.grid.clone();
+    for axis in &mut between.axes {
+        (axis.start, axis.step) = (axis.start + 0.21 * axis.step, 0.5 * axis.step);
+        axis.count = 2 * axis.count - 2;
+    }
+    let places: Vec<_> = (0..between.points()).map(|point| between.configuration(point)).collect();
+    let Ok(exact) = CpuBackend::new(&model, 0).unwrap().solve(&places);
+    let store = dataset.refinement.as_ref().unwrap();
+    // A force counts with an arm of 0.1 m.
+    let square = |tau: &[f64]| tau[0].powi(2) + (0.1 * tau[1]).powi(2);
+    let (mut missed, mut whole) = (0.0, 0.0);
+    for (q, exact) in places.iter().zip(&exact) {
+        let found = store.sample(q).torque();
+        missed += square(&[found[0] - exact.torque[0], found[1] - exact.torque[1]]);
+        whole += square(&exact.torque);
+    }
+    (missed / whole).sqrt()
+}
+
+#[test]
+fn a_refined_bake_keeps_its_error_and_refines_nothing_that_keeps_it_already() {
+    let folder = Folder::new();
+    std::fs::write(folder.0.path().join("a.toml"), SCENE).unwrap();
+    let refined = |error: &str, levels: &str| -> (Option<i32>, Value) {
+        let arguments = ["bake", "a.toml", "--max-error", error, "--refine", levels, "--json"];
+        let output = haptize(folder.0.path(), &arguments);
+        (output.status.code(), serde_json::from_slice(&output.stdout).unwrap())
+    };
+    // The scene's grid alone errs by more than that.
+    let (code, json) = refined("0.08%", "4");
+    let (error, nodes) = (json["error"].as_f64().unwrap(), json["nodes"].as_u64().unwrap());
+    assert!(code == Some(0) && json["kept"] == true && error <= 0.0008 && nodes > 63, "{json:#}");
+    let between = error_between(&folder.output());
+    assert!((0.5..2.0).contains(&(between / error)), "{between} beside {error}");
+    let told = haptize(folder.0.path(), &["info", "a.haptize"]);
+    assert!(String::from_utf8_lossy(&told.stdout).contains("nodes by level"));
+    // What the grid keeps is not refined.
+    let (code, json) = refined("1%", "4");
+    assert!(code == Some(0) && json["by_level"] == serde_json::json!([63, 0, 0, 0]), "{json:#}");
+    // One level cannot keep it, and says so.
+    let (code, json) = refined("0.08%", "1");
+    assert!(code == Some(1) && json["kept"] == false && json["nodes"] == 63, "{json:#}");
+}
