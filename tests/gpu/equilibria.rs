@@ -171,6 +171,28 @@ fn the_mesh_has_the_same_equilibria_on_gpu_and_cpu() {
     check_scene("mesh.toml", None, Algorithm::Paper, 101);
 }
 
+/// The kernels search on the triangles; what they find is settled on the smooth surface.
+#[test]
+fn the_smooth_surface_has_the_same_equilibria_on_gpu_and_cpu() {
+    for (name, stride) in [("sphere.toml", 131), ("mesh.toml", 101)] {
+        let (scene, object, chain) = load(name);
+        let contact = ContactSpec { surface: ContactSurface::Smooth, ..scene.contact };
+        let model = Model::new(&object, &chain, contact);
+        let configurations = configurations(&scene, 11, stride);
+        let mut cpu = Solver::new(&model);
+        let mut gpu = GpuSolver::new(context(), &model).unwrap();
+        let results = gpu.solve(&configurations).unwrap();
+        let mut touching = 0;
+        for (q, result) in configurations.iter().zip(&results) {
+            let reference = cpu.solve(q);
+            touching += usize::from(reference.status == Status::Contact);
+            assert_eq!(difference(Algorithm::Energy, &reference, result), None, "{name}, {q:?}");
+        }
+        println!("{name}, smooth: {touching} touch, {} by the CPU", gpu.left_to_cpu());
+        assert!(touching >= 15 && gpu.left_to_cpu() * 5 <= touching, "{touching} touch, {}", gpu.left_to_cpu());
+    }
+}
+
 #[test]
 fn objects_that_are_not_isotropic_have_the_same_equilibria_on_gpu_and_cpu() {
     for material in [AXIAL, SOLID] {
