@@ -4,7 +4,7 @@ use super::{
     Failure, Report, interrupt,
     keyboard::Keyboard,
     on_demand::{self, Explored, OnDemand},
-    output::{self, Folder, Kind as FileKind},
+    output::{self, Earlier, Folder, Kind as FileKind},
     playback_report::PlaybackReport,
     tell,
 };
@@ -95,23 +95,9 @@ const LONGEST: f64 = 3600.0;
 
 /// Plays the dataset.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
-    let inputs =
-        || [&arguments.dataset].into_iter().chain(&arguments.beside).chain(&arguments.replay).map(PathBuf::as_path);
-    let moved = || std::iter::once(Path::new(&arguments.motion));
     let folder = folder(arguments);
-    let asked = arguments.record.as_ref();
-    let recorded =
-        asked.map(|file| output::check(file, FileKind::of_log(file), inputs().chain(moved()))).transpose()?;
-    let filled =
-        Folder::check(&folder, FILES.into_iter().chain(report::FIGURES), inputs().chain(moved()).collect::<Vec<_>>())?;
-    if let Some(file) = asked {
-        filled.keep_apart(file)?;
-    }
+    let Outputs { filled, recorded, explored } = Outputs::check(arguments, &folder)?;
     let kept = arguments.on_demand.as_ref();
-    let explored = kept.map(|file| output::check(file, FileKind::Dataset, inputs().chain(moved()))).transpose()?;
-    if let Some(file) = kept {
-        filled.keep_apart(file)?;
-    }
     let open = |file: &PathBuf| OnDemand::open(&arguments.dataset, file, arguments.choices);
     let on_demand = kept.map(open).transpose()?;
     let mut dataset = match &on_demand {
@@ -330,6 +316,32 @@ fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Fai
 
 fn unwritten(path: &Path, error: impl fmt::Display) -> String {
     format!("cannot write {}: {error}; free some space or give another place", path.display())
+}
+
+/// What is there already of the files that a session writes.
+struct Outputs {
+    filled: Folder,
+    recorded: Option<Earlier>,
+    explored: Option<Earlier>,
+}
+
+impl Outputs {
+    /// Checks before anything is played that no output destroys an input, or another output.
+    fn check(arguments: &Arguments, folder: &Path) -> Result<Self, Failure> {
+        let read = [&arguments.dataset].into_iter().chain(&arguments.beside).chain(&arguments.replay);
+        let inputs: Vec<&Path> = read.map(PathBuf::as_path).chain([Path::new(&arguments.motion)]).collect();
+        let filled = Folder::check(folder, FILES.into_iter().chain(report::FIGURES), inputs.clone())?;
+        let file = |file: Option<&PathBuf>, kind: fn(&Path) -> FileKind| {
+            let checked = file.map(|file| {
+                let earlier = output::check(file, kind(file), inputs.iter().copied())?;
+                filled.keep_apart(file).map(|()| earlier)
+            });
+            checked.transpose()
+        };
+        let recorded = file(arguments.record.as_ref(), FileKind::of_log)?;
+        let explored = file(arguments.on_demand.as_ref(), |_| FileKind::Dataset)?;
+        Ok(Self { filled, recorded, explored })
+    }
 }
 
 /// A session that was played.
