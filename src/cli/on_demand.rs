@@ -19,7 +19,7 @@ use crate::{
     sweep::{
         CpuBackend,
         ahead::{Ahead, Solved, follow},
-        build_object, grid_of, sample,
+        build_object, check_algorithm, grid_of, sample,
     },
 };
 use serde_json::json;
@@ -83,6 +83,7 @@ impl OnDemand {
     pub fn open(path: &Path, file: &Path, choices: Choices) -> Result<Self, Failure> {
         let began = Instant::now();
         let scene = Scene::load(path)?;
+        check_algorithm(&scene).map_err(|error| format!("{}: {error}", path.display()))?;
         if scene.grid.axes.is_empty() {
             return Err(format!(
                 "{}: has no [grid], which is the coarsest level: haptize reach --write prints one",

@@ -9,7 +9,7 @@ use super::{
     tell,
 };
 use crate::{
-    dataset::{Dataset, replace_file},
+    dataset::{self, Dataset, replace_file},
     device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, attach, open},
     render::{
         mcap, realtime,
@@ -21,6 +21,7 @@ use crate::{
         trace::{Summary, Trace},
     },
     report,
+    scene::Scene,
 };
 use serde_json::{Value, json};
 use std::{
@@ -102,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let on_demand = kept.map(open).transpose()?;
     let mut dataset = match &on_demand {
         Some(on_demand) => on_demand.dataset(),
-        None => Dataset::load(&arguments.dataset)?,
+        None => load(&arguments.dataset)?,
     };
     let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
     if let Some(advice) = &setup.advice {
@@ -316,6 +317,19 @@ fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Fai
 
 fn unwritten(path: &Path, error: impl fmt::Display) -> String {
     format!("cannot write {}: {error}; free some space or give another place", path.display())
+}
+
+/// Opens a dataset. The remedy for a scene is another one.
+fn load(path: &Path) -> Result<Dataset, Failure> {
+    Dataset::load(path).map_err(|error| match error {
+        dataset::Error::Foreign { .. } if Scene::load(path).is_ok() => format!(
+            "{}: is a scene: bake it first (haptize bake), or feel it at once (haptize play {} --on-demand FILE)",
+            path.display(),
+            path.display()
+        )
+        .into(),
+        error => error.into(),
+    })
 }
 
 /// What is there already of the files that a session writes.

@@ -8,7 +8,7 @@ use crate::{
     scene::Scene,
     store::Order,
     sweep::{
-        Aim, CpuBackend, build_object, grid_of,
+        Aim, CpuBackend, build_object, check_algorithm, grid_of,
         refine::{Judge, Refine},
         sample,
     },
@@ -34,6 +34,7 @@ pub struct RefinementGoal<'a> {
 /// Refines, measures and writes. Exit code 1 where the error that is measured is larger than asked for.
 pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure> {
     let began = Instant::now();
+    check_algorithm(scene)?;
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;

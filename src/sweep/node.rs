@@ -19,6 +19,7 @@
 use crate::{
     JointVector,
     contact::{Model, Solver, Status},
+    scene::{Algorithm, Scene},
     store::{
         Space,
         record::{mixed, slope, width},
@@ -37,6 +38,22 @@ const FARTHEST: f64 = 2.0;
 
 /// Most Newton steps to the boundary: the gap is nearly linear, and each step squares the error.
 const STEPS: usize = 6;
+
+/// The scene's algorithm gives no energy with a tangent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the scene's algorithm is not \"energy\", and nodes that refine a grid need the energy of contact with its tangent: set \
+     algorithm = \"energy\" in [contact], or bake the grid alone"
+)]
+pub struct NoEnergy;
+
+/// Checks that nodes can be solved of `scene`.
+///
+/// # Errors
+/// [`NoEnergy`] unless its algorithm is [`Algorithm::Energy`].
+pub fn check_algorithm(scene: &Scene) -> Result<(), NoEnergy> {
+    if scene.contact.algorithm == Algorithm::Energy { Ok(()) } else { Err(NoEnergy) }
+}
 
 /// A solved node.
 #[derive(Clone, Debug)]

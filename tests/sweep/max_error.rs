@@ -200,3 +200,23 @@ fn a_refined_bake_keeps_its_error_and_refines_nothing_that_keeps_it_already() {
     let (code, json) = refined("0.08%", "1");
     assert!(code == Some(1) && json["kept"] == false && json["nodes"] == 63, "{json:#}");
 }
+
+#[test]
+fn what_no_refined_bake_can_do_is_refused_before_anything_is_written() {
+    let folder = Folder::new();
+    let path = folder.0.path();
+    std::fs::write(path.join("a.toml"), SCENE).unwrap();
+    std::fs::write(path.join("paper.toml"), SCENE.replace("[contact]\n", "[contact]\nalgorithm = \"paper\"\n"))
+        .unwrap();
+    for (arguments, reason) in [
+        (&["bake", "a.toml", "--max-error", "5%", "--refine", "2", "--backend", "gpu"][..], "the GPU refines no grid"),
+        (&["bake", "paper.toml", "--max-error", "5%", "--refine", "2"], "algorithm = \"energy\""),
+        (&["play", "paper.toml", "--on-demand", "x.haptize"], "algorithm = \"energy\""),
+        (&["play", "a.toml"], "--on-demand FILE"),
+    ] {
+        let output = haptize(path, arguments);
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(1) && told.contains(reason), "{arguments:?}: {told}");
+        assert_eq!(folder.names(), ["a.toml", "paper.toml"], "{arguments:?}");
+    }
+}
