@@ -29,7 +29,7 @@ pub use spec::{
     StiffeningSpec, THRESHOLD, Waypoint,
 };
 
-pub(crate) use inertia::is_positive_semidefinite;
+pub(crate) use inertia::positive_semidefinite;
 
 use check::Checker;
 use std::path::{Path, PathBuf};

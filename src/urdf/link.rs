@@ -2,7 +2,7 @@
 
 use super::UrdfError;
 use super::document::{Source, child};
-use crate::scene::is_positive_semidefinite;
+use crate::scene::positive_semidefinite;
 use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
 use roxmltree::Node;
 use std::ops::Range;
@@ -108,12 +108,10 @@ fn inertial(source: &Source<'_>, node: Node<'_, '_>) -> Result<Inertial, UrdfErr
         let number = |name| -> Result<f64, UrdfError> { Ok(source.number(element, name)?.unwrap_or(0.0)) };
         let [xx, yy, zz] = [number("ixx")?, number("iyy")?, number("izz")?];
         let [xy, xz, yz] = [number("ixy")?, number("ixz")?, number("iyz")?];
-        tensor = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
-        if !is_positive_semidefinite(&tensor) {
-            let message =
-                "no body has this inertia, since the matrix has a negative eigenvalue: correct it, or remove <inertia>";
-            return Err(source.error(element.range(), message));
-        }
+        let message =
+            "no body has this inertia, since the matrix has a negative eigenvalue: correct it, or remove <inertia>";
+        tensor = positive_semidefinite(DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]))
+            .ok_or_else(|| source.error(element.range(), message))?;
     }
     let inertia = place.matrix3 * tensor * place.matrix3.transpose();
     Ok(Inertial { mass: value, centre: place.translation, inertia })

@@ -3,7 +3,7 @@
 use super::super::check::Checker;
 use super::super::error::SceneError;
 use super::super::file::{JointTable, NodesTable, Number, ProxyTable};
-use super::super::inertia::is_positive_semidefinite;
+use super::super::inertia::positive_semidefinite;
 use super::super::{JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
 use crate::{MAX_JOINTS, tolerances::GRID_LINE};
 use glam::DMat3;
@@ -92,17 +92,11 @@ fn inertia(checker: &Checker<'_>, value: &Spanned<Vec<f64>>) -> Result<DMat3, Sc
             return Err(checker.error(value.span(), message));
         }
     };
-    if moments.into_iter().any(|moment| moment < 0.0) {
-        return Err(checker.error(value.span(), "inertia has a negative moment: moments are zero or positive"));
-    }
     let [[xx, yy, zz], [xy, xz, yz]] = [moments, products];
-    let inertia = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
-    if !is_positive_semidefinite(&inertia) {
-        let message =
-            "no body has these products of inertia beside these moments: the matrix must have no negative eigenvalue";
-        return Err(checker.error(value.span(), message));
-    }
-    Ok(inertia)
+    let message = "no body has this inertia, since its matrix has a negative eigenvalue: moments are zero or positive, and \
+                   products of inertia are no larger than those moments allow";
+    positive_semidefinite(DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]))
+        .ok_or_else(|| checker.error(value.span(), message))
 }
 
 /// Names become columns of tables and legends of figures.
