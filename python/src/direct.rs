@@ -5,7 +5,7 @@ use crate::{
     errors,
     scene::Scene,
 };
-use haptize::sweep::{Direct, Inspection};
+use haptize::sweep::{Contact, Direct, Inspection};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
@@ -128,12 +128,8 @@ impl Equilibrium {
     /// Contact forces on the arm's nodes [N], shape (nodes, 3).
     #[getter]
     fn arm_forces(&self, py: Python<'_>) -> PyResult<Py<PyArrayDyn<f64>>> {
-        let forces = self.inspection.proxy_nodes.iter().map(|node| {
-            node.contacts.iter().fold([0.0; 3], |sum, contact| {
-                let force = contact.force.to_array();
-                [sum[0] + force[0], sum[1] + force[1], sum[2] + force[2]]
-            })
-        });
+        let force = |contact: &Contact| contact.force.to_array();
+        let forces = self.inspection.proxy_nodes.iter().map(|node| node.contact.as_ref().map_or([0.0; 3], force));
         Self::vectors(py, forces)
     }
 

@@ -146,19 +146,17 @@ fn describe(text: &mut String, inspection: &Inspection, chain: &Chain) -> fmt::R
     writeln!(text, "  energy       {energy:.6} J")?;
     writeln!(text, "  gap          {:.3} mm to the surface at rest", gap * 1e3)?;
     writeln!(text, "  solved       in {iterations} iterations to a residual of {residual:.1e}")?;
-    let untouched = proxy_nodes.iter().filter(|node| node.contacts.is_empty()).count();
+    let untouched = proxy_nodes.iter().filter(|node| node.contact.is_none()).count();
     writeln!(
         text,
         "proxy nodes in contact: x [m] (force [N] on object nodes with weights, J by columns); {untouched} others are free"
     )?;
-    for (number, node) in proxy_nodes.iter().enumerate().filter(|(_, node)| !node.contacts.is_empty()) {
+    for (number, node) in proxy_nodes.iter().enumerate() {
+        let Some(contact) = &node.contact else { continue };
         writeln!(text, "  {number:<3} {:<10} {}", node.link, numbers(&node.position.to_array()))?;
-        for contact in &node.contacts {
-            let carriers =
-                contact.nodes.iter().zip(&contact.weights).map(|(node, weight)| format!("{node} ({weight:.3})"));
-            let carriers = carriers.collect::<Vec<_>>().join(" ");
-            writeln!(text, "      force {} on {carriers}", numbers(&contact.force.to_array()))?;
-        }
+        let carriers = contact.nodes.iter().zip(&contact.weights).map(|(node, weight)| format!("{node} ({weight:.3})"));
+        let carriers = carriers.collect::<Vec<_>>().join(" ");
+        writeln!(text, "      force {} on {carriers}", numbers(&contact.force.to_array()))?;
         let columns: Vec<_> = node.jacobian.iter().map(|column| numbers(&column.to_array())).collect();
         writeln!(text, "      J     {}", columns.join("  "))?;
     }

@@ -102,8 +102,7 @@ pub struct NodeForce {
 /// One proxy node in contact with one feature of the surface: pushed by `force` at x_i, pushing back on the object's
 /// nodes.
 ///
-/// A point has at most one; a node with a radius has one for each facet that takes force (`law/series.rs`), whose sum
-/// is its force.
+/// A node of the proxy has at most one.
 #[derive(Clone, Debug)]
 pub struct Touch {
     /// Number of the proxy's node.

@@ -2,8 +2,8 @@
 //!
 //! Of the energy form, and of linearised contact, the kernel returns the forces on the object's nodes. A depth in f32 is
 //! known to some nanometres, which shallow contact feels in its energy and stiff contact in its forces; worse, the
-//! kernel cannot see it. So the CPU's search settles each result from these forces on, a step or two away: with walls
-//! that the kernel did not know of, and a residual that owes nothing to f32. The paper's iteration is taken as it is:
+//! kernel cannot see it. So the CPU's search settles each result from these forces on, a step or two away: on the
+//! smooth surface, which the kernel knows at rest only, and to a residual that owes nothing to f32. The paper's iteration is taken as it is:
 //! what it leads to is defined by its steps.
 
 use super::{

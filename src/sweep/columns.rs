@@ -10,7 +10,6 @@
 use crate::JointMatrix;
 use crate::contact::{Equilibrium, NodeForce, Status, Touch};
 use bytemuck::Pod;
-use glam::DVec3;
 use std::collections::{BTreeMap, TryReserveError};
 
 /// Columns of a sweep.
@@ -267,7 +266,8 @@ impl Columns {
             && forces.is_sorted_by(|a, b| a.node < b.node)
             && forces.last().is_none_or(|last| (last.node as usize) < shape.surface_nodes);
         let on_proxy = if shape.with_touches { on_proxy(touches) } else { Vec::new() };
-        let sound = sound && on_proxy.iter().all(|contact| contact.force.as_vec3().is_finite());
+        let sound = sound && on_proxy.is_sorted_by(|a, b| a.node < b.node)
+            && on_proxy.iter().all(|contact| contact.force.as_vec3().is_finite());
         self.iterations.push(*iterations);
         let tangent = tangent.filter(|tangent| sound && tangent.is_finite());
         let entries = self.tangent.len() + shape.width().tangent;
@@ -395,11 +395,9 @@ impl Columns {
     }
 }
 
-/// Sum of the forces on each proxy node that is touched, ascending by node [N].
+/// Forces on the proxy's nodes that are touched, ascending by node [N].
 fn on_proxy(touches: &[Touch]) -> Vec<NodeForce> {
-    let mut sums: BTreeMap<u32, DVec3> = BTreeMap::new();
-    touches.iter().for_each(|touch| *sums.entry(touch.proxy_node).or_default() += touch.force);
-    sums.into_iter().map(|(node, force)| NodeForce { node, force }).collect()
+    touches.iter().map(|touch| NodeForce { node: touch.proxy_node, force: touch.force }).collect()
 }
 
 /// Takes `count` numbers off the front of `bytes`, which need not be aligned.

@@ -39,8 +39,8 @@ pub struct ProxyNode {
     pub position: DVec3,
     /// Columns of J_i, one per joint [m/rad, or 1].
     pub jacobian: Vec<DVec3>,
-    /// Contacts: none, one feature of the surface, or every feature within its radius.
-    pub contacts: Vec<Contact>,
+    /// What it touches, if anything.
+    pub contact: Option<Contact>,
 }
 
 /// A contact of a proxy node.
@@ -87,15 +87,10 @@ impl Inspection {
                 link: chain.joints[specified.link].name.clone(),
                 position,
                 jacobian: (0..chain.joints.len()).map(|joint| chain.jacobian_column(pose, node, joint)).collect(),
-                contacts: equilibrium
-                    .touches
-                    .iter()
-                    .filter(|touch| touch.proxy_node as usize == node)
-                    .map(|touch| {
-                        let (nodes, weights) = touch.carriers.iter().copied().unzip();
-                        Contact { force: touch.force, nodes, weights }
-                    })
-                    .collect(),
+                contact: equilibrium.touches.iter().find(|touch| touch.proxy_node as usize == node).map(|touch| {
+                    let (nodes, weights) = touch.carriers.iter().copied().unzip();
+                    Contact { force: touch.force, nodes, weights }
+                }),
             });
         let proxy_nodes = proxy_nodes.collect();
         let Equilibrium { status, iterations, residual, energy, gap, torque, .. } = equilibrium;
@@ -117,7 +112,7 @@ impl Inspection {
     pub fn torque_of_contacts(&self) -> JointVector {
         let mut torque = JointVector::zeros(self.q.len());
         for node in &self.proxy_nodes {
-            for contact in &node.contacts {
+            if let Some(contact) = &node.contact {
                 torque.iter_mut().zip(&node.jacobian).for_each(|(tau, column)| *tau += column.dot(contact.force));
             }
         }

@@ -85,7 +85,7 @@ fn balance_and_contact_law_hold_at_every_contact_stiffness() {
     }
 }
 
-/// Spheres instead of points: in a dent they touch several facets at once.
+/// Spheres instead of points.
 #[test]
 fn balance_and_contact_law_hold_for_nodes_with_a_radius() {
     for radius in [0.003, 0.008] {
