@@ -52,7 +52,8 @@ fn main() {
         ("quasi-static", GraphicsEffects { quasi_static: true, ..Default::default() }),
     ];
     println!(
-        "  nodes  springs    effects       built [s]  set up [s]  factor [MB]  frame: least, median, 95 % [ms]  over isotropic"
+        "  nodes  springs    effects       built [s]  set up [s]  factor [MB]  frame: least, median, 95 % [ms]  over \
+         isotropic"
     );
     for rings in RINGS {
         let mut isotropic = [0.0; 3];
@@ -79,7 +80,8 @@ fn main() {
                 let (kind, megabytes) = (format!("{kind:?}"), object.factor.bytes() as f64 * 1e-6);
                 let ratio = frame / isotropic[number];
                 println!(
-                    "{nodes:7}  {kind:9}  {name:12}  {built:9.2}  {set_up:10.2}  {megabytes:11.1}  {frame:12.2}, {median:6.1}, {late:7.1}  {ratio:14.1}"
+                    "{nodes:7}  {kind:9}  {name:12}  {built:9.2}  {set_up:10.2}  {megabytes:11.1}  {frame:12.2}, \
+                     {median:6.1}, {late:7.1}  {ratio:14.1}"
                 );
             }
         }

@@ -189,7 +189,8 @@ impl World<'_> {
             ticks.len() / 2
         );
         println!(
-            "error: felt {:.2} %, of the store at the end {:.2} % rms; steepest {steepest:.4} N m a tick, of direct solves {exact:.4}",
+            "error: felt {:.2} %, of the store at the end {:.2} % rms; steepest {steepest:.4} N m a tick, of direct \
+             solves {exact:.4}",
             100.0 * (felt / size).sqrt(),
             100.0 * (full / size).sqrt()
         );

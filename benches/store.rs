@@ -193,6 +193,9 @@ fn main() {
     for spacing in [4.0, 2.0, 1.4, 1.0, 0.7] {
         dense_grid(&scene, spacing, Interpolation::Potential, &unseen);
     }
+    for spacing in [1.0, 0.5, 0.4] {
+        dense_grid(&scene, spacing, Interpolation::Linear, &unseen);
+    }
     let fill = |order, spacing: f64, levels, aim| {
         let begin = Instant::now();
         let refine = Refine { model: &model, base: grid(&scene, spacing), levels, order, aim, most: 50_000 };

@@ -47,7 +47,8 @@ const SCARCE: usize = 1 << 29;
 pub fn scarcity() -> String {
     match left() {
         Some(left) if left < SCARCE => format!(
-            " (only {} MB of memory are left, in which a driver may find no room: close other programs, or raise the limit, ulimit -v)",
+            " (only {} MB of memory are left, in which a driver may find no room: close other programs, or raise the \
+             limit, ulimit -v)",
             left / 1_000_000
         ),
         _ => String::new(),

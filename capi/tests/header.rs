@@ -21,7 +21,8 @@ fn the_header_is_what_the_sources_make() {
     let committed = std::fs::read_to_string(&header).unwrap_or_default();
     assert!(
         committed == made,
-        "{}: not what the sources make; write it anew with HAPTIZE_WRITE_HEADER=1 cargo test -p haptize-capi --test header",
+        "{}: not what the sources make; write it anew with HAPTIZE_WRITE_HEADER=1 cargo test -p haptize-capi --test \
+         header",
         header.display()
     );
 }

@@ -130,8 +130,8 @@ fn run_shard(arguments: &Arguments, scene: &Scene, shard: Shard) -> Result<Repor
             warn(&report);
             let SweepReport { points, contact_points, resumed_points, seconds, backend, adapter, .. } = &report;
             let text = format!(
-                "{file}: shard {shard}, {points} points, {contact_points} in contact, {resumed_points} of an earlier run; {seconds:.2} s on \
-                 {backend} ({adapter})\n"
+                "{file}: shard {shard}, {points} points, {contact_points} in contact, {resumed_points} of an earlier \
+                 run; {seconds:.2} s on {backend} ({adapter})\n"
             );
             (text, serde_json::to_value(&report)?)
         }
@@ -210,8 +210,8 @@ pub fn lowered(text: &mut String, lowered: Option<Lowered>) -> fmt::Result {
     let Some(Lowered { points, converged, greatest, rounds, searches, seconds }) = lowered else { return Ok(()) };
     writeln!(
         text,
-        "  lowered      {points} points by neighbours' equilibria, {converged} of them unconverged from rest, energy by at most {:.1} %; \
-         {rounds} rounds, {searches} searches, {seconds:.2} s",
+        "  lowered      {points} points by neighbours' equilibria, {converged} of them unconverged from rest, energy \
+         by at most {:.1} %; {rounds} rounds, {searches} searches, {seconds:.2} s",
         100.0 * greatest
     )
 }
@@ -240,7 +240,8 @@ fn announce(progress: &Progress) {
     let time = seconds.map(|seconds| seconds * points.saturating_sub(*done) as f64 / *points as f64);
     let time = time.map_or(String::new(), |seconds| format!(", solved in about {}", duration(seconds)));
     tell(format_args!(
-        "haptize: predicted from {sampled} of them: {:.0} % in contact{time}; finding lower equilibria and measuring accuracy come on top",
+        "haptize: predicted from {sampled} of them: {:.0} % in contact{time}; finding lower equilibria and measuring \
+         accuracy come on top",
         100.0 * contact_fraction
     ));
 }

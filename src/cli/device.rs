@@ -131,8 +131,8 @@ fn examine(arguments: &Check) -> Result<Report, Failure> {
         )?,
         Watchdog::None => writeln!(
             text,
-            "  watchdog     NONE in the device: if haptize is killed or the machine hangs, the last torque stays on; keep its \
-             power switch at hand"
+            "  watchdog     NONE in the device: if haptize is killed or the machine hangs, the last torque stays on; \
+             keep its power switch at hand"
         )?,
     }
     reports.iter().try_for_each(|report| describe(&mut text, report))?;

@@ -53,13 +53,14 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
     match adapters.as_slice() {
         [] if named.is_some() => writeln!(
             text,
-            "graphics adapters      none whose name contains {:?}, which {ADAPTER_VARIABLE} asks for: set it to a part of a name, or \
-             unset it to see all",
+            "graphics adapters      none whose name contains {:?}, which {ADAPTER_VARIABLE} asks for: set it to a \
+             part of a name, or unset it to see all",
             named.as_deref().unwrap_or_default()
         )?,
         [] => writeln!(
             text,
-            "graphics adapters      none found: `haptize bake --backend gpu` and `haptize view` need a Vulkan driver, nothing else does"
+            "graphics adapters      none found: `haptize bake --backend gpu` and `haptize view` need a Vulkan driver, \
+             nothing else does"
         )?,
         found => {
             for (rank, adapter) in found.iter().enumerate() {

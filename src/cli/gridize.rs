@@ -225,7 +225,8 @@ fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
         let names = table.joints().join(", ");
         let (file, many) = (log.display(), table.joints().len());
         return Err(format!(
-            "{file}: {} has {many} joints ({names}), more than {MAX_JOINTS}: choose some by a column mapping (--columns)",
+            "{file}: {} has {many} joints ({names}), more than {MAX_JOINTS}: choose some by a column mapping \
+             (--columns)",
             table.topic()
         )
         .into());

@@ -149,7 +149,8 @@ fn describe(text: &mut String, inspection: &Inspection, chain: &Chain) -> fmt::R
     let untouched = proxy_nodes.iter().filter(|node| node.contact.is_none()).count();
     writeln!(
         text,
-        "proxy nodes in contact: x [m] (force [N] on object nodes with weights, J by columns); {untouched} others are free"
+        "proxy nodes in contact: x [m] (force [N] on object nodes with weights, J by columns); {untouched} others are \
+         free"
     )?;
     for (number, node) in proxy_nodes.iter().enumerate() {
         let Some(contact) = &node.contact else { continue };

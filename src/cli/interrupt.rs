@@ -47,7 +47,8 @@ pub fn listen(json: bool, resumes: bool) -> Result<(), Failure> {
     })
     .map_err(|error| {
         format!(
-            "cannot listen for signals: {error}; close other programs, or raise the limits on processes and memory (ulimit -u, ulimit -v)"
+            "cannot listen for signals: {error}; close other programs, or raise the limits on processes and memory \
+             (ulimit -u, ulimit -v)"
         )
     })?;
     ignore(&ignored);

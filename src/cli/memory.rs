@@ -47,8 +47,8 @@ mod answer {
     /// Text around the number of bytes.
     const SAID: [&str; 2] = [
         "out of memory: ",
-        " bytes were asked for in vain; close other programs, raise the limit (ulimit -v), or take a coarser grid or surface; what was \
-         written is kept: an unfinished haptize bake or haptize scan goes on with --resume",
+        " bytes were asked for in vain; close other programs, raise the limit (ulimit -v), or take a coarser grid or \
+         surface; what was written is kept: an unfinished haptize bake or haptize scan goes on with --resume",
     ];
 
     /// Answers `abort` after a failed allocation. Any other one takes its course.

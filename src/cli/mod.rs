@@ -15,8 +15,8 @@
 /// Which adapter draws and computes, for the help of commands that use one.
 macro_rules! adapter_help {
     () => {
-        "\n\nWith several GPUs the fastest is used. Set WGPU_ADAPTER_NAME to part of a GPU's name to choose another; `haptize \
-         doctor` lists them."
+        "\n\nWith several GPUs the fastest is used. Set WGPU_ADAPTER_NAME to part of a GPU's name to choose another; \
+         `haptize doctor` lists them."
     };
 }
 

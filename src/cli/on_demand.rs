@@ -102,8 +102,8 @@ impl OnDemand {
                 earlier.refinement.filter(|found| found.space() == store.space() && earlier.scene == scene.text)
             else {
                 return Err(format!(
-                    "{}: was not explored with this scene and these levels: give another file, or the scene and --levels of \
-                     that session",
+                    "{}: was not explored with this scene and these levels: give another file, or the scene and \
+                     --levels of that session",
                     file.display()
                 )
                 .into());

@@ -84,7 +84,8 @@ impl Lines {
         Self {
             slurm: vec![
                 format!(
-                    "id=$(sbatch --parsable --array=0-{last} --cpus-per-task={cores} --mem={memory}M{time}{gpu} --requeue --wrap {})",
+                    "id=$(sbatch --parsable --array=0-{last} --cpus-per-task={cores} --mem={memory}M{time}{gpu} \
+                     --requeue --wrap {})",
                     wrap(&bake("auto"))
                 ),
                 format!(
@@ -129,8 +130,8 @@ fn describe(text: &mut String, plan: &Plan, arguments: &Arguments, lines: &Lines
     match (plan.seconds(), plan.longest()) {
         (Some(all), Some(longest)) => writeln!(
             text,
-            "  time         {} for all on {} threads such as here, {} for the longest shard, {} of it to set up; lower equilibria and the \
-             error come on top, in the merge",
+            "  time         {} for all on {} threads such as here, {} for the longest shard, {} of it to set up; \
+             lower equilibria and the error come on top, in the merge",
             bake::duration(all),
             plan.threads,
             bake::duration(longest),

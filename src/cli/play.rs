@@ -490,7 +490,8 @@ pub fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
     let Timing { missed_deadlines, missed_frames, unrecorded, .. } = timing;
     writeln!(
         text,
-        "  missed       {missed_deadlines} deadlines (ticks left out because an earlier one ran late), {missed_frames} frames, {unrecorded} records"
+        "  missed       {missed_deadlines} deadlines (ticks left out because an earlier one ran late), \
+         {missed_frames} frames, {unrecorded} records"
     )?;
     let Some(Steal { late, late_beside_steal, seconds }) = timing.steal.filter(|steal| steal.late > 0) else {
         return Ok(());
@@ -499,8 +500,8 @@ pub fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
     if late_beside_steal > 0 {
         write!(
             text,
-            ", {late_beside_steal} of them while the hypervisor took the processor ({seconds:.2} s in all): give the virtual \
-             machine processors of its own"
+            ", {late_beside_steal} of them while the hypervisor took the processor ({seconds:.2} s in all): give the \
+             virtual machine processors of its own"
         )?;
     }
     if late > late_beside_steal {

@@ -45,8 +45,8 @@ impl PlaybackReport {
         self.forces.extend(EndForce::new(&name(path, &dataset), &setup.chain, &played.trace));
         if self.forces.len() < 2 {
             return Err(format!(
-                "--beside compares the force at the end of arms that have three joints, and contact nodes on the last link alone; \
-                 play {} by itself",
+                "--beside compares the force at the end of arms that have three joints, and contact nodes on the last \
+                 link alone; play {} by itself",
                 path.display()
             )
             .into());

@@ -49,7 +49,8 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
     let uniform: usize = base.axes.iter().map(|axis| ((axis.count - 1) << (wanted.levels - 1)) + 1).product();
     let percent = 100.0 * aim;
     tell(format_args!(
-        "haptize: for an rms error of {percent:.2} %: {} points of the scene's grid, and of up to {uniform} where it errs",
+        "haptize: for an rms error of {percent:.2} %: {} points of the scene's grid, and of up to {uniform} where it \
+         errs",
         base.points()
     ));
     let refine = Refine {
@@ -84,7 +85,8 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
     )?;
     writeln!(
         text,
-        "  nodes        {:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {equilibria} equilibria, {rounds} rounds",
+        "  nodes        {:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {equilibria} \
+         equilibria, {rounds} rounds",
         uniform as f64 / nodes.max(1) as f64
     )?;
     writeln!(text, "  bytes        {} on the disk, {} in memory", megabytes(file), megabytes(bytes))?;

@@ -128,8 +128,8 @@ fn write_plan(scene: &ScanScene, arguments: &Arguments, file: &Path) -> Result<R
         .map_err(|error| format!("cannot write {}: {error}; free some space or give another place", file.display()))?;
     let (rows, seconds, unreachable) = (trajectory.rows.len(), trajectory.duration(), plan.unreachable.len());
     let text = format!(
-        "{}: {rows} rows through {} points in {seconds:.0} s, {dwell} s at each; {unreachable} points are not reached by the \
-         joints\n  note         limits of torque and speed are the robot's own: nothing of haptize watches it\n",
+        "{}: {rows} rows through {} points in {seconds:.0} s, {dwell} s at each; {unreachable} points are not reached \
+         by the joints\n  note         limits of torque and speed are the robot's own: nothing of haptize watches it\n",
         file.display(),
         plan.points - unreachable
     );
@@ -187,7 +187,8 @@ fn drive(
     let guard = Guard::new(open(address, None)?, None).map_err(|halt| format!("{address}: {halt}"))?;
     if guard.scheduler().is_some() {
         return Err(format!(
-            "{address}: its maker's library drives it in a thread of its own, in which a scan cannot run: use --plan-out and its maker's tools"
+            "{address}: its maker's library drives it in a thread of its own, in which a scan cannot run: use \
+             --plan-out and its maker's tools"
         )
         .into());
     }

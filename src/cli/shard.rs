@@ -74,7 +74,8 @@ impl ShardChoice {
             told.iter().find(|(_, other, own)| own.checked_sub(*other) != number.checked_sub(first))
         {
             return Err(format!(
-                "--shard auto/{count}: {name} and {other} tell different numbers; give the one that counts: --shard ${name}/{count}"
+                "--shard auto/{count}: {name} and {other} tell different numbers; give the one that counts: --shard \
+                 ${name}/{count}"
             )
             .into());
         }

@@ -57,7 +57,8 @@ impl MeshRipple {
         (self.median > RIPPLE_WARNING).then_some(if self.skin {
             "the mesh shows through: give the skin a greater width or bending stiffness, or the mesh shorter edges"
         } else {
-            "the mesh shows through, and a finer one would as well: give the object a skin ([object.skin]) with a width of some edges"
+            "the mesh shows through, and a finer one would as well: give the object a skin ([object.skin]) with a \
+             width of some edges"
         })
     }
 }

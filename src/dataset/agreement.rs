@@ -57,7 +57,8 @@ fn check_sphere(surface: &Surface, centre: DVec3, radius: f64) -> Result<(), Str
     match distances.enumerate().find(|(_, distance)| (distance - radius).abs() > rounding) {
         None => Ok(()),
         Some((node, distance)) => Err(format!(
-            "node {node} of the surface is {distance} m from the middle of the scene's sphere, whose radius is {radius} m"
+            "node {node} of the surface is {distance} m from the middle of the scene's sphere, whose radius is \
+             {radius} m"
         )),
     }
 }

@@ -100,8 +100,8 @@ pub enum OpenError {
     NoNode,
     /// A joint-true device, whose joints are no one's guess.
     #[error(
-        "the scene does not say how the joints of {device} drive its arm: give [device] a map, q = map * (coordinates of the \
-         device), with one row for each joint of the scene, or take a scene that has one"
+        "the scene does not say how the joints of {device} drive its arm: give [device] a map, q = map * (coordinates \
+         of the device), with one row for each joint of the scene, or take a scene that has one"
     )]
     NoMap {
         /// Its address.
@@ -190,8 +190,8 @@ impl Kind {
         if self == Self::ForceDimension && cfg!(target_os = "linux") && !has_udev_rule("1451") {
             let rule = r#"SUBSYSTEM=="usb", ATTR{idVendor}=="1451", MODE="0666""#;
             missing.push(format!(
-                "no udev rule lets users open USB devices of vendor 1451: put {rule} into /etc/udev/rules.d/60-force-dimension.rules and plug \
-                 the device in again"
+                "no udev rule lets users open USB devices of vendor 1451: put {rule} into \
+                 /etc/udev/rules.d/60-force-dimension.rules and plug the device in again"
             ));
         }
         if self == Self::Touch && cfg!(target_os = "linux") && env::var_os("GTDD_HOME").is_none() {

@@ -134,7 +134,8 @@ impl Inverse3 {
 fn connect(address: &str) -> Result<TcpStream, String> {
     let absent = || {
         format!(
-            "no service answers at {address}: install and start the Haply Inverse service, or name it as in inverse3:HOST:PORT"
+            "no service answers at {address}: install and start the Haply Inverse service, or name it as in \
+             inverse3:HOST:PORT"
         )
     };
     let found = address.to_socket_addrs().map_err(|_| absent())?;

@@ -111,8 +111,8 @@ pub enum GridizeError {
     },
     /// All samples in a subspace.
     #[error(
-        "the samples span only {rank} of {joints} joint directions (thickness {thickness:.1e} of the extent): measure off \
-         that line or plane too, or leave out a joint"
+        "the samples span only {rank} of {joints} joint directions (thickness {thickness:.1e} of the extent): measure \
+         off that line or plane too, or leave out a joint"
     )]
     Flat {
         /// Directions spanned.

@@ -44,7 +44,8 @@ pub enum SamplesError {
     },
     /// NaN or an infinity.
     #[error(
-        "sample {sample} has {what} {value} at joint `{joint}`: remove it, or let the import drop rows that are not finite"
+        "sample {sample} has {what} {value} at joint `{joint}`: remove it, or let the import drop rows that are not \
+         finite"
     )]
     NotFinite {
         /// Number of the sample, from 0.

@@ -29,7 +29,8 @@ pub enum Fault {
     /// The device's port has given more energy than it took, by more than
     /// [`GREATEST_GIVEN_ENERGY`](crate::tolerances::GREATEST_GIVEN_ENERGY).
     #[error(
-        "the loop gave the hand energy from nowhere: lower the gains to the bounds that were reported or name passivity_control"
+        "the loop gave the hand energy from nowhere: lower the gains to the bounds that were reported or name \
+         passivity_control"
     )]
     Energy,
     /// The torque came out as no number: gains beyond all measure.

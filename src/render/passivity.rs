@@ -129,7 +129,8 @@ pub fn advice(spec: &HapticsSpec, field: &TorqueField, bounds: &[Bound]) -> Opti
         remedies.push(format!("or else coupling_stiffness = {}", list((0..joints).map(least))));
     }
     Some(format!(
-        "the gains are not passive, so the loop may create energy: {} is {:.4}, at most {:.4} is safe{others}. Set in [haptics]: {}",
+        "the gains are not passive, so the loop may create energy: {} is {:.4}, at most {:.4} is safe{others}. Set in \
+         [haptics]: {}",
         worst.what,
         worst.value,
         worst.safe,
@@ -177,7 +178,8 @@ pub fn bounds(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) ->
             value: stiffness,
             safe: wall_bound(spec, a),
             remedy: format!(
-                "lower it, or give the device a damping bd of {:.4} {torque} s/{angle} (a hand on the device adds to it)",
+                "lower it, or give the device a damping bd of {:.4} {torque} s/{angle} (a hand on the device adds to \
+                 it)",
                 0.5 * stiffness * period + spec.coupling_damping[a]
             ),
         });

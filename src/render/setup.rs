@@ -72,8 +72,8 @@ pub enum SetupError {
     Effect(#[from] EffectError),
     /// An effect on what is drawn, and nothing to draw.
     #[error(
-        "the scene in the dataset: {0} acts on the object that contact forces move, and the dataset does not hold the contact \
-         forces and the surface of one: bake a virtual object again with this scene, or leave {0} out"
+        "the scene in the dataset: {0} acts on the object that contact forces move, and the dataset does not hold the \
+         contact forces and the surface of one: bake a virtual object again with this scene, or leave {0} out"
     )]
     NothingDrawn(&'static str),
     /// The torques cannot be interpolated.

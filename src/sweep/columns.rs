@@ -266,7 +266,8 @@ impl Columns {
             && forces.is_sorted_by(|a, b| a.node < b.node)
             && forces.last().is_none_or(|last| (last.node as usize) < shape.surface_nodes);
         let on_proxy = if shape.with_touches { on_proxy(touches) } else { Vec::new() };
-        let sound = sound && on_proxy.is_sorted_by(|a, b| a.node < b.node)
+        let sound = sound
+            && on_proxy.is_sorted_by(|a, b| a.node < b.node)
             && on_proxy.iter().all(|contact| contact.force.as_vec3().is_finite());
         self.iterations.push(*iterations);
         let tangent = tangent.filter(|tangent| sound && tangent.is_finite());

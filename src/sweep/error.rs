@@ -27,8 +27,8 @@ pub enum SweepError {
     },
     /// The columns need more memory than is left.
     #[error(
-        "the grid's {points} points do not fit in memory: {shortage}; or haptize into a file (`haptize bake`), which takes little \
-             memory whatever the grid"
+        "the grid's {points} points do not fit in memory: {shortage}; or haptize into a file (`haptize bake`), which \
+         takes little memory whatever the grid"
     )]
     Shortage {
         /// Grid points.
@@ -82,7 +82,8 @@ pub enum SweepError {
     },
     /// The part cannot be read or written.
     #[error(
-        "{path}: {source}; free some space (memory, if that is what is missing), then continue with the same command, a bake with --resume"
+        "{path}: {source}; free some space (memory, if that is what is missing), then continue with the same command, \
+         a bake with --resume"
     )]
     Part {
         /// The part.

@@ -42,8 +42,8 @@ const STEPS: usize = 6;
 /// The scene's algorithm gives no energy with a tangent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the scene's algorithm is not \"energy\", and nodes that refine a grid need the energy of contact with its tangent: set \
-     algorithm = \"energy\" in [contact], or bake the grid alone"
+    "the scene's algorithm is not \"energy\", and nodes that refine a grid need the energy of contact with its \
+                                            tangent: set algorithm = \"energy\" in [contact], or bake the grid alone"
 )]
 pub struct NoEnergy;
 

@@ -322,14 +322,16 @@ impl Pilot {
         let falls = match self.prospects.first() {
             None => "and finer grids do not help".to_owned(),
             Some(best) => format!(
-                "and errors fall only with the spacing to the power {:.2} (`{}`): it would take {:.1e} points, {:.1} times as \
-                 fine a grid, where at most {limit} points (--max-points) and {FARTHEST_EXTRAPOLATION} times are tried",
+                "and errors fall only with the spacing to the power {:.2} (`{}`): it would take {:.1e} points, {:.1} \
+                 times as fine a grid, where at most {limit} points (--max-points) and {FARTHEST_EXTRAPOLATION} times \
+                 are tried",
                 best.order, best.interpolation, best.points, best.finer
             ),
         };
         format!(
-            "{aim}, is out of reach: {reached}, {falls}. What would help: a larger error or a grid over a smaller or shallower \
-             range (deep contact has several equilibria, between which torque jumps on any grid). Nothing was baked"
+            "{aim}, is out of reach: {reached}, {falls}. What would help: a larger error or a grid over a smaller or \
+             shallower range (deep contact has several equilibria, between which torque jumps on any grid). Nothing \
+             was baked"
         )
     }
 }

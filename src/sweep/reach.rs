@@ -116,8 +116,9 @@ pub enum ReachError {
     Bake(#[from] BakeError),
     /// Nothing touches.
     #[error(
-        "the proxy touches the object at none of {configurations} random configurations within the joint limits{depth}: move the object \
-         or the arm, widen the limits (limits of [[proxy.joint]]), or allow for deeper contact (--depth)"
+        "the proxy touches the object at none of {configurations} random configurations within the joint \
+         limits{depth}: move the object or the arm, widen the limits (limits of [[proxy.joint]]), or allow for deeper \
+         contact (--depth)"
     )]
     NoContact {
         /// Configurations measured.

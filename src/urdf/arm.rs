@@ -86,7 +86,8 @@ impl Arm {
             let message = match moving.len() {
                 0 => format!("no joint moves link {tip:?}: name a tip farther out"),
                 count => format!(
-                    "the chain to {tip:?} has {count} moving joints, {}: a scene takes {MAX_JOINTS}; hold some with --lock JOINT=VALUE",
+                    "the chain to {tip:?} has {count} moving joints, {}: a scene takes {MAX_JOINTS}; hold some with \
+                     --lock JOINT=VALUE",
                     moving.join(", ")
                 ),
             };
@@ -231,7 +232,8 @@ impl Builder<'_> {
                     open.push((joint.child, place * joint.origin * *motion));
                 } else if !self.way.contains(&number) {
                     let message = format!(
-                        "joint {:?} moves beside the chain: link {:?} and what it carries are left out; --lock {}=VALUE keeps them",
+                        "joint {:?} moves beside the chain: link {:?} and what it carries are left out; --lock \
+                         {}=VALUE keeps them",
                         joint.name, self.robot.links[joint.child].name, joint.name
                     );
                     self.note(&joint.span, message);
@@ -249,8 +251,8 @@ impl Builder<'_> {
             let chain = self.way.iter().map(|&number| &self.robot.joints[number]).filter(|other| other.name != *name);
             if chain.into_iter().any(|other| other.name == *leader || other.mimic.as_ref() == Some(leader)) {
                 return refuse(format!(
-                    "joint {name:?} follows {leader:?} (mimic), as another joint of the chain does or is, and the joints of a scene \
-                     move independently: hold it with --lock {name}=VALUE, or remove <mimic>"
+                    "joint {name:?} follows {leader:?} (mimic), as another joint of the chain does or is, and the \
+                     joints of a scene move independently: hold it with --lock {name}=VALUE, or remove <mimic>"
                 ));
             }
             let message = format!(
@@ -263,7 +265,8 @@ impl Builder<'_> {
             JointType::Floating | JointType::Planar => {
                 let kind = if joint.kind == JointType::Planar { "planar" } else { "floating" };
                 return refuse(format!(
-                    "joint {name:?} is {kind}, and the joints of a scene turn or slide: make it fixed, or write it as such joints"
+                    "joint {name:?} is {kind}, and the joints of a scene turn or slide: make it fixed, or write it as \
+                     such joints"
                 ));
             }
             JointType::Fixed | JointType::Revolute | JointType::Continuous => JointKind::Revolute,
@@ -273,7 +276,8 @@ impl Builder<'_> {
             Some([lower, upper]) if upper - lower >= LEAST_RANGE => [lower, upper],
             Some([lower, upper]) => {
                 return refuse(format!(
-                    "joint {name:?} moves from {lower} to {upper}: the lower limit must be less than the upper, by {LEAST_RANGE} or more"
+                    "joint {name:?} moves from {lower} to {upper}: the lower limit must be less than the upper, by \
+                     {LEAST_RANGE} or more"
                 ));
             }
             None => return refuse(format!("joint {name:?} has no limits: add <limit lower=\"..\" upper=\"..\"/>")),

@@ -56,8 +56,8 @@ impl<'a> Source<'a> {
         match error {
             roxmltree::Error::DtdDetected => {
                 let start = self.text.find("<!DOCTYPE").unwrap_or(0);
-                let message = "a robot file has no document type, and none is read, since entities can grow without bound: \
-                               remove <!DOCTYPE ..>";
+                let message = "a robot file has no document type, and none is read, since entities can grow without \
+                               bound: remove <!DOCTYPE ..>";
                 self.error(start..start + "<!DOCTYPE".len(), message)
             }
             roxmltree::Error::UnknownNamespace(prefix, place) if prefix == "xacro" => {

@@ -58,7 +58,8 @@ pub fn sample(robot: &Robot, arm: &Arm, spacing: f64, packages: Option<&Path>) -
         // In tenths of a millimetre, a little wider than would do.
         let wider = (1.05e4 * spacing * (count / MAX_CONTACT_NODES as f64).sqrt()).ceil() / 1e4;
         refuse(format!(
-            "a spacing of {spacing} m makes {count:.0} contact nodes, and a scene takes {MAX_CONTACT_NODES}: give --spacing {wider} or more"
+            "a spacing of {spacing} m makes {count:.0} contact nodes, and a scene takes {MAX_CONTACT_NODES}: give \
+             --spacing {wider} or more"
         ))
     };
     // Twice as many are refused before anything is sampled.

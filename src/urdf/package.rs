@@ -25,8 +25,8 @@ pub(super) fn resolve(name: &str, robot: &Path, packages: Option<&Path>) -> Resu
         });
         return of_user.chain(above).map(|place| place.join(inside)).find(|file| file.is_file()).ok_or_else(|| {
             format!(
-                "the package {package:?} with the file {inside:?} lies in no folder above this file: name the folder that holds the \
-                 package with --package-path DIR"
+                "the package {package:?} with the file {inside:?} lies in no folder above this file: name the folder \
+                 that holds the package with --package-path DIR"
             )
         });
     }

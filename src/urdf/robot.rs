@@ -132,7 +132,8 @@ impl Robot {
             if let Some(earlier) = movers.insert(joint.child, element.range().start) {
                 let (link, line) = (&links[joint.child].name, source.line(earlier));
                 return refuse(format!(
-                    "link {link:?} is the child of the joint on line {line} already: a URDF is a tree; remove one of them"
+                    "link {link:?} is the child of the joint on line {line} already: a URDF is a tree; remove one of \
+                     them"
                 ));
             }
             joints.push(joint);

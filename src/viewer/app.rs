@@ -180,9 +180,9 @@ impl Viewer {
             self.begin(task, egui);
         }
         self.error = Some(format!(
-            "The GPU that drew this window was lost ({why}). It was opened again; what was felt went on meanwhile. Update the \
-             GPU's driver if this comes back, or draw on another adapter: set {ADAPTER_VARIABLE} to a part of its name before \
-             haptize starts; haptize doctor lists them"
+            "The GPU that drew this window was lost ({why}). It was opened again; what was felt went on meanwhile. \
+             Update the GPU's driver if this comes back, or draw on another adapter: set {ADAPTER_VARIABLE} to a part \
+             of its name before haptize starts; haptize doctor lists them"
         ));
     }
 
@@ -352,8 +352,8 @@ impl Viewer {
 pub fn not_drawn(error: ViewError) -> String {
     match error {
         ViewError::Gpu(GpuError::Lost(why)) => format!(
-            "the GPU that draws this window was lost: {why}. The loop goes on; start haptize view again if the window does not \
-             open anew by itself, and update the driver if this comes back"
+            "the GPU that draws this window was lost: {why}. The loop goes on; start haptize view again if the window \
+             does not open anew by itself, and update the driver if this comes back"
         ),
         other => other.to_string(),
     }

@@ -77,15 +77,16 @@ pub enum ViewError {
     Gpu(#[source] GpuError),
     /// There is nothing to draw on.
     #[error(
-        "the window needs a Vulkan, Metal or DX12 adapter to draw on, a software one will do; found: {0}. Install your GPU's \
-         Vulkan driver or Mesa's software Vulkan (package mesa-vulkan-drivers); haptize play and haptize info need neither"
+        "the window needs a Vulkan, Metal or DX12 adapter to draw on, a software one will do; found: {0}. Install \
+         your GPU's Vulkan driver or Mesa's software Vulkan (package mesa-vulkan-drivers); haptize play and haptize \
+         info need neither"
     )]
     NoAdapter(String),
     /// It was lost, and no other window can be opened instead.
     #[error(
-        "the GPU that draws the window was lost, and the window with it: {0}. Start haptize view again; if this comes back, \
-         update the GPU's driver, or draw on another adapter: set {ADAPTER_VARIABLE} to a part of its name; haptize doctor \
-         lists them"
+        "the GPU that draws the window was lost, and the window with it: {0}. Start haptize view again; if this comes \
+         back, update the GPU's driver, or draw on another adapter: set {ADAPTER_VARIABLE} to a part of its name; \
+         haptize doctor lists them"
     )]
     Lost(String),
     /// The object's frame update.
@@ -102,8 +103,8 @@ pub enum ViewError {
     Window(String),
     /// The windowing system gave up: most often the display is gone.
     #[error(
-        "the window ended unexpectedly: {0}. Start haptize view again; if the display was there all the time, please report \
-         this with the output of haptize doctor"
+        "the window ended unexpectedly: {0}. Start haptize view again; if the display was there all the time, please \
+         report this with the output of haptize doctor"
     )]
     Ended(String),
     /// The file cannot be opened.

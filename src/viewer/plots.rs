@@ -119,8 +119,8 @@ impl Plots {
                 if ui.button("Reset").clicked() {
                     history.reset_timing();
                 }
-                let why = "The window holds still for two seconds while the loop goes on: the jitter that is left is the \
-                           machine's own, what is more is the window's";
+                let why = "The window holds still for two seconds while the loop goes on: the jitter that is left is \
+                           the machine's own, what is more is the window's";
                 let clocked = history.cost().percentiles().count > 0;
                 hold_still = ui.add_enabled(clocked, Button::new("Hold still")).on_hover_text(why).clicked();
             }

@@ -96,8 +96,8 @@ impl ForceDimension {
         } else {
             "libdrd.so"
         };
-        let remedy = "the library libdrd is not found: install the Force Dimension SDK (3.16 or newer) and set FDSDK to its folder, or \
-                      name the library as in force-dimension:/PATH/libdrd.so.3";
+        let remedy = "the library libdrd is not found: install the Force Dimension SDK (3.16 or newer) and set FDSDK \
+                      to its folder, or name the library as in force-dimension:/PATH/libdrd.so.3";
         LibraryFiles { candidates: files(&folders, name), remedy }
     }
 
@@ -115,8 +115,8 @@ impl ForceDimension {
             // SAFETY: the text is the library's own and lives as long as it.
             let reason = unsafe { text((functions.dhdErrorGetLastStr)()) };
             return Err(format!(
-                "no device opens ({reason}): plug it in, switch its power on, calibrate it with the maker's tool, and let users open its \
-                 USB device (a udev rule for vendor 1451)"
+                "no device opens ({reason}): plug it in, switch its power on, calibrate it with the maker's tool, and \
+                 let users open its USB device (a udev rule for vendor 1451)"
             ));
         };
         // SAFETY: `id` is that of the device that was opened; the text lives as long as the library.

@@ -122,8 +122,8 @@ impl OpenHaptics {
     pub fn library() -> LibraryFiles {
         let folders = ["/usr/lib", "/usr/lib/x86_64-linux-gnu", "/usr/local/lib"].map(PathBuf::from);
         let name = if cfg!(windows) { "hd.dll" } else { "libHD.so" };
-        let remedy = "the library libHD is not found: install OpenHaptics and the Touch device driver, set GTDD_HOME as their guide \
-                      says, or name the library as in touch:/PATH/libHD.so";
+        let remedy = "the library libHD is not found: install OpenHaptics and the Touch device driver, set GTDD_HOME \
+                      as their guide says, or name the library as in touch:/PATH/libHD.so";
         LibraryFiles { candidates: files(&folders, name), remedy }
     }
 
@@ -152,8 +152,8 @@ impl OpenHaptics {
         if error.is_some() || device == INVALID_HANDLE {
             let error = error.unwrap_or(0);
             return Err(format!(
-                "no device opens (error {error:#06x}): plug it in, switch its power on, join the group dialout, and configure it with the \
-                 maker's setup tool"
+                "no device opens (error {error:#06x}): plug it in, switch its power on, join the group dialout, and \
+                 configure it with the maker's setup tool"
             ));
         }
         // SAFETY: the device is open; the functions take numbers.

@@ -112,8 +112,8 @@ impl ContactEffects {
         let Some((name, place)) = spec.at_contacts() else { return Ok(None) };
         let contacts = Contacts::new(dataset, chain.nodes.len())?.ok_or_else(|| {
             let message = format!(
-                "{name} needs the contact forces on this proxy, which the dataset does not hold: bake a virtual object again \
-                 with this scene; for a real object, which tells no contact forces, leave it out"
+                "{name} needs the contact forces on this proxy, which the dataset does not hold: bake a virtual \
+                 object again with this scene; for a real object, which tells no contact forces, leave it out"
             );
             Diagnostic::new(path, text, place.clone(), message)
         })?;

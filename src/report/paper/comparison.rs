@@ -265,8 +265,8 @@ fn slope_over_bound(haptics: &HapticsSpec) -> f64 {
 
 /// Section 4.2.
 fn real_objects(Scans { bare, fabric, side }: Scans<'_>) -> Vec<Row> {
-    const HULL: &str = "the count is the volume of the samples' hull in C-space over 0.03^3 rad^3; it depends on link lengths \
-                        and on where the block stands, which the paper does not give";
+    const HULL: &str = "the count is the volume of the samples' hull in C-space over 0.03^3 rad^3; it depends on link \
+                        lengths and on where the block stands, which the paper does not give";
     let row = |quantity, paper, ours, why: &str| Row::new("4.2", quantity, paper, ours, why);
     let held = |of: Scanned<'_>| EndForce::new("", of.chain, of.trace).and_then(|force| force.held());
     let steady = |held: Option<SteadyForce>| held.map_or(f64::NAN, |held| 100.0 * held.variation);

@@ -103,8 +103,8 @@ fn check_size(checker: &Checker<'_>, axes: &[AxisSpec], span: std::ops::Range<us
     }
     let bytes = points * (BYTES_PER_POINT + size_of::<f64>() * axes.len()) as f64;
     let message = format!(
-        "the grid has {points:.3e} points and would need at least {:.0} GB on the disk; at most {MAX_POINTS} points are \
-         possible: widen the spacing or shorten the axes",
+        "the grid has {points:.3e} points and would need at least {:.0} GB on the disk; at most {MAX_POINTS} points \
+         are possible: widen the spacing or shorten the axes",
         bytes / 1e9
     );
     Err(checker.error(span, message))

@@ -26,8 +26,8 @@ const CONTACT_ITERATIONS: u32 = 400;
 /// Validates `table`, read from the checker's text, as a scene with a virtual object.
 pub(super) fn scene(checker: &Checker<'_>, table: &SceneTable) -> Result<Scene, SceneError> {
     let (Some(object), Some(contact_table)) = (&table.object, &table.contact) else {
-        let message = "the scene needs [object] and [contact] to be baked; a scene of a real object, with [scan], is haptized \
-                       by `haptize scan`";
+        let message = "the scene needs [object] and [contact] to be baked; a scene of a real object, with [scan], is \
+                       haptized by `haptize scan`";
         return Err(checker.error(0..0, message));
     };
     let Rendering { path, text, name, proxy, haptics, graphics, motion, .. } = rendering(checker, table)?;
@@ -124,8 +124,8 @@ fn stiffness(
             Err(checker.error(value.span(), message))
         }
         (None, Some(_)) if lengths.contains(&0.0) => {
-            let message = "stiffness_per_length is of nodes along links, and the proxy has nodes { at = .. } besides: give \
-                           stiffness [N/m] of each node instead";
+            let message = "stiffness_per_length is of nodes along links, and the proxy has nodes { at = .. } besides: \
+                           give stiffness [N/m] of each node instead";
             Err(checker.error(span, message))
         }
         (None, Some(per_length)) => {
@@ -165,8 +165,8 @@ fn contact(checker: &Checker<'_>, table: &Spanned<ContactTable>, proxy: &ProxySp
         && algorithm != Algorithm::Paper
         && balls
     {
-        let message = "nodes with a radius do not balance where the closest triangle changes: leave surface out, and they touch \
-                       the smooth surface";
+        let message = "nodes with a radius do not balance where the closest triangle changes: leave surface out, and \
+                       they touch the smooth surface";
         return Err(checker.error(value.span(), message));
     }
     let default = if algorithm == Algorithm::Paper { ContactSurface::Facets } else { ContactSurface::Smooth };

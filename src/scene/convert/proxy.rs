@@ -85,16 +85,16 @@ fn inertia(checker: &Checker<'_>, value: &Spanned<Vec<f64>>) -> Result<DMat3, Sc
         [xx, yy, zz, xy, xz, yz] => ([xx, yy, zz], [xy, xz, yz]),
         _ => {
             let message = format!(
-                "inertia has {} numbers: it is a list of three moments [xx, yy, zz], or of moments and products [xx, yy, zz, \
-                 xy, xz, yz]",
+                "inertia has {} numbers: it is a list of three moments [xx, yy, zz], or of moments and products [xx, \
+                 yy, zz, xy, xz, yz]",
                 numbers.len()
             );
             return Err(checker.error(value.span(), message));
         }
     };
     let [[xx, yy, zz], [xy, xz, yz]] = [moments, products];
-    let message = "no body has this inertia, since its matrix has a negative eigenvalue: moments are zero or positive, and \
-                   products of inertia are no larger than those moments allow";
+    let message = "no body has this inertia, since its matrix has a negative eigenvalue: moments are zero or \
+                   positive, and products of inertia are no larger than those moments allow";
     positive_semidefinite(DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]))
         .ok_or_else(|| checker.error(value.span(), message))
 }

@@ -140,8 +140,8 @@ pub(super) fn loops(accuracy: &Accuracy) -> Canvas {
     let mut canvas = sheet(
         "Work of the contact torque around closed loops, which a passive object never gives",
         &format!(
-            "squares in the plane of two joints, rms over loops; the object stores {:.3} J at most, and zero is drawn at the \
-             rounding of that",
+            "squares in the plane of two joints, rms over loops; the object stores {:.3} J at most, and zero is drawn \
+             at the rounding of that",
             accuracy.greatest_energy
         ),
     );
@@ -228,7 +228,8 @@ pub(super) fn refinement(accuracy: &Accuracy) -> Canvas {
 pub(super) fn graphics(accuracy: &Accuracy) -> Canvas {
     let mut canvas = sheet(
         "Error of what is drawn",
-        "a push and its release, relative to the rms of positions and energy; left: frame step; right: iterations on the GPU",
+        "a push and its release, relative to the rms of positions and energy; left: frame step; right: iterations on \
+         the GPU",
     );
     let by = |study: Study| {
         let worst = series(accuracy, study, |row| (row.value, row.worst / row.size));

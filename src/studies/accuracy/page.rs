@@ -44,39 +44,39 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
         (
             "accuracy-spacing",
             figures::spacing(accuracy),
-            "Solid curves are rms errors, dashed ones the worst. Where contact begins, where another node of the proxy \
-             touches and where a contact passes from one facet to the next, the torque has a kink or a jump: such places \
-             fill a layer of one cell, whose share falls with the spacing, so that the curves bend towards the order 0.5 \
-             (jumps) or 1.5 (kinks) however smooth the interpolation is in between. The knee is where smooth cells stop \
-             to count.",
+            "Solid curves are rms errors, dashed ones the worst. Where contact begins, where another node of the \
+             proxy touches and where a contact passes from one facet to the next, the torque has a kink or a jump: \
+             such places fill a layer of one cell, whose share falls with the spacing, so that the curves bend \
+             towards the order 0.5 (jumps) or 1.5 (kinks) however smooth the interpolation is in between. The knee is \
+             where smooth cells stop to count.",
         ),
         (
             "accuracy-loops",
             figures::loops(accuracy),
             "Left: linear torque, component by component, is no gradient: it gives or takes energy around a loop. The \
-             potential's work is zero to rounding. Where curves coincide, the first shows around the second. Right: what a \
-             look-up of each costs at the scene's own spacing.",
+             potential's work is zero to rounding. Where curves coincide, the first shows around the second. Right: \
+             what a look-up of each costs at the scene's own spacing.",
         ),
         (
             "accuracy-solver",
             figures::solver(accuracy),
-            "A tolerance below the knee buys nothing that interpolation does not throw away. Linearised contact freezes the \
-             geometry, at rest and again at each update (0 to 8 along its curve); the paper's iteration has its own fixed point, \
-             or none: the table counts what did not converge.",
+            "A tolerance below the knee buys nothing that interpolation does not throw away. Linearised contact \
+             freezes the geometry, at rest and again at each update (0 to 8 along its curve); the paper's iteration \
+             has its own fixed point, or none: the table counts what did not converge.",
         ),
         (
             "accuracy-refinement",
             figures::refinement(accuracy),
-            "Each dot compares a setting with the next finer one. Left: where such a curve does not fall to the left, torque does not \
-             converge. Right: another skin or contact stiffness is another body.",
+            "Each dot compares a setting with the next finer one. Left: where such a curve does not fall to the left, \
+             torque does not converge. Right: another skin or contact stiffness is another body.",
         ),
         (
             "accuracy-graphics",
             figures::graphics(accuracy),
-            "Errors of the nodes' positions and of the object's energy, relative to what they are themselves. Left: by the \
-             frame step, against a step of 1/3840 s; where the object's vibration is followed they fall with its square. \
-             Right: by the iterations of the GPU's solver, against an exact one at the same step; the floor is f32. Few \
-             iterations move the object sluggishly, and never make it gain energy.",
+            "Errors of the nodes' positions and of the object's energy, relative to what they are themselves. Left: \
+             by the frame step, against a step of 1/3840 s; where the object's vibration is followed they fall with \
+             its square. Right: by the iterations of the GPU's solver, against an exact one at the same step; the \
+             floor is f32. Few iterations move the object sluggishly, and never make it gain energy.",
         ),
     ];
     let mut files = Vec::new();
@@ -290,7 +290,8 @@ fn all_rows(html: &mut String, accuracy: &Accuracy) -> fmt::Result {
     for row in &accuracy.rows {
         writeln!(
             html,
-            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{:.3}<td>{:.3}<td>{:.3}<td>{:.3e}<td>{:.3e}<td>{}<td>{:.2} %</tr>",
+            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{:.3}<td>{:.3}<td>{:.3}<td>{:.3e}<td>{:.3e}<td>{}<td>{:.2} \
+             %</tr>",
             study_name(row.study),
             escaped(&row.series),
             escaped(&row.setting),

@@ -30,7 +30,8 @@ pub(in super::super) fn figure(effects: &Effects) -> Canvas {
     let mut canvas = Canvas::new(WIDTH, TOP + rows * ROW + 52.0);
     headline(&mut canvas, "What each effect costs, relative to the scene without it");
     let note = format!(
-        "dots, left numbers: alone, the least of {} rounds, lines up to the greatest; rings, right numbers: within the whole scene; {:.0} % of the ticks are in contact; {} nodes are drawn; frames on the GPU: {}",
+        "dots, left numbers: alone, the least of {} rounds, lines up to the greatest; rings, right numbers: within \
+         the whole scene; {:.0} % of the ticks are in contact; {} nodes are drawn; frames on the GPU: {}",
         effects.rounds,
         100.0 * effects.in_contact,
         effects.nodes,

@@ -14,8 +14,8 @@ use std::fmt::{self, Write as _};
 pub(in super::super) fn describe(text: &mut String, effects: &Effects) -> fmt::Result {
     writeln!(
         text,
-        "  effects: the plain scene with each over it without (frames and GPU memory: graphics alone), and so within the whole \
-         scene; least of the rounds"
+        "  effects: the plain scene with each over it without (frames and GPU memory: graphics alone), and so within \
+         the whole scene; least of the rounds"
     )?;
     write!(text, "    {:<18}", "")?;
     for (title, _) in effects.heads() {
@@ -70,11 +70,11 @@ pub(in super::super) fn csv(effects: &Effects) -> String {
 /// None in a `String`.
 pub(in super::super) fn html(html: &mut String, effects: &Effects, figure: &Canvas) -> fmt::Result {
     writeln!(html, "<h2>What each effect costs</h2>")?;
-    let caption = "Dots are the least of the rounds over the least of the baseline, lines reach up to the greatest; rings are what \
-                   the effect costs within the whole scene. An effect \
-                   of the tick costs no frame, one of the graphics no tick; friction and contact damping have contact \
-                   forces stored, which the size of the dataset shows. In the table: least (median, greatest), alone, and below it \
-                   within the whole scene.";
+    let caption = "Dots are the least of the rounds over the least of the baseline, lines reach up to the greatest; \
+                   rings are what the effect costs within the whole scene. An effect of the tick costs no frame, one \
+                   of the graphics no tick; friction and contact damping have contact forces stored, which the size \
+                   of the dataset shows. In the table: least (median, greatest), alone, and below it within the whole \
+                   scene.";
     writeln!(html, "<figure>{}<figcaption>{caption}</figcaption></figure>", figure.svg())?;
     write!(html, "<table><tr><th>effect<th>value")?;
     for (title, takes) in effects.heads() {

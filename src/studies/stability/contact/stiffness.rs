@@ -172,7 +172,8 @@ impl Cell {
         let percent = |share: Share| 100.0 * share.part();
         let each = |share: Share| 1e6 * share.time.as_secs_f64() / share.solved.max(1) as f64;
         let mut note = format!(
-            "worst with {which}; {:.1} % of all {}, {median}/{most} iterations (median/max), {:.0} us; paper {:.0} %, {:.0} us",
+            "worst with {which}; {:.1} % of all {}, {median}/{most} iterations (median/max), {:.0} us; paper {:.0} %, \
+             {:.0} us",
             percent(self.all),
             self.all.solved,
             each(self.all),
