@@ -1,5 +1,5 @@
-//! What a scene does not name is not there: nothing of it in the dataset, in a tick or in a frame; and what it names but cannot
-//! act is refused. One table of all effects for each claim.
+//! What a scene does not name is not there: nothing of it in the dataset, in a tick or in a frame; and what it names
+//! but cannot act is refused. One table of all effects for each claim.
 
 #![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 
@@ -181,7 +181,8 @@ fn what_is_named_to_be_off_is_what_was_never_named() {
     }
 }
 
-/// Section 3.1 written out: look-up, virtual coupling, one step of the proxy. Where no effect is named that is all there is.
+/// Section 3.1 written out: look-up, virtual coupling, one step of the proxy. Where no effect is named that is all
+/// there is.
 #[test]
 fn a_tick_without_effects_is_the_papers_to_the_last_bit() {
     let scene = sphere().with_effects(false, &[]).unwrap();

@@ -1,4 +1,5 @@
-//! What accuracy costs: errors that fall, rows that repeat, fronts and offers that follow from the rows, files that appear.
+//! What accuracy costs: errors that fall, rows that repeat, fronts and offers that follow from the rows, files that
+//! appear.
 
 #![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 
@@ -41,7 +42,8 @@ fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
         assert!(steps.is_sorted_by(|a, b| a > b) && steps[4] < 0.4 * steps[3], "{series}: {steps:?}");
         assert!(iterations[0] > 1e-2 && iterations[6] < 1e-4, "{series}: {iterations:?}");
     }
-    // Mesh, contact nodes and contact stiffness in four steps, each row against the next; stiffer contact changes ever less.
+    // Mesh, contact nodes and contact stiffness in four steps, each row against the next; stiffer contact changes ever
+    // less.
     let changes = |study: Study| found.of(study).map(|row| row.rms).collect::<Vec<f64>>();
     for study in [Study::Mesh, Study::Links, Study::Stiffness] {
         assert!(changes(study).len() == 3 && changes(study).iter().all(|change| *change > 0.0), "{study:?}");

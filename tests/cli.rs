@@ -413,7 +413,8 @@ fn hard_cases_make_one_table_and_an_unknown_room_is_refused() {
     assert!(text(&output.stderr).contains("`kitchen`") && text(&output.stderr).contains("gridization"));
 }
 
-/// No command writes over what it reads, over a file of another kind, or over what is no file; `--json` says so in one object.
+/// No command writes over what it reads, over a file of another kind, or over what is no file; `--json` says so in one
+/// object.
 #[test]
 fn no_output_destroys_an_input() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! The scenes of public devices: kinematics against published formulas, and each baked and felt by a simulated device in the loop.
+//! The scenes of public devices: kinematics against published formulas, and each baked and felt by a simulated device
+//! in the loop.
 
 // Helpers outside test functions may fail the test too.
 #![allow(clippy::unwrap_used, clippy::panic)]
@@ -70,8 +71,8 @@ fn the_touch_reaches_where_trigonometry_says() {
     assert!(effort.iter().zip(levers).all(|(effort, lever)| (effort - lever).abs() < 1e-12), "{effort:?}");
 }
 
-/// The pantograph of the vendor's package at the joint angles 168.25 and 12.5 degrees, bases 0.038 m apart: its end effector is
-/// where the two distal bars meet.
+/// The pantograph of the vendor's package at the joint angles 168.25 and 12.5 degrees, bases 0.038 m apart: its end
+/// effector is where the two distal bars meet.
 #[test]
 fn the_pantographs_end_effector_is_on_its_first_pair_of_bars() {
     let end = DVec3::new(0.018_794_5, 0.036_023_4, 0.0);
@@ -122,8 +123,8 @@ fn feels(name: &str, most: f64) {
     anywhere_within_the_limits(&scene, &dataset, &setup);
 }
 
-/// The hand goes anywhere within the device's limits, far beyond what is haptized: the proxy enters the object nowhere that was not
-/// solved, and a hand in the object is pushed back wherever it is.
+/// The hand goes anywhere within the device's limits, far beyond what is haptized: the proxy enters the object nowhere
+/// that was not solved, and a hand in the object is pushed back wherever it is.
 fn anywhere_within_the_limits(scene: &Scene, dataset: &Dataset, setup: &Setup) {
     /// Depth from which a hand must feel something [m]: well beyond a cell's error of where contact begins.
     const DEEP: f64 = 0.004;

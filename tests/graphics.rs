@@ -43,8 +43,8 @@ fn push(nodes: usize, frame: usize, size: f64) -> Vec<DVec3> {
     (0..nodes).map(|k| size * DVec3::new(0.1, 0.02 * (k % 3) as f64, -(((k + frame) % 7) as f64))).collect()
 }
 
-/// The object pushed hard for a while, then left alone: most that its energy rose in a frame beyond the work done on it,
-/// relative to the most that it ever stored. Prints a line of the table.
+/// The object pushed hard for a while, then left alone: most that its energy rose in a frame beyond the work done on
+/// it, relative to the most that it ever stored. Prints a line of the table.
 fn greatest_gain(object: &Object, period: f64, effects: &GraphicsEffects, size: f64) -> f64 {
     let mut motion = ObjectMotion::new(object, period, effects).unwrap();
     let rest = motion.energy();

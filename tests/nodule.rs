@@ -88,8 +88,8 @@ fn layers(version: &str) -> String {
     text + "$EndElements\n"
 }
 
-/// Layers in series under one stress: strain is stress over each layer's modulus. Exact where no tetrahedron is cut, since
-/// Poisson's ratio is zero.
+/// Layers in series under one stress: strain is stress over each layer's modulus. Exact where no tetrahedron is cut,
+/// since Poisson's ratio is zero.
 fn check_series(object: &Object, height: f64, interface: f64, area: f64, young: [f64; 2]) {
     let stress = 1e-3 * YOUNG;
     let stretch = |x: DVec3| {
@@ -160,8 +160,9 @@ fn an_inclusion_like_the_rest_changes_nothing() {
     }
 }
 
-/// A ball with a ball in its middle under pressure: its bulk modulus is that of Hashin's composite sphere (Hashin 1962, Journal of
-/// Applied Mechanics 29), K = Km + c (Ki - Km) (3 Km + 4 Gm) / (3 Km + 4 Gm + 3 (1 - c) (Ki - Km)), c the inner share of the volume.
+/// A ball with a ball in its middle under pressure: its bulk modulus is that of Hashin's composite sphere (Hashin 1962,
+/// Journal of Applied Mechanics 29), K = Km + c (Ki - Km) (3 Km + 4 Gm) / (3 Km + 4 Gm + 3 (1 - c) (Ki - Km)), c the
+/// inner share of the volume.
 #[test]
 fn a_composite_sphere_has_hashins_bulk_modulus() {
     let bulk = |young: f64, poisson: f64| young / (3.0 * (1.0 - 2.0 * poisson));

@@ -1,5 +1,5 @@
-//! Real objects from the first touch to the hand (sections 2.2, 2.3 and 4.2): the simulated spongy block, scanned, gridized
-//! and felt, and the logs of a real instrument where they are at hand.
+//! Real objects from the first touch to the hand (sections 2.2, 2.3 and 4.2): the simulated spongy block, scanned,
+//! gridized and felt, and the logs of a real instrument where they are at hand.
 #![allow(clippy::unwrap_used)]
 
 use glam::DVec3;
@@ -145,8 +145,8 @@ fn a_real_instrument_is_predicted_about_as_well_as_it_repeats_itself() {
         assert!(error < 1.1 * repeated && error > 0.1 * repeated, "joint {joint}: {error} {repeated}");
     }
     assert!(held_out.predicted > held_out.samples / 2);
-    // A whole run under a load that no other run had is harder: nothing was measured between its neighbours, one direction of
-    // motion at a time. It is predicted to a tenth of the range.
+    // A whole run under a load that no other run had is harder: nothing was measured between its neighbours, one
+    // direction of motion at a time. It is predicted to a tenth of the range.
     mapping.torque.keep = Keep::Forward;
     let (rest, run): (Vec<_>, Vec<_>) = logs.iter().cloned().partition(|log| !log.ends_with("tool5_04.txt"));
     let rest = import(&mapping, &rest, &mut |_| {}).unwrap().samples;

@@ -92,8 +92,8 @@ fn a_translation_costs_the_foundation_alone() {
 /// Bending stiffness at which the foundation of 1 N/m^3 still leaves the factorisation its digits [N m].
 const BENDING: f64 = 1e-3;
 
-/// Energies of the displacement `harmonic` of degree l along x, whose mean square over the sphere is given, in units of the continuum's: for
-/// tension l (l + 1) / R^2, for bending the square of that, for the foundation one.
+/// Energies of the displacement `harmonic` of degree l along x, whose mean square over the sphere is given, in units of
+/// the continuum's: for tension l (l + 1) / R^2, for bending the square of that, for the foundation one.
 fn ratios(divisions: usize, degree: u32, mean_square: f64, harmonic: fn(DVec3) -> f64) -> [f64; 3] {
     let unit = SkinSpec { tension: 0.0, bending: 0.0, foundation: 1.0 };
     // The foundation, which makes them definite, is taken off again.

@@ -102,7 +102,8 @@ fn stretch(x: DVec3) -> DVec3 {
     1e-3 * DVec3::new(-POISSON * x.x, -POISSON * x.y, x.z)
 }
 
-/// The patch test: a uniform strain leaves the inside of an irregular mesh in balance, and pulls at the ends with E strain area.
+/// The patch test: a uniform strain leaves the inside of an irregular mesh in balance, and pulls at the ends with E
+/// strain area.
 #[test]
 fn a_uniform_bar_stretches_exactly_whatever_its_mesh() {
     for version in ["2.2", "4.1"] {
@@ -151,8 +152,8 @@ fn a_box_filled_with_a_whole_number_of_cubes_stretches_exactly() {
     assert!(inner.into_iter().all(|(_, force)| force.length() < 1e-10 * pull));
 }
 
-/// A lattice across the surface represents the volume of what it fills: the stretched share of a box that is no whole number of
-/// cubes, and of a sphere, to some percent.
+/// A lattice across the surface represents the volume of what it fills: the stretched share of a box that is no whole
+/// number of cubes, and of a sphere, to some percent.
 #[test]
 fn cut_cubes_count_by_their_share() {
     let energy = |object: &Object| -> f64 {
@@ -169,8 +170,8 @@ fn cut_cubes_count_by_their_share() {
     assert!(error.abs() < 0.05, "{error}");
 }
 
-/// A clamped bar under a force across its end, against beam theory with shear. Linear tetrahedra are too stiff in bending; the error
-/// falls with their size.
+/// A clamped bar under a force across its end, against beam theory with shear. Linear tetrahedra are too stiff in
+/// bending; the error falls with their size.
 #[test]
 fn a_cantilever_converges_to_beam_theory() {
     let (width, length, load) = (0.04, 0.2, 0.1);

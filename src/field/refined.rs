@@ -1,8 +1,8 @@
 //! The field of a refined dataset: the store answers, with the finest of its levels that are there.
 //!
 //! Its order says how (`dataset/store`): `potential` is minus the gradient of one smooth energy, whichever nodes there
-//! are. There is no boundary layer: the torque begins at w = 0 without a jump. A store does not say what it does not keep:
-//! how many nodes of the object touch.
+//! are. There is no boundary layer: the torque begins at w = 0 without a jump. A store does not say what it does not
+//! keep: how many nodes of the object touch.
 
 use super::{Flags, Sample, stencil::Lattice};
 use crate::{JointVector, store::Store, tolerances::GRADIENT_STEP};

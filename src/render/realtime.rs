@@ -158,8 +158,8 @@ impl<'session> HapticLoop<'session> {
         self.tick_at(now, deadline);
     }
 
-    /// Ticks against the clock, or as `scheduler` calls, while `goes_on`. Returns what the system refused or what stopped
-    /// the scheduler.
+    /// Ticks against the clock, or as `scheduler` calls, while `goes_on`. Returns what the system refused or what
+    /// stopped the scheduler.
     fn pace(&mut self, scheduler: Option<Arc<dyn Scheduler>>, goes_on: impl Fn(&Self) -> bool + Sync) -> Vec<String> {
         let Some(scheduler) = scheduler else {
             let refused = self.begin();

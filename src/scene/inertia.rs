@@ -9,8 +9,8 @@ use glam::{DMat3, DVec3};
 const INERTIA_ROUNDING: f64 = 1e-5;
 
 /// Returns the inertia of a body that `inertia` is the rounding of [kg m^2]: the matrix itself, or, where its least
-/// eigenvalue is below zero by rounding, the matrix with its moments raised by as much. `None` if it is not symmetric, or
-/// farther from positive semidefinite than rounding takes it: no body has that inertia.
+/// eigenvalue is below zero by rounding, the matrix with its moments raised by as much. `None` if it is not symmetric,
+/// or farther from positive semidefinite than rounding takes it: no body has that inertia.
 pub(crate) fn positive_semidefinite(inertia: DMat3) -> Option<DMat3> {
     let trace = inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z;
     if inertia == DMat3::ZERO {
@@ -63,8 +63,8 @@ mod tests {
         assert!(positive_semidefinite(asymmetric).is_none());
     }
 
-    /// What a file's digits hide below zero is lifted, however small the other moments are: a small moment beside a large
-    /// one would otherwise give a chain an inertia that is not positive definite.
+    /// What a file's digits hide below zero is lifted, however small the other moments are: a small moment beside a
+    /// large one would otherwise give a chain an inertia that is not positive definite.
     #[test]
     fn eigenvalues_below_zero_by_rounding_are_lifted() {
         let [xx, xy, yy, zz] = [2e-3, 0.1, 1e-3, 2e5];

@@ -6,9 +6,9 @@ use haptize::contact::{Model, Solver, Status};
 use haptize::object::Compliance;
 use haptize::scene::Algorithm;
 
-/// A node pressed into the middle of a face of a regular octahedron: by its threefold symmetry the face moves along its normal
-/// N and stays flat, so lambda = kc d / (1 + kc c) exactly, c = N . C N of the mean displacement of the three corners under
-/// a force shared by them, and U = lambda d / 2. Frozen and deformed geometry agree.
+/// A node pressed into the middle of a face of a regular octahedron: by its threefold symmetry the face moves along its
+/// normal N and stays flat, so lambda = kc d / (1 + kc c) exactly, c = N . C N of the mean displacement of the three
+/// corners under a force shared by them, and U = lambda d / 2. Frozen and deformed geometry agree.
 #[test]
 fn a_node_on_the_middle_of_a_symmetric_face_feels_two_springs_in_series() {
     let object = octahedron();
@@ -58,8 +58,8 @@ fn touching_without_depth_is_free() {
     assert!(far.status == Status::Free && (far.gap - 1.01).abs() < 1e-12);
 }
 
-/// Exactly over a vertex, an edge and at the object's centre: where the closest point jumps, numbers stay finite, and what is
-/// called converged is balanced.
+/// Exactly over a vertex, an edge and at the object's centre: where the closest point jumps, numbers stay finite, and
+/// what is called converged is balanced.
 #[test]
 fn symmetric_positions_give_finite_numbers() {
     let object = octahedron();
@@ -79,8 +79,8 @@ fn symmetric_positions_give_finite_numbers() {
     }
 }
 
-/// The stored energy and the force on a ball of radius 20 mm at `centre`, slid along x, in an almost rigid trough: a block
-/// with a groove of 90 degrees along y, edges at z = 0, bottom 50 mm below.
+/// The stored energy and the force on a ball of radius 20 mm at `centre`, slid along x, in an almost rigid trough: a
+/// block with a groove of 90 degrees along y, edges at z = 0, bottom 50 mm below.
 fn in_the_trough(height: f64, aside: f64) -> (f64, f64, Status) {
     let profile = [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.0), (0.05, 0.0), (0.0, -0.05), (-0.05, 0.0), (-0.1, 0.0)];
     let mut nodes = Vec::new();
@@ -107,7 +107,8 @@ fn in_the_trough(height: f64, aside: f64) -> (f64, f64, Status) {
     (equilibrium.energy, equilibrium.torque[0], equilibrium.status)
 }
 
-/// The nearer wall of a groove pushes a ball: aside of the middle by any amount, since the depth is that of the closest point.
+/// The nearer wall of a groove pushes a ball: aside of the middle by any amount, since the depth is that of the closest
+/// point.
 #[test]
 fn a_ball_in_a_groove_is_pushed_by_the_nearer_wall() {
     let (kc, r) = (3e3, 0.02f64);

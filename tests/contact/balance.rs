@@ -106,8 +106,8 @@ fn balance_and_contact_law_hold_for_nodes_with_a_radius() {
     }
 }
 
-/// A sphere of springs pressed by a bar of points or balls that once failed: what converges is balanced, the others say that they have
-/// not converged. Returns how many of `places` converge.
+/// A sphere of springs pressed by a bar of points or balls that once failed: what converges is balanced, the others say
+/// that they have not converged. Returns how many of `places` converge.
 fn hard(object: &Object, radius: f64, stiffness: f64, depths: [f64; 2], places: &[usize]) -> usize {
     let chain = floating_bar(radius);
     let model = Model::new(object, &chain, bodies::contact_of(&chain, stiffness));
@@ -149,7 +149,8 @@ fn rigid_balls_on_facets_finer_than_themselves_balance_on_a_skin() {
     assert_eq!(hard(&bodies::skinned(16).unwrap(), BALL, f64::INFINITY, [0.2, 0.5], &[5, 14]), 2);
 }
 
-/// Between rigid contact forces c and the forces K u that hold the displacement, in the energy norm: recomputed from u by the stiffness itself.
+/// Between rigid contact forces c and the forces K u that hold the displacement, in the energy norm: recomputed from u
+/// by the stiffness itself.
 #[test]
 fn the_residual_of_rigid_contact_is_the_imbalance_of_forces() {
     let object = sphere(SpringKind::Isotropic);
@@ -186,8 +187,8 @@ fn the_residual_of_rigid_contact_is_the_imbalance_of_forces() {
     assert!(compared > 2, "{compared}");
 }
 
-/// A ball on a mirror plane of the object may balance on a saddle of E, from which it slides off to either side. The result is the
-/// minimum of a hair's breadth beside the plane.
+/// A ball on a mirror plane of the object may balance on a saddle of E, from which it slides off to either side. The
+/// result is the minimum of a hair's breadth beside the plane.
 #[test]
 fn saddles_are_left() {
     let object = bodies::sphere(bodies::PAPER).unwrap();
@@ -209,8 +210,8 @@ fn saddles_are_left() {
     assert!(left > 5, "a ball that slid off is pushed sideways: {left}");
 }
 
-/// Balls about as soft as the object, pressed in by half their radius and more, near edges and vertices of their own dents, where a
-/// depth below the nearest facet alone has kinks.
+/// Balls about as soft as the object, pressed in by half their radius and more, near edges and vertices of their own
+/// dents, where a depth below the nearest facet alone has kinks.
 #[test]
 fn soft_balls_rest_deep_in_their_dents() {
     let object =
@@ -294,9 +295,10 @@ fn gradient_error(here: &Equilibrium, [before, after]: &[Equilibrium; 2], joint:
     (slope + here.torque[joint]).abs() / here.torque.norm().max(1e-3)
 }
 
-/// The envelope theorem: tau = -dU/dq at a minimum. A stencil of points whose ends touch other facets than its middle crosses a kink of U,
-/// where the derivative does not exist. U of balls has none down to half the object's radius, although its slope may change fast. Deeper,
-/// as far as its centre, which may be left to any side, an end may be another equilibrium. All that is counted, and must be rare.
+/// The envelope theorem: tau = -dU/dq at a minimum. A stencil of points whose ends touch other facets than its middle
+/// crosses a kink of U, where the derivative does not exist. U of balls has none down to half the object's radius,
+/// although its slope may change fast. Deeper, as far as its centre, which may be left to any side, an end may be
+/// another equilibrium. All that is counted, and must be rare.
 #[test]
 fn torque_is_minus_the_gradient_of_stored_energy() {
     for (kind, radius) in [(SpringKind::Isotropic, 0.0), (SpringKind::Axial, 0.0), (SpringKind::Isotropic, 0.008)] {

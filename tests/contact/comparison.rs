@@ -31,9 +31,9 @@ fn linearised_contact_tends_to_the_energy_form_as_depth_tends_to_zero() {
     assert!(differences[1] < 0.2 * differences[0] && differences[2] < 0.2 * differences[1], "{differences:?}");
 }
 
-/// Frictionless springs on three nodes act along the normal like one spring of three times the stiffness. The paper ties whole
-/// nodes, whose depths differ from the contact point's by the bulge of a facet, e^2 / 2R for edges e on radius R: at
-/// soft contact and depths beyond it the two agree up to that, and the better the finer the mesh.
+/// Frictionless springs on three nodes act along the normal like one spring of three times the stiffness. The paper
+/// ties whole nodes, whose depths differ from the contact point's by the bulge of a facet, e^2 / 2R for edges e on
+/// radius R: at soft contact and depths beyond it the two agree up to that, and the better the finer the mesh.
 #[test]
 fn the_papers_iteration_is_close_to_the_energy_form_at_soft_contact() {
     let chain = Chain::new(&arm(0.0));
@@ -63,7 +63,8 @@ fn the_papers_iteration_is_close_to_the_energy_form_at_soft_contact() {
     assert!(medians[0] < 0.25 && medians[1] < 0.5 * medians[0], "{medians:?}");
 }
 
-/// Theory: step 4 pushes the surface past the proxy, the next pass finds nothing inside. That is a failure, not freedom.
+/// Theory: step 4 pushes the surface past the proxy, the next pass finds nothing inside. That is a failure, not
+/// freedom.
 #[test]
 fn the_papers_iteration_says_when_it_has_lost_contact() {
     let object = sphere(SpringKind::Isotropic);
@@ -92,8 +93,8 @@ fn the_papers_iteration_says_when_it_has_lost_contact() {
     assert!(shares.windows(2).all(|pair| pair[1] <= pair[0]), "{shares:?}");
 }
 
-/// Nodes that are free at rest may be touched by the surface bulging: the frozen problem keeps their rows too. A stiff tie checks
-/// that its law holds for every proxy node.
+/// Nodes that are free at rest may be touched by the surface bulging: the frozen problem keeps their rows too. A stiff
+/// tie checks that its law holds for every proxy node.
 #[test]
 fn linearised_contact_obeys_its_law_at_every_node() {
     let object = sphere(SpringKind::Axial);
@@ -136,8 +137,8 @@ fn a_node_at_the_centre_ends() {
     }
 }
 
-/// Each update of linearised contact comes nearer to the energy form, whose fixed point it shares; with many, half of the
-/// configurations at least have reached it.
+/// Each update of linearised contact comes nearer to the energy form, whose fixed point it shares; with many, half of
+/// the configurations at least have reached it.
 #[test]
 fn updates_lead_from_linearised_contact_to_the_energy_form() {
     let object = sphere(SpringKind::Isotropic);

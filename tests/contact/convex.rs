@@ -1,5 +1,5 @@
-//! Contact with the geometry frozen at rest is a convex quadratic program. An off-the-shelf interior-point solver is given its
-//! dual, with compliance, gaps and normals from elsewhere, and must find the same minimum.
+//! Contact with the geometry frozen at rest is a convex quadratic program. An off-the-shelf interior-point solver is
+//! given its dual, with compliance, gaps and normals from elsewhere, and must find the same minimum.
 
 use crate::fixture::{arm, contact, random_configurations, sphere};
 use crate::oracle::{depth, displacement, pose};
@@ -27,8 +27,9 @@ impl Triplets {
     }
 }
 
-/// Energy and torque of the multipliers lambda >= 0 that minimise `1/2 lambda (W + I / kc) lambda - depth . lambda`, the dual of
-/// the frozen problem: W = G K^-1 G^T from K itself; lengths in millimetres, which keeps all numbers near one.
+/// Energy and torque of the multipliers lambda >= 0 that minimise `1/2 lambda (W + I / kc) lambda - depth . lambda`,
+/// the dual of the frozen problem: W = G K^-1 G^T from K itself; lengths in millimetres, which keeps all numbers near
+/// one.
 fn program(object: &Object, chain: &Chain, q: &[f64], kc: f64) -> (f64, Vec<f64>) {
     let here = pose(chain, q);
     let rows: Vec<_> = here.nodes.iter().map(|x| depth(&object.rest, &object.triangles, *x)).collect();

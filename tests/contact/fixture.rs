@@ -77,7 +77,8 @@ pub fn arm_of_six() -> ProxySpec {
     spec
 }
 
-/// A single node that slides from `from` along `axis`: depth is the joint's coordinate where `axis` is a face's inward normal.
+/// A single node that slides from `from` along `axis`: depth is the joint's coordinate where `axis` is a face's inward
+/// normal.
 pub fn probe(from: DVec3, axis: DVec3) -> Chain {
     ball(from, axis, 0.0)
 }

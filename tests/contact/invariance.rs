@@ -1,4 +1,5 @@
-//! What must not change a result: where the world's origin is, how it is turned, what was solved before; and broken numbers.
+//! What must not change a result: where the world's origin is, how it is turned, what was solved before; and broken
+//! numbers.
 
 use crate::fixture::{arm, contact, object, random_configurations, sphere};
 use glam::{DMat3, DVec3};
@@ -54,8 +55,8 @@ fn turning_and_moving_the_world_changes_nothing() {
     }
 }
 
-/// The start is the rest state: nothing is carried from one configuration to the next, to the last bit; also where just the last joint
-/// turns, and the nodes that hang on the others stay.
+/// The start is the rest state: nothing is carried from one configuration to the next, to the last bit; also where just
+/// the last joint turns, and the nodes that hang on the others stay.
 #[test]
 fn results_do_not_depend_on_what_was_solved_before() {
     let object = sphere(SpringKind::Axial);

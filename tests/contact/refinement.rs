@@ -29,7 +29,8 @@ const SCENE: &str = r#"
     nodes = [{ from = [-0.036, 0.002, 0.0], to = [0.0, 0.002, 0.0], spacing = 0.004 }]
 "#;
 
-/// Force and torque in `count` configurations along a line, in a scene that differs from [`SCENE`] by these replacements.
+/// Force and torque in `count` configurations along a line, in a scene that differs from [`SCENE`] by these
+/// replacements.
 fn torques(count: u32, replacements: &[(&str, &str)]) -> Vec<f64> {
     let text = replacements.iter().fold(SCENE.to_string(), |text, (old, new)| {
         assert!(text.contains(old));
@@ -71,8 +72,8 @@ fn torque_converges_at_second_order_as_the_nodes_of_a_link_come_closer() {
     assert!(first > 2.8 * second && second < 0.01 * size, "{first} {second} of {size}");
 }
 
-/// What is left of a sequence of joint torques, taken in turn, when its smooth part is taken out: third differences, scaled so that
-/// independent errors keep their size.
+/// What is left of a sequence of joint torques, taken in turn, when its smooth part is taken out: third differences,
+/// scaled so that independent errors keep their size.
 fn ripple(torques: &[f64]) -> f64 {
     rms(torques.windows(7).map(|w| (w[6] - 3.0 * w[4] + 3.0 * w[2] - w[0]) / 20.0_f64.sqrt()))
 }
@@ -87,7 +88,8 @@ fn torque_converges_at_second_order_as_the_mesh_under_a_smooth_surface_is_refine
     let [coarse, middle, fine] = [3, 4, 5].map(|subdivisions| on(subdivisions, "smooth"));
     let [flat, flat_middle] = [3, 4].map(|subdivisions| on(subdivisions, "facets"));
     let size = rms(fine.iter().copied());
-    // From 642 to 2,562 and to 10,242 nodes. Corners of facets make most of the changes of flat ones, and of the ripple.
+    // From 642 to 2,562 and to 10,242 nodes. Corners of facets make most of the changes of flat ones, and of the
+    // ripple.
     let (first, second) = (difference(&coarse, &middle), difference(&middle, &fine));
     println!("{first} {second} {} of {size}, {} {}", difference(&flat, &flat_middle), ripple(&coarse), ripple(&flat));
     assert!(first > 3.2 * second && second < 0.005 * size, "{first} {second} of {size}");

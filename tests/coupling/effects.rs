@@ -79,7 +79,8 @@ fn friction_takes_energy_in_every_tick_and_the_accounts_close() {
 #[test]
 fn contact_damping_resists_along_the_normal_only() {
     let (with, without) = (setup("[haptics]\ncontact_damping = 10.0").unwrap(), setup("").unwrap());
-    // Deeper at 0.02 m/s while sliding at 0.03. The proxy follows, springs in series, at 0.016 m/s: the damper adds 0.16 N.
+    // Deeper at 0.02 m/s while sliding at 0.03. The proxy follows, springs in series, at 0.016 m/s: the damper adds
+    // 0.16 N.
     let motion = |t: f64| [0.03 * t, 0.004 + 0.02 * t];
     let ends = [&with, &without].map(|setup| {
         let mut outputs = Vec::new();
@@ -149,8 +150,8 @@ fn an_effect_that_cannot_act_is_refused_with_its_line() {
     }
 }
 
-/// Root mean square of the torque that the stored forces miss if they act on the nodes `shift` farther along the proxy, over that of
-/// the torque.
+/// Root mean square of the torque that the stored forces miss if they act on the nodes `shift` farther along the proxy,
+/// over that of the torque.
 fn torque_error(data: &Dataset, chain: &Chain, shift: usize) -> f64 {
     let touches = data.touches.as_ref().unwrap();
     let (mut missed, mut whole) = (0.0, 0.0);

@@ -43,8 +43,8 @@ fn a_loop_that_feeds_the_hand_is_let_go_with_the_reason() {
     assert!(
         setup.exceeded.iter().any(|bound| bound.what.contains("coupling stiffness") && bound.safe.round() == 4000.0)
     );
-    // Shaken by 1 mm from tick to tick the device always goes along with the torque that is held: 15 N times 2 mm a tick,
-    // of which its own damping takes 12 mJ.
+    // Shaken by 1 mm from tick to tick the device always goes along with the torque that is held: 15 N times 2 mm a
+    // tick, of which its own damping takes 12 mJ.
     let shaken = |t: f64| [0.0, if ((1e3 * t).round() as usize).is_multiple_of(2) { -0.011 } else { -0.009 }];
     let mut outputs = Vec::new();
     felt(&setup, 0.1, shaken, |output| outputs.push(*output));

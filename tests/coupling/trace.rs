@@ -67,8 +67,8 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 #[test]
 fn the_accounts_close_from_the_columns_of_the_file_alone() {
     let setup: Setup = setup(ALL).unwrap();
-    // From beyond a stop of the proxy, so that the coupling's spring is loaded at the start; into the block, along it, and
-    // against the stop again.
+    // From beyond a stop of the proxy, so that the coupling's spring is loaded at the start; into the block, along it,
+    // and against the stop again.
     let way = [(0.0, 0.21, -0.005), (0.5, 0.1, 0.012), (1.0, 0.0, 0.008), (1.5, 0.22, 0.01), (2.0, 0.1, -0.01)];
     let way = way.map(|(time, x, z)| Waypoint { time, q: JointVector::from_slice(&[x, z]) });
     let mut hand = setup.hand(Motion::through(&way, 2).unwrap()).unwrap();

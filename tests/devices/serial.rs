@@ -45,7 +45,8 @@ fn enabled(hardware: Box<dyn Hardware>) -> Result<Guard, String> {
     Ok(guard)
 }
 
-/// Opens a device on a machine that may be too busy for the emulator's thread to answer in the milliseconds that a device takes.
+/// Opens a device on a machine that may be too busy for the emulator's thread to answer in the milliseconds that a
+/// device takes.
 fn patiently<T>(mut open: impl FnMut() -> Result<T, String>) -> T {
     for _ in 0..50 {
         if let Ok(opened) = open() {

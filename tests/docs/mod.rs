@@ -1,8 +1,10 @@
-//! The pages of the documentation: every command in them runs, and prints what the page says; every link leads somewhere.
+//! The pages of the documentation: every command in them runs, and prints what the page says; every link leads
+//! somewhere.
 //!
-//! Fenced blocks of `sh` are run as scripts, those of `console` command by command; what stands below a command must be what it prints, but
-//! for numbers, and `...` stands for any lines. A page's blocks run one after the other in one folder that has the repository's `datasets`
-//! and robots. A block that begins with `# Not run by the tests:` is listed instead, with its reason.
+//! Fenced blocks of `sh` are run as scripts, those of `console` command by command; what stands below a command must be
+//! what it prints, but for numbers, and `...` stands for any lines. A page's blocks run one after the other in one
+//! folder that has the repository's `datasets` and robots. A block that begins with `# Not run by the tests:` is listed
+//! instead, with its reason.
 
 #![cfg(unix)]
 
@@ -73,7 +75,8 @@ fn commands(text: &str) -> (Vec<Shown>, Vec<String>) {
     (commands, left_out)
 }
 
-/// `line` without what changes from run to run and from machine to machine: numbers, what solved, and how far apart words are.
+/// `line` without what changes from run to run and from machine to machine: numbers, what solved, and how far apart
+/// words are.
 fn masked(line: &str) -> String {
     let solver = [" on cpu (", " on gpu ("].iter().find_map(|solver| line.find(solver));
     let line = &line[..solver.unwrap_or(line.len())];
@@ -111,7 +114,8 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// The folder in which the commands of a page run: the repository's datasets, and robots. The sponge is scanned on a third of its lines.
+/// The folder in which the commands of a page run: the repository's datasets, and robots. The sponge is scanned on a
+/// third of its lines.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for part in ["datasets", "tests/urdf/robots"] {

@@ -13,7 +13,8 @@ use haptize::{
     tolerances::GPU_SETTLED_RESIDUAL,
 };
 
-/// Springs along their rest direction, and a solid: of both, unlike isotropic springs, the compliance has blocks of nine numbers.
+/// Springs along their rest direction, and a solid: of both, unlike isotropic springs, the compliance has blocks of
+/// nine numbers.
 const AXIAL: Material = Material::Springs(SpringSpec { kind: SpringKind::Axial, stiffness: 300.0 });
 const SOLID: Material =
     Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.01), inclusions: Vec::new() });
@@ -37,8 +38,8 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Relative agreement of U and of the torque, a hundred times the residual to which results are settled in f64 (soft directions), or
-/// ten times the residual of 1e-5 that the paper's iteration is asked for in f32.
+/// Relative agreement of U and of the torque, a hundred times the residual to which results are settled in f64 (soft
+/// directions), or ten times the residual of 1e-5 that the paper's iteration is asked for in f32.
 fn agreement(algorithm: Algorithm) -> f64 {
     if algorithm == Algorithm::Paper { 1e-4 } else { 100.0 * GPU_SETTLED_RESIDUAL }
 }
@@ -152,7 +153,8 @@ fn check_scene(name: &str, material: Option<Material>, algorithm: Algorithm, str
     // The paper's iteration is chaotic where it does not settle at once: rounding decides now and then whether it does.
     let allowed = if algorithm == Algorithm::Paper { configurations.len() / 50 } else { 0 };
     assert!(unlike.len() <= allowed, "{name}, {algorithm:?}: {unlike:#?}");
-    // Left to the CPU: what lies within rounding of no contact, about 1e-6 of all, and what does not settle: about one in twenty.
+    // Left to the CPU: what lies within rounding of no contact, about 1e-6 of all, and what does not settle: about one
+    // in twenty.
     println!("{name}, {algorithm:?}: {touching} touch, {} by the CPU", gpu.left_to_cpu());
     assert!(gpu.left_to_cpu() * 5 <= touching, "{name}, {algorithm:?}: {} left to the CPU", gpu.left_to_cpu());
 }
@@ -212,7 +214,8 @@ fn part<'a>((scene, object, chain): &'a (Scene, Object, Chain), algorithm: Algor
     model
 }
 
-/// Of a large object only the compliance within reach is formed: equilibria are the CPU's, and so is what reaches beyond.
+/// Of a large object only the compliance within reach is formed: equilibria are the CPU's, and so is what reaches
+/// beyond.
 #[test]
 fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
     let [isotropic, axial] = [None, Some(AXIAL)].map(|material| load_of("sphere.toml", material));
@@ -237,7 +240,8 @@ fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
     assert!(matches!(refusal, GpuError::TooManyNodes { .. }), "{refusal}");
 }
 
-/// Configurations whose gap at rest is `wanted` [m] by f64, each between one in contact and a free one next to it in `path`.
+/// Configurations whose gap at rest is `wanted` [m] by f64, each between one in contact and a free one next to it in
+/// `path`.
 fn grazing(cpu: &mut Solver, path: &[JointVector], wanted: f64) -> Vec<JointVector> {
     let mut over = |q: &JointVector| cpu.gap(q) - wanted;
     let mut found = Vec::new();
@@ -260,7 +264,8 @@ fn grazing(cpu: &mut Solver, path: &[JointVector], wanted: f64) -> Vec<JointVect
     found
 }
 
-/// A gap that f32 cannot tell from none, points and balls, where shaders have no f64: contact or not, and what comes of it, is the CPU's.
+/// A gap that f32 cannot tell from none, points and balls, where shaders have no f64: contact or not, and what comes of
+/// it, is the CPU's.
 #[test]
 fn contact_within_rounding_of_none_is_decided_in_f64() {
     for name in ["sphere.toml", "mesh.toml"] {
@@ -285,8 +290,8 @@ fn contact_within_rounding_of_none_is_decided_in_f64() {
     }
 }
 
-/// Where shaders have f64 contact or not is decided on the device, to the last bits, on flat facets and on the smooth surface; none of
-/// those that are free is left to the CPU.
+/// Where shaders have f64 contact or not is decided on the device, to the last bits, on flat facets and on the smooth
+/// surface; none of those that are free is left to the CPU.
 #[test]
 fn contact_or_not_is_exact_on_a_device_with_f64() {
     for (name, surface) in [
@@ -328,8 +333,8 @@ fn contact_or_not_is_exact_on_a_device_with_f64() {
     }
 }
 
-/// An arm whose placement f32 rounds by more than the object's size suggests: contact that is shallower than that rounding is
-/// found all the same.
+/// An arm whose placement f32 rounds by more than the object's size suggests: contact that is shallower than that
+/// rounding is found all the same.
 #[test]
 fn an_arm_much_longer_than_the_object_touches_where_the_cpus_does() {
     let scene = Scene::parse(LONG_ARM, "long_arm.toml").unwrap();
@@ -453,7 +458,8 @@ fn no_configuration_is_no_work() {
     assert!(GpuSolver::new(context(), &model).unwrap().solve(&[]).unwrap().is_empty());
 }
 
-/// The kernels freeze geometry once: a scene that asks for more is refused, and left to the CPU where the choice is free.
+/// The kernels freeze geometry once: a scene that asks for more is refused, and left to the CPU where the choice is
+/// free.
 #[test]
 fn updates_are_refused() {
     let (scene, object, chain) = load("sphere.toml");
@@ -464,8 +470,9 @@ fn updates_are_refused() {
     assert!(matches!(refusal, GpuError::Unsupported("updates")), "{refusal}");
 }
 
-/// Every hard case of contact that the CPU keeps: stiffness, exact places and awkward ones, slivers, units, a kilometre from the
-/// origin, torque along paths and against the energy, singular arms; not the search for lower equilibria, which is the CPU's alone.
+/// Every hard case of contact that the CPU keeps: stiffness, exact places and awkward ones, slivers, units, a kilometre
+/// from the origin, torque along paths and against the energy, singular arms; not the search for lower equilibria,
+/// which is the CPU's alone.
 #[test]
 fn the_gpu_keeps_the_bounds_of_its_hard_cases() {
     use haptize::studies::stability::{CaseResult, Effort, Setting, cases, table};
@@ -478,7 +485,8 @@ fn the_gpu_keeps_the_bounds_of_its_hard_cases() {
     }
 }
 
-/// The scene's tolerance is what accuracy costs on the GPU too: the rougher it is the fewer steps are taken, in f32 and f64.
+/// The scene's tolerance is what accuracy costs on the GPU too: the rougher it is the fewer steps are taken, in f32 and
+/// f64.
 #[test]
 fn a_rougher_tolerance_takes_fewer_steps_and_is_kept() {
     let (scene, object, chain) = load("sphere.toml");
@@ -523,7 +531,8 @@ fn stiff_contact_is_as_accurate_as_soft_contact() {
         }
         println!("Kc {stiffness}: {touching} touch, residual {worst:.1e}, {} by the CPU", gpu.left_to_cpu());
         assert!(touching > 20 && worst <= 1e-4);
-        // Found at the stiffness that f32 resolves, and stiffened in f64; at its own, three quarters of the rigid ones are left.
+        // Found at the stiffness that f32 resolves, and stiffened in f64; at its own, three quarters of the rigid ones
+        // are left.
         assert!(gpu.left_to_cpu() * 2 <= touching, "Kc {stiffness}: {} left to the CPU", gpu.left_to_cpu());
     }
 }

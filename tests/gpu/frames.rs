@@ -59,7 +59,8 @@ fn frames_follow_the_cpus() {
         assert!(relative(twin.displacement(), displacement) < 1e-3, "frame {frame}");
         assert!(relative(twin.velocity(), velocity) < 1e-3, "frame {frame}");
     });
-    // Springs along the edges couple the coordinates: the inverse has nine numbers for a pair of nodes, of which the others need one.
+    // Springs along the edges couple the coordinates: the inverse has nine numbers for a pair of nodes, of which the
+    // others need one.
     let axial = Material::Springs(SpringSpec { kind: SpringKind::Axial, stiffness: 300.0 });
     let (_, axial, _) = load_of("sphere.toml", Some(axial));
     frames_of(&axial, FrameMethod::Inverse, |frame, twin, displacement, velocity| {
@@ -70,8 +71,8 @@ fn frames_follow_the_cpus() {
     assert!(relative(&[DVec3::X, DVec3::X], &rotated) > 1.0, "the comparator tells fields apart");
 }
 
-/// The method that is chosen for the sphere that ships, 2,562 nodes of which all are drawn, reaches the CPU's frames: a few dozen iterations
-/// leave most of a push out.
+/// The method that is chosen for the sphere that ships, 2,562 nodes of which all are drawn, reaches the CPU's frames: a
+/// few dozen iterations leave most of a push out.
 #[test]
 fn the_sphere_that_ships_is_drawn_where_the_cpu_has_it() {
     let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();

@@ -18,7 +18,8 @@ const COMMANDS: [&[&str]; 6] = [
     &["view", "x.haptize", "--screenshot", "x.png", "--time", "0.1", "--json"],
 ];
 
-/// What each command says, and the files that it makes. The window's picture must be there, but it shows times that it measured.
+/// What each command says, and the files that it makes. The window's picture must be there, but it shows times that it
+/// measured.
 fn answers(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut answers: BTreeMap<_, _> =
         COMMANDS.iter().map(|arguments| (arguments.join(" "), succeed(folder, arguments).into_bytes())).collect();

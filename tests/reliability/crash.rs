@@ -1,5 +1,5 @@
-//! Bakes that are killed, that fill the disk, and that run out of memory: what was written is never lost, and the dataset is the one of
-//! an undisturbed bake.
+//! Bakes that are killed, that fill the disk, and that run out of memory: what was written is never lost, and the
+//! dataset is the one of an undisturbed bake.
 //!
 //! `HAPTIZE_KILLS` sets the number of bakes that are killed on each backend.
 

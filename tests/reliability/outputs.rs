@@ -1,5 +1,5 @@
-//! What commands write: never over an input, over a file of another kind, or to what is no regular file; nothing of another run is left
-//! beside it, and what was replaced is told.
+//! What commands write: never over an input, over a file of another kind, or to what is no regular file; nothing of
+//! another run is left beside it, and what was replaced is told.
 
 use crate::program::{OBJECTS, command, message, succeed, write_scene};
 use serde_json::Value;

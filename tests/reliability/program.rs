@@ -42,7 +42,8 @@ pub const OBJECTS: [(&str, &str); 5] = [
     ),
 ];
 
-/// Writes `scene.toml` and its meshes into `folder`: two joints above an object from [`OBJECTS`], of `lines` times `lines` points.
+/// Writes `scene.toml` and its meshes into `folder`: two joints above an object from [`OBJECTS`], of `lines` times
+/// `lines` points.
 pub fn write_scene(folder: &Path, object: &str, lines: usize) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     std::fs::copy(root.join("datasets/cube.obj"), folder.join("cube.obj")).unwrap();
@@ -85,7 +86,8 @@ press = [{{ time = 0.0, q = [0.0, 0.0] }}, {{ time = 0.1, q = [0.004, 0.035] }}]
     )
 }
 
-/// As a Gmsh 2.2 file: a cube of side 0.2 m around the origin: twelve tetrahedra, one on each half of a face, around a node that is not in its middle.
+/// As a Gmsh 2.2 file: a cube of side 0.2 m around the origin: twelve tetrahedra, one on each half of a face, around a
+/// node that is not in its middle.
 pub const BLOCK: &str = "$MeshFormat
 2.2 0 8
 $EndMeshFormat

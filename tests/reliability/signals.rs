@@ -1,4 +1,5 @@
-//! Signals: every command ends within a second, however long what it does takes; nothing half written is left, and `nohup` is honoured.
+//! Signals: every command ends within a second, however long what it does takes; nothing half written is left, and
+//! `nohup` is honoured.
 
 #![cfg(unix)]
 

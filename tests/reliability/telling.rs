@@ -1,5 +1,5 @@
-//! What is said: nothing that a file holds commands a terminal, files that contradict themselves are not called sound, and every message
-//! names the file and a remedy that helps.
+//! What is said: nothing that a file holds commands a terminal, files that contradict themselves are not called sound,
+//! and every message names the file and a remedy that helps.
 
 use crate::program::{OBJECTS, command, message, succeed, write_scene};
 use haptize::dataset::Dataset;
@@ -137,8 +137,8 @@ fn messages_name_the_file_and_what_helps() {
     assert!(said.contains("mesa-vulkan-drivers") && !said.contains("--backend"), "{said}");
 }
 
-/// Options that `said` names and that the command has not of which it is said: that of the last `haptize COMMAND` in the sentence, or
-/// else `command`.
+/// Options that `said` names and that the command has not of which it is said: that of the last `haptize COMMAND` in
+/// the sentence, or else `command`.
 fn foreign_options(helps: &BTreeMap<&str, String>, command: &str, said: &str) -> Vec<String> {
     let (mut foreign, mut of, mut words) = (Vec::new(), command, said.split_whitespace().peekable());
     while let Some(word) = words.next() {

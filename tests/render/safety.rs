@@ -115,11 +115,13 @@ fn gains_beyond_their_bound_are_named_with_the_safe_value() {
     let found = passivity::exceeded(&spec, &field(&spec), &labels(&data.grid));
     let safe: Vec<(f64, f64)> = found.iter().map(|bound| (bound.value, bound.safe)).collect();
     assert_eq!(safe[..2], [(30.0, 20.0), (50.0, 40.0)]);
-    // Layer and object together: sqrt((Ks / safe)^2 + L^2) with the object's own relative stiffness L, which is less than one.
+    // Layer and object together: sqrt((Ks / safe)^2 + L^2) with the object's own relative stiffness L, which is less
+    // than one.
     let &[_, _, (together, 1.0)] = &safe[..] else { panic!("{safe:?}") };
     assert!(together > 50.0 / 40.0 && together < (1.0 + (50.0_f64 / 40.0).powi(2)).sqrt(), "{together}");
     assert!(found[1].to_string().contains("boundary slope Ks of joint joint 1 is 50.0000, beyond the passive 40.0000"));
-    // The values that it names are safe; beside the object's own stiffness, which takes a hundredth of it, a slope a little less.
+    // The values that it names are safe; beside the object's own stiffness, which takes a hundredth of it, a slope a
+    // little less.
     spec.boundary_slope[1] = 0.98 * safe[1].1;
     spec.coupling_stiffness[0] = safe[0].1;
     assert_eq!(passivity::exceeded(&spec, &field(&spec), &labels(&data.grid)), []);

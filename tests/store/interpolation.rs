@@ -20,8 +20,8 @@ const ROUNDING: f64 = 1e-5;
 /// Distance from a border at which both sides are looked at, in steps of the base.
 const BESIDE: f64 = 1e-9;
 
-/// Greatest jump of value and slopes (by steps of the base) of `sample` across random points of the planes between cells of the
-/// finest level.
+/// Greatest jump of value and slopes (by steps of the base) of `sample` across random points of the planes between
+/// cells of the finest level.
 fn greatest_jump(store: &Store, joints: usize, mut sample: impl FnMut(&[f64]) -> Root) -> [f64; 2] {
     let mut random = Random(7);
     let finest = store.space().levels() - 1;
@@ -58,7 +58,8 @@ fn linear_is_continuous_and_potential_smooth_at_every_border_of_blocks_and_level
             for seed in 0..3 {
                 let store = store(joints, levels(joints), order, 0.6, seed, noise(joints, 99 + seed));
                 let [value, slope] = greatest_jump(&store, joints, |q| store.sample(q));
-                // Both sides are 2 BESIDE apart: of functions of order one, whose slopes are hardly over a hundred a step.
+                // Both sides are 2 BESIDE apart: of functions of order one, whose slopes are hardly over a hundred a
+                // step.
                 assert!(value < ROUNDING, "{joints} joints, {order:?}, seed {seed}: value jumps by {value}");
                 assert!(slope < 10.0 * ROUNDING, "{joints} joints, {order:?}, seed {seed}: slopes jump by {slope}");
             }
@@ -138,8 +139,8 @@ fn every_node_is_met_by_value_slopes_and_mixed_derivatives() {
     }
 }
 
-/// Value, slopes and mixed derivatives of a polynomial: products of two different coordinates at most, each to the third power at most
-/// where `cubic`.
+/// Value, slopes and mixed derivatives of a polynomial: products of two different coordinates at most, each to the
+/// third power at most where `cubic`.
 fn polynomial(q: &[f64], cubic: bool) -> Vec<f64> {
     let joints = q.len();
     let f = |x: f64| if cubic { x + 2.0 * x * x - 3.0 * x * x * x } else { x };

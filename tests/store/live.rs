@@ -125,7 +125,8 @@ fn what_arrives_while_it_is_felt_makes_no_jump_and_no_energy_from_nowhere() {
         assert_eq!(answers.by_levels.iter().sum::<u64>(), answers.ticks);
         assert!(contact > 2000 && answers.coarser > 1000 && answers.coarser < answers.ticks, "{contact} {answers:?}");
         changes += answers.changes;
-        // Without the passage the torque would jump by as much, which is far more than any motion changes it by in a tick.
+        // Without the passage the torque would jump by as much, which is far more than any motion changes it by in a
+        // tick.
         assert!(answers.greatest_change > 3.0 * steepest, "{steepest} N m in a tick, {answers:?}");
         assert!(answers.given > 0.0 && answers.taken > 0.0, "{answers:?}");
     }

@@ -1,4 +1,5 @@
-//! Stores filled by the solver: exact at nodes, within their aim where nothing was solved, with fewer nodes than a uniform grid.
+//! Stores filled by the solver: exact at nodes, within their aim where nothing was solved, with fewer nodes than a
+//! uniform grid.
 
 use haptize::{
     JointVector,
@@ -13,8 +14,8 @@ use haptize::{
     },
 };
 
-/// A ball of 6 mm on two joints and a slide, pressed some 8 mm into a sphere with a skin: so deep it has one equilibrium. No node lies on a
-/// plane of symmetry.
+/// A ball of 6 mm on two joints and a slide, pressed some 8 mm into a sphere with a skin: so deep it has one
+/// equilibrium. No node lies on a plane of symmetry.
 const SCENE: &str = r#"
     [object]
     sphere = { radius = 0.05, subdivisions = 3 }

@@ -24,8 +24,8 @@ fn a_failing_backend_leaves_a_part_and_the_earlier_file() {
     assert!(std::fs::read(folder.output()).unwrap() == whole);
 }
 
-/// The device breaks down for good in the third batch of ten; the sweep goes on, and says so in report and file, also when it
-/// is killed later on and resumed.
+/// The device breaks down for good in the third batch of ten; the sweep goes on, and says so in report and file, also
+/// when it is killed later on and resumed.
 #[test]
 fn a_sweep_whose_device_is_lost_goes_on_with_the_cpu() {
     let scene = scene();

@@ -32,7 +32,8 @@ pub fn sweep() -> Sweep<'static> {
     sweep_of(&scene(), "none", "2012-03-04T00:00:00Z")
 }
 
-/// Answers with made-up numbers that depend on the configuration alone, half of them by the CPU; breaks down after some configurations.
+/// Answers with made-up numbers that depend on the configuration alone, half of them by the CPU; breaks down after some
+/// configurations.
 pub struct MadeUp {
     pub solved: usize,
     pub left_to_cpu: usize,

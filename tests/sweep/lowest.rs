@@ -1,4 +1,5 @@
-//! The lowest equilibrium: a ball pressed so deep into a soft sphere that it has several, on a grid over which they change.
+//! The lowest equilibrium: a ball pressed so deep into a soft sphere that it has several, on a grid over which they
+//! change.
 
 use crate::fixture::Folder;
 use haptize::{
@@ -14,8 +15,8 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-/// Two points on two slides, 14 to 20 mm below the top of a sphere of 102 nodes, whose facets they feel; equilibria change every few
-/// millimetres.
+/// Two points on two slides, 14 to 20 mm below the top of a sphere of 102 nodes, whose facets they feel; equilibria
+/// change every few millimetres.
 pub const SCENE: &str = r#"
 name = "deep points"
 [object]

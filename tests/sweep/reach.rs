@@ -39,8 +39,8 @@ fn ranges_and_shares_are_those_of_a_ball_before_a_sphere() {
     let found = reach(0.02).unwrap();
     let [push, lift] = &found.joints[..] else { panic!("{found:?}") };
     assert_eq!((push.name.as_str(), push.unit, push.limits), ("push", "m", [-0.02, 0.05]));
-    // The ball touches once it is pushed at all, and anywhere up to 60 mm off the middle; pushed to the end, it goes 50 mm deep in the middle,
-    // so that 20 mm deep contact is at the sides.
+    // The ball touches once it is pushed at all, and anywhere up to 60 mm off the middle; pushed to the end, it goes 50
+    // mm deep in the middle, so that 20 mm deep contact is at the sides.
     let close = |found: f64, expected: f64| assert!((found - expected).abs() < SLACK, "{found}, not {expected}");
     close(push.range[0], 0.0);
     close(push.range[1], 0.05);
@@ -48,7 +48,8 @@ fn ranges_and_shares_are_those_of_a_ball_before_a_sphere() {
     close(lift.range[1], 0.06);
     close(found.body, 0.1);
     assert!(found.joints.iter().all(|joint| joint.limits[0] <= joint.range[0] && joint.range[1] <= joint.limits[1]));
-    // Contact is where the centre of the ball, at (60 mm - push, lift), is within 60 mm of the middle; integrated over squares.
+    // Contact is where the centre of the ball, at (60 mm - push, lift), is within 60 mm of the middle; integrated over
+    // squares.
     let (mut touching, mut shallow, mut all) = (0, 0, 0);
     for i in 0..700 {
         for k in 0..1000 {
@@ -72,7 +73,8 @@ fn ranges_and_shares_are_those_of_a_ball_before_a_sphere() {
 
 #[test]
 fn depth_sets_the_range_and_no_contact_is_refused() {
-    // Within 10 mm of the middle, contact of depth d ends where the ball's centre, 10 mm off, is 60 mm - d from that of the sphere.
+    // Within 10 mm of the middle, contact of depth d ends where the ball's centre, 10 mm off, is 60 mm - d from that of
+    // the sphere.
     let middle = SCENE.replace("limits = [-0.1, 0.1]", "limits = [-0.01, 0.01]");
     let middle = Scene::parse(&middle, "middle.toml").unwrap();
     for depth in [0.02, 0.002_f64] {

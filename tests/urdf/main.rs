@@ -1,5 +1,5 @@
-//! Arms from URDF: kinematics and inertia against the file's own links, nodes on the links' shapes, scenes that bake, and bad
-//! files refused at their line.
+//! Arms from URDF: kinematics and inertia against the file's own links, nodes on the links' shapes, scenes that bake,
+//! and bad files refused at their line.
 
 // Helpers outside test functions may fail the test too.
 #![allow(clippy::unwrap_used, clippy::panic)]

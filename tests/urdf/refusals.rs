@@ -14,7 +14,8 @@ const PLAIN: &str = r#"<robot name="plain">
 <joint name="grip" type="fixed"><parent link="arm"/><child link="hand"/></joint>
 </robot>"#;
 
-/// Part of the plain robot, what stands there instead, the line that the message must name, and words that it must have.
+/// Part of the plain robot, what stands there instead, the line that the message must name, and words that it must
+/// have.
 const CASES: &[(&str, &str, usize, &[&str])] = &[
     ("</robot>", "", 1, &["not well-formed XML"]),
     (

@@ -58,7 +58,8 @@ fn a_drag_ends_in_contact_and_shows_torque() {
     assert!(window.torque() > 0.05);
 }
 
-/// The scrape begins and ends beyond the grid of the small scene, whose joints reach farther, and comes to its border in contact.
+/// The scrape begins and ends beyond the grid of the small scene, whose joints reach farther, and comes to its border
+/// in contact.
 #[test]
 fn the_window_tells_the_border_of_the_haptized_range_from_free_space_beyond_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -105,7 +106,8 @@ fn keys_press_the_arm_onto_the_object_and_off_it() {
         window.harness.step();
         assert_eq!(window.torque() > 0.05, touches, "{key:?}: {} N m", window.torque());
     }
-    // A key stays down for the time between two frames, not only for the frame; not for ever where no other one is drawn.
+    // A key stays down for the time between two frames, not only for the frame; not for ever where no other one is
+    // drawn.
     let tip = |window: &Window| window.harness.state().tip_in(scene).unwrap();
     let goes_on = |window: &mut Window, seconds: f64| {
         let before = tip(window);

@@ -5,11 +5,11 @@ use eframe::egui::Theme;
 use egui_kittest::{SnapshotOptions, kittest::Queryable};
 use haptize::viewer::Start;
 
-/// Greatest colour distance of a pixel (weighted, squared, in YIQ) that counts as alike, egui's own, and how many others there
-/// may be of the window's 504,000. Measured: none differs at all between processes on one machine, alone or after all other
-/// tests; five do, light and dark, where the rasteriser compiles for a processor of another kind (SSE2 instead of AVX2), on
-/// the rims of curves. Four times that is allowed. What must be told differs in far more, which is tested: a single word that
-/// is missing in 350.
+/// Greatest colour distance of a pixel (weighted, squared, in YIQ) that counts as alike, egui's own, and how many
+/// others there may be of the window's 504,000. Measured: none differs at all between processes on one machine, alone
+/// or after all other tests; five do, light and dark, where the rasteriser compiles for a processor of another kind
+/// (SSE2 instead of AVX2), on the rims of curves. Four times that is allowed. What must be told differs in far more,
+/// which is tested: a single word that is missing in 350.
 const ALIKE: f32 = 0.6;
 const OTHER_PIXELS: usize = 20;
 

@@ -183,8 +183,8 @@ pub fn small_scene() -> String {
     text
 }
 
-/// The sphere's torques as if they had been measured on a real arm and a real object: nothing else is stored, and the scene
-/// tells of no object.
+/// The sphere's torques as if they had been measured on a real arm and a real object: nothing else is stored, and the
+/// scene tells of no object.
 pub fn scanned(folder: &Path) -> PathBuf {
     let mut dataset = Dataset::open(&SPHERE.1).unwrap();
     (dataset.contacts, dataset.surface, dataset.energy, dataset.gap) = (None, None, None, None);

@@ -234,8 +234,8 @@ impl Refine<'_> {
         }
     }
 
-    /// Fills a store for an rms error of `aim` [N m], level by level until `measure` says that it is kept; also the error
-    /// that is expected of it.
+    /// Fills a store for an rms error of `aim` [N m], level by level until `measure` says that it is kept; also the
+    /// error that is expected of it.
     fn round(
         &self,
         book: &mut Nodebook<'_>,

@@ -1,4 +1,5 @@
-//! A stand-in for `libdrd`: one delta device in a simulated hand, its call order recorded. Built by the tests as a shared library.
+//! A stand-in for `libdrd`: one delta device in a simulated hand, its call order recorded. Built by the tests as a
+//! shared library.
 
 #![allow(non_snake_case, clippy::missing_safety_doc)]
 

@@ -1,5 +1,5 @@
-//! A stand-in for `libHD`: a scheduler with a thread of its own, a stack of errors, frames that are checked, and one device in a
-//! simulated hand. Built by the tests as a shared library.
+//! A stand-in for `libHD`: a scheduler with a thread of its own, a stack of errors, frames that are checked, and one
+//! device in a simulated hand. Built by the tests as a shared library.
 
 #![allow(non_snake_case, clippy::missing_safety_doc)]
 

@@ -1,6 +1,8 @@
-//! Coverage of the code under test, where it was compiled with counters: one byte for each block, counted up when the block runs.
+//! Coverage of the code under test, where it was compiled with counters: one byte for each block, counted up when the
+//! block runs.
 //!
-//! `tests/fuzz.sh` compiles it so, with a stable compiler. Otherwise there are no counters, and nothing here does anything.
+//! `tests/fuzz.sh` compiles it so, with a stable compiler. Otherwise there are no counters, and nothing here does
+//! anything.
 
 use std::{
     slice,
@@ -31,8 +33,9 @@ fn counters<'a>() -> &'a mut [u8] {
     if count == 0 {
         return &mut [];
     }
-    // SAFETY: the compiler reserved these bytes for as long as the program runs, and whoever holds [`TURN`] alone looks at them. Threads
-    // that still count meanwhile count as code does that was compiled so, without a lock: that may lose a count, no more.
+    // SAFETY: the compiler reserved these bytes for as long as the program runs, and whoever holds [`TURN`] alone looks
+    // at them. Threads that still count meanwhile count as code does that was compiled so, without a lock: that may
+    // lose a count, no more.
     unsafe { slice::from_raw_parts_mut(first, count) }
 }
 
@@ -52,7 +55,8 @@ impl Coverage {
         Self { seen: vec![0; count], _turn: turn }
     }
 
-    /// Takes what has run since the last call, and returns whether any of it is new: a block, or a magnitude of its count.
+    /// Takes what has run since the last call, and returns whether any of it is new: a block, or a magnitude of its
+    /// count.
     pub fn take(&mut self) -> bool {
         let mut is_new = false;
         for (counters, seen) in counters().chunks_mut(CHUNK).zip(self.seen.chunks_mut(CHUNK)) {

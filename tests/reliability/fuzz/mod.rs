@@ -1,12 +1,12 @@
 //! Fuzzing without a special compiler: every reader gets mutated input, from a fixed seed.
 //!
-//! Each target maps an input to an outcome, which is the kind of error or the success. Inputs with a new outcome join the corpus, so
-//! that mutation goes on from them; `tests/fuzz.sh` compiles the library with counters, and then so do inputs that run new code. An
-//! execution fails if it panics, takes longer than [`LONGEST`], or takes more memory than
+//! Each target maps an input to an outcome, which is the kind of error or the success. Inputs with a new outcome join
+//! the corpus, so that mutation goes on from them; `tests/fuzz.sh` compiles the library with counters, and then so do
+//! inputs that run new code. An execution fails if it panics, takes longer than [`LONGEST`], or takes more memory than
 //! [`MOST_BYTES`]; its input is kept then, and belongs into `corpus/` once the cause is mended.
 //!
-//! `HAPTIZE_FUZZ` sets the number of executions of each target. With `HAPTIZE_FUZZ_BY_KINDS` new code is counted but not followed, to see
-//! what that gains.
+//! `HAPTIZE_FUZZ` sets the number of executions of each target. With `HAPTIZE_FUZZ_BY_KINDS` new code is counted but
+//! not followed, to see what that gains.
 
 mod coverage;
 mod mutate;
@@ -111,7 +111,8 @@ fn execute(target: &Target, file: &Path, input: &[u8]) -> Result<String, Offence
     }
 }
 
-/// What an outcome says without what it quotes from the input: the first words of its first line, behind the file's name.
+/// What an outcome says without what it quotes from the input: the first words of its first line, behind the file's
+/// name.
 fn kind(outcome: &str) -> String {
     let line = outcome.lines().next().unwrap_or_default();
     let said = line.split_once(": ").map_or(line, |(_, said)| said);

@@ -100,7 +100,8 @@ fn heard(protocol: &dyn Protocol, bytes: &[u8]) -> String {
     kinds.join(" ")
 }
 
-/// States of a device as the service sent them: one in full, one of a tick, and one of two devices, one of which says nothing.
+/// States of a device as the service sent them: one in full, one of a tick, and one of two devices, one of which says
+/// nothing.
 const SERVICE: [&str; 3] = [
     r#"{"session_id":15,"session":{"session_id":15,"config":{"profile":{"name":"default"}}},"inverse3":[{"device_id":"04BA","config":
 {"type":"inverse3","device_info":{"major_version":7,"id":"04BA","device_type":4},"handedness":"right","mount":{},"filters":{"force_gate":
