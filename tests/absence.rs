@@ -239,7 +239,7 @@ fn a_frame_without_effects_is_the_papers_to_the_last_bit() {
     let (mut u, mut v, mut f, mut right) = (zero.clone(), zero.clone(), zero.clone(), zero);
     let mut most: f64 = 0.0;
     for ((q, share), nodes) in places.iter().zip(plain.drawn(&places)) {
-        forces.interpolate(q, *share, &mut f);
+        forces.at(q, *share, &mut f);
         object.stiffness.apply(&u, &mut right);
         for (k, right) in right.iter_mut().enumerate() {
             *right = f[k] + (2.0 * object.mass[k] / period) * v[k] - *right;

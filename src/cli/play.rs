@@ -443,11 +443,12 @@ fn exchanged(joules: f64) -> String {
 /// Describes what was felt, for people.
 pub fn describe(text: &mut String, s: &Summary) -> fmt::Result {
     writeln!(text, "{:.2} s, {} ticks, {:.0} % in contact", s.seconds, s.ticks, 100.0 * s.contact_share)?;
-    writeln!(
-        text,
-        "  contact      torque at most {:.4} N m, {} object nodes",
-        s.max_contact_torque, s.max_contact_nodes
-    )?;
+    write!(text, "  contact      torque at most {:.4} N m", s.max_contact_torque)?;
+    // What was measured, and a store, do not say how many nodes of the object are in contact.
+    match s.max_contact_nodes {
+        0 => writeln!(text)?,
+        nodes => writeln!(text, ", {nodes} object nodes")?,
+    }
     writeln!(
         text,
         "  steepest     {:.4} N m in a millisecond on the proxy, {:.4} on the device",

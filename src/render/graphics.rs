@@ -1,33 +1,20 @@
-//! The object as it is drawn: interpolated contact forces move its nodes, frame by frame (section 3.2).
+//! The object as it is drawn: contact forces move its nodes, frame by frame (section 3.2).
 //!
-//! *Forces.* The extended contact force f_ex(q) of a grid point has f_j at its contacting nodes and zero elsewhere.
-//! Between grid points `f_ex_bar(q) = share sum_c w_c f_ex(q_c)`, with the corners and weights of the torque and the
-//! factor that boundary layer and fade put on it, so that what is seen and what is felt stay
-//! `tau_bar = -sum_i J_i^T f`.
+//! *Forces*: see [`ContactForces`].
 //!
 //! *Smoothing*, where the scene names it: f_ex_bar passes a low-pass filter of time constant tau_s,
 //! `f_k = f_{k-1} + (1 - exp(-T/tau_s)) (f_ex_bar - f_{k-1})`. The object is passive towards the filtered forces.
 //!
 //! *Motion*: see [`ObjectMotion`].
 
-pub use super::object_motion::ObjectMotion;
+pub use super::{contact_forces::ContactForces, object_motion::ObjectMotion};
 use crate::{
     dataset::Dataset,
-    field::stencil::{Lattice, LatticeError},
+    field::stencil::LatticeError,
     object::{FactorError, Object},
     scene::GraphicsSpec,
 };
 use glam::DVec3;
-
-/// Contact forces of a dataset, copied out of its file.
-pub struct ContactForces {
-    lattice: Lattice,
-    /// One more than there are grid points.
-    offsets: Vec<usize>,
-    nodes: Vec<u32>,
-    /// [N]
-    forces: Vec<[f32; 3]>,
-}
 
 /// The object cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -51,47 +38,12 @@ pub enum GraphicsError {
     /// The system has no threads for the frames of a large object.
     #[error("no threads can be had for the object's frames: {0}")]
     Threads(String),
+    /// No equilibrium can be solved for the forces.
+    #[error("contact cannot be solved for what is drawn: {0}")]
+    Solved(String),
     /// The object's matrix cannot be factorised.
     #[error(transparent)]
     Factor(#[from] FactorError),
-}
-
-impl ContactForces {
-    /// The contact forces of `dataset` on an object of `nodes` nodes.
-    ///
-    /// # Errors
-    /// When there are none, or they do not fit.
-    pub fn new(dataset: &Dataset, nodes: usize) -> Result<Self, GraphicsError> {
-        let lattice = Lattice::new(&dataset.grid)?;
-        let contacts = dataset.contacts.as_ref().ok_or(GraphicsError::NoForces)?;
-        let count = contacts.nodes.len();
-        let offsets: Vec<usize> = contacts.offsets.iter().map(|&o| usize::try_from(o).unwrap_or(usize::MAX)).collect();
-        let fits = offsets.len() == lattice.points() + 1
-            && offsets.is_sorted()
-            && offsets.last() == Some(&count)
-            && contacts.forces.len() == 3 * count
-            && contacts.nodes.iter().all(|&node| (node as usize) < nodes)
-            && contacts.forces.iter().all(|f| f.is_finite());
-        if !fits {
-            return Err(GraphicsError::Rows { nodes });
-        }
-        let forces = contacts.forces.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
-        Ok(Self { lattice, offsets, nodes: contacts.nodes.to_vec(), forces })
-    }
-
-    /// Writes f_ex_bar at `q`, times `share`, to `forces`, one entry per node of the object [N].
-    pub fn interpolate(&self, q: &[f64], share: f64, forces: &mut [DVec3]) {
-        forces.fill(DVec3::ZERO);
-        for (point, weight) in self.lattice.locate(q).corners() {
-            let scale = share * weight;
-            if scale > 0.0 {
-                let row = self.offsets[point]..self.offsets[point + 1];
-                for (&node, force) in self.nodes[row.clone()].iter().zip(&self.forces[row]) {
-                    forces[node as usize] += scale * DVec3::from(force.map(f64::from));
-                }
-            }
-        }
-    }
 }
 
 /// A low-pass filter on the contact forces.
@@ -142,7 +94,7 @@ impl<'object> Graphics<'object> {
 
     /// One frame with the proxy at `q`, where the field puts `share` on the dataset's torque; zero out of contact.
     pub fn frame(&mut self, q: &[f64], share: f64) {
-        self.contact.interpolate(q, share, &mut self.forces);
+        self.contact.at(q, share, &mut self.forces);
         let forces = match &mut self.smoothing {
             Some(smoothing) => smoothing.toward(&self.forces),
             None => &self.forces,

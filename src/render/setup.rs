@@ -3,7 +3,7 @@
 
 use super::{
     effects::{ContactEffects, EffectError},
-    graphics::{Graphics, GraphicsError},
+    graphics::{ContactForces, Graphics, GraphicsError},
     haptic::{Haptics, JointsError},
     npmi::{InertiaError, Npmi},
     own_motion,
@@ -114,8 +114,8 @@ impl Setup {
         // From here on the gains are as any others.
         scene.haptics = HapticsSpec { proxy_damping_is_free: false, ..gains };
         let exceeded = bounds.iter().filter(|bound| bound.is_exceeded()).cloned().collect();
-        let object = match (&scene.object, &scene.graphics, &dataset.contacts, &dataset.surface) {
-            (Some(object), Some(_), Some(_), Some(surface)) => Some(surface.object(object)?),
+        let object = match (&scene.object, &scene.graphics, &dataset.surface) {
+            (Some(object), Some(_), Some(surface)) if ContactForces::known(dataset) => Some(surface.object(object)?),
             _ => match scene.graphics.and_then(|graphics| graphics.effects.named()) {
                 Some(effect) => return Err(SetupError::NothingDrawn(effect)),
                 None => None,

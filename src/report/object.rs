@@ -67,7 +67,7 @@ pub fn instants(dataset: &Dataset, chain: &Chain, trace: &Trace, count: usize) -
     let chosen = (0..count).filter_map(|k| frames.get(first + k * (last - first) / count.saturating_sub(1).max(1)));
     let mut pose = chain.new_pose();
     let nodes = frames.iter().map(|frame| frame.nodes.len()).max().unwrap_or(0);
-    let all = dataset.contacts.is_some().then(|| ContactForces::new(dataset, nodes)).transpose();
+    let all = ContactForces::known(dataset).then(|| ContactForces::new(dataset, nodes)).transpose();
     let all = all.map_err(|error| refused(error.to_string()))?;
     chosen
         .map(|frame| {
@@ -77,11 +77,15 @@ pub fn instants(dataset: &Dataset, chain: &Chain, trace: &Trace, count: usize) -
             chain.pose(&frame.proxy, &mut pose);
             let mut forces = vec![DVec3::ZERO; nodes];
             if let (Some(all), true) = (&all, touching(frame)) {
-                all.interpolate(&frame.proxy, 1.0, &mut forces);
+                all.at(&frame.proxy, 1.0, &mut forces);
             }
             let acting = forces.into_iter().enumerate().filter(|(_, force)| *force != DVec3::ZERO);
-            let forces = acting.map(|(node, force)| NodeForce { node: node as u32, force }).collect();
-            let contact_nodes = tick(frame).map_or(0, |tick| tick.contact_nodes);
+            let forces: Vec<_> = acting.map(|(node, force)| NodeForce { node: node as u32, force }).collect();
+            // A store does not say how many nodes are in contact.
+            let contact_nodes = match tick(frame).map_or(0, |tick| tick.contact_nodes) {
+                0 => forces.len() as u32,
+                stored => stored,
+            };
             Ok(Instant { time: frame.time, nodes: frame.nodes.clone(), forces, contact_nodes, pose: pose.clone() })
         })
         .collect()

@@ -74,7 +74,7 @@ impl Nodes {
     /// # Errors
     /// When the device fails.
     pub fn advance(&mut self, latest: &Latest, elapsed: f64) -> Result<(), GpuError> {
-        self.contact.interpolate(&latest.proxy, latest.share, &mut self.forces);
+        self.contact.at(&latest.proxy, latest.share, &mut self.forces);
         self.owed += elapsed;
         let due = (self.owed / self.period).floor();
         self.owed -= due * self.period;
@@ -143,11 +143,11 @@ fn extremes(loaded: &Loaded) -> [f64; 2] {
     });
     let shown = deepest(&mut instants.filter_map(|q| dataset.grid.nearest(&q)));
     let deepest = shown.or_else(|| deepest(&mut (0..dataset.grid.points())));
-    let (Some(object), Some(point)) = (&loaded.setup.object, deepest) else { return [0.0; 2] };
+    let (Some(object), Some(forces), Some(point)) = (&loaded.setup.object, &loaded.forces, deepest) else {
+        return [0.0; 2];
+    };
     let mut displacement = vec![DVec3::ZERO; object.rest.len()];
-    for contact in dataset.forces(point) {
-        displacement[contact.node as usize] = contact.force;
-    }
+    forces.at(&dataset.grid.configuration(point), 1.0, &mut displacement);
     let size = |vectors: &[DVec3]| vectors.iter().map(|vector| vector.length()).fold(0.0, f64::max);
     let force = size(&displacement);
     // K was proven positive definite when the object was built; where memory lacks, nothing is coloured.

@@ -74,7 +74,7 @@ impl Loaded {
         Ok((Arc::new(haptics), advice))
     }
 
-    /// Whether the dataset holds which nodes of the object are in contact. What was measured on a real object does not.
+    /// Whether the dataset knows which nodes of the object are in contact. What was measured on a real object does not.
     #[must_use]
     pub fn knows_nodes(&self) -> bool {
         self.dataset.contacts.is_some()

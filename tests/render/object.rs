@@ -94,12 +94,12 @@ fn pushed() -> Dataset {
 fn contact_forces_are_interpolated_over_the_nodes_of_all_corners() {
     let contact = ContactForces::new(&pushed(), 102).unwrap();
     let mut forces = vec![DVec3::ONE; 102];
-    contact.interpolate(&[0.25], 0.5, &mut forces);
+    contact.at(&[0.25], 0.5, &mut forces);
     // Three quarters of the point at 0.2 rad and a quarter of that at 0.4 rad, times the share.
     assert!((forces[3] - DVec3::new(0.0, 0.0, -0.625)).length() < 1e-12, "{}", forces[3]);
     assert!((forces[7] - DVec3::new(0.125, 0.0, 0.0)).length() < 1e-12, "{}", forces[7]);
     assert_eq!(forces.iter().filter(|f| **f != DVec3::ZERO).count(), 2);
-    contact.interpolate(&[0.25], 0.0, &mut forces);
+    contact.at(&[0.25], 0.0, &mut forces);
     assert!(forces.iter().all(|f| *f == DVec3::ZERO));
 }
 

@@ -64,7 +64,7 @@ pub(super) fn graphics(
     };
     let none = vec![DVec3::ZERO; object.rest.len()];
     let mut forces = none.clone();
-    ContactForces::new(own, none.len())?.interpolate(&own.grid.configuration(deepest(own)), 1.0, &mut forces);
+    ContactForces::new(own, none.len())?.at(&own.grid.configuration(deepest(own)), 1.0, &mut forces);
     let push = Push { object, effects: graphics.effects, rate: graphics.rate, forces, none };
     frames(&push, study)?;
     if let Err(error) = iterations(&push, study) {

@@ -316,7 +316,7 @@ impl Body {
     /// A frame for each of `places`, and a wait for the last.
     fn play(&mut self, places: &[(JointVector, f64)]) -> Result<(), FrameError> {
         for (q, share) in places {
-            self.contact.interpolate(q, *share, &mut self.forces);
+            self.contact.at(q, *share, &mut self.forces);
             let forces = match &mut self.smoothing {
                 Some(smoothing) => smoothing.toward(&self.forces),
                 None => &self.forces,
