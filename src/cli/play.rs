@@ -3,7 +3,7 @@
 use super::{
     Failure, Report, interrupt,
     keyboard::Keyboard,
-    on_demand::{self, Explored, OnDemand},
+    on_demand::{self, Explored, Exploring},
     output::{self, Earlier, Folder, Kind as FileKind},
     playback_report::PlaybackReport,
     tell,
@@ -99,10 +99,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let folder = folder(arguments);
     let Outputs { filled, recorded, explored } = Outputs::check(arguments, &folder)?;
     let kept = arguments.on_demand.as_ref();
-    let open = |file: &PathBuf| OnDemand::open(&arguments.dataset, file, arguments.choices);
-    let on_demand = kept.map(open).transpose()?;
-    let mut dataset = match &on_demand {
-        Some(on_demand) => on_demand.dataset(),
+    let exploring = kept.map(|file| arguments.choices.open(&arguments.dataset, file)).transpose()?;
+    let mut dataset = match &exploring {
+        Some(exploring) => exploring.on_demand.dataset(),
         None => load(&arguments.dataset)?,
     };
     let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
@@ -111,11 +110,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     let (played, told) = match &arguments.replay {
         Some(file) => replay(&setup, &dataset, file)?,
-        None => (perform(&setup, &dataset, arguments, on_demand.as_ref())?, None),
+        None => (perform(&setup, &dataset, arguments, exploring.as_ref())?, None),
     };
-    if let (Some(file), Some(on_demand)) = (kept, &on_demand) {
+    if let (Some(file), Some(exploring)) = (kept, &exploring) {
         // With what was solved meanwhile.
-        dataset = on_demand.dataset();
+        dataset = exploring.on_demand.dataset();
         dataset.save(file.as_path())?;
     }
     if let Some(timing) = &played.timing {
@@ -207,7 +206,7 @@ fn perform(
     setup: &Setup,
     dataset: &Dataset,
     arguments: &Arguments,
-    on_demand: Option<&OnDemand>,
+    exploring: Option<&Exploring>,
 ) -> Result<Played, Failure> {
     let motion = motion(setup, &arguments.motion)?;
     let seconds = arguments.seconds.unwrap_or_else(|| motion.duration());
@@ -215,13 +214,17 @@ fn perform(
         return Err(format!("cannot play {seconds} s: give --seconds between 0 and {LONGEST}").into());
     }
     if let Some(address) = &arguments.device {
-        let how = How { seconds, hold_key: arguments.hold_key, on_demand };
+        let how = How { seconds, hold_key: arguments.hold_key, exploring };
         return drive(setup, dataset, address, motion, how);
     }
     let mut device: Box<dyn Device> =
         if arguments.exact { Box::new(Recorded::new(motion)) } else { Box::new(setup.hand(motion)?) };
-    match on_demand {
-        Some(on_demand) => on_demand.play(setup, device.as_mut(), &setup.plan(dataset, seconds, 0)),
+    match exploring {
+        Some(exploring) => {
+            let mut graphics = setup.graphics(dataset)?;
+            let plan = setup.plan(dataset, seconds, SNAPSHOTS);
+            exploring.play(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan)
+        }
         None => play(setup, dataset, device.as_mut(), seconds, arguments.realtime),
     }
 }
@@ -231,12 +234,12 @@ struct How<'a> {
     /// Duration [s].
     seconds: f64,
     hold_key: bool,
-    on_demand: Option<&'a OnDemand>,
+    exploring: Option<&'a Exploring>,
 }
 
 /// Feels the dataset with the device at `address`, until Ctrl-C at the latest. The simulated one is led along `motion`.
 fn drive(setup: &Setup, dataset: &Dataset, address: &Address, motion: Motion, how: How<'_>) -> Result<Played, Failure> {
-    let How { seconds, hold_key, on_demand } = how;
+    let How { seconds, hold_key, exploring } = how;
     let hand = if address.kind == Kind::Simulated { Some(setup.hand(motion)?) } else { None };
     let (key, input) = Key::new();
     let _keyboard = if hold_key { Some(Keyboard::start(input)?) } else { None };
@@ -254,8 +257,8 @@ fn drive(setup: &Setup, dataset: &Dataset, address: &Address, motion: Motion, ho
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
     // Last of all: the motors go on.
     let mut device = attach(guard, address, setup.chain.clone(), &setup.scene)?;
-    let played = match on_demand {
-        Some(on_demand) => on_demand.play(setup, device.as_mut(), &plan),
+    let played = match exploring {
+        Some(exploring) => exploring.play(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan),
         None => realtime::run(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, stop)
             .map(|(trace, timing)| Played { trace, timing: Some(timing), explored: None })
             .map_err(Failure::from),

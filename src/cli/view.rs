@@ -1,6 +1,6 @@
 //! `haptize view`: the window, or one picture of it.
 
-use super::{Failure, Report};
+use super::{Failure, Report, on_demand::Choices};
 use crate::device::Address;
 use std::path::PathBuf;
 
@@ -12,6 +12,7 @@ Examples:
   haptize view                           the sphere of the demo
   haptize view sphere.haptize
   haptize view touch.haptize --device touch --hold-key
+  haptize view datasets/organ.toml --on-demand organ.haptize
   haptize view sphere.haptize --screenshot window.png --motion scrape --time 2.5 --dark",
     adapter_help!()
 ))]
@@ -24,6 +25,12 @@ pub struct Arguments {
     /// Torque only while the space bar is held in the window (a dead-man key).
     #[arg(long, requires = "device")]
     hold_key: bool,
+    /// Bake nothing: solve contact ahead of the motion while it is felt, and keep what was explored in this file when
+    /// the window is closed. Of an earlier session of the same scene, it is where this one goes on.
+    #[arg(long, value_name = "FILE", requires = "file", conflicts_with = "screenshot")]
+    on_demand: Option<PathBuf>,
+    #[command(flatten)]
+    choices: Choices,
     /// Write the window to this PNG file instead of opening it: needs no display, but some Vulkan, software too.
     #[arg(long, value_name = "PNG")]
     screenshot: Option<PathBuf>,
@@ -44,6 +51,10 @@ pub struct Arguments {
 /// Greatest side of a picture [points].
 const GREATEST: f32 = 4000.0;
 
+/// How often a session on demand looks for a signal.
+#[cfg(feature = "viewer")]
+const LOOK: std::time::Duration = std::time::Duration::from_millis(50);
+
 fn size(text: &str) -> Result<[f32; 2], String> {
     let sides = text.split_once('x').and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]));
     let within = |sides: &[f32; 2]| sides.iter().all(|side| (0.0..=GREATEST).contains(side));
@@ -55,10 +66,13 @@ fn size(text: &str) -> Result<[f32; 2], String> {
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     use super::output::{self, Kind};
     use crate::viewer::{self, DeviceChoice, Picture, Start};
+    let device = arguments.device.clone().map(|address| DeviceChoice { address, hold_key: arguments.hold_key });
+    if let (Some(scene), Some(kept)) = (&arguments.file, &arguments.on_demand) {
+        return explore(scene, kept, arguments.choices, device);
+    }
     let start = arguments.file.clone().map_or(Start::Sphere, Start::File);
     let Some(file) = &arguments.screenshot else {
-        let device = arguments.device.clone();
-        viewer::open(start, device.map(|address| DeviceChoice { address, hold_key: arguments.hold_key }))?;
+        viewer::open(start, device)?;
         return Ok(Report { text: String::new(), json: serde_json::json!({}), whole: true });
     };
     if !file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
@@ -84,6 +98,56 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     viewer::screenshot(&start, &picture, file)?;
     let (mut text, mut json) =
         (format!("wrote {}\n", file.display()), serde_json::json!({ "file": file.display().to_string() }));
+    earlier.tell(&mut text, &mut json);
+    Ok(Report { text, json, whole: true })
+}
+
+/// Opens the window on a scene whose contact is solved while it is felt, and keeps what was explored, however the window
+/// ends, by a signal, too.
+#[cfg(feature = "viewer")]
+fn explore(
+    scene: &std::path::Path,
+    kept: &std::path::Path,
+    choices: Choices,
+    device: Option<crate::viewer::DeviceChoice>,
+) -> Result<Report, Failure> {
+    use super::{
+        interrupt,
+        output::{self, Kind},
+        tell,
+    };
+    use crate::viewer::{self, Start};
+    use std::{
+        sync::{
+            Arc,
+            atomic::{AtomicBool, Ordering},
+        },
+        thread,
+    };
+    let earlier = output::check(kept, Kind::Dataset, Some(scene))?;
+    let on_demand = choices.open(scene, kept)?.on_demand;
+    let (closed, stop) = (AtomicBool::new(false), interrupt::stop_flag());
+    let shown = thread::scope(|scope| {
+        scope.spawn(|| {
+            while !closed.load(Ordering::Acquire) {
+                if stop.load(Ordering::Relaxed) {
+                    // The program ends soon, as by any signal.
+                    let saved = on_demand.dataset().save(kept);
+                    let what = saved.map_or_else(|error| error.to_string(), |()| format!("kept in {}", kept.display()));
+                    return tell(format_args!("haptize: {} blocks explored, {what}", on_demand.blocks()));
+                }
+                thread::sleep(LOOK);
+            }
+        });
+        let shown = viewer::open(Start::OnDemand(Arc::clone(&on_demand)), device);
+        closed.store(true, Ordering::Release);
+        shown
+    });
+    interrupt::over();
+    on_demand.dataset().save(kept)?;
+    shown?;
+    let mut text = format!("{} blocks explored, kept in {}\n", on_demand.blocks(), kept.display());
+    let mut json = serde_json::json!({ "blocks": on_demand.blocks(), "file": kept.display().to_string() });
     earlier.tell(&mut text, &mut json);
     Ok(Report { text, json, whole: true })
 }

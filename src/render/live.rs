@@ -40,6 +40,7 @@ pub struct Live {
     last: Option<Felt>,
     passage: Passage,
     answers: Answers,
+    published: triple_buffer::Input<Answers>,
 }
 
 /// The other ends of a [`Live`].
@@ -48,6 +49,8 @@ pub struct LiveEnds {
     pub whereabouts: Vec<triple_buffer::Output<Whereabouts>>,
     /// Equilibria at the proxy.
     pub solutions: Option<triple_buffer::Input<Solution>>,
+    /// What answered the ticks so far.
+    pub answers: triple_buffer::Output<Answers>,
 }
 
 /// Count of answers by source.
@@ -133,6 +136,7 @@ impl Live {
         let ends = || triple_buffer::triple_buffer(&Whereabouts::at_rest(start));
         let (inputs, outputs) = (0..threads + usize::from(direct)).map(|_| ends()).unzip();
         let (written, read) = triple_buffer::triple_buffer(&Solution::none(joints));
+        let (published, answers) = triple_buffer::triple_buffer(&Answers::default());
         let live = Self {
             wanted: levels,
             levers: *levers,
@@ -142,8 +146,9 @@ impl Live {
             last: None,
             passage: Passage::new(joints),
             answers: Answers::default(),
+            published,
         };
-        (live, LiveEnds { whereabouts: outputs, solutions: direct.then_some(written) })
+        (live, LiveEnds { whereabouts: outputs, solutions: direct.then_some(written), answers })
     }
 
     /// Returns the count of answers so far.
@@ -198,6 +203,7 @@ impl Live {
         self.tick += 1;
         let whereabouts = Whereabouts { position: *position, velocity: *velocity, tick: self.tick };
         self.whereabouts.iter_mut().for_each(|end| end.write(whereabouts));
+        self.published.write(self.answers);
     }
 }
 

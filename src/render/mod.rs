@@ -14,6 +14,7 @@ pub mod live;
 pub mod mcap;
 pub mod npmi;
 pub mod object_motion;
+pub mod on_demand;
 mod own_motion;
 mod passage;
 pub mod passivity;

@@ -9,7 +9,7 @@ use super::{
     clock,
     graphics::Graphics,
     haptic::Haptics,
-    live::{Answers, Live},
+    live::Live,
     session::{Driver, Frames, Latest, Plan, SessionError},
     steal::{LateTick, StealObserver},
     timing::{Durations, Percentiles, Timing},
@@ -222,10 +222,10 @@ pub fn run(
     plan: &Plan,
     stop: &AtomicBool,
 ) -> Result<(Trace, Timing), SessionError> {
-    run_live(haptics, device, graphics, plan, stop, None).map(|(trace, timing, _)| (trace, timing))
+    run_live(haptics, device, graphics, plan, stop, None)
 }
 
-/// The same over contact that is solved meanwhile, if it is `live`; also what answered.
+/// The same over contact that is solved meanwhile, if it is `live`.
 ///
 /// # Errors
 /// As for [`run`].
@@ -236,7 +236,7 @@ pub fn run_live(
     plan: &Plan,
     stop: &AtomicBool,
     live: Option<Live>,
-) -> Result<(Trace, Timing, Option<Answers>), SessionError> {
+) -> Result<(Trace, Timing), SessionError> {
     let scheduler = device.scheduler();
     let (body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device)?;
     let mut body = body.with_live(live);
@@ -257,8 +257,7 @@ pub fn run_live(
         let feeling = thread::Builder::new().name("haptic".into()).spawn_scoped(scope, move || {
             let goes_on = |body: &HapticLoop<'_>| !body.is_over(plan.ticks) && !stop.load(Ordering::Relaxed);
             let refused = body.pace(scheduler, goes_on);
-            let answers = body.driver.live().map(|live| *live.answers());
-            (refused, body.lateness, body.cost, body.missed, body.unrecorded, answers)
+            (refused, body.lateness, body.cost, body.missed, body.unrecorded)
         });
         let feeling = match feeling {
             Ok(thread) => thread,
@@ -286,7 +285,7 @@ pub fn run_live(
         let felt = feeling.join().map_err(|_| SessionError::Thread("haptic"))?;
         let drawn = drawing.map(|thread| thread.join().map_err(|_| SessionError::Thread("graphics"))).transpose()?;
         clock::unlock_memory();
-        let (refused, lateness, cost, missed_deadlines, unrecorded, answers) = felt;
+        let (refused, lateness, cost, missed_deadlines, unrecorded) = felt;
         let Drawn { frames, shown, cost: frame_cost, missed: missed_frames } = drawn.unwrap_or_default();
         let timing = Timing {
             refused,
@@ -299,7 +298,7 @@ pub fn run_live(
             steal: observer.finish(),
             unrecorded,
         };
-        Ok((Trace { joints: plan.joints.clone(), start, ticks: recorded, frames, shown }, timing, answers))
+        Ok((Trace { joints: plan.joints.clone(), start, ticks: recorded, frames, shown }, timing))
     })
 }
 

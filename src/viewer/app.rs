@@ -14,7 +14,7 @@ use super::{
 use crate::{
     JointVector,
     gpu::{ADAPTER_VARIABLE, Context, GpuError},
-    render::timing::Timing,
+    render::{on_demand::OnDemand, timing::Timing},
     scene::Scene,
 };
 use eframe::{egui, egui_wgpu::RenderState};
@@ -25,12 +25,14 @@ use std::{
 };
 
 /// The scene or file that is opened first.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub enum Start {
     /// The paper's sphere, baked.
     Sphere,
     /// A scene or a dataset.
     File(PathBuf),
+    /// A scene that is solved while it is felt.
+    OnDemand(Arc<OnDemand>),
 }
 
 impl Start {
@@ -199,6 +201,7 @@ impl Viewer {
                 Err(error) => self.error = Some(error.to_string()),
             },
             Start::File(path) => self.open_file(path, egui),
+            Start::OnDemand(on_demand) => self.begin(Task::OnDemand(Arc::clone(on_demand)), egui),
         }
     }
 
@@ -327,6 +330,7 @@ impl Viewer {
             let egui = egui.clone();
             move || egui.request_repaint()
         };
+        session.show_explored(wake());
         let redrawn = self.scene.follow(&session.loaded, &session.controls.tuning.graphics, wake()).map_err(not_drawn);
         self.error = redrawn.and_then(|()| session.follow(wake())).err().or(self.error.take());
         session.feel.step((elapsed / session.loaded.setup.haptics.period()).round() as usize);

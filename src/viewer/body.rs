@@ -2,6 +2,7 @@
 
 use super::{loaded::Loaded, view_renderer::Surface};
 use crate::{
+    JointVector,
     contact::Status,
     gpu::{Context, FrameError, FrameMethod, FrameUpdate, GpuError},
     object::Factor,
@@ -126,28 +127,13 @@ impl Body {
 /// Instants of a motion that are looked at for [`Body::extremes`].
 const INSTANTS: usize = 50;
 
-/// Returns [`Body::extremes`]: those at the grid point with the most energy, or with the largest torque.
+/// Returns [`Body::extremes`]: those where most is pressed.
 fn extremes(loaded: &Loaded) -> [f64; 2] {
-    let dataset = &loaded.dataset;
-    let weight = |point: usize| match &dataset.energy {
-        Some(energy) => energy[point],
-        None => dataset.torque(point).iter().map(|tau| tau * tau).sum(),
-    };
-    let deepest = |points: &mut dyn Iterator<Item = usize>| {
-        let converged = points.filter(|&point| dataset.status(point) == Status::Contact);
-        converged.max_by(|&a, &b| weight(a).total_cmp(&weight(b)))
-    };
-    let motions = loaded.motions();
-    let instants = motions.iter().flat_map(|(_, motion)| {
-        (0..INSTANTS).map(|k| motion.at(motion.duration() * k as f64 / (INSTANTS - 1) as f64).0)
-    });
-    let shown = deepest(&mut instants.filter_map(|q| dataset.grid.nearest(&q)));
-    let deepest = shown.or_else(|| deepest(&mut (0..dataset.grid.points())));
-    let (Some(object), Some(forces), Some(point)) = (&loaded.setup.object, &loaded.forces, deepest) else {
+    let (Some(object), Some(forces), Some(q)) = (&loaded.setup.object, &loaded.forces, deepest(loaded)) else {
         return [0.0; 2];
     };
     let mut displacement = vec![DVec3::ZERO; object.rest.len()];
-    forces.at(&dataset.grid.configuration(point), 1.0, &mut displacement);
+    forces.at(&q, 1.0, &mut displacement);
     let size = |vectors: &[DVec3]| vectors.iter().map(|vector| vector.length()).fold(0.0, f64::max);
     let force = size(&displacement);
     // K was proven positive definite when the object was built; where memory lacks, nothing is coloured.
@@ -156,4 +142,32 @@ fn extremes(loaded: &Loaded) -> [f64; 2] {
         Err(_) => displacement.fill(DVec3::ZERO),
     }
     [size(&displacement), force]
+}
+
+/// The configuration of the motions, or else of the whole dataset, at which the energy is greatest, or the torque. Where
+/// a dataset is only being made, that with the greatest forces.
+fn deepest(loaded: &Loaded) -> Option<JointVector> {
+    let dataset = &loaded.dataset;
+    let motions = loaded.motions();
+    let instants = motions.iter().flat_map(|(_, motion)| {
+        (0..INSTANTS).map(|k| motion.at(motion.duration() * k as f64 / (INSTANTS - 1) as f64).0)
+    });
+    if let (Some(_), Some(forces), Some(object)) = (&loaded.on_demand, &loaded.forces, &loaded.setup.object) {
+        let mut acting = vec![DVec3::ZERO; object.rest.len()];
+        let mut total = |q: &JointVector| {
+            forces.at(q, 1.0, &mut acting);
+            acting.iter().map(|force| force.length()).sum::<f64>()
+        };
+        return instants.map(|q| (total(&q), q)).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, q)| q);
+    }
+    let weight = |point: usize| match &dataset.energy {
+        Some(energy) => energy[point],
+        None => dataset.torque(point).iter().map(|tau| tau * tau).sum(),
+    };
+    let deepest = |points: &mut dyn Iterator<Item = usize>| {
+        let converged = points.filter(|&point| dataset.status(point) == Status::Contact);
+        converged.max_by(|&a, &b| weight(a).total_cmp(&weight(b)))
+    };
+    let shown = deepest(&mut instants.filter_map(|q| dataset.grid.nearest(&q)));
+    shown.or_else(|| deepest(&mut (0..dataset.grid.points()))).map(|point| dataset.grid.configuration(point))
 }

@@ -184,7 +184,11 @@ impl Controls {
     fn haptization(&mut self, ui: &mut Ui, loaded: &Loaded, solvers: &[Solver]) -> bool {
         let provenance = &loaded.dataset.provenance;
         let by = if provenance.adapter.is_empty() { &provenance.backend } else { &provenance.adapter };
-        note(ui, format!("{} points, {} on {by}", loaded.dataset.grid.points(), provenance.algorithm));
+        let points = match &loaded.on_demand {
+            Some(_) => "solved while it is felt".into(),
+            None => format!("{} points", loaded.dataset.grid.points()),
+        };
+        note(ui, format!("{points}, {} on {by}", provenance.algorithm));
         if let Some(error) = provenance.error.as_ref().and_then(|error| error.lines().into_iter().next()) {
             note(ui, format!("error: {error}"));
         }

@@ -11,6 +11,8 @@ use crate::{
     device::{Applied, Device, Pointer, PointerInput, Reading, Scheduler},
     render::{
         haptic::Haptics,
+        live::{Answers, Live},
+        on_demand::{Exploration, OnDemand},
         realtime::{ClearFault, Ends, HapticLoop},
         session::{Driver, Latest},
         trace::Tick,
@@ -49,6 +51,7 @@ pub struct Feel {
     refused: mpsc::Receiver<Vec<String>>,
     returned: mpsc::Receiver<Box<dyn Device>>,
     threads: Vec<JoinHandle<()>>,
+    exploration: Option<Exploration>,
 }
 
 /// How often the hand's goal is moved.
@@ -65,6 +68,8 @@ const RING: usize = 1 << 14;
 struct Body {
     haptics: Arc<Haptics>,
     device: Timed,
+    /// The contact that is solved meanwhile.
+    live: Option<Live>,
     stop: Arc<AtomicBool>,
     /// Whether the device is the simulated one that is led, which may wait a little longer.
     is_led: bool,
@@ -76,7 +81,8 @@ struct Body {
 type Seen = (rtrb::Consumer<Tick>, triple_buffer::Output<Latest>, Option<ClearFault>);
 
 impl Feel {
-    /// Starts the loop with `device`; without one, with a simulated one that is held where `guide` leads it.
+    /// Starts the loop with `device`; without one, with a simulated one that is held where `guide` leads it. Contact is
+    /// solved meanwhile where it is `on_demand`.
     ///
     /// # Errors
     /// In words, when device and loop do not fit or the system gives no threads.
@@ -86,8 +92,9 @@ impl Feel {
         guide: Guide,
         pace: TickSource,
         device: Option<Box<dyn Device>>,
+        on_demand: Option<&Arc<OnDemand>>,
     ) -> Result<Self, String> {
-        let (device, input): (Box<dyn Device>, _) = match device {
+        let (mut device, input): (Box<dyn Device>, _) = match device {
             Some(device) => (device, None),
             None => {
                 let (pointer, input) = Pointer::new(gains, &guide.goal()).map_err(|error| error.to_string())?;
@@ -95,12 +102,14 @@ impl Feel {
             }
         };
         let is_led = input.is_some();
+        let explored = on_demand.map(|on_demand| explore(on_demand, &haptics, device.as_mut())).transpose()?;
+        let (live, exploration) = explored.unzip();
         let guide = Arc::new(Mutex::new(guide));
         let stop = Arc::new(AtomicBool::new(false));
         let (cost, costs) = rtrb::RingBuffer::new(RING);
         let device = Timed { device, read: Instant::now(), cost };
         let (give_back, returned) = mpsc::channel();
-        let body = Body { haptics, device, stop: Arc::clone(&stop), is_led, give_back };
+        let body = Body { haptics, device, live, stop: Arc::clone(&stop), is_led, give_back };
         let (report, began) = mpsc::channel();
         let (refuse, refused) = mpsc::channel();
         let (acknowledge, stepped) = mpsc::channel();
@@ -123,7 +132,7 @@ impl Feel {
         };
         let ended = "the haptic thread ended before its first tick; start haptize again".to_owned();
         let (ticks, latest, clear) = began.recv().map_err(|_| ended)??;
-        Ok(Self { guide, ticks, costs, latest, clear, stop, steps, stepped, refused, returned, threads })
+        Ok(Self { guide, ticks, costs, latest, clear, stop, steps, stepped, refused, returned, threads, exploration })
     }
 
     /// Ends the loop and gives back the device, without torque; none where its thread ended before.
@@ -174,6 +183,11 @@ impl Feel {
         *self.latest.read()
     }
 
+    /// What answered the ticks so far, where contact is solved meanwhile.
+    pub fn answers(&mut self) -> Option<Answers> {
+        self.exploration.as_mut().map(Exploration::answers)
+    }
+
     /// Returns the requests of the haptic thread that the system refused, once.
     #[must_use]
     pub fn refused(&self) -> Option<Vec<String>> {
@@ -185,6 +199,16 @@ impl Drop for Feel {
     fn drop(&mut self) {
         self.end();
     }
+}
+
+/// Begins to solve where `device` has the proxy start.
+fn explore(
+    on_demand: &Arc<OnDemand>,
+    haptics: &Haptics,
+    device: &mut dyn Device,
+) -> Result<(Live, Exploration), String> {
+    let start = haptics.start(&device.read(0.0).position).map_err(|fault| fault.to_string())?;
+    on_demand.begin(start.proxy()).map_err(|error| error.to_string())
 }
 
 fn lock(guide: &Mutex<Guide>) -> MutexGuard<'_, Guide> {
@@ -213,7 +237,8 @@ impl Body {
         let goes_on = || !self.stop.load(Ordering::Acquire);
         match HapticLoop::new(&self.haptics, &mut self.device) {
             Err(error) => drop(report.send(Err(error.to_string()))),
-            Ok((mut body, Ends { ticks, latest, clear, .. })) => {
+            Ok((body, Ends { ticks, latest, clear, .. })) => {
+                let mut body = body.with_live(self.live);
                 drop(report.send(Ok((ticks, latest, Some(clear)))));
                 match scheduler {
                     None => {
@@ -250,7 +275,7 @@ impl Body {
         done: &mpsc::Sender<()>,
     ) {
         let mut driver = match Driver::new(&self.haptics, &mut self.device) {
-            Ok(driver) => driver,
+            Ok(driver) => driver.with_live(self.live),
             Err(error) => return drop(report.send(Err(error.to_string()))),
         };
         let (mut record, ticks) = rtrb::RingBuffer::new(RING);

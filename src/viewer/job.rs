@@ -11,6 +11,7 @@ use crate::{
     dataset::{Dataset, Surface},
     gpu::{AdapterChoice, AdapterSummary, Context, GpuError, GpuSolver},
     proxy::Chain,
+    render::on_demand::OnDemand,
     scene::Scene,
     sweep::{BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, build_object, remedied, sample},
 };
@@ -35,6 +36,8 @@ pub enum Task {
     /// Bake a scene, on the geometry that a dataset holds of its object where there is one: its mesh is not read again
     /// then.
     Bake(Arc<Scene>, Option<Surface>),
+    /// Open a scene that is solved while it is felt.
+    OnDemand(Arc<OnDemand>),
 }
 
 /// The backend of a bake.
@@ -137,6 +140,7 @@ impl Job {
         let title = match &task {
             Task::Open(path) => format!("Opening {}", path.file_name().unwrap_or(path.as_os_str()).display()),
             Task::Bake(scene, _) => format!("Haptizing {}", scene.name),
+            Task::OnDemand(on_demand) => format!("Opening {}", on_demand.scene().name),
         };
         let stop = Arc::new(AtomicBool::new(false));
         let (sender, reports) = mpsc::channel();
@@ -219,6 +223,7 @@ fn run(
             let dataset = Dataset::load(&path)?;
             Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
         }
+        Task::OnDemand(on_demand) => Loaded::on_demand(on_demand)?,
         Task::Bake(scene, surface) => bake((*scene).clone(), surface, solver, context, stop, progress)?,
     };
     let body = Body::new(context, &loaded, &loaded.tuning().graphics)?;

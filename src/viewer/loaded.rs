@@ -7,6 +7,7 @@ use crate::{
     render::{
         graphics::ContactForces,
         haptic::Haptics,
+        on_demand::OnDemand,
         setup::{Setup, SetupError},
     },
     scene::{HapticsSpec, Scene, Tuning},
@@ -29,6 +30,8 @@ pub struct Loaded {
     pub setup: Arc<Setup>,
     /// Contact forces on the object; absent where there is no object to draw.
     pub forces: Option<Arc<ContactForces>>,
+    /// What solves its contact while it is felt; absent where everything is stored that is felt.
+    pub on_demand: Option<Arc<OnDemand>>,
     /// The report of the bake, if this window baked it.
     pub report: Option<Arc<SweepReport>>,
 }
@@ -53,8 +56,18 @@ impl Loaded {
             dataset: Arc::new(dataset),
             setup: Arc::new(setup),
             forces: forces.map(Arc::new),
+            on_demand: None,
             report: None,
         })
+    }
+
+    /// A scene that is solved while it is felt.
+    ///
+    /// # Errors
+    /// When it cannot be rendered.
+    pub fn on_demand(on_demand: Arc<OnDemand>) -> Result<Self, SetupError> {
+        let loaded = Self::new(on_demand.dataset(), Some(on_demand.scene().clone()), None)?;
+        Ok(Self { on_demand: Some(on_demand), ..loaded })
     }
 
     /// Gains and effects as its scene has them.

@@ -102,7 +102,7 @@ impl Viewer {
                 "{adapter}\nAnother adapter draws and computes where {ADAPTER_VARIABLE} is set to a part of its name \
                  before haptize starts; haptize doctor lists them"
             ));
-            let Some(session) = &self.session else { return };
+            let Some(session) = &mut self.session else { return };
             if let Some(tick) = session.history.last() {
                 ui.separator();
                 let mut contact = contact(tick, session.loaded.knows_nodes());
@@ -120,6 +120,15 @@ impl Viewer {
                     format!("{} {} {unit}", if unit == "N" { "force" } else { "torque" }, number(size))
                 });
                 ui.label(RichText::new(sizes.collect::<Vec<_>>().join(", ")).small());
+                if let (Some(answers), Some(on_demand)) = (session.feel.answers(), &session.loaded.on_demand) {
+                    ui.separator();
+                    let coarser = 100.0 * answers.coarser as f64 / answers.ticks.max(1) as f64;
+                    let text = format!("{} blocks solved, {coarser:.1} % coarser than wanted", on_demand.blocks());
+                    ui.label(RichText::new(text).small()).on_hover_text(
+                        "Contact is solved ahead of the motion. Ticks that came before the finest level was there were \
+                         answered by a coarser one",
+                    );
+                }
                 if let Some(fault) = tick.fault {
                     ui.separator();
                     ui.colored_label(ui.visuals().error_fg_color, RichText::new(fault.to_string()).small());

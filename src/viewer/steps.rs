@@ -44,11 +44,16 @@ fn texts(loaded: &Loaded) -> [(&'static str, String); 3] {
         None if loaded.dataset.surface.is_none() => {
             format!("Torque was measured and brought to {points} joint configurations.")
         }
+        None if loaded.on_demand.is_some() => {
+            "Contact of arm and object is solved ahead of the motion, while you move; the line below says how much \
+             was solved."
+                .into()
+        }
         None => format!("Contact of arm and object was solved beforehand at {points} joint configurations."),
     };
     [
         ("1  Solve", solve),
-        ("2  Store", format!("Each holds a torque. The map on the right shows them over the joints {joints}; all of them are the dataset.")),
+        ("2  Store", format!("Each configuration holds a torque. The map on the right shows them over the joints {joints}; all of them are the dataset.")),
         ("3  Look up", "1000 times a second the torque is interpolated where the arm is: the ring on the map. The plots show what is felt.".into()),
     ]
 }
