@@ -57,11 +57,12 @@ pub fn scene(py: Python<'_>, error: &SceneFailure) -> PyErr {
 }
 
 pub fn dataset(py: Python<'_>, error: &dataset::Error) -> PyErr {
-    use dataset::Error::{Damaged, Foreign, Inconsistent, Memory, Read, Version, Write};
+    use dataset::Error::{Damaged, Foreign, Inconsistent, Memory, Occupied, Read, Version, Write};
     let path = match error {
         Read { path, .. }
         | Memory { path, .. }
         | Write { path, .. }
+        | Occupied { path }
         | Foreign { path, .. }
         | Version { path, .. }
         | Damaged { path, .. }

@@ -1,9 +1,6 @@
 //! `haptize man`: manual pages, one for the program and one for each command.
 
-use super::{
-    Failure, Report,
-    output::{self, Kind},
-};
+use super::{Failure, Report, output::Folder};
 use crate::dataset::replace_file;
 use clap_mangen::Man;
 use std::path::PathBuf;
@@ -22,20 +19,22 @@ pub struct Arguments {
 /// Writes all pages; those of an earlier version are replaced.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let folder = &arguments.output;
-    std::fs::create_dir_all(folder)
-        .map_err(|error| format!("cannot make the folder {}: {error}; give another by -o", folder.display()))?;
     let mut line = super::command_line().disable_help_subcommand(true);
     line.build();
     let commands = line.get_subcommands().filter(|command| !command.is_hide_set()).cloned();
     let pages: Vec<Man> = std::iter::once(line.clone()).chain(commands).map(Man::new).collect();
-    let mut files = Vec::new();
-    for page in pages {
-        let file = folder.join(page.get_filename());
-        output::check(&file, Kind::Page, [])?;
-        replace_file(&file, |out| page.render(out))
+    let names: Vec<String> = pages.iter().map(Man::get_filename).collect();
+    let earlier = Folder::check(folder, names.iter().map(String::as_str), [])?;
+    std::fs::create_dir_all(folder)
+        .map_err(|error| format!("cannot make the folder {}: {error}; give another by -o", folder.display()))?;
+    let files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
+    for (page, file) in pages.iter().zip(&files) {
+        replace_file(file, |out| page.render(out))
             .map_err(|error| format!("cannot write {}: {error}; give another place by -o", file.display()))?;
-        files.push(file.display().to_string());
     }
-    let text = format!("{} manual pages in {}\n", files.len(), folder.display());
-    Ok(Report { text, json: serde_json::json!({ "files": files }), whole: true })
+    let mut text = format!("{} manual pages in {}\n", files.len(), folder.display());
+    let shown: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    let mut json = serde_json::json!({ "files": shown });
+    earlier.close(&files, &mut text, &mut json)?;
+    Ok(Report { text, json, whole: true })
 }

@@ -85,11 +85,13 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut files = vec![(scene.clone(), text)];
     files.extend(arguments.from.mesh().map(|(name, text)| (scene.with_file_name(name), text)));
     let missing = |(path, text): &(PathBuf, &str)| -> Result<bool, Failure> {
-        match std::fs::read(path) {
-            Ok(found) if found == text.as_bytes() => Ok(false),
-            Ok(_) => Err(taken(path)),
-            Err(_) if path.exists() => Err(taken(path)),
+        // What is no regular file is not read: a pipe would be waited for.
+        match std::fs::metadata(path) {
             Err(_) => Ok(true),
+            Ok(there) if there.is_file() && std::fs::read(path).is_ok_and(|found| found == text.as_bytes()) => {
+                Ok(false)
+            }
+            Ok(_) => Err(taken(path)),
         }
     };
     let missing = files.iter().map(missing).collect::<Result<Vec<_>, _>>()?;

@@ -2,7 +2,7 @@
 //! What is replaced is reported.
 
 use super::Failure;
-use crate::dataset::resolved;
+use crate::dataset::{may_be_dataset, resolved};
 use serde_json::{Value, json};
 use std::{
     fmt::Write,
@@ -50,6 +50,7 @@ impl Kind {
             Some("png") => Self::Picture,
             Some("svg") => Self::Drawing,
             Some("csv") => Self::Table,
+            Some("1") => Self::Page,
             _ => Self::Text,
         }
     }
@@ -57,8 +58,7 @@ impl Kind {
     /// Whether the file at `path` that begins with `start` is of this kind.
     fn is(self, path: &Path, start: &[u8]) -> bool {
         match self {
-            // Safetensors: the length of the header, which is a JSON object.
-            Self::Dataset => start.len() > 8 && start[8] == b'{' && start[..8].ends_with(&[0, 0, 0]),
+            Self::Dataset => may_be_dataset(start),
             Self::Archive => start.starts_with(b"PK"),
             Self::Hdf5 => start.starts_with(b"\x89HDF\r\n\x1a\n"),
             Self::Page => start.starts_with(b"."),

@@ -110,7 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
 /// Writes the plan of `scene` to `file`.
 fn write_plan(scene: &ScanScene, arguments: &Arguments, file: &Path) -> Result<Report, Failure> {
     let kind = Kind::of_log(file);
-    output::check(file, kind, [arguments.scene.as_path()])?;
+    let earlier = output::check(file, kind, [arguments.scene.as_path()])?;
     let control = &scene.scan.control;
     let dwell = arguments.dwell.unwrap_or(control.window + control.average);
     if !(dwell > 0.0 && dwell <= LONGEST) {
@@ -127,19 +127,20 @@ fn write_plan(scene: &ScanScene, arguments: &Arguments, file: &Path) -> Result<R
     written
         .map_err(|error| format!("cannot write {}: {error}; free some space or give another place", file.display()))?;
     let (rows, seconds, unreachable) = (trajectory.rows.len(), trajectory.duration(), plan.unreachable.len());
-    let text = format!(
+    let mut text = format!(
         "{}: {rows} rows through {} points in {seconds:.0} s, {dwell} s at each; {unreachable} points are not reached \
          by the joints\n  note         limits of torque and speed are the robot's own: nothing of haptize watches it\n",
         file.display(),
         plan.points - unreachable
     );
-    let json = serde_json::json!({
+    let mut json = serde_json::json!({
         "file": file.display().to_string(),
         "rows": rows,
         "points": plan.points,
         "unreachable": unreachable,
         "seconds": seconds,
     });
+    earlier.tell(&mut text, &mut json);
     Ok(Report { text, json, whole: true })
 }
 

@@ -33,6 +33,12 @@ pub enum Error {
         /// The system's message.
         source: io::Error,
     },
+    /// It would replace a file of another kind.
+    #[error("{path}: there is a file already that is not a dataset; nothing is written: name another file")]
+    Occupied {
+        /// The file.
+        path: PathBuf,
+    },
     /// Not a file of this program.
     #[error("{path}: not a haptize dataset: {reason}; give a file written by `haptize bake` or `haptize gridize`")]
     Foreign {

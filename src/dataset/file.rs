@@ -39,7 +39,9 @@ use safetensors::{Dtype, tensor::TensorInfo};
 use serde::Serialize;
 use std::{
     collections::BTreeMap,
-    io::{self, Seek, SeekFrom, Write},
+    fs::{self, File},
+    io::{self, Read, Seek, SeekFrom, Write},
+    path::Path,
 };
 
 #[cfg(target_endian = "big")]
@@ -187,13 +189,34 @@ pub(super) fn bytes(dataset: &Dataset) -> usize {
     tensors(dataset).iter().map(Tensor::bytes).sum()
 }
 
+/// Whether a file that begins with `start` may be a dataset: it begins with the length of its header, a JSON object.
+pub(crate) fn may_be_dataset(start: &[u8]) -> bool {
+    start.len() > LENGTH && start[LENGTH] == b'{' && start[..LENGTH].ends_with(&[0, 0, 0])
+}
+
+/// Checks that a dataset written to `path` replaces a dataset, an empty file, or none.
+///
+/// # Errors
+/// [`Error::Occupied`] when a file of another kind is there.
+pub(crate) fn check_place(path: &Path) -> Result<(), Error> {
+    let mut start = Vec::new();
+    let is_file = fs::metadata(path).is_ok_and(|there| there.is_file());
+    let read = is_file && File::open(path).and_then(|file| file.take(PAGE as u64).read_to_end(&mut start)).is_ok();
+    if read && !start.is_empty() && !may_be_dataset(&start) {
+        return Err(Error::Occupied { path: path.into() });
+    }
+    Ok(())
+}
+
 impl Dataset {
     /// Writes the dataset, replacing the file `target` whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Inconsistent`] when it would be refused on reading, [`Error::Write`] from the system.
+    /// [`Error::Inconsistent`] when it would be refused on reading, [`Error::Occupied`] when a file of another kind is
+    /// there, [`Error::Write`] from the system.
     pub fn save<'a>(&self, target: impl Into<Target<'a>>) -> Result<(), Error> {
         let target = target.into();
+        check_place(target.path())?;
         check::check(self).map_err(|reason| Error::Inconsistent { path: target.path().into(), reason })?;
         if let Some(store) = &self.refinement {
             return store::file::save(self, store, target);

@@ -80,6 +80,9 @@ pub enum SweepError {
         /// The output.
         path: PathBuf,
     },
+    /// There is a file of another kind in the output's place.
+    #[error(transparent)]
+    Output(dataset::Error),
     /// The part cannot be read or written.
     #[error(
         "{path}: {source}; free some space (memory, if that is what is missing), then continue with the same command, \

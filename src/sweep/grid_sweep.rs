@@ -311,6 +311,7 @@ impl<'a> Sweep<'a> {
         }
         // The part grows beside the file that a link leads to: only there can that be replaced.
         let output = &dataset::resolved(output).map_err(|source| SweepError::Folder { path: output.into(), source })?;
+        dataset::check_place(output).map_err(SweepError::Output)?;
         let mut binding = self.binding();
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
         let mut provenance = binding.provenance;

@@ -16,7 +16,7 @@ use super::{
     table::{Block, Table},
     tally::Tally,
 };
-use crate::dataset::{Grid, Provenance};
+use crate::dataset::{Grid, Provenance, resolved};
 use memmap2::Mmap;
 use serde::{Deserialize, Serialize};
 use std::{
@@ -122,6 +122,8 @@ impl Part {
     /// takes its date and notices. Results that are there are never thrown away: without `resume` they are an error.
     pub fn open(path: &Path, resume: bool, binding: &mut Binding) -> Result<(Self, Tally), SweepError> {
         let failed = |source| SweepError::Part { path: path.into(), source };
+        // A pipe would be waited for, and a device has no end.
+        resolved(path).map_err(|why| SweepError::ForeignPart { path: path.into(), reason: why.to_string() })?;
         let file = OpenOptions::new()
             .read(true)
             .write(true)

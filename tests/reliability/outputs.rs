@@ -6,7 +6,8 @@ use serde_json::Value;
 use std::{
     collections::BTreeSet,
     path::Path,
-    process::{Command, Output},
+    process::{Command, Output, Stdio},
+    time::{Duration, Instant},
 };
 
 /// A folder with a scene, its meshes and its dataset `x.haptize`.
@@ -71,6 +72,32 @@ fn what_is_in_the_way_of_a_growing_file_is_not_lost() {
     }
 }
 
+/// Opened, a pipe that nobody writes to is waited for without end.
+#[cfg(unix)]
+#[test]
+fn a_pipe_in_the_way_is_refused_and_not_waited_for() {
+    let home = home();
+    for name in ["pipe.toml", "y.haptize.part"] {
+        assert!(Command::new("mkfifo").arg(home.path().join(name)).status().unwrap().success());
+    }
+    for (arguments, expected) in [
+        (&["new", "-o", "pipe.toml"][..], "exists already"),
+        (&["bake", "scene.toml", "-o", "y.haptize", "--backend", "cpu"], "no regular file"),
+        (&["bake", "scene.toml", "-o", "y.haptize", "--backend", "cpu", "--resume"], "no regular file"),
+    ] {
+        let mut child = command(home.path(), arguments).stderr(Stdio::piped()).spawn().unwrap();
+        let patience = Instant::now() + Duration::from_secs(60);
+        while child.try_wait().unwrap().is_none() && Instant::now() < patience {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        let waits = child.try_wait().unwrap().is_none();
+        // One that has ended is not there to be killed.
+        let _ = child.kill();
+        let output = child.wait_with_output().unwrap();
+        assert!(!waits && message(&output).contains(expected), "{arguments:?}: {}", message(&output));
+    }
+}
+
 /// A pipe, and where it may be made a device that swallows everything.
 #[cfg(unix)]
 fn irregular(folder: &Path, name: &str) {
@@ -91,9 +118,16 @@ fn nothing_is_written_to_devices_and_pipes() {
         irregular(home.path(), name);
     }
     std::fs::create_dir(home.path().join("o")).unwrap();
-    for name in
-        ["cspace.png", "gridized.svg", "stability.md", "accuracy.csv", "table.json", "sponge.csv", "out.contacts.csv"]
-    {
+    for name in [
+        "cspace.png",
+        "gridized.svg",
+        "stability.md",
+        "accuracy.csv",
+        "table.json",
+        "sponge.csv",
+        "out.contacts.csv",
+        "haptize.1",
+    ] {
         irregular(&home.path().join("o"), name);
     }
     std::fs::write(home.path().join("t.csv"), "a,b\n1,2\n").unwrap();
@@ -111,6 +145,8 @@ fn nothing_is_written_to_devices_and_pipes() {
         &["accuracy", "scene.toml", "-o", "o"],
         &["stability", "gridization", "--no-gpu", "-o", "o"],
         &["paper", "-o", "o"],
+        &["man", "-o", "o"],
+        &["scan", "sponge.toml", "--plan-out", "device"],
         &["view", "x.haptize", "--screenshot", "device.png"],
     ] {
         refused(home.path(), arguments, "no regular file");
@@ -123,7 +159,7 @@ fn nothing_is_written_to_devices_and_pipes() {
     assert!(
         ["device", "device.png", "o/cspace.png", "o/table.json"].iter().all(|name| irregular(&home.path().join(name)))
     );
-    assert_eq!(names(&home.path().join("o")).len(), 7);
+    assert_eq!(names(&home.path().join("o")).len(), 8);
 }
 
 /// Twice into one folder: every file of the first run must be one that the second knows, and replaces.
@@ -153,11 +189,17 @@ fn a_folder_holds_the_files_of_one_run_and_it_is_told_what_was_replaced() {
     refused(home.path(), &["play", "x.haptize", "--record", "new/motion.svg", "-o", "new"], "cannot be written");
     for again in [
         &["stability", "gridization", "--no-gpu", "-o", "s"][..],
+        &["man", "-o", "m"],
         &["accuracy", "scene.toml", "--points", "16", "--configurations", "8", "--rounds", "1", "--effects", "-o", "a"],
     ] {
         let first = run(home.path(), again).1;
         assert_eq!(told(&run(home.path(), again).1, "replaced"), files(&first), "{again:?}");
     }
+    std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/sponge.toml"), home.path().join("sponge.toml"))
+        .unwrap();
+    let plan = ["scan", "sponge.toml", "--plan-out", "plan.csv"];
+    assert!(run(home.path(), &plan).1["replaced"].is_null());
+    assert!(run(home.path(), &plan).1["replaced"]["bytes"].as_u64() > Some(0));
 }
 
 #[test]
