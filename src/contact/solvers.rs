@@ -45,3 +45,28 @@ impl<'a> Solvers<'a> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::bodies::{PAPER, contact, floating_bar, pressed, sphere};
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    #[test]
+    fn a_solver_that_a_panic_left_in_the_middle_of_its_work_is_made_anew() {
+        let (object, chain) = (sphere(PAPER).unwrap(), floating_bar(0.0));
+        let [model, other] = [500.0, 5.0].map(|stiffness| Model::new(&object, &chain, contact(stiffness)));
+        let places = pressed(&model, 1, 3, 0.002, 0.01);
+        let solvers = Solvers::new(&model, 1);
+        let stopped = catch_unwind(AssertUnwindSafe(|| {
+            solvers.map(&places[..1], |solver, _| {
+                // As wrong as a solver can be left.
+                *solver = Solver::new(&other);
+                panic!("in the middle of its work");
+            })
+        }));
+        assert!(stopped.map(|results: Vec<()>| results).is_err());
+        let again = solvers.map(&places, |solver, q| solver.solve(q).forces);
+        assert_eq!(again, places.iter().map(|q| Solver::new(&model).solve(q).forces).collect::<Vec<_>>());
+    }
+}
