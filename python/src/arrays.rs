@@ -7,7 +7,12 @@ use numpy::{
     PyUntypedArrayMethods,
     npyffi::{NPY_ARRAY_ALIGNED, NPY_ARRAY_C_CONTIGUOUS, NPY_ARRAY_WRITEABLE, NPY_TYPES},
 };
-use pyo3::{exceptions::PyValueError, intern, prelude::*, types::PyDict};
+use pyo3::{
+    exceptions::{PyTypeError, PyValueError},
+    intern,
+    prelude::*,
+    types::PyDict,
+};
 
 /// Rows from which on other Python threads run meanwhile: a few microseconds of work.
 const MANY: usize = 32;
@@ -61,7 +66,7 @@ impl<'py> Configurations<'py> {
         let out = match out {
             None => PyArray::zeros(py, shape, false),
             Some(out) => {
-                let out = out.cast::<PyArrayDyn<T>>()?;
+                let out = output(out)?;
                 if out.shape() != shape || !is_plain(out) {
                     return Err(wrong_output(out.shape(), &shape));
                 }
@@ -83,6 +88,15 @@ impl<'py> Configurations<'py> {
 /// Whether `array` lies in C order at aligned addresses, and so is a slice.
 fn is_plain<T: Element>(array: &Bound<'_, PyArrayDyn<T>>) -> bool {
     array.is_c_contiguous() && array.data().is_aligned()
+}
+
+/// `out` as an array of `T`.
+fn output<'a, 'py, T: Element>(out: &'a Bound<'py, PyAny>) -> PyResult<&'a Bound<'py, PyArrayDyn<T>>> {
+    out.cast().map_err(|_| {
+        let kind = T::get_dtype(out.py());
+        let found = out.getattr("dtype").map_or_else(|_| out.get_type().to_string(), |kind| format!("of {kind}"));
+        PyTypeError::new_err(format!("out is {found}: it must be an array of {kind}"))
+    })
 }
 
 fn wrong_output(shape: &[usize], expected: &[usize]) -> PyErr {
@@ -176,7 +190,7 @@ impl<'a, 'py> Output<'a, 'py> {
         match plain_vector(out, joints) {
             Some(vector) if vector.has(NPY_ARRAY_WRITEABLE) => Ok(Self(Some(vector))),
             Some(_) => Err(PyValueError::new_err("out: the array is read-only")),
-            None => Err(wrong_output(out.cast::<PyArrayDyn<f64>>()?.shape(), &[joints])),
+            None => Err(wrong_output(output::<f64>(out)?.shape(), &[joints])),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Bakes: the interpreter is free meanwhile, and Ctrl-C stops them.
 
-use crate::{dataset::Dataset, errors, scene::Scene};
+use crate::{background, dataset::Dataset, errors, scene::Scene};
 use haptize::{
     dataset,
     sweep::{BackendChoice, Bake, Progress},
@@ -8,7 +8,7 @@ use haptize::{
 use pyo3::{exceptions::PyValueError, prelude::*};
 use std::{
     path::PathBuf,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{Arc, atomic::AtomicBool},
     time::SystemTime,
 };
 
@@ -17,7 +17,7 @@ use std::{
 /// output: the file to write; without one the dataset stays in memory. resume: go on with a bake into that file that
 /// was interrupted. backend: "auto", "cpu" or "gpu". measure_error: random configurations at which the dataset's error
 /// is measured; 0 leaves it out. progress: called with (points done, points) several times a second; what it raises
-/// stops the bake, as Ctrl-C does.
+/// stops the bake, as Ctrl-C does, within a second.
 ///
 /// Other threads run meanwhile. BakeError where the scene cannot be haptized; what a bake into a file has solved is
 /// kept.
@@ -38,31 +38,27 @@ pub fn bake(
         "gpu" => BackendChoice::Gpu,
         other => return Err(PyValueError::new_err(format!("no backend {other:?}: take \"auto\", \"cpu\" or \"gpu\""))),
     };
-    let scene = &scene.get().scene;
-    let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
-    let stop = AtomicBool::new(false);
-    let mut raised = None;
-    let mut tell = |told: Progress| {
-        let called = Python::attach(|py| {
-            py.check_signals()?;
-            progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (told.done, told.points)).map(drop))
-        });
-        if let Err(error) = called {
-            raised.get_or_insert(error);
-            stop.store(true, Ordering::Relaxed);
-        }
-    };
-    let baked = py.detach(|| {
-        let bake =
-            Bake { scene, backend, measured: measure_error, aim: None, date: &date, stop: &stop, progress: &mut tell };
-        match &output {
-            Some(output) => bake.to_file(output, resume).map(|report| (None, report)),
+    let stop = Arc::new(AtomicBool::new(false));
+    let (scene, file, stopped) = (scene.get().scene.clone(), output.clone(), Arc::clone(&stop));
+    let work = move |tell: &dyn Fn([usize; 2])| {
+        let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
+        let bake = Bake {
+            scene: &scene,
+            backend,
+            measured: measure_error,
+            aim: None,
+            date: &date,
+            stop: &stopped,
+            progress: &mut |told: Progress| tell([told.done, told.points]),
+        };
+        match &file {
+            Some(file) => bake.to_file(file, resume).map(|report| (None, report)),
             None => bake.in_memory().map(|(dataset, report)| (Some(dataset), report)),
         }
-    });
-    if let Some(error) = raised {
-        return Err(error);
-    }
+    };
+    let baked = background::run(py, &stop, work, |[done, points]| {
+        progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (done, points)).map(drop))
+    })?;
     let (dataset, report) = baked.map_err(|error| errors::bake(&error))?;
     let report = serde_json::to_value(&report).map_err(|error| PyValueError::new_err(error.to_string()))?;
     let dataset = match (dataset, output) {

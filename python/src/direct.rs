@@ -2,16 +2,17 @@
 
 use crate::{
     arrays::{self, Configurations},
-    errors,
+    background, errors,
     scene::Scene,
 };
 use haptize::sweep::{Contact, Direct, Inspection};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
+use std::sync::atomic::AtomicBool;
 
 /// The object and the arm of a scene, ready to be solved at any configuration. Threads may share it.
 ///
-/// Solver(scene): builds the object, which takes up to some seconds. BakeError where it cannot be built.
+/// Solver(scene): builds the object, which takes seconds where it is large; Ctrl-C ends it. BakeError where it cannot be built.
 #[pyclass(frozen, module = "haptize")]
 pub struct Solver {
     direct: Direct,
@@ -21,9 +22,10 @@ pub struct Solver {
 impl Solver {
     #[new]
     fn new(py: Python<'_>, scene: &Bound<'_, Scene>) -> PyResult<Self> {
-        let scene = &scene.get().scene;
-        let direct = py.detach(|| Direct::new(scene)).map_err(|error| errors::bake(&error))?;
-        Ok(Self { direct })
+        let scene = scene.get().scene.clone();
+        let build = move |_: &dyn Fn(())| Direct::new(&scene);
+        let built = background::run(py, &AtomicBool::new(false), build, |()| Ok(()))?;
+        Ok(Self { direct: built.map_err(|error| errors::bake(&error))? })
     }
 
     /// Solve the configuration q [rad; m], one entry per joint, from the object at rest.

@@ -2,6 +2,7 @@
 //! library and its results back. Nothing is decided here.
 
 mod arrays;
+mod background;
 mod bake;
 mod dataset;
 mod direct;

@@ -3,7 +3,7 @@
 use crate::errors;
 use haptize::scene;
 use pyo3::{
-    exceptions::PyTypeError,
+    exceptions::{PyAttributeError, PyTypeError},
     prelude::*,
     types::{PyDict, PyString},
 };
@@ -70,7 +70,12 @@ fn text_of(tables: &Bound<'_, PyDict>) -> PyResult<String> {
     let plain = py.eval(c"lambda value: value.tolist()", None, None)?;
     let options = PyDict::new(py);
     options.set_item("default", plain)?;
-    let json: String = py.import("json")?.call_method("dumps", (tables,), Some(&options))?.extract()?;
+    let dumped = py.import("json")?.call_method("dumps", (tables,), Some(&options)).map_err(|error| {
+        // What has no `tolist`.
+        let is_foreign = error.is_instance_of::<PyAttributeError>(py);
+        if is_foreign { PyTypeError::new_err(format!("not a scene: {error}")) } else { error }
+    });
+    let json: String = dumped?.extract()?;
     let table: toml::Table = serde_json::from_str(&json).map_err(|error| {
         PyTypeError::new_err(format!("not a scene: {error} (None, NaN and infinities have no place in one)"))
     })?;

@@ -1,12 +1,16 @@
 """Bakes, files, and views into them."""
 
 import gc
+import re
 import signal
+import subprocess
+import sys
 import threading
 
 import haptize
 import numpy as np
 import pytest
+from conftest import SCENE
 
 
 def test_views_are_the_dataset(dataset, file):
@@ -109,6 +113,42 @@ def test_ctrl_c_stops_a_bake(scene):
 
     with pytest.raises(KeyboardInterrupt):
         haptize.bake(scene, backend="cpu", progress=interrupt)
+
+
+INTERRUPTED = """
+import haptize, os, signal, sys, threading, time
+slow = haptize.Scene(sys.stdin.read())
+threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+try:
+    {call}
+except KeyboardInterrupt:
+    before, patience = time.process_time(), time.monotonic() + 60
+    while time.process_time() < before + 0.5 and time.monotonic() < patience:
+        time.sleep(0.05)
+    print("goes on" if time.process_time() > before + 0.5 else "has ended")
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends a process there")
+@pytest.mark.parametrize("call", ["haptize.Solver(slow)", 'haptize.bake(slow, backend="cpu")'])
+def test_ctrl_c_ends_a_call_and_does_not_wait_for_its_work(call, tmp_path):
+    """The compliance of so many nodes takes many seconds, in which nothing looks at a signal."""
+    object = "sphere = { radius = 0.05, edge = 0.002 }\nskin = { thickness = 0.002, young = 1e5, foundation = 1e6 }\n"
+    scene = re.sub(r"(?s)sphere = .*?(?=\[contact\])", object, SCENE)
+    command = [sys.executable, "-c", INTERRUPTED.format(call=call)]
+    # From elsewhere, where this repository's sources are not taken for the package.
+    ended = subprocess.run(command, input=scene, text=True, capture_output=True, cwd=tmp_path)
+    assert (ended.returncode, ended.stdout) == (0, "goes on\n"), ended.stderr
+
+
+def test_no_file_of_another_kind_is_replaced(scene, dataset, tmp_path):
+    notes = tmp_path / "notes.toml"
+    notes.write_text(scene.text)
+    with pytest.raises(haptize.BakeError, match="not a dataset"):
+        haptize.bake(scene, notes, backend="cpu")
+    with pytest.raises(haptize.DatasetError, match="not a dataset"):
+        dataset.save(notes)
+    assert notes.read_text() == scene.text and list(tmp_path.iterdir()) == [notes]
 
 
 def test_other_threads_run_while_a_scene_is_baked(scene):

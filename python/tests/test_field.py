@@ -76,6 +76,8 @@ def test_outside_the_grid_is_told(field):
     assert field.status([5.0, 0.02]) == 4
     assert np.isnan(field.gap([5.0, 0.02]))
     assert np.array_equal(field.torque([5.0, 5.0]), [0.0, 0.0])
+    # Also where the step of a difference is below the rounding of the coordinates.
+    assert np.array_equal(field.gradient([1e300, -1e300]), np.zeros((2, 2)))
 
 
 @pytest.mark.parametrize(
@@ -108,8 +110,10 @@ def test_a_wrong_buffer_is_refused_and_left_alone(field):
             field.torque(q, out)
         assert (out == 7.0).all()
     for out in (np.full((4, 2), 7.0, dtype=np.float32), [[0.0, 0.0]] * 4, "out"):
-        with pytest.raises(TypeError):
+        with pytest.raises(TypeError, match="must be an array of float64"):
             field.torque(q, out)
+        with pytest.raises(TypeError, match="must be an array of float64"):
+            field.torque(PRESSED, out)
     out = np.full((4, 2), 7.0)
     out.flags.writeable = False
     with pytest.raises(ValueError):

@@ -19,7 +19,8 @@ impl TorqueField {
             });
             place[l] = q[l];
             for (k, (before, after)) in before.iter().zip(after.iter()).enumerate() {
-                slope[k * joints + l] = (after - before) / (ends[1] - ends[0]);
+                // Where rounding swallows the step q is so far outside the grid that nothing changes.
+                slope[k * joints + l] = if ends[0] < ends[1] { (after - before) / (ends[1] - ends[0]) } else { 0.0 };
             }
         }
     }
