@@ -121,4 +121,18 @@ fn cmake_finds_what_is_installed() {
     let solved = run(Command::new(build.join("solve")).args([&scene, &dataset]).args(&q));
     // Both look the same torque up, behind one code and two.
     assert_eq!(numbers(pressed.lines().next().unwrap())[1..], numbers(solved.lines().nth(1).unwrap())[2..]);
+
+    // As docs/c.md has it: the module's folder is all that is named.
+    let (recipe, build) = (files.path("recipe"), files.path("recipe/build"));
+    std::fs::create_dir(&recipe).unwrap();
+    let text = format!(
+        "cmake_minimum_required(VERSION 3.15)\nproject(recipe C)\nlist(APPEND CMAKE_MODULE_PATH {}/share/haptize/cmake)\n\
+         find_package(Haptize REQUIRED)\nadd_executable(program {HERE}/examples/press.c)\n\
+         target_link_libraries(program Haptize::Haptize)\n",
+        prefix.display()
+    );
+    std::fs::write(recipe.join("CMakeLists.txt"), text).unwrap();
+    run(Command::new("cmake").arg("-S").arg(&recipe).arg("-B").arg(&build));
+    run(Command::new("cmake").arg("--build").arg(&build));
+    assert_eq!(run(Command::new(build.join("program")).arg(&dataset).args(&q)), pressed);
 }

@@ -165,6 +165,17 @@ fn run(page: &Path) -> String {
 }
 
 #[test]
+fn the_contents_list_every_page_of_the_guide() {
+    let contents = fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
+    let listed = |page: &Path| contents.contains(&format!("({})", page.file_name().unwrap().to_str().unwrap()));
+    let missing: Vec<_> = pages()
+        .into_iter()
+        .filter(|page| page.starts_with("docs") && !page.ends_with("SUMMARY.md") && !listed(page))
+        .collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
+#[test]
 fn every_command_of_the_documentation_runs_and_prints_what_is_shown() {
     let failures: String = pages().par_iter().map(|page| run(page)).collect();
     assert!(failures.is_empty(), "{failures}");
