@@ -1,6 +1,6 @@
 //! How long each kernel takes on the first adapter, what it moves, and what bounds it: those of a sweep of the sphere
 //! scene, by each algorithm, and those of the object's frame update. Then whole sweeps on that adapter beside the CPU
-//! backend.
+//! backend; and what the host does beside the device, with the device itself and with a stand-in that takes no time.
 //!
 //!     cargo bench --bench kernels
 //!
@@ -10,19 +10,20 @@
 
 use glam::DVec3;
 use haptize::{
+    JointVector,
     contact::Model,
-    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver, KernelTime},
+    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver, KernelTime, stages::Stages},
     object::Object,
     proxy::Chain,
     scene::{Algorithm, GraphicsEffects, Scene, Shape},
-    sweep::{Backend, BackendChoice, Bake, sample},
+    sweep::{Backend, BackendChoice, Bake, build_object, sample},
 };
 use std::{
     collections::BTreeMap,
     error::Error,
     path::Path,
     sync::{Arc, atomic::AtomicBool},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 /// Frames that a figure of the frame update is taken from.
@@ -47,6 +48,12 @@ const FEW_WORKGROUPS: f64 = 128.0;
 const COPIED: u64 = 64 << 20;
 const COPIES: usize = 16;
 
+/// Every so many-th configuration is solved where the host is timed beside a software rasteriser.
+const HOST_STRIDE: usize = 16;
+
+/// Sweeps that the host is timed for beside a device that takes no time: the least counts.
+const HOST_TURNS: usize = 7;
+
 /// What is known of the adapter beforehand.
 #[derive(Clone, Copy)]
 struct Adapter {
@@ -66,6 +73,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     match Context::open_timed(AdapterChoice::Any) {
         Ok(context) => kernels(&Arc::new(context), &scene)?,
         Err(error) => println!("\nkernels skipped: {error}"),
+    }
+    for name in ["datasets/sphere.toml", "tests/scenes/sphere.toml"] {
+        host(name, if hardware { 1 } else { HOST_STRIDE })?;
     }
     compare(&scene, if hardware { &FINER } else { &FINER[..1] })
 }
@@ -128,6 +138,52 @@ fn sweep(context: &Arc<Context>, scene: &Scene, algorithm: Algorithm, adapter: A
     };
     table(&context.kernel_times()?, "configuration", count, &BTreeMap::new(), seconds, adapter);
     Ok(())
+}
+
+/// Where the host's time goes for every `stride`-th configuration of a scene: beside the adapter, and beside what it
+/// found, returned at once.
+fn host(name: &str, stride: usize) -> Result<(), Box<dyn Error>> {
+    let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(name))?;
+    let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
+    let model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
+    let configurations: Vec<JointVector> = sample(&scene).into_iter().step_by(stride).collect();
+    let mut solver = GpuSolver::new(Arc::new(Context::open(AdapterChoice::Any)?), &model)?;
+    let recorded = solver.record(&configurations)?;
+    println!("\nhost, {name}: {} configurations [us each]", configurations.len());
+    println!(
+        "  {:<22} {:>10} {:>10} {:>10} {:>10} {:>14}",
+        "beside", "submitting", "reading", "settling", "assembling", "but settling"
+    );
+    let print = |beside: &str, times: [f64; 5]| {
+        let [submitting, reading, settling, assembling, others] = times;
+        println!(
+            "  {beside:<22} {submitting:>10.2} {reading:>10.2} {settling:>10.2} {assembling:>10.2} {others:>14.2}"
+        );
+    };
+    print("the adapter", host_times(&mut solver, &configurations)?);
+    let mut least = [f64::INFINITY; 5];
+    for _ in 0..HOST_TURNS {
+        let times = host_times(&mut GpuSolver::of(vec![recorded.clone()], &model), &configurations)?;
+        if times[4] < least[4] {
+            least = times;
+        }
+    }
+    print("what takes no time", least);
+    Ok(())
+}
+
+/// Time of the host to solve: submitting, reading, settling, assembling, and all but settling [us a configuration].
+fn host_times<S: Stages>(
+    solver: &mut GpuSolver<'_, S>,
+    configurations: &[JointVector],
+) -> Result<[f64; 5], Box<dyn Error>> {
+    let begin = Instant::now();
+    solver.solve(configurations)?;
+    let whole = begin.elapsed();
+    let time = solver.host_time();
+    let each = |time: Duration| 1e6 * time.as_secs_f64() / configurations.len() as f64;
+    let others = whole.saturating_sub(time.settling);
+    Ok([time.submitting, time.reading, time.settling, time.assembling, others].map(each))
 }
 
 /// `scene` on a grid so many times as fine.

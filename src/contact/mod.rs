@@ -21,7 +21,7 @@ mod reach;
 mod solver;
 mod solvers;
 
-pub use backend::Backend;
+pub use backend::{Backend, CHUNKS_IN_FLIGHT, Work};
 pub use mesh_ripple::MeshRipple;
 pub use model::{Model, MotionBound};
 pub use proximity::Proximity;

@@ -10,6 +10,7 @@ use super::{
     layout::{DoubleParameters, Parameters},
     model::DeviceModel,
     shaders::{self, CLUSTER, GROUP, Shader},
+    stages::Detected,
 };
 use crate::{
     JointVector,
@@ -86,16 +87,16 @@ pub(super) struct Detection {
 }
 
 impl Detection {
-    /// For `chunk` configurations at a time of what `device` has of `model`; `in_double` is whether in f64.
+    /// For `chunk` configurations at a time of what `device` has of `model`; in f64 where `double` is there.
     pub fn new(
         context: &Context,
         model: &contact::Model<'_>,
         device: &DeviceModel,
         chunk: usize,
-        in_double: bool,
+        double_model: Option<&DoubleModel>,
     ) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
-        let chunk = chunk as u64;
+        let (chunk, in_double) = (chunk as u64, double_model.is_some());
         let DeviceModel { parameters: single, rest, mesh, clusters, .. } = device;
         let buffer = |what, bytes| StorageBuffer::new(context, what, bytes);
         let size = if in_double { size_of::<f64>() } else { size_of::<f32>() } as u64;
@@ -112,9 +113,9 @@ impl Detection {
         let Buffers { parameters, positions, .. } = &buffers;
         let bindings = [(Uniform, parameters), (Read, rest), (Read, mesh), (Write, positions), (Read, clusters)];
         let distances = BoundKernel::new(context, (&shaders::DETECTION, WORKGROUP), &[], &bindings)?;
-        let ends = match &buffers.double_parameters {
-            Some(uniform) => Ends::double(context, model, device, (&buffers, uniform), chunk)?,
-            None => Ends::single(context, device, &buffers)?,
+        let ends = match (&buffers.double_parameters, double_model) {
+            (Some(uniform), Some(double)) => Ends::double(context, double, device, (&buffers, uniform), chunk)?,
+            _ => Ends::single(context, device, &buffers)?,
         };
         Ok(Self {
             single: *single,
@@ -150,20 +151,17 @@ impl Detection {
         self.double.is_some()
     }
 
-    /// Places the proxy at each configuration; smallest gap of each at rest [m], and the numbers of those
-    /// in contact.
-    pub fn detect(&self, context: &Context, chunk: &[JointVector]) -> Result<(Vec<f64>, Vec<u32>), GpuError> {
+    /// Submits where the proxy is at each configuration, its smallest gap at rest, and the list of those in contact.
+    pub fn submit(&self, context: &Context, chunk: &[JointVector]) -> wgpu::SubmissionIndex {
         let Self { buffers, ends, .. } = self;
         let count = chunk.len() as u32;
         self.write_inputs(context, chunk, count);
         let placed = count * self.single.proxy_nodes;
-        let gap_size = if self.is_exact() { size_of::<f64>() } else { size_of::<f32>() };
-        let gap_bytes = gap_size as u64 * u64::from(count);
-        let list_bytes = 4 * u64::from(count + 1);
+        let (gap_bytes, list_bytes) = self.read_bytes(count);
         let place_bytes = 16 * u64::from(placed);
         // In f64 three coordinates more of each node are written, and read where they matter.
         let double_bytes = if self.is_exact() { 24 * u64::from(placed) } else { 0 };
-        let motion_bytes = 2 * gap_size as u64 * u64::from(count * self.single.joints);
+        let motion_bytes = 2 * gap_bytes * u64::from(self.single.joints);
         let mut encoder = context.device.create_command_encoder(&Default::default());
         buffers.gaps.clear(&mut encoder, gap_bytes);
         buffers.list.clear(&mut encoder, list_bytes);
@@ -175,8 +173,18 @@ impl Detection {
         ];
         context.record(&mut encoder, dispatches);
         self.staging.record(&mut encoder, &[(&buffers.gaps, gap_bytes), (&buffers.list, list_bytes)]);
-        let submission = context.queue.submit([encoder.finish()]);
-        self.staging.take(context, &submission, gap_bytes + list_bytes, |bytes| {
+        context.queue.submit([encoder.finish()])
+    }
+
+    /// Waits for a submission of [`Detection::submit`] of `count` configurations.
+    pub fn collect(
+        &self,
+        context: &Context,
+        count: usize,
+        submission: &wgpu::SubmissionIndex,
+    ) -> Result<Detected, GpuError> {
+        let (gap_bytes, list_bytes) = self.read_bytes(count as u32);
+        self.staging.take(context, submission, gap_bytes + list_bytes, |bytes| {
             let (gaps, list) = bytes.split_at(gap_bytes as usize);
             let gaps: Vec<f64> = if self.is_exact() {
                 bytemuck::pod_collect_to_vec(gaps)
@@ -188,8 +196,14 @@ impl Detection {
             if list[0] as usize != touching + 1 {
                 return Err(GpuError::NeverWritten { count: gaps.len() - touching, total: gaps.len() });
             }
-            Ok((gaps, list[1..=touching].to_vec()))
+            Ok(Detected { touching: list[1..=touching].to_vec(), gaps })
         })?
+    }
+
+    /// Bytes of the gaps of `count` configurations, and of the list of those in contact [B].
+    fn read_bytes(&self, count: u32) -> (u64, u64) {
+        let gap_size = if self.is_exact() { size_of::<f64>() } else { size_of::<f32>() };
+        (gap_size as u64 * u64::from(count), 4 * u64::from(count + 1))
     }
 
     /// Tells the device of the `count` configurations of `chunk`.
@@ -231,7 +245,7 @@ impl Ends {
 
     fn double(
         context: &Context,
-        model: &contact::Model<'_>,
+        DoubleModel { chain, surface, smooth }: &DoubleModel,
         device: &DeviceModel,
         (buffers, uniform): (&Buffers, &StorageBuffer),
         chunk: u64,
@@ -239,14 +253,12 @@ impl Ends {
         use Access::{Read, Uniform, Write};
         let Buffers { motions, positions, gaps, list, .. } = buffers;
         let DeviceModel { mesh, clusters, .. } = device;
-        let chain = StorageBuffer::from_slice(context, "chain", &chain(model))?;
-        let surface = StorageBuffer::from_slice(context, "surface in f64", &surface(model))?;
         let nodes = u64::from(device.parameters.proxy_nodes);
         let placed = &StorageBuffer::new(context, "proxy positions in f64", 24 * chunk * nodes)?;
-        let places = [(Uniform, uniform), (Read, &chain), (Read, motions), (Write, placed), (Write, positions)];
+        let places = [(Uniform, uniform), (Read, chain), (Read, motions), (Write, placed), (Write, positions)];
         let smallest = [
             (Uniform, uniform),
-            (Read, &surface),
+            (Read, surface),
             (Read, mesh),
             (Read, clusters),
             (Read, positions),
@@ -254,14 +266,31 @@ impl Ends {
             (Write, gaps),
         ];
         let compaction = [(Uniform, uniform), (Read, gaps), (Write, list)];
-        let smooth = f64::from(u8::from(model.surface.smooth.is_some()));
-        let overrides = [("WORKGROUP", f64::from(IN_STEP)), ("SMOOTH", smooth)];
+        let overrides = [("WORKGROUP", f64::from(IN_STEP)), ("SMOOTH", f64::from(u8::from(*smooth)))];
         Ok(Self {
             kinematics: BoundKernel::new(context, (&shaders::DOUBLE_KINEMATICS, WORKGROUP), &[], &places)?,
             smallest: BoundKernel::new(context, (&shaders::DOUBLE_GAP, IN_STEP), &overrides, &smallest)?,
             compaction: BoundKernel::new(context, (&shaders::DOUBLE_COMPACTION, WORKGROUP), &[], &compaction)?,
             arm_bytes: chain.size(),
             surface_bytes: surface.size(),
+        })
+    }
+}
+
+/// Arm and surface in f64 on the device.
+pub(super) struct DoubleModel {
+    chain: StorageBuffer,
+    surface: StorageBuffer,
+    /// Whether the surface is smooth.
+    smooth: bool,
+}
+
+impl DoubleModel {
+    pub fn new(context: &Context, model: &contact::Model<'_>) -> Result<Self, GpuError> {
+        Ok(Self {
+            chain: StorageBuffer::from_slice(context, "chain", &chain(model))?,
+            surface: StorageBuffer::from_slice(context, "surface in f64", &surface(model))?,
+            smooth: model.surface.smooth.is_some(),
         })
     }
 }

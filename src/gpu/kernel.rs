@@ -306,6 +306,11 @@ impl Staging {
         }
     }
 
+    /// Records a copy of the first `bytes` bytes of `source` to `place`.
+    pub fn copy(&self, encoder: &mut wgpu::CommandEncoder, place: u64, source: &StorageBuffer, bytes: u64) {
+        encoder.copy_buffer_to_buffer(&source.raw, 0, &self.raw, place, bytes);
+    }
+
     /// Waits for `submission` and hands the first `bytes` bytes to `use_bytes`.
     ///
     /// # Errors

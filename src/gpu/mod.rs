@@ -9,7 +9,9 @@
 //! | `model` | object, proxy and contact law as buffers |
 //! | `detection` | the stages that place the proxy and test it for contact at rest |
 //! | `pipeline` | the stages of a batch and their buffers |
-//! | `solver` | the backend of a sweep: chunks, batches, retries |
+//! | `stages` | what a batch goes through, whoever does it; a device that returns stored results |
+//! | `flights` | sections of configurations in flight on some devices, and back in order |
+//! | `solver` | the backend of a sweep: what is made of results, retries |
 //! | `unpack` | from what the kernels wrote to equilibria, settled in f64 by the CPU's search |
 //! | `frame` | the object's nodes, one passive step a frame |
 //! | `kernel` | one compute pipeline with its bindings and dispatches; buffers, poison, read-back |
@@ -24,6 +26,7 @@ mod context;
 mod detection;
 #[cfg(test)]
 mod facet_tests;
+mod flights;
 mod frame;
 mod kernel;
 pub mod layout;
@@ -33,11 +36,13 @@ mod model;
 mod pipeline;
 pub mod shaders;
 mod solver;
+pub mod stages;
 mod timing;
 mod unpack;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterChoice, AdapterSummary, adapters};
 pub use context::{Context, GpuError};
+pub use flights::HostTime;
 pub use frame::{FrameCost, FrameError, FrameMethod, FrameUpdate};
 pub use pipeline::BatchCapacity;
 pub use solver::GpuSolver;

@@ -28,6 +28,7 @@ pub(super) const DEPTH: &str = include_str!("../../shaders/depth.wgsl");
 pub(super) const DOUBLE_TYPES: &str = include_str!("../../shaders/double_types.wgsl");
 pub(super) const FACET: &str = include_str!("../../shaders/facet.wgsl");
 const COMPACT: &str = include_str!("../../shaders/compaction.wgsl");
+const RESULTS: &str = include_str!("../../shaders/results.wgsl");
 const SUPPORT: &str = include_str!("../../shaders/support.wgsl");
 const DEFORMED: &str = include_str!("../../shaders/deformed.wgsl");
 const SPRINGS: &str = include_str!("../../shaders/springs.wgsl");
@@ -129,6 +130,14 @@ pub static PAPER: Shader = Shader {
     overrides: &[&[], ISOTROPIC, CRAMPED],
 };
 
+/// Where the touches of each configuration go.
+pub static RESULTS_COUNT: Shader =
+    Shader { name: "results", entry: "count", parts: &[TYPES, RESULTS], overrides: &[&[], CRAMPED] };
+
+/// Touches without gaps.
+pub static RESULTS_GATHER: Shader =
+    Shader { name: "results", entry: "gather", parts: &[TYPES, RESULTS], overrides: &[&[], CRAMPED] };
+
 /// Graphics with dynamics, and without.
 const MOTIONS: &[&[(&str, f64)]] = &[&[], &[("QUASI_STATIC", 1.0)]];
 
@@ -203,6 +212,8 @@ pub static ALL: &[&Shader] = &[
     &DOUBLE_COMPACTION,
     &ENERGY,
     &PAPER,
+    &RESULTS_COUNT,
+    &RESULTS_GATHER,
     &FRAME_STIFFENING,
     &FRAME_LOAD,
     &FRAME_ADVANCE,

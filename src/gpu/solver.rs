@@ -1,9 +1,9 @@
-//! Equilibria of many configurations on the GPU: the backend of a sweep.
+//! Equilibria of many configurations on GPUs: the backend of a sweep.
 //!
-//! A chunk of configurations is placed and tested for contact in one submission; the host then knows how many touch,
-//! and submits these in batches, one workgroup a configuration. While the device solves one batch, all cores settle the
-//! one before in f64. Sizes of chunks and batches follow from measured time: a dispatch should last tens of
-//! milliseconds. Results do not depend on them.
+//! Configurations are cut into sections (`flights`), which are placed and tested for contact; the host then knows how
+//! many touch, and submits these in batches, one workgroup a configuration. While the devices solve sections, all cores
+//! settle the ones before in f64. Sizes of sections and batches follow from measured time: a dispatch should last tens
+//! of milliseconds. Results depend neither on them nor on how many devices there are.
 //!
 //! What f32 or the kernel's room cannot decide is left to the CPU's f64 solver: forces that do not settle, more
 //! contacts than the lists hold, and where shaders have no f64 contact within rounding of none. Nothing is cut off.
@@ -11,62 +11,34 @@
 use super::{
     adapter::AdapterSummary,
     context::{Context, GpuError},
+    flights::{HostTime, Landed, PacedDevice, Queue, fly},
     pipeline::{BatchCapacity, Pipeline},
+    stages::{Detected, Found, GapPrecision, Recorded, Stages},
     unpack::unpack,
 };
 use crate::{
     JointVector,
-    contact::{self, Backend, Equilibrium, Solvers, Status},
+    contact::{self, Backend, Equilibrium, Solvers, Status, Work},
     scene::Algorithm,
     tolerances::GPU_RESOLVED_RESIDUAL,
 };
-use std::{
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{sync::Arc, time::Instant};
 
-/// How long a dispatch should last: long enough to keep the device busy, far below the 2 s after which an operating
-/// system takes it for hung.
-const DISPATCH_TARGET: Duration = Duration::from_millis(50);
+/// Configurations of a call on a software rasteriser, which takes a second for some hundred of them.
+const SOFTWARE_CHUNK: usize = 1024;
 
-/// Solves configurations on the GPU.
-pub struct GpuSolver<'a> {
-    context: Arc<Context>,
+/// Solves configurations on GPUs, or on what stands for them.
+pub struct GpuSolver<'a, S: Stages = Pipeline<'a>> {
+    devices: Vec<PacedDevice<S>>,
+    host: HostPart<'a>,
+    time: HostTime,
+}
+
+/// What is done with what the devices found.
+struct HostPart<'a> {
     model: &'a contact::Model<'a>,
     cpu: Solvers<'a>,
-    room: BatchCapacity,
-    pipeline: Pipeline,
-    chunk: AdaptiveSize,
-    batch: AdaptiveSize,
     left_to_cpu: usize,
-}
-
-/// A number of configurations that follows measured time.
-#[derive(Clone, Copy, Debug)]
-struct AdaptiveSize {
-    now: usize,
-    most: usize,
-}
-
-impl AdaptiveSize {
-    /// Steers towards [`DISPATCH_TARGET`], at most by a factor of two up and four down.
-    fn adapt(&mut self, done: usize, time: Duration) {
-        // A dispatch that was cut short by the end of the list says nothing about a full one.
-        if done < self.now && time < DISPATCH_TARGET {
-            return;
-        }
-        let ratio = (DISPATCH_TARGET.as_secs_f64() / time.as_secs_f64().max(1e-6)).clamp(0.25, 2.0);
-        self.now = ((done as f64 * ratio) as usize).clamp(1, self.most);
-    }
-}
-
-/// One batch under way.
-struct PendingBatch {
-    first: usize,
-    count: usize,
-    set: usize,
-    submission: wgpu::SubmissionIndex,
-    since: Instant,
 }
 
 impl<'a> GpuSolver<'a> {
@@ -87,141 +59,170 @@ impl<'a> GpuSolver<'a> {
         model: &'a contact::Model<'a>,
         room: BatchCapacity,
     ) -> Result<Self, GpuError> {
-        let room = room.within(context.binding_limit(), model);
-        let pipeline = Pipeline::new(&context, model, room)?;
-        Ok(Self {
-            context,
-            model,
-            cpu: Solvers::new(model, rayon::current_num_threads()),
-            room,
-            pipeline,
-            // First dispatches are small: nothing is known of the device yet.
-            chunk: AdaptiveSize { now: room.chunk.min(1024), most: room.chunk },
-            batch: AdaptiveSize { now: room.batch.min(64), most: room.batch },
-            left_to_cpu: 0,
-        })
+        Self::on(vec![context], model, room)
     }
 
-    /// The adapter in use.
-    #[must_use]
-    pub fn adapter(&self) -> &AdapterSummary {
-        self.context.adapter()
+    /// The same on several devices, which share the configurations. None of them is no error, and solves nothing.
+    ///
+    /// # Errors
+    /// As [`GpuSolver::new`].
+    pub fn on(
+        contexts: Vec<Arc<Context>>,
+        model: &'a contact::Model<'a>,
+        room: BatchCapacity,
+    ) -> Result<Self, GpuError> {
+        let pipelines = contexts.into_iter().map(|context| Pipeline::new(context, model, room));
+        Ok(Self::of(pipelines.collect::<Result<_, _>>()?, model))
     }
 
-    /// Whether contact or not is decided on the device, in f64.
-    #[must_use]
-    pub fn is_exact(&self) -> bool {
-        self.pipeline.detection().is_exact()
+    /// The adapters in use.
+    pub fn adapters(&self) -> impl Iterator<Item = &AdapterSummary> {
+        self.devices.iter().map(|device| device.stages.context().adapter())
+    }
+
+    /// What its first device finds of `configurations`, to be replayed.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn record(&mut self, configurations: &[JointVector]) -> Result<Recorded, GpuError> {
+        Recorded::of(&mut self.devices[0].stages, configurations)
     }
 
     /// A good number of configurations for one call: progress is reported between calls.
     #[must_use]
     pub fn chunk(&self) -> usize {
-        if self.adapter().hardware { self.room.chunk } else { self.room.chunk.min(1024) }
+        let of = |device: &PacedDevice<Pipeline<'_>>| {
+            let section = device.stages.room().section;
+            if device.stages.context().adapter().hardware { section } else { section.min(SOFTWARE_CHUNK) }
+        };
+        self.devices.iter().map(of).sum()
+    }
+}
+
+impl<'a, S: Stages> GpuSolver<'a, S> {
+    /// A solver of `model` on `devices`, which were made for it.
+    pub fn of(devices: Vec<S>, model: &'a contact::Model<'a>) -> Self {
+        let cpu = Solvers::new(model, rayon::current_num_threads());
+        Self {
+            devices: devices.into_iter().map(PacedDevice::new).collect(),
+            host: HostPart { model, cpu, left_to_cpu: 0 },
+            time: HostTime::default(),
+        }
     }
 
-    /// Equilibria of one chunk.
-    fn solve_chunk(&mut self, chunk: &[JointVector]) -> Result<Vec<Equilibrium>, GpuError> {
-        let since = Instant::now();
-        let (gaps, touching) = self.pipeline.detection().detect(&self.context, chunk)?;
-        self.chunk.adapt(chunk.len(), since.elapsed());
-        let mut results: Vec<Equilibrium> = gaps.iter().zip(chunk).map(|(&gap, q)| free(gap, q.len())).collect();
-        self.decide_free(chunk, &touching, &mut results);
-        let mut flight: Option<PendingBatch> = None;
-        let mut first = 0;
-        while first < touching.len() || flight.is_some() {
-            let previous = flight.take();
-            if first < touching.len() {
-                let count = self.batch.now.min(touching.len() - first);
-                let set = previous.as_ref().map_or(0, |flight: &PendingBatch| 1 - flight.set);
-                let submission = self.pipeline.solve(&self.context, first, count, set);
-                flight = Some(PendingBatch { first, count, set, submission, since: Instant::now() });
-                first += count;
-            }
-            if let Some(done) = previous {
-                let members = &touching[done.first..done.first + done.count];
-                let landed = self.land(chunk, members, &done, &mut results)?;
-                // The next one began when this one ended.
-                if let Some(next) = &mut flight {
-                    next.since = landed;
-                }
-            }
+    /// Whether contact or not is decided on the devices, in f64.
+    #[must_use]
+    pub fn is_exact(&self) -> bool {
+        self.devices.iter().all(|device| device.stages.precision().exact)
+    }
+
+    /// Where the time of the host went since the solver was made.
+    #[must_use]
+    pub fn host_time(&self) -> HostTime {
+        self.time
+    }
+}
+
+impl HostPart<'_> {
+    /// Adds the equilibria of a section that a device has solved.
+    fn conclude(
+        &mut self,
+        precision: GapPrecision,
+        landed: Landed<'_>,
+        time: &mut HostTime,
+        equilibria: &mut Vec<Equilibrium>,
+    ) -> Result<(), GpuError> {
+        let Landed { configurations, detected: Detected { gaps, touching }, found } = landed;
+        let begin = Instant::now();
+        let first = equilibria.len();
+        equilibria.extend(gaps.iter().zip(configurations).map(|(&gap, q)| free(gap, q.len())));
+        let results = &mut equilibria[first..];
+        let assembled = Instant::now();
+        self.decide_free(precision, configurations, &touching, results);
+        let settled = self.settle(precision, configurations, &touching, &found, results)?;
+        let done = Instant::now();
+        for (&member, result) in touching.iter().zip(settled) {
+            results[member as usize] = result;
         }
-        Ok(results)
+        time.settling += done - assembled;
+        time.assembling += (assembled - begin) + done.elapsed();
+        Ok(())
     }
 
     /// Solves on the CPU what touches nothing but lies within what its gap is known to of contact, and where gaps are
     /// those to flat triangles measures those to a smooth surface.
-    fn decide_free(&mut self, chunk: &[JointVector], touching: &[u32], results: &mut [Equilibrium]) {
-        let mut free = vec![true; chunk.len()];
+    fn decide_free(
+        &mut self,
+        precision: GapPrecision,
+        section: &[JointVector],
+        touching: &[u32],
+        results: &mut [Equilibrium],
+    ) {
+        let measured = precision.exact || self.model.surface.smooth.is_none();
+        if measured && results.iter().all(|result| result.gap.abs() > precision.band) {
+            return;
+        }
+        let mut free = vec![true; section.len()];
         touching.iter().for_each(|&member| free[member as usize] = false);
-        let measured = self.pipeline.detection().is_exact() || self.model.surface.smooth.is_none();
         let (undecided, others): (Vec<usize>, Vec<usize>) =
-            (0..chunk.len()).filter(|&k| free[k]).partition(|&k| self.is_undecided(&results[k]));
+            (0..section.len()).filter(|&k| free[k]).partition(|&k| self.is_undecided(precision, &results[k]));
         self.left_to_cpu += undecided.len();
         let open = if measured { undecided } else { [undecided, others].concat() };
-        let decided = self.cpu.map(&open, |solver, &k| solver.solve(&chunk[k]));
+        let decided = self.cpu.map(&open, |solver, &k| solver.solve(&section[k]));
         for (k, result) in open.into_iter().zip(decided) {
             results[k] = result;
         }
     }
 
-    /// Waits for a batch and stores its results; when the device had done with it.
-    fn land(
+    /// The equilibria of those in contact, settled from what the kernels `found`.
+    fn settle(
         &mut self,
-        chunk: &[JointVector],
-        members: &[u32],
-        flight: &PendingBatch,
-        results: &mut [Equilibrium],
-    ) -> Result<Instant, GpuError> {
-        let (outcomes, touches) = self.pipeline.collect(&self.context, flight.set, flight.count, &flight.submission)?;
-        let landed = Instant::now();
-        self.batch.adapt(flight.count, landed - flight.since);
-        let places: Vec<usize> = (0..members.len()).collect();
+        precision: GapPrecision,
+        section: &[JointVector],
+        touching: &[u32],
+        found: &Found,
+        at_rest: &[Equilibrium],
+    ) -> Result<Vec<Equilibrium>, GpuError> {
+        let counts = found.results.iter().map(|result| result.touches as usize);
+        let starts: Vec<usize> = counts
+            .scan(0_usize, |end, count| {
+                let start = *end;
+                *end = end.saturating_add(count);
+                Some(start)
+            })
+            .collect();
+        let places: Vec<usize> = (0..touching.len()).collect();
+        let model = self.model;
         let solved = self.cpu.map(&places, |solver, &place| {
-            let member = members[place] as usize;
-            let list = &touches[place * self.room.contacts..][..self.room.contacts];
-            let mut result = unpack(self.model, solver, &chunk[member], &outcomes[place], list)?;
-            if self.model.contact.algorithm == Algorithm::Paper {
-                result.gap = results[member].gap;
+            let member = touching[place] as usize;
+            let (outcome, list) = (found.results.get(place)?, found.touches.get(*starts.get(place)?..)?);
+            let mut result = unpack(model, solver, &section[member], outcome, list)?;
+            if model.contact.algorithm == Algorithm::Paper {
+                result.gap = at_rest[member].gap;
             }
-            Some(if self.is_undecided(&result) { (solver.solve(&chunk[member]), 1) } else { (result, 0) })
+            let undecided = self.is_undecided(precision, &result);
+            Some(if undecided { (solver.solve(&section[member]), 1) } else { (result, 0) })
         });
         let unwritten = solved.iter().filter(|result| result.is_none()).count();
         if unwritten > 0 {
-            return Err(GpuError::NeverWritten { count: unwritten, total: members.len() });
+            return Err(GpuError::NeverWritten { count: unwritten, total: touching.len() });
         }
-        for (&member, (result, left)) in members.iter().zip(solved.into_iter().flatten()) {
-            results[member as usize] = result;
-            self.left_to_cpu += left;
-        }
-        Ok(landed)
+        let (results, left): (Vec<_>, Vec<usize>) = solved.into_iter().flatten().unzip();
+        self.left_to_cpu += left.into_iter().sum::<usize>();
+        Ok(results)
     }
 
     /// Whether f32 or the kernel's room left open what the equilibrium is. The paper's iteration often does not
     /// converge in any precision, and is then left at that.
-    fn is_undecided(&self, result: &Equilibrium) -> bool {
+    fn is_undecided(&self, precision: GapPrecision, result: &Equilibrium) -> bool {
         result.gap.is_nan()
-            || result.gap.abs() <= self.pipeline.detection().gap_band()
+            || result.gap.abs() <= precision.band
             || match result.status {
                 Status::Contact => result.residual.is_nan() || result.residual > GPU_RESOLVED_RESIDUAL,
                 Status::Unconverged => self.model.contact.algorithm != Algorithm::Paper,
                 Status::Overflow => true,
                 Status::Free | Status::Outside => false,
             }
-    }
-
-    /// Opens the device again, with half the room.
-    fn reopen(&mut self) -> Result<(), GpuError> {
-        let context = Arc::new(self.context.reopen()?);
-        let room = self.room.half();
-        self.pipeline = Pipeline::new(&context, self.model, room)?;
-        self.context = context;
-        self.room = room;
-        for (pace, most) in [(&mut self.chunk, room.chunk), (&mut self.batch, room.batch)] {
-            *pace = AdaptiveSize { now: (pace.now / 2).clamp(1, most), most };
-        }
-        Ok(())
     }
 }
 
@@ -240,28 +241,58 @@ pub(super) fn free(gap: f64, joints: usize) -> Equilibrium {
     }
 }
 
-impl Backend for GpuSolver<'_> {
+/// One chunk.
+struct OneChunk {
+    configurations: Option<Vec<JointVector>>,
+    equilibria: Vec<Equilibrium>,
+}
+
+impl Work for OneChunk {
+    fn next(&mut self) -> Option<Vec<JointVector>> {
+        self.configurations.take()
+    }
+
+    fn take(&mut self, equilibria: Vec<Equilibrium>) {
+        self.equilibria = equilibria;
+    }
+
+    fn note(&mut self, _: String) {}
+}
+
+impl<S: Stages> Backend for GpuSolver<'_, S> {
     type Error = GpuError;
 
-    /// Equilibria of `configurations`, in the same order. A device that is lost, hangs or runs out of memory is opened
-    /// again, once a chunk, with half the room.
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, GpuError> {
-        let mut results = Vec::with_capacity(configurations.len());
-        while results.len() < configurations.len() {
-            let rest = &configurations[results.len()..];
-            let solved = match self.solve_chunk(&rest[..rest.len().min(self.chunk.now)]) {
-                Err(GpuError::Lost(_) | GpuError::TimedOut(_) | GpuError::OutOfMemory(_)) => {
-                    self.reopen()?;
-                    self.solve_chunk(&rest[..rest.len().min(self.chunk.now)])?
-                }
-                outcome => outcome?,
+        let mut work = OneChunk { configurations: Some(configurations.to_vec()), equilibria: Vec::new() };
+        self.stream(&mut work)?;
+        Ok(work.equilibria)
+    }
+
+    /// Solves chunk by chunk. A device that is lost, hangs or runs out of memory is opened again, with half the room;
+    /// if no result has come since the last time, this is an error.
+    fn stream(&mut self, work: &mut dyn Work) -> Result<(), GpuError> {
+        let mut queue = Queue::new(work);
+        let mut landed_at_failure = None;
+        loop {
+            let Self { devices, host, time } = self;
+            let conclude = |stages: &S, landed: Landed<'_>, time: &mut HostTime, equilibria: &mut Vec<Equilibrium>| {
+                host.conclude(stages.precision(), landed, time, equilibria)
             };
-            results.extend(solved);
+            match fly(devices, &mut queue, time, conclude) {
+                Ok(()) => return Ok(()),
+                Err((device, GpuError::Lost(_) | GpuError::TimedOut(_) | GpuError::OutOfMemory(_)))
+                    if landed_at_failure != Some(queue.landed()) =>
+                {
+                    landed_at_failure = Some(queue.landed());
+                    queue.rewind();
+                    self.devices[device].reopen()?;
+                }
+                Err((_, error)) => return Err(error),
+            }
         }
-        Ok(results)
     }
 
     fn left_to_cpu(&self) -> usize {
-        self.left_to_cpu
+        self.host.left_to_cpu
     }
 }

@@ -179,9 +179,12 @@ mod tests {
         assert_eq!(timed.0, plain.0, "results depend on the clock");
         assert_eq!(plain.1, []);
         let names: Vec<&str> = timed.1.iter().map(|kernel| kernel.name.as_str()).collect();
-        assert_eq!(names, ["kinematics", "detection", "classification", "compaction", "energy"]);
+        assert_eq!(
+            names,
+            ["kinematics", "detection", "classification", "compaction", "energy", "results count", "results gather"]
+        );
         // One workgroup a configuration, and for each of its nodes the place is written, then read and written.
-        let [kinematics, detection, .., energy] = &timed.1[..] else { panic!("{names:?}") };
+        let [kinematics, detection, _, _, energy, ..] = &timed.1[..] else { panic!("{names:?}") };
         let touching = timed.0.iter().filter(|(status, ..)| *status != crate::contact::Status::Free).count() as u64;
         assert!(energy.workgroups >= touching && touching > 50, "{} for {touching}", energy.workgroups);
         let places = (16 * chain.nodes.len() * configurations.len()) as u64;

@@ -3,7 +3,7 @@
 use super::{Backend, CpuBackend, WithFallback};
 use crate::{
     JointVector,
-    contact::{Equilibrium, Model},
+    contact::{Equilibrium, Model, Work},
     gpu::{ADAPTER_VARIABLE, AdapterChoice, Context, GpuError, GpuSolver, adapters},
     memory,
 };
@@ -85,7 +85,8 @@ impl<'a> ChosenBackend<'a> {
     /// A device that is open already, to solve `model`, with the CPU behind it.
     #[must_use]
     pub fn on(device: GpuSolver<'a>, model: &'a Model<'a>) -> Self {
-        let (chunk, name) = (device.chunk(), device.adapter().to_string());
+        let adapters: Vec<String> = device.adapters().map(ToString::to_string).collect();
+        let (chunk, name) = (device.chunk(), adapters.join("; "));
         Self::Gpu { solver: Box::new(WithFallback::new(device, name, model)), chunk }
     }
 
@@ -139,6 +140,13 @@ impl Backend for ChosenBackend<'_> {
         match self {
             Self::Cpu(cpu) => cpu.solve(configurations).map_err(|never| match never {}),
             Self::Gpu { solver, .. } => Ok(solver.solve(configurations)?),
+        }
+    }
+
+    fn stream(&mut self, work: &mut dyn Work) -> Result<(), Self::Error> {
+        match self {
+            Self::Cpu(cpu) => cpu.stream(work).map_err(|never| match never {}),
+            Self::Gpu { solver, .. } => Ok(solver.stream(work)?),
         }
     }
 

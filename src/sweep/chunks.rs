@@ -11,10 +11,11 @@ use super::{
 };
 use crate::{
     JointVector,
-    contact::{Equilibrium, SHARE},
+    contact::{Equilibrium, SHARE, Work},
     dataset::Provenance,
 };
 use std::{
+    collections::VecDeque,
     ops::Range,
     panic::resume_unwind,
     path::{Path, PathBuf},
@@ -169,8 +170,8 @@ impl ChunkSize {
 /// A stretch of points under way.
 struct Chunk {
     points: Range<usize>,
-    /// Configurations that are to be solved.
-    configurations: Vec<JointVector>,
+    /// Gaps of the points that are known to be free [m]; nothing where free space is not looked for.
+    free_gaps: Vec<Option<f32>>,
 }
 
 impl Sweep<'_> {
@@ -203,103 +204,217 @@ impl Sweep<'_> {
         begun: Begun,
         footprint: Footprint,
         part: Option<PathBuf>,
-        mut kept: Kept,
+        kept: Kept,
     ) -> Result<Solved, SweepError> {
-        let Begun { mut tally, mut provenance } = begun;
-        let (points, resumed, start) = (self.points(), tally.points, Instant::now());
-        let left_before = backend.left_to_cpu();
-        let (mesh_ripple, forecast) = (self.mesh_ripple(), self.forecast);
-        let mut tell = |tally: &Tally, rate| {
-            let (done, contact_points) = (tally.points, tally.statuses.in_contact());
-            (run.progress)(Progress { done, points, contact_points, rate, footprint, forecast, mesh_ripple });
+        let (start, left_before) = (Instant::now(), backend.left_to_cpu());
+        let Begun { tally, provenance } = begun;
+        let resumed = tally.points;
+        let mut course = Course {
+            sweep: self,
+            free_space: self.free_space(),
+            slab: 0..0,
+            gaps: None,
+            cut: resumed,
+            chunks: VecDeque::new(),
+            size: ChunkSize::new(run.chunk.clamp(1, self.points().max(1))),
+            run,
+            tally,
+            provenance,
+            kept,
+            part,
+            footprint,
+            resumed,
+            skipped: 0,
+            start,
+            taken: start,
+            failure: None,
         };
-        tell(&tally, 0.0);
-        let (free_space, mut skipped) = (self.free_space(), 0);
-        let mut size = ChunkSize::new(run.chunk.clamp(1, points.max(1)));
-        let rest = |done| self.shard.rest(self.grid.points(), done);
-        while tally.points < points {
-            let whole = 0..self.grid.points();
-            let slab = free_space.as_ref().map_or(whole, |free_space| free_space.slab(rest(tally.points).start));
-            let gaps = free_space.as_ref().map(|free_space| self.gaps(free_space, slab.clone())).transpose()?;
-            let free_gap = |point| gaps.as_ref()?.gap(point);
-            while tally.points < points && rest(tally.points).start < slab.end {
-                let (done, Range { start: first, end }) = (tally.points, rest(tally.points));
-                let stopped = || SweepError::Stopped { done, points, part: part.clone() };
-                if run.stop.load(Ordering::Relaxed) {
-                    return Err(stopped());
-                }
-                let chunk = self.cut(first..end.min(slab.end), size.size, free_gap);
-                let begun = Instant::now();
-                let equilibria = solved(backend, &chunk.configurations, chunk.points.clone())?;
-                size.adapt(chunk.configurations.len(), begun.elapsed());
-                for notice in backend.notices() {
-                    let notice = format!("from grid point {first} on: {notice}");
-                    kept.send(Entry::Notice(notice.clone())).ok_or_else(stopped)?;
-                    provenance.notices.push(notice);
-                }
-                let mut columns = kept.columns().ok_or_else(stopped)?;
-                let mut equilibria = equilibria.iter();
-                for point in chunk.points {
-                    match free_gap(point) {
-                        Some(gap) => columns.push_free(gap, self.shape),
-                        None => equilibria.next().into_iter().for_each(|solved| columns.push(solved, self.shape)),
-                    }
-                }
-                skipped += columns.points() - chunk.configurations.len();
-                tally.add(&columns);
-                kept.send(Entry::Chunk(first, columns)).ok_or_else(stopped)?;
-                tell(&tally, (tally.points - resumed) as f64 / start.elapsed().as_secs_f64().max(f64::MIN_POSITIVE));
-            }
-        }
+        course.tell();
+        let streamed = backend.stream(&mut course);
+        course.finish(streamed)?;
         let facts = RunFacts {
             footprint,
-            skipped_points: skipped,
+            skipped_points: course.skipped,
             resumed_points: resumed,
-            solved_points: tally.points - resumed,
+            solved_points: course.tally.points - resumed,
             left_to_cpu: backend.left_to_cpu() - left_before,
             lowered: None,
             solving: start.elapsed(),
             time: start.elapsed(),
         };
-        Ok(Solved { tally, facts, provenance })
+        Ok(Solved { tally: course.tally, facts, provenance: course.provenance })
     }
 
     pub(super) fn gaps(&self, free_space: &FreeSpace<'_>, slab: Range<usize>) -> Result<FreeGaps, SweepError> {
         let (points, bytes) = (slab.len(), 4 * slab.len());
         free_space.find(slab).map_err(|source| SweepError::Memory { points, bytes, source })
     }
+}
 
-    /// The first points of `points`, so many that at most `most` of them are to be solved.
-    fn cut(&self, points: Range<usize>, most: usize, free_gap: impl Fn(usize) -> Option<f32>) -> Chunk {
-        let mut configurations = Vec::new();
-        let end = points.end.min(points.start.saturating_add(together(most)));
-        for point in points.start..end {
-            if free_gap(point).is_none() {
+/// A sweep's points on their way through a backend: cut into chunks, and their results kept.
+struct Course<'c, 'r> {
+    sweep: &'c Sweep<'c>,
+    run: &'c mut Run<'r>,
+    free_space: Option<FreeSpace<'c>>,
+    /// Points whose gaps are looked up, and what was found.
+    slab: Range<usize>,
+    gaps: Option<FreeGaps>,
+    /// Number of points that were cut off the sweep's so far.
+    cut: usize,
+    /// Chunks that were given to the backend and have no results yet.
+    chunks: VecDeque<Chunk>,
+    size: ChunkSize,
+    tally: Tally,
+    provenance: Provenance,
+    kept: Kept,
+    /// Where results are kept.
+    part: Option<PathBuf>,
+    footprint: Footprint,
+    /// Points that were there at the start, and points that were not solved.
+    resumed: usize,
+    skipped: usize,
+    start: Instant,
+    /// When the last chunk came back.
+    taken: Instant,
+    /// Why nothing more is wanted.
+    failure: Option<SweepError>,
+}
+
+impl Course<'_, '_> {
+    fn tell(&mut self) {
+        let (tally, points) = (&self.tally, self.sweep.points());
+        let seconds = self.start.elapsed().as_secs_f64().max(f64::MIN_POSITIVE);
+        (self.run.progress)(Progress {
+            done: tally.points,
+            points,
+            contact_points: tally.statuses.in_contact(),
+            rate: (tally.points - self.resumed) as f64 / seconds,
+            footprint: self.footprint,
+            forecast: self.sweep.forecast,
+            mesh_ripple: self.sweep.mesh_ripple(),
+        });
+    }
+
+    fn stopped(&self) -> SweepError {
+        SweepError::Stopped { done: self.tally.points, points: self.sweep.points(), part: self.part.clone() }
+    }
+
+    /// The points that are left to cut off, as far as they are consecutive.
+    fn rest(&self) -> Range<usize> {
+        self.sweep.shard.rest(self.sweep.grid.points(), self.cut)
+    }
+
+    /// Looks for free space about the next point, if that was not done.
+    fn look_for_free_space(&mut self) -> Result<(), SweepError> {
+        let first = self.rest().start;
+        if let Some(free_space) = &self.free_space
+            && !self.slab.contains(&first)
+        {
+            // Of two slabs only one is kept.
+            self.gaps = None;
+            self.slab = free_space.slab(first);
+            self.gaps = Some(self.sweep.gaps(free_space, self.slab.clone())?);
+        }
+        Ok(())
+    }
+
+    /// Cuts off the next points, so many that at most [`ChunkSize::size`] of them are to be solved.
+    fn cut_chunk(&mut self) -> (Chunk, Vec<JointVector>) {
+        let (rest, most) = (self.rest(), self.size.size);
+        let (mut configurations, mut free_gaps) = (Vec::new(), Vec::new());
+        let end = rest.end.min(rest.start.saturating_add(together(most)));
+        let end = if self.free_space.is_some() { end.min(self.slab.end) } else { end };
+        let mut point = rest.start;
+        while point < end {
+            let free_gap = self.gaps.as_ref().and_then(|gaps| gaps.gap(point));
+            if free_gap.is_none() {
                 if configurations.len() == most {
-                    return Chunk { points: points.start..point, configurations };
+                    break;
                 }
-                configurations.push(self.grid.configuration(point));
+                configurations.push(self.sweep.grid.configuration(point));
+            }
+            if self.gaps.is_some() {
+                free_gaps.push(free_gap);
+            }
+            point += 1;
+        }
+        (Chunk { points: rest.start..point, free_gaps }, configurations)
+    }
+
+    /// Keeps the results of a chunk.
+    fn keep(&mut self, chunk: &Chunk, equilibria: &[Equilibrium]) -> Result<(), SweepError> {
+        let solved = chunk.points.len() - chunk.free_gaps.iter().flatten().count();
+        if equilibria.len() != solved {
+            return Err(SweepError::Miscount { asked: solved, found: equilibria.len() });
+        }
+        let mut columns = self.kept.columns().ok_or_else(|| self.stopped())?;
+        let shape = self.sweep.shape;
+        let mut equilibria = equilibria.iter();
+        for place in 0..chunk.points.len() {
+            match chunk.free_gaps.get(place).copied().flatten() {
+                Some(gap) => columns.push_free(gap, shape),
+                None => equilibria.next().into_iter().for_each(|solved| columns.push(solved, shape)),
             }
         }
-        Chunk { points: points.start..end, configurations }
+        self.skipped += columns.points() - solved;
+        self.tally.add(&columns);
+        self.kept.send(Entry::Chunk(chunk.points.start, columns)).ok_or_else(|| self.stopped())?;
+        self.size.adapt(solved, self.taken.elapsed());
+        self.taken = Instant::now();
+        self.tell();
+        Ok(())
+    }
+
+    /// What became of the sweep, once the backend is done with it.
+    fn finish<E: std::error::Error + Send + Sync + 'static>(
+        &mut self,
+        streamed: Result<(), E>,
+    ) -> Result<(), SweepError> {
+        if let Some(failure) = self.failure.take() {
+            return Err(failure);
+        }
+        let under_way = self.chunks.front().zip(self.chunks.back());
+        let (first, last) = under_way
+            .map_or((self.cut, self.cut), |(first, last)| (first.points.start, last.points.end.saturating_sub(1)));
+        streamed.map_err(|source| SweepError::Backend { first, last, source: Box::new(source) })?;
+        if let Some(chunk) = self.chunks.front() {
+            return Err(SweepError::Miscount { asked: chunk.points.len(), found: 0 });
+        }
+        if self.tally.points < self.sweep.points() { Err(self.stopped()) } else { Ok(()) }
     }
 }
 
-/// `configurations`, which lie among `points`, solved by `backend`.
-pub(super) fn solved<B: Backend>(
-    backend: &mut B,
-    configurations: &[JointVector],
-    points: Range<usize>,
-) -> Result<Vec<Equilibrium>, SweepError> {
-    let equilibria = backend.solve(configurations).map_err(|source| SweepError::Backend {
-        first: points.start,
-        last: points.end - 1,
-        source: Box::new(source),
-    })?;
-    if equilibria.len() != configurations.len() {
-        return Err(SweepError::Miscount { asked: configurations.len(), found: equilibria.len() });
+impl Work for Course<'_, '_> {
+    fn next(&mut self) -> Option<Vec<JointVector>> {
+        let is_over = self.cut >= self.sweep.points() || self.run.stop.load(Ordering::Relaxed);
+        if is_over || self.failure.is_some() {
+            return None;
+        }
+        if let Err(failure) = self.look_for_free_space() {
+            self.failure = Some(failure);
+            return None;
+        }
+        let (chunk, configurations) = self.cut_chunk();
+        self.cut += chunk.points.len();
+        self.chunks.push_back(chunk);
+        Some(configurations)
     }
-    Ok(equilibria)
+
+    fn take(&mut self, equilibria: Vec<Equilibrium>) {
+        let Some(chunk) = self.chunks.pop_front() else { return };
+        if self.failure.is_none() {
+            self.failure = self.keep(&chunk, &equilibria).err();
+        }
+    }
+
+    fn note(&mut self, notice: String) {
+        let first = self.chunks.front().map_or_else(|| self.rest().start, |chunk| chunk.points.start);
+        let notice = format!("from grid point {first} on: {notice}");
+        if self.kept.send(Entry::Notice(notice.clone())).is_none() && self.failure.is_none() {
+            self.failure = Some(self.stopped());
+        }
+        self.provenance.notices.push(notice);
+    }
 }
 
 #[cfg(test)]

@@ -1,15 +1,15 @@
 //! A backend on a device that may fail for good, and the CPU in its place from then on.
 //!
 //! A GPU is lost by a driver's reset, by sleep, by being pulled out, or by other programs that take its memory. Its
-//! solver first tries again by itself with smaller batches; what it cannot mend ends here. The current batch and all
-//! that follow are then solved by the CPU, so that a sweep of hours goes on, and [`Backend::notices`] reports it.
+//! solver first tries again by itself with smaller batches; what it cannot mend ends here. The batches under way
+//! and all that follow are then solved by the CPU, so that a sweep of hours goes on, and [`Backend::notices`] reports it.
 
 use super::{Backend, CpuBackend};
 use crate::{
     JointVector,
-    contact::{Equilibrium, Model},
+    contact::{Equilibrium, Model, Work},
 };
-use std::fmt::Display;
+use std::{collections::VecDeque, fmt::Display};
 
 /// A backend with the CPU behind it.
 pub struct WithFallback<'a, B> {
@@ -37,6 +37,65 @@ impl<'a, B: Backend> WithFallback<'a, B> {
     }
 }
 
+/// Some work, of which the chunks that have no equilibria are remembered.
+struct Remembered<'w> {
+    work: &'w mut dyn Work,
+    under_way: VecDeque<Vec<JointVector>>,
+}
+
+impl Work for Remembered<'_> {
+    fn next(&mut self) -> Option<Vec<JointVector>> {
+        let chunk = self.work.next()?;
+        self.under_way.push_back(chunk.clone());
+        Some(chunk)
+    }
+
+    fn take(&mut self, equilibria: Vec<Equilibrium>) {
+        self.under_way.pop_front();
+        self.work.take(equilibria);
+    }
+
+    fn note(&mut self, notice: String) {
+        self.work.note(notice);
+    }
+}
+
+/// The chunks of some work that a device has left behind, and then the others.
+struct Resumed<'w> {
+    work: &'w mut dyn Work,
+    left_behind: VecDeque<Vec<JointVector>>,
+}
+
+impl Work for Resumed<'_> {
+    fn next(&mut self) -> Option<Vec<JointVector>> {
+        self.left_behind.pop_front().or_else(|| self.work.next())
+    }
+
+    fn take(&mut self, equilibria: Vec<Equilibrium>) {
+        self.work.take(equilibria);
+    }
+
+    fn note(&mut self, notice: String) {
+        self.work.note(notice);
+    }
+}
+
+impl<'a, B: Backend> WithFallback<'a, B> {
+    /// Leaves the device, which has failed.
+    fn leave(&mut self, error: &B::Error) {
+        self.left_to_cpu = self.left_to_cpu();
+        self.device = None;
+        self.notices.push(format!("solved by {}, since {} failed: {error}", CpuBackend::adapter(), self.name));
+    }
+
+    fn cpu(&mut self) -> Result<&mut CpuBackend<'a>, rayon::ThreadPoolBuildError> {
+        match &mut self.cpu {
+            Some(cpu) => Ok(cpu),
+            empty => Ok(empty.insert(CpuBackend::new(self.model, 0)?)),
+        }
+    }
+}
+
 impl<B: Backend> Backend for WithFallback<'_, B> {
     /// When the system gives no threads to the CPU backend.
     type Error = rayon::ThreadPoolBuildError;
@@ -45,22 +104,26 @@ impl<B: Backend> Backend for WithFallback<'_, B> {
         if let Some(device) = &mut self.device {
             match device.solve(configurations) {
                 Ok(equilibria) => return Ok(equilibria),
+                Err(error) => self.leave(&error),
+            }
+        }
+        self.cpu()?.solve(configurations).map_err(|never| match never {})
+    }
+
+    fn stream(&mut self, work: &mut dyn Work) -> Result<(), Self::Error> {
+        let mut left_behind = VecDeque::new();
+        if let Some(device) = &mut self.device {
+            let mut remembered = Remembered { work: &mut *work, under_way: VecDeque::new() };
+            match device.stream(&mut remembered) {
+                Ok(()) => return Ok(()),
                 Err(error) => {
-                    self.left_to_cpu = device.left_to_cpu();
-                    self.device = None;
-                    self.notices.push(format!(
-                        "solved by {}, since {} failed: {error}",
-                        CpuBackend::adapter(),
-                        self.name
-                    ));
+                    left_behind = remembered.under_way;
+                    self.leave(&error);
                 }
             }
         }
-        let cpu = match &mut self.cpu {
-            Some(cpu) => cpu,
-            empty => empty.insert(CpuBackend::new(self.model, 0)?),
-        };
-        cpu.solve(configurations).map_err(|never| match never {})
+        self.notices().into_iter().for_each(|notice| work.note(notice));
+        self.cpu()?.stream(&mut Resumed { work, left_behind }).map_err(|never| match never {})
     }
 
     fn notices(&mut self) -> Vec<String> {

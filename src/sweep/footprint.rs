@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     JointVector,
-    contact::{Equilibrium, NodeForce, Touch},
+    contact::{CHUNKS_IN_FLIGHT, Equilibrium, NodeForce, Touch},
 };
 
 /// Memory and disk of a sweep. The object, its compliance and the backend's own buffers come on top: they do not grow
@@ -43,8 +43,8 @@ pub(super) fn results(points: usize, touching: usize, shape: Shape) -> usize {
     Columns::bytes(points, shape.width(), points.saturating_mul(contacts), points.saturating_mul(touches))
 }
 
-/// A chunk on its way: `solved` configurations and their equilibria, and the columns of `points` points, and of the
-/// chunks before that are being kept [bytes].
+/// Chunks on their way: `solved` configurations of each and their equilibria, and the columns of `points` points, and
+/// of the chunks before that are being kept [bytes].
 pub(super) fn chunk(solved: usize, points: usize, touching: usize, shape: Shape) -> usize {
     // Lists grow by doubling.
     let lists = 2 * (node_forces(touching, shape) * size_of::<NodeForce>() + touching * size_of::<Touch>());
@@ -52,7 +52,8 @@ pub(super) fn chunk(solved: usize, points: usize, touching: usize, shape: Shape)
     let contacts = if shape.with_forces { 2 * solved.saturating_mul(node_forces(touching, shape)) } else { 0 };
     let touches = 2 * solved.saturating_mul(touching * shape.width().touches);
     let columns = Columns::bytes(points, shape.width(), contacts, touches);
-    solved.saturating_mul(each).saturating_add(columns.saturating_mul(1 + BEHIND))
+    let under_way = solved.saturating_mul(each).saturating_add(points.saturating_mul(size_of::<Option<f32>>()));
+    under_way.saturating_mul(CHUNKS_IN_FLIGHT).saturating_add(columns.saturating_mul(1 + BEHIND))
 }
 
 /// Nodes of the object that `touching` nodes of the proxy touch.

@@ -5,13 +5,14 @@ use glam::DVec3;
 use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Solver, Status, Touch},
-    gpu::{BatchCapacity, GpuError, GpuSolver},
+    gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver},
     object::{Compliance, Object},
     proxy::Chain,
     scene::{Algorithm, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
     sweep::Backend,
     tolerances::GPU_SETTLED_RESIDUAL,
 };
+use std::sync::Arc;
 
 /// Springs along their rest direction, and a solid: of both, unlike isotropic springs, the compliance has blocks of
 /// nine numbers.
@@ -425,6 +426,41 @@ fn sizes_of_chunks_and_batches_leave_no_trace() {
     let pieces = solve(BatchCapacity { chunk: 7, batch: 2, ..BatchCapacity::default() });
     assert!(whole.iter().any(|result| result.status == Status::Contact));
     assert_eq!(format!("{whole:?}"), format!("{pieces:?}"), "bit for bit");
+    // One section after the other, and more lanes than sections.
+    for in_flight in [1, 8] {
+        let results = solve(BatchCapacity { chunk: 7, batch: 2, in_flight, ..BatchCapacity::default() });
+        assert_eq!(format!("{whole:?}"), format!("{results:?}"), "{in_flight} in flight");
+    }
+}
+
+/// One adapter opened twice is two devices to the solver.
+#[test]
+fn two_devices_find_what_one_finds() {
+    let (scene, object, chain) = load("sphere.toml");
+    let configurations = configurations(&scene, 5, 211);
+    let model = Model::new(&object, &chain, scene.contact);
+    let room = BatchCapacity { chunk: 16, ..BatchCapacity::default() };
+    let one = GpuSolver::with_room(context(), &model, room).unwrap().solve(&configurations).unwrap();
+    let other = Arc::new(Context::open(AdapterChoice::Any).unwrap());
+    let mut solver = GpuSolver::on(vec![context(), other], &model, room).unwrap();
+    assert_eq!(solver.adapters().count(), 2);
+    assert_eq!(format!("{one:?}"), format!("{:?}", solver.solve(&configurations).unwrap()), "bit for bit");
+}
+
+/// What is recorded of a device and returned at once leaves the host the same work, and the same results.
+#[test]
+fn a_recording_stands_for_its_device() {
+    let (scene, object, chain) = load("sphere.toml");
+    let configurations = configurations(&scene, 5, 211);
+    let model = Model::new(&object, &chain, scene.contact);
+    let mut solver = GpuSolver::new(context(), &model).unwrap();
+    let found = solver.solve(&configurations).unwrap();
+    let mut replayed = GpuSolver::of(vec![solver.record(&configurations).unwrap()], &model);
+    for turn in 0..2 {
+        assert_eq!(format!("{found:?}"), format!("{:?}", replayed.solve(&configurations).unwrap()), "turn {turn}");
+    }
+    let time = replayed.host_time();
+    assert!(!time.settling.is_zero() && !time.reading.is_zero());
 }
 
 #[test]

@@ -1,0 +1,487 @@
+//! Sections of configurations on their way through the stages of some devices, several at a time, and back in order.
+//!
+//! Every section has a lane of one device. Sections are waited for in the order in which they departed: once one is
+//! known to touch, its contacts are submitted, and once these are solved the next section takes its lane. Before the
+//! host turns to the results each device has a search ahead of it, if there is any.
+
+use super::{
+    context::GpuError,
+    stages::{Detected, Found, Stages},
+};
+use crate::{
+    JointVector,
+    contact::{CHUNKS_IN_FLIGHT, Equilibrium, Work},
+};
+use std::{
+    collections::VecDeque,
+    ops::Range,
+    time::{Duration, Instant},
+};
+
+/// How long a dispatch should last: long enough to keep the device busy, far below the 2 s after which an operating
+/// system takes it for hung.
+const DISPATCH_TARGET: Duration = Duration::from_millis(50);
+
+/// A number of configurations that follows measured time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AdaptiveSize {
+    pub now: usize,
+    most: usize,
+}
+
+impl AdaptiveSize {
+    /// Begins with `first`, at most `most`.
+    pub fn new(first: usize, most: usize) -> Self {
+        Self { now: first.min(most), most }
+    }
+
+    /// Steers towards [`DISPATCH_TARGET`] for one dispatch, at most by a factor of two up and four down, after `done`
+    /// configurations took `time`.
+    pub fn adapt(&mut self, done: usize, time: Duration) {
+        // A dispatch that was cut short by the end of the list says nothing about a full one.
+        if done < self.now && time < DISPATCH_TARGET {
+            return;
+        }
+        let wanted = DISPATCH_TARGET.as_secs_f64() / time.as_secs_f64().max(1e-6) * done as f64;
+        let limits = (self.now as f64 / 4.0, self.now as f64 * 2.0);
+        self.now = (wanted.clamp(limits.0, limits.1) as usize).clamp(1, self.most);
+    }
+
+    /// Half of it, of at most `most`.
+    fn halve(&mut self, most: usize) {
+        *self = Self { now: (self.now / 2).clamp(1, most.max(1)), most };
+    }
+}
+
+/// First sizes of sections and batches: nothing is known of the device yet.
+const FIRST_SECTION: usize = 1024;
+const FIRST_BATCH: usize = 64;
+
+/// A device, and how much it is given at a time.
+pub(super) struct PacedDevice<S> {
+    pub stages: S,
+    section: AdaptiveSize,
+    batch: AdaptiveSize,
+    /// When it was last known to be done with something.
+    done: Instant,
+}
+
+impl<S: Stages> PacedDevice<S> {
+    pub fn new(stages: S) -> Self {
+        let room = stages.room();
+        let section = AdaptiveSize::new(FIRST_SECTION, room.section);
+        let batch = AdaptiveSize::new(FIRST_BATCH, room.batch);
+        Self { stages, section, batch, done: Instant::now() }
+    }
+
+    /// Begins again after a failure, with half the room.
+    pub fn reopen(&mut self) -> Result<(), GpuError> {
+        self.stages.reopen()?;
+        let room = self.stages.room();
+        self.section.halve(room.section);
+        self.batch.halve(room.batch);
+        Ok(())
+    }
+
+    /// How long the device worked on what was submitted at `since` and is done now, if it works on one thing at a time.
+    fn worked(&mut self, since: Instant) -> Duration {
+        let now = Instant::now();
+        let begun = since.max(std::mem::replace(&mut self.done, now));
+        now - begun
+    }
+}
+
+/// Time of the host's thread that runs a search, by what it did. Waiting for a device counts as reading.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HostTime {
+    /// Configurations to the device, commands recorded and submitted.
+    pub submitting: Duration,
+    /// Waiting for the device, and results copied from it.
+    pub reading: Duration,
+    /// Results settled in f64, on all cores, and their torques and forces found.
+    pub settling: Duration,
+    /// Equilibria of all configurations put in order.
+    pub assembling: Duration,
+}
+
+impl HostTime {
+    fn of<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {
+        let begin = Instant::now();
+        let result = work();
+        *total += begin.elapsed();
+        result
+    }
+}
+
+/// Part of a chunk.
+#[derive(Clone, Debug)]
+struct Section {
+    /// Number of the chunk, counted from the first one of the work.
+    chunk: usize,
+    places: Range<usize>,
+}
+
+/// A chunk that was asked for and is not handed back yet.
+struct Asked {
+    configurations: Vec<JointVector>,
+    departed: usize,
+    equilibria: Vec<Equilibrium>,
+}
+
+/// The chunks of some work that are under way.
+pub(super) struct Queue<'w> {
+    work: &'w mut dyn Work,
+    chunks: VecDeque<Asked>,
+    /// Chunks that were handed back.
+    handed: usize,
+    /// Configurations whose equilibria are there.
+    landed: usize,
+    is_over: bool,
+}
+
+impl<'w> Queue<'w> {
+    pub fn new(work: &'w mut dyn Work) -> Self {
+        Self { work, chunks: VecDeque::new(), handed: 0, landed: 0, is_over: false }
+    }
+
+    /// Configurations whose equilibria are there.
+    pub fn landed(&self) -> usize {
+        self.landed
+    }
+
+    /// Everything that has no equilibrium yet is to depart again.
+    pub fn rewind(&mut self) {
+        self.chunks.iter_mut().for_each(|chunk| chunk.departed = chunk.equilibria.len());
+    }
+
+    /// The next section, of at most `most` configurations; `None` where there is none now.
+    fn depart(&mut self, most: usize) -> Option<Section> {
+        let waiting = |chunk: &Asked| chunk.departed < chunk.configurations.len();
+        loop {
+            self.hand_back();
+            if self.chunks.iter().any(waiting) || self.is_over || self.chunks.len() >= CHUNKS_IN_FLIGHT {
+                break;
+            }
+            match self.work.next() {
+                None => self.is_over = true,
+                Some(configurations) => {
+                    let equilibria = Vec::with_capacity(configurations.len());
+                    self.chunks.push_back(Asked { configurations, departed: 0, equilibria });
+                }
+            }
+        }
+        let place = self.chunks.iter().position(waiting)?;
+        let chunk = &mut self.chunks[place];
+        let first = chunk.departed;
+        chunk.departed = chunk.configurations.len().min(first + most.max(1));
+        Some(Section { chunk: self.handed + place, places: first..chunk.departed })
+    }
+
+    fn configurations(&self, section: &Section) -> &[JointVector] {
+        &self.chunks[section.chunk - self.handed].configurations[section.places.clone()]
+    }
+
+    /// Where the equilibria of `section`, the earliest that has none, are to be added.
+    fn equilibria(&mut self, section: &Section) -> (&[JointVector], &mut Vec<Equilibrium>) {
+        let chunk = &mut self.chunks[section.chunk - self.handed];
+        self.landed += section.places.len();
+        (&chunk.configurations[section.places.clone()], &mut chunk.equilibria)
+    }
+
+    /// Hands back the chunks that are whole.
+    fn hand_back(&mut self) {
+        while let Some(chunk) = self.chunks.pop_front_if(|chunk| chunk.equilibria.len() == chunk.configurations.len()) {
+            self.handed += 1;
+            self.work.take(chunk.equilibria);
+        }
+    }
+}
+
+/// A section on its way.
+struct Flight<T> {
+    device: usize,
+    lane: usize,
+    section: Section,
+    /// What it waits for: nothing, where nothing touches.
+    ticket: Option<T>,
+    since: Instant,
+    /// Where its proxy is, once that is known.
+    detected: Option<Detected>,
+}
+
+/// A section with its results.
+pub(super) struct Landed<'q> {
+    pub configurations: &'q [JointVector],
+    pub detected: Detected,
+    pub found: Found,
+}
+
+/// All devices, and the sections that they work on.
+struct Fleet<'f, S: Stages> {
+    devices: &'f mut [PacedDevice<S>],
+    idle: VecDeque<(usize, usize)>,
+    flights: VecDeque<Flight<S::Ticket>>,
+    time: &'f mut HostTime,
+}
+
+/// A failure, and the number of the device that failed.
+pub(super) type Failed = (usize, GpuError);
+
+/// Takes all of `queue` through `devices`. `conclude` adds the equilibria of a section that one of them has solved to a
+/// list.
+pub(super) fn fly<S: Stages>(
+    devices: &mut [PacedDevice<S>],
+    queue: &mut Queue<'_>,
+    time: &mut HostTime,
+    mut conclude: impl FnMut(&S, Landed<'_>, &mut HostTime, &mut Vec<Equilibrium>) -> Result<(), GpuError>,
+) -> Result<(), Failed> {
+    // One lane of every device, then the next.
+    let lanes = devices.iter().map(|device| device.stages.room().lanes).max().unwrap_or(0);
+    let all = (0..lanes).flat_map(|lane| (0..devices.len()).map(move |device| (device, lane)));
+    let idle = all.filter(|&(device, lane)| lane < devices[device].stages.room().lanes).collect();
+    let mut fleet = Fleet { devices, idle, flights: VecDeque::new(), time };
+    loop {
+        fleet.depart(queue);
+        let Some(flight) = fleet.flights.pop_front() else { break };
+        let Some(detected) = flight.detected else {
+            fleet.search(flight, queue)?;
+            continue;
+        };
+        let Flight { device, lane, section, ticket, since, .. } = flight;
+        let found = fleet.found(device, lane, detected.touching.len(), ticket, since).map_err(|e| (device, e))?;
+        fleet.idle.push_back((device, lane));
+        fleet.depart(queue);
+        fleet.keep_busy(queue)?;
+        let (configurations, equilibria) = queue.equilibria(&section);
+        let landed = Landed { configurations, detected, found };
+        conclude(&fleet.devices[device].stages, landed, fleet.time, equilibria).map_err(|e| (device, e))?;
+    }
+    Ok(())
+}
+
+impl<S: Stages> Fleet<'_, S> {
+    /// Fills idle lanes.
+    fn depart(&mut self, queue: &mut Queue<'_>) {
+        while let Some(&(device, lane)) = self.idle.front() {
+            let paced = &mut self.devices[device];
+            let Some(section) = queue.depart(paced.section.now) else { return };
+            self.idle.pop_front();
+            let configurations = queue.configurations(&section);
+            let ticket = HostTime::of(&mut self.time.submitting, || paced.stages.detect(lane, configurations));
+            let (ticket, since) = (Some(ticket), Instant::now());
+            self.flights.push_back(Flight { device, lane, section, ticket, since, detected: None });
+        }
+    }
+
+    /// Waits for where the proxy is in the section that departed, and has its contacts solved.
+    fn search(&mut self, flight: Flight<S::Ticket>, queue: &Queue<'_>) -> Result<(), Failed> {
+        let Flight { device, lane, section, ticket, since, .. } = flight;
+        let paced = &mut self.devices[device];
+        let count = queue.configurations(&section).len();
+        let detected = match ticket {
+            None => Detected::default(),
+            Some(ticket) => {
+                let read = || paced.stages.detected(lane, count, &ticket);
+                HostTime::of(&mut self.time.reading, read).map_err(|error| (device, error))?
+            }
+        };
+        let time = paced.worked(since);
+        paced.section.adapt(count, time);
+        let batch = paced.batch.now;
+        let ticket = match detected.touching.len() {
+            0 => None,
+            count => Some(HostTime::of(&mut self.time.submitting, || paced.stages.solve(lane, count, batch))),
+        };
+        let (detected, since) = (Some(detected), Instant::now());
+        self.flights.push_back(Flight { device, lane, section, ticket, since, detected });
+        Ok(())
+    }
+
+    fn found(
+        &mut self,
+        device: usize,
+        lane: usize,
+        count: usize,
+        ticket: Option<S::Ticket>,
+        since: Instant,
+    ) -> Result<Found, GpuError> {
+        let Some(ticket) = ticket else { return Ok(Found::default()) };
+        let paced = &mut self.devices[device];
+        let found = HostTime::of(&mut self.time.reading, || paced.stages.found(lane, count, &ticket))?;
+        let time = paced.worked(since);
+        paced.batch.adapt(count, time);
+        Ok(found)
+    }
+
+    /// Lets searches begin until every device whose sections are on their way has one ahead of it.
+    fn keep_busy(&mut self, queue: &Queue<'_>) -> Result<(), Failed> {
+        while let Some(front) = self.flights.front() {
+            let searches = |flight: &Flight<S::Ticket>| flight.device == front.device && flight.detected.is_some();
+            if front.detected.is_some() || self.flights.iter().any(searches) {
+                break;
+            }
+            if let Some(front) = self.flights.pop_front() {
+                self.search(front, queue)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::{
+        solver::free,
+        stages::{GapPrecision, StageRoom},
+    };
+
+    /// A device that finds the first coordinate of each configuration, in contact where it is odd. It is lost once,
+    /// when it is asked for what it found so often.
+    struct Odd {
+        lanes: Vec<Vec<f64>>,
+        room: StageRoom,
+        until_lost: usize,
+        opened: usize,
+    }
+
+    impl Odd {
+        fn new(lanes: usize, section: usize, until_lost: usize) -> PacedDevice<Self> {
+            let room = StageRoom { lanes, section, batch: 1 };
+            PacedDevice::new(Self { lanes: vec![Vec::new(); lanes], room, until_lost, opened: 1 })
+        }
+    }
+
+    impl Stages for Odd {
+        type Ticket = usize;
+
+        fn room(&self) -> StageRoom {
+            self.room
+        }
+
+        fn precision(&self) -> GapPrecision {
+            GapPrecision { band: 0.0, exact: true }
+        }
+
+        fn detect(&mut self, lane: usize, section: &[JointVector]) -> usize {
+            assert!(section.len() <= self.room.section);
+            self.lanes[lane] = section.iter().map(|q| q[0]).collect();
+            self.lanes[lane].len()
+        }
+
+        fn detected(&mut self, lane: usize, count: usize, ticket: &usize) -> Result<Detected, GpuError> {
+            let gaps = self.lanes[lane].clone();
+            assert_eq!((gaps.len(), count), (*ticket, count), "another section has the lane");
+            let touching = (0..).zip(&gaps).filter(|(_, gap)| **gap % 2.0 != 0.0).map(|(place, _)| place).collect();
+            Ok(Detected { gaps, touching })
+        }
+
+        fn solve(&mut self, lane: usize, _: usize, _: usize) -> usize {
+            self.lanes[lane].len()
+        }
+
+        fn found(&mut self, _: usize, _: usize, _: &usize) -> Result<Found, GpuError> {
+            match self.until_lost.checked_sub(1) {
+                None if self.opened == 1 => Err(GpuError::Lost("on purpose".into())),
+                None => Ok(Found::default()),
+                Some(left) => {
+                    self.until_lost = left;
+                    Ok(Found::default())
+                }
+            }
+        }
+
+        fn reopen(&mut self) -> Result<(), GpuError> {
+            self.opened += 1;
+            Ok(())
+        }
+    }
+
+    /// Chunks of these sizes, whose configurations are numbered; sizes and numbers that came back.
+    struct Numbers {
+        sizes: VecDeque<usize>,
+        given: usize,
+        under_way: usize,
+        most_under_way: usize,
+        taken: Vec<Vec<f64>>,
+    }
+
+    impl Work for Numbers {
+        fn next(&mut self) -> Option<Vec<JointVector>> {
+            let size = self.sizes.pop_front()?;
+            let chunk = (self.given..self.given + size).map(|number| JointVector::from_slice(&[number as f64]));
+            self.given += size;
+            self.under_way += 1;
+            self.most_under_way = self.most_under_way.max(self.under_way);
+            Some(chunk.collect())
+        }
+
+        fn take(&mut self, equilibria: Vec<Equilibrium>) {
+            self.under_way -= 1;
+            self.taken.push(equilibria.iter().map(|equilibrium| equilibrium.gap).collect());
+        }
+
+        fn note(&mut self, _: String) {}
+    }
+
+    const SIZES: [usize; 9] = [5, 0, 0, 0, 0, 0, 17, 1, 8];
+
+    /// What comes back of chunks of [`SIZES`], and how many were under way at most.
+    fn flown(devices: &mut [PacedDevice<Odd>]) -> (Vec<Vec<f64>>, usize, usize) {
+        let (sizes, taken) = (SIZES.into(), Vec::new());
+        let mut work = Numbers { sizes, given: 0, under_way: 0, most_under_way: 0, taken };
+        let mut failures = 0;
+        let mut queue = Queue::new(&mut work);
+        let mut time = HostTime::default();
+        let conclude = |_: &Odd, landed: Landed<'_>, _: &mut HostTime, equilibria: &mut Vec<Equilibrium>| {
+            let gaps = landed.detected.gaps;
+            assert!(gaps.iter().zip(landed.configurations).all(|(gap, q)| *gap == q[0]));
+            equilibria.extend(gaps.into_iter().map(|gap| free(gap, 1)));
+            Ok(())
+        };
+        while let Err((device, _)) = fly(devices, &mut queue, &mut time, conclude) {
+            failures += 1;
+            queue.rewind();
+            devices[device].reopen().unwrap();
+        }
+        (work.taken, work.most_under_way, failures)
+    }
+
+    #[test]
+    fn chunks_come_back_whole_and_in_order_however_many_are_under_way() {
+        let mut numbers = (0..).map(f64::from);
+        let expected: Vec<Vec<f64>> = SIZES.iter().map(|&size| numbers.by_ref().take(size).collect()).collect();
+        let never = usize::MAX;
+        for (lanes, section) in [(1, 1), (1, 100), (2, 3), (3, 4), (8, 2)] {
+            let (one, under_way, failures) = flown(&mut [Odd::new(lanes, section, never)]);
+            assert_eq!((one, failures), (expected.clone(), 0), "{lanes} lanes of {section}");
+            assert!(under_way <= CHUNKS_IN_FLIGHT, "{under_way}");
+            let mut both = [Odd::new(lanes, section, never), Odd::new(1, 2, never)];
+            assert_eq!(flown(&mut both).0, expected, "two devices");
+        }
+    }
+
+    #[test]
+    fn what_was_under_way_on_a_device_that_is_lost_departs_again() {
+        let mut numbers = (0..).map(f64::from);
+        let expected: Vec<Vec<f64>> = SIZES.iter().map(|&size| numbers.by_ref().take(size).collect()).collect();
+        for lost_after in [0, 1, 4] {
+            let (taken, _, failures) = flown(&mut [Odd::new(3, 4, lost_after), Odd::new(2, 4, usize::MAX)]);
+            assert_eq!((taken, failures), (expected.clone(), 1), "lost after {lost_after}");
+        }
+    }
+
+    #[test]
+    fn sizes_follow_the_time_of_a_dispatch() {
+        let mut size = AdaptiveSize::new(64, 10_000);
+        size.adapt(64, DISPATCH_TARGET / 100);
+        assert_eq!(size.now, 128, "no more than twice");
+        size.adapt(128, DISPATCH_TARGET * 100);
+        assert_eq!(size.now, 32, "no less than a quarter");
+        size.adapt(10, DISPATCH_TARGET / 100);
+        assert_eq!(size.now, 32, "cut short");
+        // Three batches one behind the other, each as long as it should be.
+        size.adapt(96, DISPATCH_TARGET * 3);
+        assert_eq!(size.now, 32);
+    }
+}
