@@ -156,7 +156,9 @@ fn host(name: &str, stride: usize) -> Result<(), Box<dyn Error>> {
     );
     let print = |beside: &str, times: [f64; 5]| {
         let [submitting, reading, settling, assembling, others] = times;
-        println!("  {beside:<22} {submitting:>10.2} {reading:>10.2} {settling:>10.2} {assembling:>10.2} {others:>14.2}");
+        println!(
+            "  {beside:<22} {submitting:>10.2} {reading:>10.2} {settling:>10.2} {assembling:>10.2} {others:>14.2}"
+        );
     };
     print("the adapter", host_times(&mut solver, &configurations)?);
     let mut least = [f64::INFINITY; 5];
