@@ -14,14 +14,28 @@ use std::sync::atomic::AtomicBool;
 fn a_failing_backend_leaves_a_part_and_the_earlier_file() {
     let whole = uninterrupted();
     let folder = Folder::new();
-    std::fs::write(folder.output(), "earlier").unwrap();
+    // As much of an earlier dataset as tells it apart from other files.
+    let earlier = b"\x02\0\0\0\0\0\0\0{}";
+    std::fs::write(folder.output(), earlier).unwrap();
     let mut broken = MadeUp { breaks_after: 25, ..MadeUp::default() };
     let error = bake(&sweep(), &mut broken, &folder.output(), false, 10, usize::MAX).unwrap_err();
     assert_eq!(error.to_string(), "the backend failed at grid points 20 to 29: device lost");
-    assert_eq!(std::fs::read(folder.output()).unwrap(), b"earlier");
+    assert_eq!(std::fs::read(folder.output()).unwrap(), earlier);
     let report = bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX).unwrap();
     assert_eq!(report.resumed_points, 20);
     assert!(std::fs::read(folder.output()).unwrap() == whole);
+}
+
+#[test]
+fn a_file_of_another_kind_is_not_replaced() {
+    let folder = Folder::new();
+    std::fs::write(folder.output(), "a thesis").unwrap();
+    let error = bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 10, usize::MAX).unwrap_err();
+    assert!(matches!(error, SweepError::Output(_)) && error.to_string().contains("not a dataset"), "{error}");
+    assert_eq!(
+        (std::fs::read(folder.output()).unwrap(), folder.names()),
+        (b"a thesis".to_vec(), vec!["a.haptize".into()])
+    );
 }
 
 /// The device breaks down for good in the third batch of ten; the sweep goes on, and says so in report and file, also
