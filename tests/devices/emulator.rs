@@ -151,13 +151,21 @@ impl<F: Firmware + 'static> Emulator<F> {
     }
 
     /// Runs beside `open`, which waits for replies, and gives both back.
-    pub fn while_opening<T>(mut self, open: impl FnOnce(&str) -> T) -> (Self, T) {
+    pub fn while_opening<T>(self, open: impl FnOnce(&str) -> T) -> (Self, T) {
+        self.beside(false, open)
+    }
+
+    /// Runs beside `open`, which waits for replies, and gives both back; the hand moves with the clock if it is `alive`.
+    pub fn beside<T>(mut self, alive: bool, open: impl FnOnce(&str) -> T) -> (Self, T) {
         let over = Arc::new(AtomicBool::new(false));
         let (ends, path) = (Arc::clone(&over), self.line.path.clone());
         let body = thread::spawn(move || {
             self.line.in_step = false;
+            let mut last = Instant::now();
             while !ends.load(Ordering::Relaxed) {
-                self.step(0.0);
+                let now = Instant::now();
+                let elapsed = (now - std::mem::replace(&mut last, now)).as_secs_f64();
+                self.step(if alive { elapsed } else { 0.0 });
             }
             self.line.in_step = true;
             self
