@@ -161,6 +161,9 @@ impl<F: Firmware + 'static> Emulator<F> {
         let (ends, path) = (Arc::clone(&over), self.line.path.clone());
         let body = thread::spawn(move || {
             self.line.in_step = false;
+            if alive {
+                run_like_a_device();
+            }
             let mut last = Instant::now();
             while !ends.load(Ordering::Relaxed) {
                 let now = Instant::now();
@@ -174,6 +177,14 @@ impl<F: Firmware + 'static> Emulator<F> {
         over.store(true, Ordering::Relaxed);
         (body.join().unwrap(), opened)
     }
+}
+
+/// Lets this thread run before the host's: a device does not wait for the host's other programs. Left as it is where the
+/// system refuses.
+fn run_like_a_device() {
+    let priority = libc::sched_param { sched_priority: 90 };
+    // SAFETY: the call reads the number, and concerns this thread alone.
+    unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const priority) };
 }
 
 /// The firmware of a 2DIY, version 3.

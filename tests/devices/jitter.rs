@@ -34,6 +34,9 @@ fn row(name: &str, device: &mut dyn Device, joints: usize) {
         steal.late_beside_steal,
         trace.ticks.iter().filter(|tick| tick.applied.halt.is_some()).count(),
     );
+    if let Some(halt) = trace.ticks.last().and_then(|tick| tick.applied.halt) {
+        println!("{name} ended without torque: {halt}");
+    }
 }
 
 #[test]
