@@ -4,7 +4,7 @@
 //! The press runs twice: as fast as it goes, which gives the same trace and figures on every machine, and against the
 //! clock, which shows what a tick costs on this one and how punctual it is.
 
-use super::{Failure, Report, bake, output::Folder, play, tell};
+use super::{Failure, Report, bake, motion, output::Folder, play, tell};
 use crate::{dataset::Dataset, render::setup::Setup, report, scene::Scene, sweep::BackendChoice};
 use std::{
     fmt::Write,
@@ -38,7 +38,7 @@ pub fn run() -> Result<Report, Failure> {
 
     tell(format_args!("pressing it, as fast as it goes and against the clock ..."));
     let setup = Setup::new(&dataset)?;
-    let motion = play::motion(&setup, "press")?;
+    let motion = motion::named(&setup, &dataset, "press", None)?;
     let seconds = motion.duration();
     let mut played = play::play(&setup, &dataset, &mut setup.hand(motion.clone())?, seconds, false)?;
     played.timing = play::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, true)?.timing;

@@ -49,9 +49,11 @@ fn lock(text: &str) -> Result<Lock, String> {
 /// Writes the scene, and lists what the robot's file lacks.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let robot = Robot::load(&arguments.robot)?;
-    let arm = Arm::new(&robot, &arguments.tip, &arguments.lock)?;
+    let mut arm = Arm::new(&robot, &arguments.tip, &arguments.lock)?;
     let nodes = urdf::sample(&robot, &arm, arguments.spacing, arguments.package_path.as_deref())?;
-    let scene = urdf::write_scene(&robot, &arm, &nodes, &command(arguments))?;
+    let (shapes, missing) = urdf::drawn_shapes(&robot, &arm, arguments.package_path.as_deref());
+    arm.notes.extend(missing);
+    let scene = urdf::write_scene(&robot, &arm, &nodes, &shapes, &command(arguments))?;
     let output = match &arguments.output {
         Some(output) => output.clone(),
         None => PathBuf::from(arguments.robot.file_name().ok_or("the robot's path names no file; give -o")?)

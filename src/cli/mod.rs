@@ -38,6 +38,7 @@ mod man;
 mod max_error;
 mod memory;
 mod merge;
+mod motion;
 mod new;
 mod on_demand;
 mod output;

@@ -4,7 +4,7 @@ use super::{
     Failure, Report, bake,
     bar::Bar,
     gridize::{self, Source},
-    interrupt,
+    interrupt, motion,
     output::Folder,
     play,
     scan::{self, Course},
@@ -180,7 +180,7 @@ fn describe(
 /// Plays the `motion` of the dataset's scene with a simulated hand, as fast as it goes.
 fn felt(dataset: &Dataset, motion: &str) -> Result<(Setup, Trace), Failure> {
     let setup = Setup::new(dataset)?;
-    let motion = play::motion(&setup, motion)?;
+    let motion = motion::named(&setup, dataset, motion, None)?;
     let seconds = motion.duration();
     let played = play::play(&setup, dataset, &mut setup.hand(motion)?, seconds, false)?;
     Ok((setup, played.trace))

@@ -3,6 +3,7 @@
 use super::{
     Failure, Report, interrupt,
     keyboard::Keyboard,
+    motion,
     on_demand::{self, Explored, Exploring},
     output::{self, Earlier, Folder, Kind as FileKind},
     playback_report::PlaybackReport,
@@ -39,15 +40,20 @@ Examples:
   haptize play sphere.haptize --motion scrape
   haptize play sphere.haptize --motion hand.csv --seconds 10 --realtime
   haptize play sphere.haptize --record session.csv
+  haptize play sphere.haptize --motion session.mcap
   haptize play organ.toml --on-demand organ.haptize      nothing baked: contact is solved where the hand goes, and kept
   haptize play sphere.haptize --replay session.csv
   haptize play sponge.haptize --motion scrape --beside sponge_fabric.haptize")]
 pub struct Arguments {
     /// The dataset's file; with --on-demand a scene.
     dataset: PathBuf,
-    /// Motion of the hand: `press` or `scrape` as in the scene, or a CSV file of times [s] and joint coordinates.
+    /// Motion of the hand: `press` or `scrape` as in the scene, a CSV file of times [s] and joint coordinates, or joint
+    /// states in MCAP, such as a session that --record wrote.
     #[arg(long, default_value = "press")]
     motion: String,
+    /// Topic of the MCAP file that --motion names; by default the hand's of a session, or the only one.
+    #[arg(long, value_name = "NAME", conflicts_with = "replay")]
+    topic: Option<String>,
     /// Duration [s]; by default that of the motion.
     #[arg(long, allow_negative_numbers = true)]
     seconds: Option<f64>,
@@ -65,7 +71,7 @@ pub struct Arguments {
     #[arg(long)]
     realtime: bool,
     /// Record the session into this file: all inputs of the loop and all its outputs. A name that ends in .mcap gives
-    /// joint states in MCAP, for other programs; only the table that other names give can be replayed.
+    /// joint states in MCAP, for other programs and for --motion; only the table that other names give can be replayed.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replay the session in this file and check that it matches bit for bit.
@@ -128,7 +134,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     files.extend(write(&setup, &dataset, &played, &folder)?);
     let mut felt = PlaybackReport::new(&arguments.dataset, &dataset, &setup, &played.trace);
     if let Some(path) = &arguments.beside {
-        felt.beside(path, motion(&setup, &arguments.motion)?, played.trace.summary().seconds)?;
+        felt.beside(
+            path,
+            motion::named(&setup, &dataset, &arguments.motion, arguments.topic.as_deref())?,
+            played.trace.summary().seconds,
+        )?;
         let drawn = felt.draw(&folder, &played.trace)?;
         files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
     }
@@ -208,7 +218,7 @@ fn perform(
     arguments: &Arguments,
     exploring: Option<&Exploring>,
 ) -> Result<Played, Failure> {
-    let motion = motion(setup, &arguments.motion)?;
+    let motion = motion::named(setup, dataset, &arguments.motion, arguments.topic.as_deref())?;
     let seconds = arguments.seconds.unwrap_or_else(|| motion.duration());
     if !(seconds > 0.0 && seconds <= LONGEST) {
         return Err(format!("cannot play {seconds} s: give --seconds between 0 and {LONGEST}").into());
@@ -409,34 +419,6 @@ pub fn write(setup: &Setup, dataset: &Dataset, played: &Played, folder: &Path) -
     Ok(files)
 }
 
-/// The motion called `name` in the scene, or in the file of that name.
-pub fn motion(setup: &Setup, name: &str) -> Result<Motion, Failure> {
-    let joints = setup.chain.joints.len();
-    let waypoints = match name {
-        "press" => &setup.scene.motion.press,
-        "scrape" => &setup.scene.motion.scrape,
-        file if Path::new(file).exists() => return Ok(Motion::from_csv(Path::new(file), joints)?),
-        file => {
-            let known =
-                "the scene in the dataset may name the motions `press` and `scrape`; a CSV file gives any other";
-            return Err(format!("{file}: cannot be read: there is no such file; {known}").into());
-        }
-    };
-    if waypoints.is_empty() {
-        let known = "give [motion] in the scene such waypoints and bake it again, or a CSV file by --motion";
-        return Err(format!(
-            "the dataset's scene has no motion \"{name}\", and its contact is not such that one could be made: {known}"
-        )
-        .into());
-    }
-    if setup.made_motions.contains(&name) {
-        tell(format_args!(
-            "haptize: note: the scene names no {name}; this one was made from where the dataset is in contact"
-        ));
-    }
-    Ok(Motion::through(waypoints, joints)?)
-}
-
 /// Says in millijoules what was added to the loop's energy, or taken from it.
 fn exchanged(joules: f64) -> String {
     let verb = if joules > 0.0 { "injected" } else { "removed" };
@@ -488,6 +470,7 @@ pub fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
             "  {what:<12} median {p50:.1} us, 99 % {p99:.1}, 99.9 % {p999:.1}, 99.99 % {p9999:.1}, most {max:.1}"
         )
     };
+    line("period", timing.interval)?;
     line("lateness", timing.lateness)?;
     line("tick", timing.tick_cost)?;
     line("frame", timing.frame_cost)?;

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     JointVector,
     dataset::replace_file,
-    device::{Address, DeviceRig, Guard, Key, Kind as DeviceKind, attach_joints, open},
+    device::{Address, DeviceRig, Guard, Key, Kind as DeviceKind, attach_joints, open, with_scheduler},
     proxy::Chain,
     scan::{
         LogHeader, LogWriter, Plan, Rig, ScanProgress, ScanReport, ScanRow, Session, Trajectory, labels,
@@ -186,28 +186,43 @@ fn drive(
     let (key, input) = Key::new();
     let _keyboard = if course.guided.is_some() { Some(Keyboard::start(input)?) } else { None };
     let guard = Guard::new(open(address, None)?, None).map_err(|halt| format!("{address}: {halt}"))?;
-    if guard.scheduler().is_some() {
+    let scheduler = guard.scheduler();
+    let (rate, most) =
+        (scene.scan.control.rate, scheduler.as_ref().map_or(f64::INFINITY, |scheduler| scheduler.rate()));
+    if rate > most {
         return Err(format!(
-            "{address}: its maker's library drives it in a thread of its own, in which a scan cannot run: use \
-             --plan-out and its maker's tools"
+            "{address}: its maker's library calls {most} times a second: give [scan.control] a rate of {most} Hz or \
+             less, not {rate}"
         )
         .into());
     }
     let description = guard.description();
     let device = attach_joints(guard, address, chain.degrees_of_freedom(), &scene.device)?;
+    let hand = course.guided.map(|_| key);
+    let simulated = address.kind == DeviceKind::Simulated;
+    let mut scan = |mut rig: DeviceRig<'_>| -> Result<ScanReport, Failure> {
+        let (mut log, logged) = open_log(scene, &chain, output, course, &rig)?;
+        tell(format_args!("haptize: {}", rig.description()));
+        let session = Session { spec: &scene.scan, chain: &chain, rig: &mut rig, log: &mut log, stop, progress };
+        go(session, course, &plan, &logged)
+    };
+    match scheduler {
+        Some(scheduler) => with_scheduler(device, scheduler.as_ref(), |device, mut wait| {
+            scan(DeviceRig::new(device, description, simulated, hand, stop, move |period| wait.wait(period)))
+        })?,
+        None => scan(DeviceRig::new(device, description, simulated, hand, stop, against_the_clock())),
+    }
+}
+
+/// Returns what waits until so many seconds after the last call, and returns how many there were.
+fn against_the_clock() -> impl FnMut(f64) -> f64 {
     let mut last = Instant::now();
-    let wait = |period: f64| {
+    move |period: f64| {
         let due = last + Duration::from_secs_f64(period);
         thread::sleep(due.saturating_duration_since(Instant::now()));
         let now = Instant::now();
         (now - std::mem::replace(&mut last, now)).as_secs_f64()
-    };
-    let hand = course.guided.map(|_| key);
-    let mut rig = DeviceRig::new(device, description, address.kind == DeviceKind::Simulated, hand, stop, wait);
-    let (mut log, logged) = open_log(scene, &chain, output, course, &rig)?;
-    tell(format_args!("haptize: {}", rig.description()));
-    let session = Session { spec: &scene.scan, chain: &chain, rig: &mut rig, log: &mut log, stop, progress };
-    go(session, course, &plan, &logged)
+    }
 }
 
 /// The arm of `scene`, and where it goes.

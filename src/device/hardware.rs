@@ -99,6 +99,9 @@ pub trait Scheduler: Send + Sync {
     /// # Errors
     /// Returns the reason if the thread stops calling; `tick` is then not called any more.
     fn run(&self, tick: &mut (dyn FnMut() -> bool + Send)) -> Result<(), Halt>;
+
+    /// Returns how often it calls [Hz].
+    fn rate(&self) -> f64;
 }
 
 /// One open device. Between opening and [`Hardware::enable`] it is read with its motors off or at zero torque. `read`

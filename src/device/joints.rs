@@ -16,6 +16,11 @@ impl JointDevice {
     pub fn new(guard: Guard, map: LinearMap) -> Self {
         Self { guard, map }
     }
+
+    /// Lets torques rise from zero again, as after each interruption.
+    pub fn interrupt(&mut self) {
+        self.guard.interrupt();
+    }
 }
 
 impl Device for JointDevice {

@@ -11,6 +11,7 @@
 //! | `guard`, `halt`, `key`, `tally` | the safety layer, its reasons, the dead-man key, counts |
 //! | `linear_map`, `joints`, `tip` | from a device's coordinates to the scene's joints |
 //! | `rig` | a device as the rig of a scan |
+//! | `relay` | the same where the maker's library owns the thread |
 //! | `catalogue` | kinds of devices, by name |
 //! | `check` | the procedure of `haptize device check` |
 //! | `inverse3` | Haply Inverse3, through the maker's service |
@@ -31,6 +32,7 @@ mod linear_map;
 mod motion;
 mod pointer;
 mod recorded;
+mod relay;
 mod rig;
 pub mod serial;
 mod simulated;
@@ -55,6 +57,7 @@ pub use hand::{HandError, SimulatedHand};
 pub use motion::{Motion, MotionError};
 pub use pointer::{Pointer, PointerInput};
 pub use recorded::Recorded;
+pub use relay::{Relayed, Ticker, Wait, relay, with_scheduler};
 pub use rig::DeviceRig;
 
 use crate::JointVector;

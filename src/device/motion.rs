@@ -89,9 +89,20 @@ impl Motion {
     /// # Errors
     /// When there are none, a time does not ascend, or a configuration does not fit.
     pub fn through(waypoints: &[Waypoint], joints: usize) -> Result<Self, MotionError> {
-        let motion = Self { waypoints: waypoints.to_vec(), smooth: true };
+        Self { waypoints: waypoints.to_vec(), smooth: true }.checked(joints)
+    }
+
+    /// A motion along `samples` of `joints` joints, with straight lines between them.
+    ///
+    /// # Errors
+    /// As [`Motion::through`].
+    pub fn along(samples: Vec<Waypoint>, joints: usize) -> Result<Self, MotionError> {
+        Self { waypoints: samples, smooth: false }.checked(joints)
+    }
+
+    fn checked(self, joints: usize) -> Result<Self, MotionError> {
         let mut before = f64::NEG_INFINITY;
-        for (k, point) in waypoints.iter().enumerate() {
+        for (k, point) in self.waypoints.iter().enumerate() {
             if !(point.time.is_finite() && point.time > before) {
                 return Err(MotionError::Time { waypoint: k + 1, time: point.time });
             }
@@ -100,7 +111,7 @@ impl Motion {
                 return Err(MotionError::Waypoint { waypoint: k + 1, q: point.q, joints });
             }
         }
-        if waypoints.is_empty() { Err(MotionError::Empty) } else { Ok(motion) }
+        if self.waypoints.is_empty() { Err(MotionError::Empty) } else { Ok(self) }
     }
 
     /// The motion in the comma-separated `file`, of `joints` joints. Empty lines, lines that begin with # or %, and a

@@ -4,7 +4,7 @@
 //! holds less than that: by a clamp in size, warm motors, or a stop. The ramp at the start is over long before the
 //! first measurement.
 
-use super::{Applied, Clamps, Device, JointDevice, Key};
+use super::{Applied, Clamps, Device, Key};
 use crate::{
     JointVector,
     scan::{Rig, RigError, RigReading},
@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A joint-true device that scans.
 pub struct DeviceRig<'a> {
-    device: JointDevice,
+    device: Box<dyn Device + 'a>,
     description: String,
     simulated: bool,
     /// Says that a hand holds the device.
@@ -26,19 +26,19 @@ pub struct DeviceRig<'a> {
 }
 
 impl<'a> DeviceRig<'a> {
-    /// Returns `device` as a rig. While the key `hand` is held, a hand is taken to lead the device. `wait` waits until
+    /// Returns the joint-true `device` as a rig. While the key `hand` is held, a hand is taken to lead the device. `wait` waits until
     /// so many seconds after the last tick, and returns how many there were. Raising `stop` ends the scan with an error
     /// at the next tick.
     #[must_use]
     pub fn new(
-        device: JointDevice,
+        device: impl Device + 'a,
         description: String,
         simulated: bool,
         hand: Option<Key>,
         stop: &'a AtomicBool,
         wait: impl FnMut(f64) -> f64 + 'a,
     ) -> Self {
-        Self { device, description, simulated, hand, wait: Box::new(wait), stop, time: 0.0 }
+        Self { device: Box::new(device), description, simulated, hand, wait: Box::new(wait), stop, time: 0.0 }
     }
 }
 

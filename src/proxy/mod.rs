@@ -5,6 +5,7 @@
 //! += q_i R_(i-1) axis_i for a prismatic one. Nothing here allocates once a [`Pose`] has its size.
 
 mod chain;
+mod drawn;
 mod dynamics;
 mod gravity;
 mod inertia;
@@ -15,6 +16,7 @@ mod links;
 mod random;
 
 pub use chain::{Chain, Joint, Node, Pose};
+pub use drawn::{Triangles, block, cylinder, shape_frame, shape_triangles, sphere};
 pub use dynamics::Dynamics;
 pub use inertia::{JointMatrix, cholesky, solve_positive, solve_transposed};
 pub use links::Links;

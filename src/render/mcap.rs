@@ -2,13 +2,13 @@
 //!
 //! Four topics of joint states, one message a tick: `/device` (position y, velocity, torque that the device held),
 //! `/proxy` (position x, contact torque), `/hand` (where the hand wants the device), `/command` (position y, torque
-//! that the loop asked for). Stamps count from the session's start. What is needed to replay a session bit for bit is
-//! in its CSV recording only.
+//! that the loop asked for). Stamps count from the session's start. `/hand` is a motion that `play` takes again; what is
+//! needed to replay a session bit for bit is in its CSV recording only.
 
 use super::trace::{Tick, Trace};
 use crate::{
     JointVector,
-    ros::{JointState, JointStateWriter},
+    ros::{HAND_TOPIC, JointState, JointStateWriter},
 };
 use std::{
     collections::BTreeMap,
@@ -22,7 +22,7 @@ use std::{
 pub fn write(trace: &Trace, facts: BTreeMap<String, String>, out: impl Write) -> io::Result<()> {
     let names: Vec<String> = trace.joints.iter().map(|joint| joint.name.clone()).collect();
     let mut writer = JointStateWriter::new(out)?;
-    let topics = ["/device", "/proxy", "/hand", "/command"].map(|name| writer.topic(name));
+    let topics = ["/device", "/proxy", HAND_TOPIC, "/command"].map(|name| writer.topic(name));
     let mut before: Option<&Tick> = None;
     for tick in &trace.ticks {
         let mut velocity = JointVector::zeros(names.len());

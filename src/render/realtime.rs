@@ -47,6 +47,7 @@ pub struct HapticLoop<'session> {
     latest: triple_buffer::Input<Latest>,
     late: rtrb::Producer<LateTick>,
     lateness: Durations,
+    interval: Durations,
     cost: Durations,
     period: Duration,
     began: Duration,
@@ -105,6 +106,7 @@ impl<'session> HapticLoop<'session> {
             latest,
             late,
             lateness: histogram()?,
+            interval: histogram()?,
             cost: histogram()?,
             period: Duration::from_secs_f64(haptics.period()),
             began: clock::now(),
@@ -190,6 +192,9 @@ impl<'session> HapticLoop<'session> {
         self.missed += u64::from(skipped);
         self.next += 1 + skipped;
         let elapsed = self.last.map_or(self.period, |last| now - last);
+        if self.last.is_some() {
+            self.interval.record(elapsed);
+        }
         let interval = (self.began + self.period * self.next).saturating_sub(now);
         self.last = Some(now);
         if self.clear.swap(false, Ordering::Acquire) {
@@ -257,7 +262,7 @@ pub fn run_live(
         let feeling = thread::Builder::new().name("haptic".into()).spawn_scoped(scope, move || {
             let goes_on = |body: &HapticLoop<'_>| !body.is_over(plan.ticks) && !stop.load(Ordering::Relaxed);
             let refused = body.pace(scheduler, goes_on);
-            (refused, body.lateness, body.cost, body.missed, body.unrecorded)
+            (refused, body.lateness, body.interval, body.cost, body.missed, body.unrecorded)
         });
         let feeling = match feeling {
             Ok(thread) => thread,
@@ -285,12 +290,13 @@ pub fn run_live(
         let felt = feeling.join().map_err(|_| SessionError::Thread("haptic"))?;
         let drawn = drawing.map(|thread| thread.join().map_err(|_| SessionError::Thread("graphics"))).transpose()?;
         clock::unlock_memory();
-        let (refused, lateness, cost, missed_deadlines, unrecorded) = felt;
+        let (refused, lateness, interval, cost, missed_deadlines, unrecorded) = felt;
         let Drawn { frames, shown, cost: frame_cost, missed: missed_frames } = drawn.unwrap_or_default();
         let timing = Timing {
             refused,
             lateness: lateness.percentiles(),
             lateness_bins: lateness.bins(),
+            interval: interval.percentiles(),
             tick_cost: cost.percentiles(),
             frame_cost,
             missed_deadlines,

@@ -52,6 +52,8 @@ pub struct Timing {
     pub lateness: Percentiles,
     /// The same as a histogram, ten bins a decade from 0.1 us on, ascending; the first holds all that was shorter.
     pub lateness_bins: Vec<Bin>,
+    /// From a tick's beginning to that of the next.
+    pub interval: Percentiles,
     /// From a tick's beginning to its torque.
     pub tick_cost: Percentiles,
     /// Cost of a frame.

@@ -13,11 +13,12 @@ use super::{
 use crate::{
     contact::NodeForce,
     dataset::Dataset,
-    proxy::{Chain, Pose},
+    proxy::{Chain, Pose, Triangles, shape_frame, shape_triangles},
     render::{
         graphics::ContactForces,
         trace::{Frame, Trace},
     },
+    scene::Rendering,
 };
 use glam::DVec3;
 
@@ -110,12 +111,13 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
     if instants.is_empty() {
         return Err(refused("the recording has no frames; give the scene a [graphics] table".to_owned()));
     }
-    let scene = Scene::new(chain, &rest, &triangles, instants);
+    let mut scene = Scene::new(chain, &rest, &triangles, instants);
+    scene.links = links(dataset);
     let rows = instants.len().div_ceil(COLUMNS);
     let top = chart::MARGIN + 52.0;
     let mut canvas = Canvas::new(WIDTH, top + rows as f64 * (CELL[1] + 34.0) + 8.0);
     chart::headline(&mut canvas, "The object deforms under the haptized contact forces");
-    let entries = [
+    let mut entries = vec![
         Entry { name: "proxy node".to_owned(), colour: PROXY_NODE, mark: Mark::Dot },
         Entry {
             name: format!("force on the arm, longest {} N", ticks::number(scene.greatest_force, 2)),
@@ -123,6 +125,10 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
             mark: Mark::Line,
         },
     ];
+    // Nodes of links that are drawn with their shapes lie on these, and are not drawn.
+    if chain.nodes.iter().all(|node| scene.links.iter().any(|(joint, _)| *joint == Some(node.link))) {
+        entries.remove(0);
+    }
     plot::legend(&mut canvas, (WIDTH - chart::MARGIN, chart::MARGIN + 12.0), &entries);
     for (number, instant) in instants.iter().enumerate() {
         let x = chart::MARGIN + (number % COLUMNS) as f64 * (CELL[0] + 6.0);
@@ -148,6 +154,8 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
 /// Everything that all instants share.
 struct Scene<'a> {
     chain: &'a Chain,
+    /// Shapes of the links, each with the joint that moves it.
+    links: Vec<(Option<usize>, Triangles)>,
     rest: &'a [DVec3],
     triangles: &'a [[u32; 3]],
     camera: Camera,
@@ -170,6 +178,7 @@ impl<'a> Scene<'a> {
         let greatest_force = forces().map(|force| force.length()).filter(|force| force.is_finite()).fold(0.0, f64::max);
         let mut scene = Self {
             chain,
+            links: Vec::new(),
             rest,
             triangles,
             camera: Camera::framing(&[], DVec3::NEG_Y, [1, 1]),
@@ -212,7 +221,7 @@ impl<'a> Scene<'a> {
             self.rest.iter().zip(&instant.nodes).map(|pair| self.map.colour(displacement(pair))).collect();
         let nodes = &instant.nodes[..self.rest.len()];
         raster.mesh(nodes, self.triangles, &colours);
-        draw_proxy(&mut raster, self.chain, &instant.pose, 0.032 * self.radius);
+        draw_proxy(&mut raster, self.chain, &instant.pose, 0.032 * self.radius, &self.links);
         for (tail, tip) in self.arrows(instant) {
             raster.arrow(tail, tip, 0.022 * self.radius, FORCE);
         }
@@ -221,9 +230,28 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Draws the links from joint to joint, the last one to its farthest node, and the contact nodes on them.
-pub(super) fn draw_proxy(raster: &mut Raster, chain: &Chain, pose: &Pose, thickness: f64) {
-    for (link, &from) in pose.origins.iter().enumerate() {
+/// The shapes of the links in the scene of `dataset`; none where it says nothing of them.
+fn links(dataset: &Dataset) -> Vec<(Option<usize>, Triangles)> {
+    let shapes = Rendering::parse(&dataset.scene, "scene").map(|scene| scene.shapes).unwrap_or_default();
+    shapes.iter().map(|shape| (shape.joint, shape_triangles(shape))).collect()
+}
+
+/// Draws the links with their shapes, and those that have none from joint to joint, the last one to its farthest node,
+/// with the contact nodes on them.
+pub(super) fn draw_proxy(
+    raster: &mut Raster,
+    chain: &Chain,
+    pose: &Pose,
+    thickness: f64,
+    shapes: &[(Option<usize>, Triangles)],
+) {
+    for (joint, (nodes, triangles)) in shapes {
+        let frame = shape_frame(*joint, pose);
+        let nodes: Vec<DVec3> = nodes.iter().map(|node| frame.transform_point3(*node)).collect();
+        raster.facets(&nodes, triangles, LINK);
+    }
+    let is_shaped = |link: usize| shapes.iter().any(|(joint, _)| *joint == Some(link));
+    for (link, &from) in pose.origins.iter().enumerate().filter(|(link, _)| !is_shaped(*link)) {
         let own = || chain.nodes.iter().zip(&pose.nodes).filter(|(node, _)| node.link == link).map(|(_, &x)| x);
         let to = match pose.origins.get(link + 1) {
             Some(&next) => next,
@@ -232,7 +260,7 @@ pub(super) fn draw_proxy(raster: &mut Raster, chain: &Chain, pose: &Pose, thickn
         raster.capsule([from, to], thickness, LINK);
         raster.sphere(from, 2.0 * thickness, LINK);
     }
-    for (node, &x) in chain.nodes.iter().zip(&pose.nodes) {
+    for (node, &x) in chain.nodes.iter().zip(&pose.nodes).filter(|(node, _)| !is_shaped(node.link)) {
         raster.sphere(x, node.radius.max(1.25 * thickness), PROXY_NODE);
     }
 }

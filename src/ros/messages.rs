@@ -4,7 +4,7 @@
 //! text's length says, up to 4 GB, before it looks whether they are there, and its reader takes a record that is longer
 //! than its chunk for one that is not. Memory is that of the longest record or chunk.
 
-use super::{MESSAGE_ENCODING, RosError, TYPE, is_mcap};
+use super::{MESSAGE_ENCODING, RosError, TYPE, chunk::Chunk, is_mcap};
 use mcap::{
     McapError,
     records::op,
@@ -18,7 +18,7 @@ use std::{
 };
 
 /// Longest record or chunk that is read [bytes]: a chunk of a recorder's is a few MiB.
-const LONGEST_RECORD: u64 = 1 << 28;
+pub(super) const LONGEST_RECORD: u64 = 1 << 28;
 
 /// The messages: topic, log time [ns], bytes.
 pub(super) struct Messages {
@@ -93,7 +93,7 @@ impl Messages {
                 }
                 LinearReadEvent::Record { data, opcode: op::CHUNK } => {
                     let chunk = Fields(data).chunk().ok_or_else(|| damaged(&self.path))?;
-                    (self.chunk, self.taken) = (chunk.map_err(failed)?.to_vec(), 0);
+                    (self.chunk, self.taken) = (chunk.records(&self.path)?.into_owned(), 0);
                 }
                 LinearReadEvent::Record { data, opcode } => {
                     let message = self.topics.take(opcode, Fields(data)).ok_or_else(|| damaged(&self.path))?;
@@ -184,16 +184,11 @@ impl<'a> Fields<'a> {
         Some((opcode, self.bytes(length)?))
     }
 
-    /// The records of a chunk, whose content this is.
-    fn chunk(&mut self) -> Option<Result<&'a [u8], McapError>> {
-        let (_first, _last, _size) = (self.u64()?, self.u64()?, self.u64()?);
-        let (saved, compression, length) = (self.u32()?, self.text()?, self.u64()?);
-        if !compression.is_empty() {
-            return Some(Err(McapError::UnsupportedCompression(String::from_utf8_lossy(compression).into_owned())));
-        }
-        let records = self.bytes(length)?;
-        let calculated = if saved == 0 { 0 } else { crc32fast::hash(records) };
-        Some(if saved == calculated { Ok(records) } else { Err(McapError::BadChunkCrc { saved, calculated }) })
+    /// The chunk whose record this is.
+    fn chunk(&mut self) -> Option<Chunk<'a>> {
+        let (_first, _last, size) = (self.u64()?, self.u64()?, self.u64()?);
+        let (checksum, compression, length) = (self.u32()?, self.text()?, self.u64()?);
+        Some(Chunk { size, checksum, compression, content: self.bytes(length)? })
     }
 
     fn text(&mut self) -> Option<&'a [u8]> {

@@ -1,15 +1,18 @@
 //! Messages of ROS 2 in MCAP files, read and written without ROS.
 //!
 //! An MCAP file holds messages of many topics; here those of type `sensor_msgs/msg/JointState` count: names, positions,
-//! velocities and efforts of joints at an instant. Files are written without compression, and read if their chunks are
-//! not compressed.
+//! velocities and efforts of joints at an instant. Files are written without compression; chunks compressed by
+//! lz4 or zstd are read.
 
 mod cdr;
+mod chunk;
+mod course;
 mod joint_state;
 mod messages;
 mod table;
 mod write;
 
+pub use course::Course;
 pub use joint_state::JointState;
 pub use table::{JointStateTable, Topic, is_mcap, topics};
 pub use write::JointStateWriter;
@@ -22,6 +25,9 @@ const TYPE: &str = "sensor_msgs/msg/JointState";
 /// How its schema and its messages are encoded.
 const SCHEMA_ENCODING: &str = "ros2msg";
 const MESSAGE_ENCODING: &str = "cdr";
+
+/// Topic of where the hand wants the device, in a session of haptize.
+pub const HAND_TOPIC: &str = "/hand";
 
 /// An MCAP file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -72,11 +78,6 @@ impl RosError {
     fn mcap(file: &std::path::Path, error: &mcap::McapError) -> Self {
         let what = match error {
             mcap::McapError::BadMagic => "not an MCAP file".to_owned(),
-            mcap::McapError::UnsupportedCompression(name) => {
-                format!(
-                    "its chunks are compressed by {name}: write it without by `mcap decompress IN.mcap -o OUT.mcap`"
-                )
-            }
             mcap::McapError::UnexpectedEof => {
                 "it ends in the middle: what is whole comes back by `mcap recover IN.mcap -o OUT.mcap`".to_owned()
             }

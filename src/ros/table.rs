@@ -144,7 +144,7 @@ impl Read for JointStateTable {
     }
 }
 
-fn decode(path: &Path, topic: &str, number: u64, bytes: &[u8]) -> Result<JointState, RosError> {
+pub(super) fn decode(path: &Path, topic: &str, number: u64, bytes: &[u8]) -> Result<JointState, RosError> {
     JointState::decode(bytes).map_err(|what| RosError::Message {
         file: path.to_owned(),
         topic: topic.to_owned(),
@@ -153,7 +153,8 @@ fn decode(path: &Path, topic: &str, number: u64, bytes: &[u8]) -> Result<JointSt
     })
 }
 
-fn chosen(path: &Path, topic: Option<&str>) -> Result<String, RosError> {
+/// Returns the topic to read: `topic`, or the only one.
+pub(super) fn chosen(path: &Path, topic: Option<&str>) -> Result<String, RosError> {
     let topics = topics(path)?;
     let wrong = |what: &str| {
         let listed: Vec<String> =

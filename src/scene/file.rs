@@ -132,6 +132,37 @@ pub(super) struct GroundTable {
 #[serde(deny_unknown_fields)]
 pub(super) struct ProxyTable {
     pub joint: Spanned<Vec<JointTable>>,
+    #[serde(default)]
+    pub shape: Vec<Spanned<ShapeTable>>,
+}
+
+/// One of four forms, drawn with the link of a joint.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ShapeTable {
+    pub joint: Option<Spanned<String>>,
+    #[serde(rename = "box")]
+    pub block: Option<Vector>,
+    pub cylinder: Option<CylinderTable>,
+    pub sphere: Option<Number>,
+    pub surface: Option<LinkSurfaceTable>,
+    pub at: Option<Vector>,
+    pub turn: Option<Vector>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CylinderTable {
+    pub radius: Number,
+    pub length: Number,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LinkSurfaceTable {
+    pub from: Vector,
+    pub to: Vector,
+    pub data: Spanned<String>,
 }
 
 #[derive(Deserialize)]

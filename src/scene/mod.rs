@@ -13,6 +13,7 @@ mod gains;
 mod inertia;
 mod own_text;
 mod scan;
+mod shape;
 mod spec;
 pub(crate) mod text;
 
@@ -21,6 +22,7 @@ pub use effects::{EFFECTS, Effect, Tuning};
 pub use error::{Diagnostic, SceneError};
 pub use gains::GainError;
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
+pub use shape::{LinkForm, LinkShape, LinkSurface, MAX_SHAPES, MAX_SURFACE};
 pub use spec::{
     Algorithm, AxisSpec, BOUNDARY_SLOPE, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec,
     FrictionSpec, GraphicsEffects, GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects,
@@ -88,6 +90,8 @@ pub struct Rendering {
     pub object: Option<ObjectSpec>,
     /// The multi-link virtual proxy.
     pub proxy: ProxySpec,
+    /// What is drawn of its links.
+    pub shapes: Vec<LinkShape>,
     /// The 1 kHz loop.
     pub haptics: HapticsSpec,
     /// The graphics loop, where there is one.

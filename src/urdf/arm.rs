@@ -28,6 +28,8 @@ pub struct Lock {
 pub struct Arm {
     /// Links that do not move.
     pub base: Vec<String>,
+    /// Their shapes, in the root's frame.
+    pub base_shapes: Vec<Placed>,
     /// From the base outwards.
     pub joints: Vec<ArmJoint>,
     /// Parts left out or assumed.
@@ -122,7 +124,7 @@ impl Arm {
             });
             before = place.translation;
         }
-        Ok(Self { base: base.names(robot), joints, notes: builder.notes })
+        Ok(Self { base: base.names(robot), base_shapes: base.shapes, joints, notes: builder.notes })
     }
 }
 

@@ -14,11 +14,14 @@
 //! | `package.rs` | files that `package://` names |
 //! | `surface.rs` | triangles of boxes, cylinders, spheres and meshes |
 //! | `nodes.rs` | contact nodes on these, at a spacing |
+//! | `drawn.rs` | the shapes that the scene draws |
 //! | `practice.rs` | a soft ball within reach, and a grid and a motion that press it |
 //! | `text.rs` | the scene file |
+//! | `shape.rs` | its end: what is drawn of the links |
 
 mod arm;
 mod document;
+mod drawn;
 mod error;
 mod group;
 mod link;
@@ -26,10 +29,12 @@ mod nodes;
 mod package;
 mod practice;
 mod robot;
+mod shape;
 mod surface;
 mod text;
 
 pub use arm::{Arm, ArmJoint, Lock, Note};
+pub use drawn::drawn_shapes;
 pub use error::UrdfError;
 pub use link::{Geometry, Inertial, Link, Placed};
 pub use nodes::{ContactNodes, sample};

@@ -1,9 +1,9 @@
 //! The scene file of an arm, as a person would have written it.
 
-use super::practice::Practice;
 use super::{Arm, ArmJoint, ContactNodes, Robot, UrdfError};
+use super::{practice::Practice, shape};
 use crate::proxy::Chain;
-use crate::scene::{JointKind, JointSpec, ProxyNodeSpec, ProxySpec, Scene};
+use crate::scene::{JointKind, JointSpec, LinkShape, ProxyNodeSpec, ProxySpec, Scene};
 use glam::DVec3;
 use std::fmt::Write;
 
@@ -19,17 +19,24 @@ const TIP_STIFFNESS: f64 = 800.0;
 /// Greatest force there [N].
 const TIP_FORCE: f64 = 10.0;
 
-/// Returns the text of a scene with the arm and a soft ball within its reach. `command`: what made it, for the head of
-/// the file.
+/// Returns the text of a scene with the arm, whose links are drawn as `shapes`, and a soft ball within its reach.
+/// `command`: what made it, for the head of the file.
 ///
 /// # Errors
 /// [`UrdfError::Scene`] if the text is no valid scene, a fault of this program.
-pub fn write_scene(robot: &Robot, arm: &Arm, nodes: &ContactNodes, command: &str) -> Result<String, UrdfError> {
+pub fn write_scene(
+    robot: &Robot,
+    arm: &Arm,
+    nodes: &ContactNodes,
+    shapes: &[LinkShape],
+    command: &str,
+) -> Result<String, UrdfError> {
     let proxy = proxy(arm, nodes);
     let practice = Practice::new(&Chain::new(&proxy));
     let mut text = String::new();
     // Writing to a string fails only where memory does.
     let _ = write(&mut text, robot, arm, &proxy, nodes, &practice, command);
+    let _ = shape::write(&mut text, &proxy, shapes);
     Scene::parse(&text, robot.path.with_extension("toml"))?;
     Ok(text)
 }
@@ -244,12 +251,12 @@ fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, practice: &Pra
 }
 
 /// Writes a heading as wide as those of the scenes that ship.
-fn heading(text: &mut String, title: &str) -> std::fmt::Result {
+pub(super) fn heading(text: &mut String, title: &str) -> std::fmt::Result {
     writeln!(text, "\n# ---- {title} {}\n", "-".repeat(112_usize.saturating_sub(title.len())))
 }
 
 /// Writes a key with its value and a comment.
-fn entry(text: &mut String, key: &str, value: &str, meaning: &str) -> std::fmt::Result {
+pub(super) fn entry(text: &mut String, key: &str, value: &str, meaning: &str) -> std::fmt::Result {
     let assignment = format!("{key} = {value}");
     if meaning.is_empty() {
         writeln!(text, "{assignment}")
@@ -274,12 +281,12 @@ fn list<T>(values: &[T], each: impl FnMut(&T) -> String) -> String {
     format!("[{}]", values.iter().map(each).collect::<Vec<_>>().join(", "))
 }
 
-fn vector(v: DVec3, decimals: usize) -> String {
+pub(super) fn vector(v: DVec3, decimals: usize) -> String {
     list(&v.to_array(), |x| number(*x, decimals))
 }
 
 /// Returns `x` with at most `decimals` decimals, and at least one.
-fn number(x: f64, decimals: usize) -> String {
+pub(super) fn number(x: f64, decimals: usize) -> String {
     let text = format!("{x:.decimals$}");
     let trimmed = text.trim_end_matches('0');
     match trimmed.strip_suffix('.').unwrap_or(trimmed) {

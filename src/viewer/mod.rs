@@ -34,6 +34,7 @@ mod history;
 mod job;
 mod lead;
 mod legend;
+mod links;
 mod loaded;
 mod node_drag;
 mod offscreen;

@@ -1,7 +1,7 @@
-//! The two drawing pipelines: the object's surface, pulled from the frame update's buffers, and instances of one
-//! rounded cone. Both share view and light (`shaders/draw_common.wgsl`), samples a pixel, and a depth buffer.
+//! The drawing pipelines: the object's surface, pulled from the frame update's buffers, shapes of links, and instances of
+//! one rounded cone. All share view and light (`shaders/draw_common.wgsl`), samples a pixel, and a depth buffer.
 
-use super::shapes::Shape;
+use super::{links::Corner, shapes::Shape};
 use crate::tolerances::GPU_LEAST_DIVISOR;
 use bytemuck::{Pod, Zeroable};
 
@@ -11,6 +11,7 @@ pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 const COMMON: &str = include_str!("../../shaders/draw_common.wgsl");
 const SURFACE: &str = include_str!("../../shaders/draw_surface.wgsl");
+const LINKS: &str = include_str!("../../shaders/draw_links.wgsl");
 const SHAPES: &str = include_str!("../../shaders/draw_shapes.wgsl");
 
 /// `View` of `shaders/draw_common.wgsl`.
@@ -48,6 +49,22 @@ pub fn shapes(device: &wgpu::Device, samples: u32) -> wgpu::RenderPipeline {
         attributes: &wgpu::vertex_attr_array![3 => Float32x4],
     };
     pipeline(device, samples, "draw_shapes", SHAPES, 1, &[Some(instances), Some(unit)])
+}
+
+/// The pipeline of the links; its buffer holds their frames. Corners lie in the first vertex buffer, the colour in the
+/// second.
+pub fn links(device: &wgpu::Device, samples: u32) -> wgpu::RenderPipeline {
+    let corners = wgpu::VertexBufferLayout {
+        array_stride: size_of::<Corner>() as u64,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Uint32],
+    };
+    let colour = wgpu::VertexBufferLayout {
+        array_stride: size_of::<[f32; 4]>() as u64,
+        step_mode: wgpu::VertexStepMode::Instance,
+        attributes: &wgpu::vertex_attr_array![3 => Float32x3],
+    };
+    pipeline(device, samples, "draw_links", LINKS, 1, &[Some(corners), Some(colour)])
 }
 
 /// Source of a drawing stage: generated constants, what is shared, and the stage itself.
@@ -138,7 +155,7 @@ mod tests {
 
     #[test]
     fn drawing_shaders_are_valid_and_their_view_is_laid_out_as_here() {
-        for stage in [SURFACE, SHAPES] {
+        for stage in [SURFACE, LINKS, SHAPES] {
             let module = naga::front::wgsl::parse_str(&source(stage)).unwrap();
             let mut validator =
                 naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());

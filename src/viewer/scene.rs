@@ -6,6 +6,7 @@ use super::{
     body::Body,
     camera::Camera,
     feel::Feel,
+    links::Links,
     loaded::Loaded,
     overlay,
     palette::{self, Palette},
@@ -47,8 +48,12 @@ pub struct SceneView {
     texture: Option<(egui::TextureId, [usize; 2])>,
     steering: Steering,
     body: Option<Body>,
+    /// Shapes of the arm's links, where it has any.
+    links: Option<Links>,
     /// The object with the effects that the controls have, set up in the background.
     redrawing: Following<GraphicsEffects, Result<Option<Body>, FrameError>>,
+    /// Link of each contact node.
+    node_links: Vec<usize>,
     pose: Pose,
     ghost: Pose,
     /// The parts that are shown.
@@ -88,7 +93,9 @@ impl SceneView {
             texture: None,
             steering: Steering::new(Camera::looking_at(Vec3::ZERO, NO_EXTENT)),
             body: None,
+            links: None,
             redrawing: Following::new(None),
+            node_links: Vec::new(),
             pose: Pose::default(),
             ghost: Pose::default(),
             shown: Shown { edges: true, forces: true, ghost: true, quantity: Quantity::Displacement },
@@ -107,6 +114,9 @@ impl SceneView {
         let chain = &loaded.setup.chain;
         (self.pose, self.ghost) = (chain.new_pose(), chain.new_pose());
         chain.pose(&loaded.start(), &mut self.pose);
+        // Without memory for them on the device, the arm is drawn from joint to joint.
+        self.links = Links::new(&self.context, &loaded.setup.scene.shapes, chain.joints.len()).unwrap_or_default();
+        self.node_links = chain.nodes.iter().map(|node| node.link).collect();
         let object = loaded.setup.object.iter().flat_map(|object| &object.rest);
         let points: Vec<Vec3> =
             object.chain(&self.pose.nodes).chain(&self.pose.origins).map(|point| point.as_vec3()).collect();
@@ -216,7 +226,8 @@ impl SceneView {
         };
         let shapes = self.shapes(palette);
         let surface = self.body.as_ref().map(|body| &body.surface);
-        let picture = self.stage.draw(size, &self.steering.camera, &look, surface, &shapes)?;
+        let links = self.links.as_ref().map(|links| links.at(&self.pose, channels(palette.link)));
+        let picture = self.stage.draw(size, &self.steering.camera, &look, surface, links.as_ref(), &shapes)?;
         let actual = [picture.width() as usize, picture.height() as usize];
         let texture = match self.texture {
             Some((id, known)) if known == actual => id,
@@ -241,10 +252,14 @@ impl SceneView {
     /// Everything that is drawn besides the surface.
     fn shapes(&self, palette: &Palette) -> Vec<Shape> {
         let unit = LINK * self.extent;
-        let mut shapes = arm(&self.pose, unit, channels(palette.link), channels(palette.node));
+        let plain = |link: usize| !self.links.as_ref().is_some_and(|links| links.is_shaped(link));
+        let mut shapes = rods(&self.pose, plain, unit, channels(palette.link));
+        shapes.extend(nodes(&self.pose, &self.node_links, plain, unit, channels(palette.node)));
         if self.shown.ghost && self.ghost.nodes != self.pose.nodes {
-            let ghost = channels(palette.ghost);
-            shapes.extend(arm(&self.ghost, GHOST * unit, ghost, ghost).into_iter().map(Shape::unlit));
+            let (unit, ghost) = (GHOST * unit, channels(palette.ghost));
+            let mut bare = rods(&self.ghost, |_| true, unit, ghost);
+            bare.extend(nodes(&self.ghost, &self.node_links, plain, unit, ghost));
+            shapes.extend(bare.into_iter().map(Shape::unlit));
         }
         if let Some(grip) = &self.steering.grip {
             let held = self.pose.nodes[grip.node].as_vec3();
@@ -269,22 +284,24 @@ impl SceneView {
     }
 }
 
-/// Links and nodes of a proxy: `unit` is the radius of a link.
-fn arm(pose: &Pose, unit: f32, link: [f32; 3], node: [f32; 3]) -> Vec<Shape> {
-    let mut shapes = Vec::new();
+/// Links of a proxy from joint to joint, those that `is_shown`: `unit` is their radius.
+fn rods(pose: &Pose, is_shown: impl Fn(usize) -> bool, unit: f32, colour: [f32; 3]) -> Vec<Shape> {
     let joints = pose.origins.iter().map(|origin| origin.as_vec3());
     let tip = pose.nodes.last().map(|tip| tip.as_vec3());
     let stops: Vec<Vec3> = joints.chain(tip).collect();
-    for ends in stops.windows(2) {
-        shapes.push(Shape::capsule(ends[0], ends[1], unit, link));
-    }
-    for origin in &pose.origins {
-        shapes.push(Shape::ball(origin.as_vec3(), JOINT_BALL * unit, link));
-    }
-    for place in &pose.nodes {
-        shapes.push(Shape::ball(place.as_vec3(), NODE_BALL * unit, node));
-    }
+    let shown = |(number, _): &(usize, &[Vec3])| is_shown(*number);
+    let mut shapes: Vec<Shape> = (stops.windows(2).enumerate().filter(shown))
+        .map(|(_, ends)| Shape::capsule(ends[0], ends[1], unit, colour))
+        .collect();
+    let shown = pose.origins.iter().enumerate().filter(|(number, _)| is_shown(*number));
+    shapes.extend(shown.map(|(_, origin)| Shape::ball(origin.as_vec3(), JOINT_BALL * unit, colour)));
     shapes
+}
+
+/// Contact nodes of a proxy on those links that `is_shown`; `links` has the link of each.
+fn nodes(pose: &Pose, links: &[usize], is_shown: impl Fn(usize) -> bool, unit: f32, colour: [f32; 3]) -> Vec<Shape> {
+    let shown = pose.nodes.iter().zip(links).filter(|(_, link)| is_shown(**link));
+    shown.map(|(place, _)| Shape::ball(place.as_vec3(), NODE_BALL * unit, colour)).collect()
 }
 
 fn channels(colour: Color32) -> [f32; 3] {
@@ -299,6 +316,10 @@ mod tests {
     #[test]
     fn an_arm_has_a_rod_a_link_and_a_ball_a_node() {
         let pose = Pose { origins: vec![DVec3::ZERO, DVec3::X], nodes: vec![DVec3::Y; 3], ..Pose::default() };
-        assert_eq!(arm(&pose, 0.1, [0.0; 3], [1.0; 3]).len(), 2 + 2 + 3);
+        let count = |shown: fn(usize) -> bool| {
+            rods(&pose, shown, 0.1, [0.0; 3]).len() + nodes(&pose, &[0, 1, 1], shown, 0.1, [1.0; 3]).len()
+        };
+        assert_eq!(count(|_| true), 2 + 2 + 3);
+        assert_eq!(count(|link| link != 1), 1 + 1 + 1, "a link with a shape is drawn by it");
     }
 }

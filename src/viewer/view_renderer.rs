@@ -3,6 +3,7 @@
 
 use super::{
     camera::Camera,
+    links::DrawnLinks,
     pipelines::{self, DEPTH, FORMAT, View, bind},
     shapes::{Shape, unit_shape},
 };
@@ -48,6 +49,7 @@ pub struct Look {
 pub struct ViewRenderer {
     context: Arc<Context>,
     surface: wgpu::RenderPipeline,
+    links: wgpu::RenderPipeline,
     shapes: wgpu::RenderPipeline,
     view: wgpu::Buffer,
     unit: wgpu::Buffer,
@@ -99,7 +101,7 @@ impl ViewRenderer {
     /// When the device refuses them.
     pub fn new(context: Arc<Context>, samples: u32) -> Result<Self, GpuError> {
         let unit_shape = unit_shape();
-        let (surface, shapes, view, unit, no_state) = context.scoped(|device| {
+        let (surface, links, shapes, view, unit, no_state) = context.scoped(|device| {
             let view = wgpu::BufferDescriptor {
                 label: Some("view"),
                 size: size_of::<View>() as u64,
@@ -109,6 +111,7 @@ impl ViewRenderer {
             let filled = |label, contents: &[u8], usage| filled(device, &context.queue, label, contents, usage);
             (
                 pipelines::surface(device, samples),
+                pipelines::links(device, samples),
                 pipelines::shapes(device, samples),
                 device.create_buffer(&view),
                 filled("unit shape", bytemuck::cast_slice(&unit_shape), wgpu::BufferUsages::VERTEX),
@@ -116,7 +119,7 @@ impl ViewRenderer {
             )
         })?;
         let unit_vertices = unit_shape.len() as u32;
-        Ok(Self { context, surface, shapes, view, unit, unit_vertices, no_state, samples, targets: None })
+        Ok(Self { context, surface, links, shapes, view, unit, unit_vertices, no_state, samples, targets: None })
     }
 
     /// Draws one picture of `size` pixels and returns its texture; the texture is the same one until the size changes.
@@ -129,6 +132,7 @@ impl ViewRenderer {
         camera: &Camera,
         look: &Look,
         surface: Option<&Surface>,
+        links: Option<&DrawnLinks<'_>>,
         shapes: &[Shape],
     ) -> Result<&wgpu::Texture, GpuError> {
         let size = size.map(|pixels| pixels.clamp(1, LARGEST_SIDE));
@@ -148,6 +152,19 @@ impl ViewRenderer {
                 pass.set_pipeline(&self.surface);
                 pass.set_bind_group(0, &bound, &[]);
                 pass.draw(0..3 * surface.triangles, 0..1);
+            }
+            if let Some(DrawnLinks { links, frames, colour: [red, green, blue] }) = links {
+                let buffer =
+                    |label, contents: &[u8], usage| filled(device, &self.context.queue, label, contents, usage);
+                let frames = buffer("frames", bytemuck::cast_slice(frames), wgpu::BufferUsages::STORAGE);
+                let colour = [*red, *green, *blue, 1.0];
+                let colour = buffer("colour of links", bytemuck::cast_slice(&colour), wgpu::BufferUsages::VERTEX);
+                let bound = bind(device, &self.links, &[&self.view, &frames]);
+                pass.set_pipeline(&self.links);
+                pass.set_bind_group(0, &bound, &[]);
+                pass.set_vertex_buffer(0, links.corners.slice(..));
+                pass.set_vertex_buffer(1, colour.slice(..));
+                pass.draw(0..links.count, 0..1);
             }
             if !shapes.is_empty() {
                 let contents = bytemuck::cast_slice(shapes);
@@ -169,7 +186,7 @@ impl ViewRenderer {
 }
 
 /// A buffer that holds `contents`, of whole words. wgpu's own way to make one panics where the device is lost.
-fn filled(
+pub(super) fn filled(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
     label: &str,

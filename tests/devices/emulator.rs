@@ -151,13 +151,24 @@ impl<F: Firmware + 'static> Emulator<F> {
     }
 
     /// Runs beside `open`, which waits for replies, and gives both back.
-    pub fn while_opening<T>(mut self, open: impl FnOnce(&str) -> T) -> (Self, T) {
+    pub fn while_opening<T>(self, open: impl FnOnce(&str) -> T) -> (Self, T) {
+        self.beside(false, open)
+    }
+
+    /// Runs beside `open`, which waits for replies, and gives both back; the hand moves with the clock if it is `alive`.
+    pub fn beside<T>(mut self, alive: bool, open: impl FnOnce(&str) -> T) -> (Self, T) {
         let over = Arc::new(AtomicBool::new(false));
         let (ends, path) = (Arc::clone(&over), self.line.path.clone());
         let body = thread::spawn(move || {
             self.line.in_step = false;
+            if alive {
+                run_like_a_device();
+            }
+            let mut last = Instant::now();
             while !ends.load(Ordering::Relaxed) {
-                self.step(0.0);
+                let now = Instant::now();
+                let elapsed = (now - std::mem::replace(&mut last, now)).as_secs_f64();
+                self.step(if alive { elapsed } else { 0.0 });
             }
             self.line.in_step = true;
             self
@@ -166,6 +177,14 @@ impl<F: Firmware + 'static> Emulator<F> {
         over.store(true, Ordering::Relaxed);
         (body.join().unwrap(), opened)
     }
+}
+
+/// Lets this thread run before the host's: a device does not wait for the host's other programs. Left as it is where the
+/// system refuses.
+fn run_like_a_device() {
+    let priority = libc::sched_param { sched_priority: 90 };
+    // SAFETY: the call reads the number, and concerns this thread alone.
+    unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const priority) };
 }
 
 /// The firmware of a 2DIY, version 3.

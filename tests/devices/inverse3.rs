@@ -1,8 +1,15 @@
 //! The Inverse3 against a mock of its service, which keeps the service's contract: one inventory first, then one state
 //! for each message, commands that count once, idle after silence. And what may come instead.
 
-use crate::felt::{PERIOD, all};
-use haptize::device::{Device, Guard, Halt, Hardware, Inverse3, Watchdog};
+use crate::{
+    desktop::haptics,
+    felt::{PERIOD, all},
+};
+use haptize::{
+    device::{Device, Guard, Halt, Hardware, Inverse3, LinearMap, TipDevice, Watchdog},
+    proxy::Chain,
+    scene::DeviceSpec,
+};
 use serde_json::{Value, json};
 use std::{
     net::{TcpListener, TcpStream},
@@ -165,6 +172,12 @@ fn enabled(mock: &Mock) -> Guard {
     let mut guard = Guard::new(Box::new(device), None).unwrap();
     guard.enable().unwrap();
     guard
+}
+
+/// Calls `session` with a device of the mock whose tip leads `chain`.
+pub fn beside_the_service(chain: Chain, session: impl FnOnce(&mut dyn Device)) {
+    let mock = Mock::new();
+    session(&mut TipDevice::new(enabled(&mock), LinearMap::identity(3), chain, &DeviceSpec::default(), &haptics(3)));
 }
 
 /// Pushes for `ticks` milliseconds of the clock; the last answer, and the reasons that there were.

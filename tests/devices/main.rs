@@ -12,6 +12,8 @@ mod emulator;
 mod felt;
 mod guard;
 mod inverse3;
+#[cfg(target_os = "linux")]
+mod jitter;
 mod mcap;
 mod program;
 mod rig;

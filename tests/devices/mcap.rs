@@ -2,9 +2,10 @@
 
 use crate::program::FINGER;
 use haptize::{
+    JointVector,
     logs::{ImportError, Mapping, import},
     proxy::Chain,
-    ros::{JointState, JointStateTable, JointStateWriter, RosError, is_mcap, topics},
+    ros::{Course, JointState, JointStateTable, JointStateWriter, RosError, is_mcap, topics},
     scan::{Plan, Trajectory, labels},
     scene::ScanScene,
 };
@@ -85,6 +86,148 @@ fn drop_outs_are_counted_and_efforts_become_contact_torques() {
     assert!(imported.samples.torques.iter().all(|torque| *torque == -0.5));
 }
 
+/// A file of `states` of one topic in chunks that `compress` compresses, which are said to hold `size` bytes.
+fn chunked(
+    path: &Path,
+    states: &[JointState],
+    name: &str,
+    compress: impl Fn(&[u8]) -> Vec<u8>,
+    size: impl Fn(u64) -> u64,
+) {
+    let options = mcap::WriteOptions::new().compression(None).disable_seeking(true);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut writer = options.create(&mut bytes).unwrap();
+    let schema = writer.add_schema("sensor_msgs/msg/JointState", "ros2msg", b"").unwrap();
+    let channel = writer.add_channel(schema, "/a", "cdr", &BTreeMap::new()).unwrap();
+    for (state, sequence) in states.iter().zip(0..) {
+        let (log_time, publish_time) = (state.stamp, state.stamp);
+        let header = mcap::records::MessageHeader { channel_id: channel, sequence, log_time, publish_time };
+        writer.write_to_known_channel(&header, &state.encode()).unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    // Records behind the magic bytes: a code, a length, the content.
+    let plain = bytes.into_inner();
+    let (magic, mut rest) = plain.split_at(8);
+    let mut file = magic.to_vec();
+    while rest.len() > 8 {
+        let length = u64::from_le_bytes(rest[1..9].try_into().unwrap()) as usize;
+        let (code, content) = (rest[0], &rest[9..9 + length]);
+        rest = &rest[9 + length..];
+        let mut content = content.to_vec();
+        if code == 6 {
+            let told = u64::from_le_bytes(content[16..24].try_into().unwrap());
+            let taken = compress(&content[40..]);
+            content.truncate(28);
+            content[16..24].copy_from_slice(&size(told).to_le_bytes());
+            content.extend((name.len() as u32).to_le_bytes());
+            content.extend(name.as_bytes());
+            content.extend((taken.len() as u64).to_le_bytes());
+            content.extend(taken);
+        }
+        // The sum of the data section stands no longer: none.
+        if code == 15 {
+            content.fill(0);
+        }
+        file.push(code);
+        file.extend((content.len() as u64).to_le_bytes());
+        file.extend(content);
+    }
+    file.extend(magic);
+    fs::write(path, file).unwrap();
+}
+
+fn lz4(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = lz4_flex::frame::FrameEncoder::new(Vec::new());
+    std::io::Write::write_all(&mut encoder, bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+fn zstd(bytes: &[u8]) -> Vec<u8> {
+    ruzstd::encoding::compress_to_vec(bytes, ruzstd::encoding::CompressionLevel::Fastest)
+}
+
+#[test]
+fn compressed_chunks_hold_what_they_held_before_and_no_more_than_they_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let states: Vec<JointState> = (0..200_u32).map(|k| state(u64::from(k), &["x"], &[f64::from(k)], &[1.0])).collect();
+    let read = |name: &str, compress: &dyn Fn(&[u8]) -> Vec<u8>, size: &dyn Fn(u64) -> u64| {
+        let path = folder.path().join(format!("{name}.mcap"));
+        chunked(&path, &states, name, compress, size);
+        (text(&path, None), fs::metadata(&path).unwrap().len())
+    };
+    let as_is = |size: u64| size;
+    let (plain, longest) = read("", &|bytes| bytes.to_vec(), &as_is);
+    let plain = plain.unwrap();
+    assert_eq!(plain.lines().count(), 201);
+    for (name, compress) in [("lz4", &lz4 as &dyn Fn(&[u8]) -> Vec<u8>), ("zstd", &zstd)] {
+        let (taken, length) = read(name, compress, &as_is);
+        assert_eq!(taken.unwrap(), plain, "{name}");
+        assert!(length < longest, "{name}: {length} of {longest} bytes");
+        // A chunk that holds more or less than it says, more than anybody wants, or nothing that was compressed.
+        for (size, told) in [(-1, "holds more"), (1, "it holds"), (1 << 40, "smaller chunks")] {
+            let error = read(name, compress, &|told| told.wrapping_add_signed(size)).0.unwrap_err().to_string();
+            assert!(error.contains(told), "{name} {size}: {error}");
+        }
+        let error = read(name, &|bytes| bytes.to_vec(), &as_is).0.unwrap_err().to_string();
+        assert!(error.contains("record it again"), "{error}");
+        // What was altered is found, by the frame or by the checksum.
+        let altered = |bytes: &[u8]| {
+            let mut taken = compress(bytes);
+            let middle = taken.len() / 2;
+            taken[middle] ^= 0x55;
+            taken
+        };
+        assert!(read(name, &altered, &as_is).0.is_err(), "{name}");
+    }
+    let error = read("snappy", &|bytes| bytes.to_vec(), &as_is).0.unwrap_err().to_string();
+    assert!(error.contains("snappy") && error.contains("mcap decompress"), "{error}");
+}
+
+#[test]
+fn a_small_file_takes_no_more_memory_than_its_chunk_says() {
+    // A gigabyte of zeros in some kilobytes, said to be a kilobyte: the rest is never taken out.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bomb.mcap");
+    let states = [state(1, &["x"], &[0.0], &[])];
+    // Blocks of 128 KiB of one byte each, as zstd writes them: magic, a window of 1 MiB, blocks, the last one marked.
+    let bomb = |_: &[u8]| {
+        let mut bytes = vec![0x28, 0xb5, 0x2f, 0xfd, 0x00, 0x50];
+        for block in 0..8192_u32 {
+            let header = u32::from(block == 8191) | 1 << 1 | (1 << 17) << 3;
+            bytes.extend(&header.to_le_bytes()[..3]);
+            bytes.push(0);
+        }
+        bytes
+    };
+    chunked(&path, &states, "zstd", bomb, |_| 1024);
+    let error = text(&path, None).unwrap_err().to_string();
+    assert!(error.contains("holds more of 1024 bytes"), "{error}");
+}
+
+#[test]
+fn the_hand_s_way_comes_back_from_a_session_and_the_joints_way_from_a_robot_s_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let joints = ["x", "y"].map(str::to_owned);
+    let states = [
+        ("/device", state(0, &["x", "y"], &[9.0, 9.0], &[])),
+        ("/hand", state(1_700_000_000_000, &["y", "x"], &[1.0, 0.0], &[])),
+        ("/hand", state(1_700_000_000_250, &["x"], &[7.0], &[])),
+        ("/hand", state(1_700_000_000_500, &["x", "y"], &[0.5, 1.5], &[])),
+        ("/hand", state(1_700_000_000_500, &["x", "y"], &[8.0, 8.0], &[])),
+        ("/hand", state(1_700_000_000_100, &["x", "y"], &[8.0, 8.0], &[])),
+        ("/hand", state(1_700_000_002_000, &["x", "y"], &[1.0, f64::NAN], &[])),
+    ];
+    let path = file(folder.path(), "log.mcap", &states);
+    let course = Course::read(&path, None, &joints).unwrap();
+    let expected = [(0.0, JointVector::from_slice(&[0.0, 1.0])), (0.5, JointVector::from_slice(&[0.5, 1.5]))];
+    assert_eq!((course.topic.as_str(), &course.samples[..], course.left_out), ("/hand", &expected[..], 4));
+    assert_eq!(Course::read(&path, Some("/device"), &joints).unwrap().samples.len(), 1);
+    let error = Course::read(&path, None, &["z".to_owned()]).unwrap_err().to_string();
+    assert!(error.contains("gives the positions of z") && error.contains("--topic"), "{error}");
+    assert!(Course::read(&path, Some("/nothing"), &joints).unwrap_err().to_string().contains("no topic /nothing"));
+}
+
 #[test]
 fn damaged_files_are_errors_with_the_remedy_and_never_panics() {
     let folder = tempfile::tempdir().unwrap();
@@ -115,6 +258,10 @@ fn damaged_files_are_errors_with_the_remedy_and_never_panics() {
     assert!(!is_mcap(&damaged));
     assert!(text(&damaged, None).unwrap_err().to_string().contains("not an MCAP file"));
 }
+
+/// Greatest distance between the ways of a device whose hand went the same way twice [rad]: the hand's speed of 1 rad/s at
+/// most over half of a tick, by which its recording is interpolated, is less.
+const SAME_WAY: f64 = 1e-4;
 
 fn haptize(folder: &Path, arguments: &[&str]) -> (bool, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_haptize")).args(arguments).current_dir(folder).output().unwrap();
@@ -149,6 +296,18 @@ fn a_session_is_recorded_as_mcap_and_gridized_again() {
     assert!(fine, "{told}");
     let (fine, told) = haptize(path, &["gridize", "session.mcap", "--step", "0.02"]);
     assert!(!fine && told.contains("--topic"), "{told}");
+    // The hand goes the same way again, and the device is where it was, to the nanosecond of the stamps.
+    let (fine, told) =
+        haptize(path, &["play", "f.haptize", "--motion", "session.mcap", "-o", "again", "--record", "again.mcap"]);
+    assert!(fine, "{told}");
+    let joints = ["q1".to_owned()];
+    let way = |name: &str, topic| Course::read(&path.join(name), Some(topic), &joints).unwrap().samples;
+    let (before, after) = (way("session.mcap", "/device"), way("again.mcap", "/device"));
+    assert!(before.len() > 900 && after.len() + 2 > before.len(), "{} {}", before.len(), after.len());
+    let farthest = before.iter().zip(&after).map(|(a, b)| (a.1[0] - b.1[0]).abs()).fold(0.0, f64::max);
+    assert!(farthest < SAME_WAY, "{farthest}");
+    let (fine, told) = haptize(path, &["play", "f.haptize", "--topic", "/hand"]);
+    assert!(!fine && told.contains("--topic is for"), "{told}");
     let (fine, told) = haptize(path, &["play", "f.haptize", "--replay", "session.mcap"]);
     assert!(!fine && told.contains("session.mcap"), "{told}");
 }

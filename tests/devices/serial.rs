@@ -8,7 +8,7 @@ use crate::{
 use haptize::{
     JointVector,
     device::{
-        Guard, Halt, Hardware, JointDevice, LinearMap,
+        Device, Guard, Halt, Hardware, JointDevice, LinearMap,
         serial::{Protocol, Reply, TwoDiy, Version, WoodenHaptics},
     },
 };
@@ -54,6 +54,24 @@ fn patiently<T>(mut open: impl FnMut() -> Result<T, String>) -> T {
         }
     }
     open().unwrap()
+}
+
+/// Calls `session` with a 2DIY whose emulator runs beside it.
+pub fn beside_two_diy(session: impl FnOnce(&mut dyn Device)) {
+    let emulator = Emulator::new(TwoDiyFirmware::default(), pressing(2, &middle()));
+    emulator.beside(true, |path| {
+        let guard = patiently(|| enabled(Box::new(TwoDiy::open(path, Version::V3)?)));
+        session(&mut JointDevice::new(guard, centred(&middle())));
+    });
+}
+
+/// Calls `session` with a WoodenHaptics whose emulator runs beside it.
+pub fn beside_wooden_haptics(session: impl FnOnce(&mut dyn Device)) {
+    let emulator = Emulator::new(WoodenFirmware::default(), pressing(3, &wooden_middle()));
+    emulator.beside(true, |path| {
+        let guard = patiently(|| enabled(Box::new(WoodenHaptics::open(path)?)));
+        session(&mut JointDevice::new(guard, centred(&wooden_middle())));
+    });
 }
 
 #[test]

@@ -46,7 +46,7 @@ const CARRIERS: [usize; 5] = [0, 1, 2, 2, 3];
 fn scene() -> Scene {
     let (robot, arm) = arm(&std::fs::read_to_string(file("arm.urdf")).unwrap(), "probe", &[]).unwrap();
     let nodes = sample(&robot, &arm, 0.006, None).unwrap();
-    let text = write_scene(&robot, &arm, &nodes, "haptize import").unwrap();
+    let text = write_scene(&robot, &arm, &nodes, &[], "haptize import").unwrap();
     Scene::parse(&text, "arm.toml").unwrap()
 }
 

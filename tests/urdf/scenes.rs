@@ -1,10 +1,12 @@
 //! `haptize import`: scenes that bake and play as they are.
 
 use super::file;
+use glam::DVec3;
 use haptize::{
+    dataset::Dataset,
     object::Object,
-    proxy::Chain,
-    scene::{JointKind, Scene},
+    proxy::{Chain, Triangles, shape_triangles},
+    scene::{JointKind, LinkForm, Rendering, Scene},
 };
 use std::{
     path::Path,
@@ -104,4 +106,82 @@ fn packages_are_found_above_the_file_or_where_the_user_says() {
     let arguments =
         ["import", "alone.urdf", "--tip", "probe", "--package-path", &packages, "--spacing", "0.01", "-o", "x.toml"];
     succeed(folder.path(), &arguments);
+}
+
+/// Greatest distance between a corner of a shape and a contact node that was put on it [m]: corners of meshes carry nodes,
+/// five decimals of which stand in the scene, and a surface has 65,535 steps within its bounds of some centimetres.
+const ON_CORNER: f64 = 2e-5;
+
+#[test]
+fn links_are_drawn_where_their_contact_nodes_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = file("arm.urdf").display().to_string();
+    succeed(folder.path(), &["import", &robot, "--tip", "probe", "--spacing", "0.008", "-o", "scene.toml"]);
+    let scene = Rendering::load(folder.path().join("scene.toml")).unwrap();
+    let of = |joint: usize| scene.shapes.iter().filter(|shape| shape.joint == Some(joint)).collect::<Vec<_>>();
+    assert!(scene.shapes.iter().any(|shape| shape.joint.is_none()), "the base stands still");
+    let names: Vec<&str> = scene.proxy.joints.iter().map(|joint| joint.name.as_str()).collect();
+    let bend = names.iter().position(|name| *name == "bend").unwrap();
+    assert!(of(bend).iter().any(|shape| matches!(shape.form, LinkForm::Cylinder { .. })));
+    assert!(of(bend).iter().any(|shape| matches!(shape.form, LinkForm::Surface(_))), "the mesh of the hand");
+    for (number, joint) in scene.proxy.joints.iter().enumerate() {
+        let surfaces: Vec<Triangles> = of(number).into_iter().map(shape_triangles).collect();
+        assert_eq!(surfaces.is_empty(), joint.nodes.is_empty(), "{}", joint.name);
+        // Boxes and meshes: their corners are nodes, unless another node is nearer than the spacing.
+        for (shape, (nodes, _)) in of(number).into_iter().zip(&surfaces) {
+            if !matches!(shape.form, LinkForm::Sphere(_) | LinkForm::Cylinder { .. }) {
+                let nearest =
+                    |corner: &DVec3| joint.nodes.iter().map(|node| node.position.distance(*corner)).fold(9.0, f64::min);
+                assert!(nodes.iter().all(|corner| nearest(corner) < 0.008 + ON_CORNER), "{}", joint.name);
+                assert!(nodes.iter().any(|corner| nearest(corner) < ON_CORNER), "{}", joint.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_drawn_changes_nothing_that_is_solved() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = file("finger.urdf").display().to_string();
+    succeed(folder.path(), &["import", &robot, "--tip", "distal", "--spacing", "0.006", "-o", "scene.toml"]);
+    let text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+    let bare = &text[..text.find("[[proxy.shape]]").unwrap()];
+    std::fs::write(folder.path().join("bare.toml"), bare).unwrap();
+    for name in ["scene", "bare"] {
+        succeed(folder.path(), &["bake", &format!("{name}.toml"), "--backend", "cpu", "--measure-error", "0"]);
+    }
+    let [drawn, plain] =
+        ["scene", "bare"].map(|name| Dataset::load(&folder.path().join(format!("{name}.haptize"))).unwrap());
+    assert_eq!(drawn.torque[..], plain.torque[..]);
+    // The dataset stands alone.
+    assert!(!Rendering::parse(&drawn.scene, "scene").unwrap().shapes.is_empty());
+    assert!(Rendering::parse(&plain.scene, "scene").unwrap().shapes.is_empty());
+    // The figure of the object shows the link that presses it: other pixels than a rod.
+    for name in ["scene", "bare"] {
+        succeed(folder.path(), &["play", &format!("{name}.haptize"), "-o", name]);
+    }
+    let [with, without] =
+        ["scene", "bare"].map(|name| std::fs::read(folder.path().join(name).join("object.png")).unwrap());
+    assert_ne!(with, without);
+}
+
+#[test]
+fn shapes_that_are_none_are_refused_with_their_line_and_the_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = file("finger.urdf").display().to_string();
+    succeed(folder.path(), &["import", &robot, "--tip", "distal", "--spacing", "0.006", "-o", "scene.toml"]);
+    let text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+    for (shape, expected) in [
+        ("joint = \"elbow\"\nsphere = 0.1", "name one of"),
+        ("sphere = 0.1\nbox = [1.0, 1.0, 1.0]", "one of box"),
+        ("at = [0.0, 0.0, 0.0]", "one of box"),
+        ("sphere = -1.0", "sphere"),
+        ("box = [1.0, 0.0, 1.0]", "must be positive"),
+        ("cylinder = { radius = 0.1 }", "length"),
+        ("cone = 1.0", "unknown field"),
+        ("surface = { from = [0.0, 0.0, 0.0], to = [1.0, 1.0, 1.0], data = \"!\" }", "import the robot again"),
+    ] {
+        let error = Scene::parse(&format!("{text}\n[[proxy.shape]]\n{shape}\n"), "s.toml").unwrap_err().to_string();
+        assert!(error.contains(expected) && error.contains("s.toml:"), "{shape}: {error}");
+    }
 }

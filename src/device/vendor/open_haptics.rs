@@ -363,6 +363,10 @@ unsafe extern "C" fn called(session: *mut c_void) -> c_uint {
 }
 
 impl Scheduler for Api {
+    fn rate(&self) -> f64 {
+        RATE as f64
+    }
+
     fn run(&self, tick: &mut (dyn FnMut() -> bool + Send)) -> Result<(), Halt> {
         let mut session = Session { tick, calls: AtomicU64::new(0), over: AtomicBool::new(false), panic: None };
         let place = &raw mut session;

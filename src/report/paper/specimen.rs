@@ -87,7 +87,7 @@ fn picture(scanned: Scanned<'_>) -> Picture {
     draw_block(&mut raster, &block);
     dots.into_iter().for_each(|dot| raster.sphere(dot, DOT, MEASURED));
     if let Some(pose) = &pressed {
-        draw_proxy(&mut raster, chain, pose, LINK);
+        draw_proxy(&mut raster, chain, pose, LINK, &[]);
     }
     raster.picture()
 }

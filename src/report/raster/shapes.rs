@@ -32,6 +32,17 @@ impl Raster {
         }
     }
 
+    /// Flat triangles of any orientation: each is lit on the side that is seen.
+    pub fn facets(&mut self, nodes: &[DVec3], triangles: &[[u32; 3]], colour: Colour) {
+        let [.., towards] = self.camera().axes();
+        for triangle in triangles {
+            let [Some(&a), Some(&b), Some(&c)] = triangle.map(|node| nodes.get(node as usize)) else { continue };
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            let normal = if normal.dot(towards) < 0.0 { -normal } else { normal };
+            self.triangle([a, b, c].map(|position| Vertex { position, normal, colour }), Finish::Solid);
+        }
+    }
+
     /// The edges of a mesh, each once.
     pub fn edges(&mut self, nodes: &[DVec3], triangles: &[[u32; 3]], width: f64, colour: Colour) {
         for triangle in triangles {

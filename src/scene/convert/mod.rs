@@ -8,6 +8,7 @@ mod motion;
 mod object;
 mod proxy;
 mod scan;
+mod shape;
 mod skin;
 
 use super::check::Checker;
@@ -88,6 +89,7 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
         graphics,
         motion: motion::convert(checker, &table.motion, joints)?,
         device: device::convert(checker, &table.device, &proxy)?,
+        shapes: shape::convert(checker, &table.proxy.shape, joints)?,
         proxy,
     })
 }

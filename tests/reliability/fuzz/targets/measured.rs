@@ -121,7 +121,11 @@ pub const MAPPINGS: Target = Target {
 pub const MCAP: Target = Target {
     name: "mcap",
     extension: "mcap",
-    seeds: || [(1, false), (2, false), (3, true)].map(|(joints, chunked)| states(joints, chunked)).to_vec(),
+    seeds: || {
+        let plain = [(1, false), (2, false), (3, true)].map(|(joints, chunked)| states(joints, chunked));
+        let [lz4, zstd] = COMPRESSIONS.map(|compression| compressed(&plain[2], compression));
+        [plain.to_vec(), vec![lz4, zstd]].concat()
+    },
     mutate: mutate::binary,
     run: |file, input| {
         write(file, input);
@@ -132,6 +136,49 @@ pub const MCAP: Target = Target {
     },
     kinds: 12,
 };
+
+/// Name of a compression, and what it makes of bytes.
+type Compression = (&'static str, fn(&[u8]) -> Vec<u8>);
+
+const COMPRESSIONS: [Compression; 2] = [
+    ("lz4", |bytes| {
+        let mut encoder = lz4_flex::frame::FrameEncoder::new(Vec::new());
+        std::io::Write::write_all(&mut encoder, bytes).unwrap();
+        encoder.finish().unwrap()
+    }),
+    ("zstd", |bytes| ruzstd::encoding::compress_to_vec(bytes, ruzstd::encoding::CompressionLevel::Fastest)),
+];
+
+/// The MCAP file `plain` with compressed chunks.
+fn compressed(plain: &[u8], (name, compress): Compression) -> Vec<u8> {
+    /// Operation code of a chunk, and bytes of its times, size and checksum, then of the empty name and the length.
+    const CHUNK: u8 = 6;
+    const HEAD: usize = 28;
+    const RECORDS: usize = 40;
+    let (magic, mut rest) = plain.split_at(mcap::MAGIC.len());
+    let mut file = magic.to_vec();
+    while rest.len() > magic.len() {
+        let length = u64::from_le_bytes(rest[1..9].try_into().unwrap()) as usize;
+        let (code, content) = (rest[0], &rest[9..9 + length]);
+        rest = &rest[9 + length..];
+        let content = if code == CHUNK {
+            let records = compress(&content[RECORDS..]);
+            let mut chunk = content[..HEAD].to_vec();
+            chunk.extend((name.len() as u32).to_le_bytes());
+            chunk.extend(name.as_bytes());
+            chunk.extend((records.len() as u64).to_le_bytes());
+            chunk.extend(records);
+            chunk
+        } else {
+            content.to_vec()
+        };
+        file.push(code);
+        file.extend((content.len() as u64).to_le_bytes());
+        file.extend(content);
+    }
+    file.extend(magic);
+    file
+}
 
 /// The joint states of the file's first topic as samples of all its joints.
 fn imported(file: &Path) -> Result<Samples, String> {

@@ -150,5 +150,6 @@ fn imported(file: &Path) -> Result<String, UrdfError> {
     let tip = robot.links.iter().rev().find(|link| link.name != "camera").map_or("none", |link| &link.name);
     let arm = Arm::new(&robot, tip, &[])?;
     let nodes = urdf::sample(&robot, &arm, 0.02, None)?;
-    urdf::write_scene(&robot, &arm, &nodes, "haptize import")
+    let (shapes, _) = urdf::drawn_shapes(&robot, &arm, None);
+    urdf::write_scene(&robot, &arm, &nodes, &shapes, "haptize import")
 }

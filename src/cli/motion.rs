@@ -1,0 +1,66 @@
+//! The motion of the hand that a command names: one of the scene, or one in a file.
+
+use super::{Failure, tell};
+use crate::{
+    dataset::Dataset,
+    device::Motion,
+    render::setup::{Setup, labels},
+    ros::{Course, is_mcap},
+    scene::Waypoint,
+};
+use std::path::Path;
+
+/// Returns the motion called `name` in the scene of `dataset`, or that in the file `name`: a table, or joint states in
+/// MCAP, of which `topic` counts.
+pub fn named(setup: &Setup, dataset: &Dataset, name: &str, topic: Option<&str>) -> Result<Motion, Failure> {
+    let joints = setup.chain.joints.len();
+    let waypoints = match name {
+        "press" => &setup.scene.motion.press,
+        "scrape" => &setup.scene.motion.scrape,
+        file if is_mcap(Path::new(file)) => return recorded(dataset, Path::new(file), topic),
+        file if Path::new(file).exists() => {
+            no_topic(topic, file)?;
+            return Ok(Motion::from_csv(Path::new(file), joints)?);
+        }
+        file => {
+            let known = "the scene in the dataset may name the motions `press` and `scrape`; a CSV or MCAP file gives \
+                         any other";
+            return Err(format!("{file}: cannot be read: there is no such file; {known}").into());
+        }
+    };
+    no_topic(topic, name)?;
+    if waypoints.is_empty() {
+        let known = "give [motion] in the scene such waypoints and bake it again, or a CSV file by --motion";
+        return Err(format!(
+            "the dataset's scene has no motion \"{name}\", and its contact is not such that one could be made: {known}"
+        )
+        .into());
+    }
+    if setup.made_motions.contains(&name) {
+        tell(format_args!(
+            "haptize: note: the scene names no {name}; this one was made from where the dataset is in contact"
+        ));
+    }
+    Ok(Motion::through(waypoints, joints)?)
+}
+
+/// Refuses a topic where there are none.
+fn no_topic(topic: Option<&str>, motion: &str) -> Result<(), Failure> {
+    topic.map_or(Ok(()), |_| Err(format!("{motion}: --topic is for a --motion in an MCAP file: leave it out").into()))
+}
+
+/// The motion in the MCAP file `file`, of the joints of `dataset`.
+fn recorded(dataset: &Dataset, file: &Path, topic: Option<&str>) -> Result<Motion, Failure> {
+    let joints: Vec<String> = labels(&dataset.grid).into_iter().map(|joint| joint.name).collect();
+    let course = Course::read(file, topic, &joints)?;
+    if course.left_out > 0 {
+        tell(format_args!(
+            "haptize: note: {}: {} messages of {} are left out: they lack a joint, or come no later than the one before",
+            file.display(),
+            course.left_out,
+            course.topic
+        ));
+    }
+    let samples: Vec<Waypoint> = course.samples.into_iter().map(|(time, q)| Waypoint { time, q }).collect();
+    Motion::along(samples, joints.len()).map_err(|error| format!("{}: {error}", file.display()).into())
+}
