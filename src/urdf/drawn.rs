@@ -10,6 +10,9 @@ use std::path::Path;
 /// Most boxes, cylinders and spheres of a link that are written one by one.
 const MOST_FORMS: usize = 64;
 
+/// Least size of a form that is drawn [m]: the last digit of a length in the scene file. Nobody sees less.
+const LEAST_SIZE: f64 = 1e-6;
+
 /// Cells along a surface's diagonal at first, and by how much they widen until it is small enough.
 const CELLS: f64 = 128.0;
 const WIDER: f64 = 1.25;
@@ -26,7 +29,10 @@ pub fn drawn_shapes(robot: &Robot, arm: &Arm, packages: Option<&Path>) -> (Vec<L
         for shape in placed {
             let form = form(&shape.geometry).filter(|_| placed.len() <= MOST_FORMS);
             match form {
-                Some(form) => shapes.push(LinkShape { joint, place: shape.place, form }),
+                Some(form) if least_size(&form) >= LEAST_SIZE => {
+                    shapes.push(LinkShape { joint, place: shape.place, form });
+                }
+                Some(_) => {}
                 None => match Surface::of(shape, &robot.source(), packages) {
                     Ok(surface) => add(&mut merged, surface),
                     Err(error) => notes.push(note(robot, shape, &error.to_string())),
@@ -48,6 +54,16 @@ fn form(geometry: &Geometry) -> Option<LinkForm> {
         Geometry::Cylinder { radius, length } => Some(LinkForm::Cylinder { radius: *radius, length: *length }),
         Geometry::Sphere(radius) => Some(LinkForm::Sphere(*radius)),
         Geometry::Mesh { .. } => None,
+    }
+}
+
+/// The least edge, radius or length of a form [m].
+fn least_size(form: &LinkForm) -> f64 {
+    match form {
+        LinkForm::Box(size) => size.min_element(),
+        LinkForm::Cylinder { radius, length } => radius.min(*length),
+        LinkForm::Sphere(radius) => *radius,
+        LinkForm::Surface(_) => f64::INFINITY,
     }
 }
 
