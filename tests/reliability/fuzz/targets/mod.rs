@@ -54,11 +54,6 @@ fn shipped(path: &str) -> Vec<u8> {
     std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
 }
 
-/// Path of a file of this repository.
-fn shipped_path(path: &str) -> String {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path).display().to_string()
-}
-
 fn write(file: &Path, input: &[u8]) {
     std::fs::write(file, input).unwrap();
 }
