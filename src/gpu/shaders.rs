@@ -27,6 +27,7 @@ pub(super) const SURFACE: &str = include_str!("../../shaders/surface.wgsl");
 pub(super) const DEPTH: &str = include_str!("../../shaders/depth.wgsl");
 pub(super) const DOUBLE_TYPES: &str = include_str!("../../shaders/double_types.wgsl");
 pub(super) const FACET: &str = include_str!("../../shaders/facet.wgsl");
+const PREFIX_SUM: &str = include_str!("../../shaders/prefix_sum.wgsl");
 const COMPACT: &str = include_str!("../../shaders/compaction.wgsl");
 const RESULTS: &str = include_str!("../../shaders/results.wgsl");
 const SUPPORT: &str = include_str!("../../shaders/support.wgsl");
@@ -64,7 +65,7 @@ pub static CLASSIFICATION: Shader = Shader {
 
 /// List of the configurations in contact.
 pub static COMPACTION: Shader =
-    Shader { name: "compaction", entry: "main", parts: &[TYPES, COMPACT], overrides: &[&[]] };
+    Shader { name: "compaction", entry: "main", parts: &[TYPES, PREFIX_SUM, COMPACT], overrides: &[&[]] };
 
 /// Node positions in f64.
 pub static DOUBLE_KINEMATICS: Shader = Shader {
@@ -84,7 +85,7 @@ pub static DOUBLE_GAP: Shader = Shader {
 
 /// List of the configurations in contact, by gaps in f64.
 pub static DOUBLE_COMPACTION: Shader =
-    Shader { name: "double_compaction", entry: "main", parts: &[DOUBLE_TYPES, COMPACT], overrides: &[&[]] };
+    Shader { name: "double_compaction", entry: "main", parts: &[DOUBLE_TYPES, PREFIX_SUM, COMPACT], overrides: &[&[]] };
 
 /// Triangles that share a bounding sphere in searches for the closest one.
 pub(super) const CLUSTER: usize = 8;
@@ -132,11 +133,11 @@ pub static PAPER: Shader = Shader {
 
 /// Where the touches of each configuration go.
 pub static RESULTS_COUNT: Shader =
-    Shader { name: "results", entry: "count", parts: &[TYPES, RESULTS], overrides: &[&[], CRAMPED] };
+    Shader { name: "results", entry: "count", parts: &[TYPES, PREFIX_SUM, RESULTS], overrides: &[&[], CRAMPED] };
 
 /// Touches without gaps.
 pub static RESULTS_GATHER: Shader =
-    Shader { name: "results", entry: "gather", parts: &[TYPES, RESULTS], overrides: &[&[], CRAMPED] };
+    Shader { name: "results", entry: "gather", parts: &[TYPES, PREFIX_SUM, RESULTS], overrides: &[&[], CRAMPED] };
 
 /// Graphics with dynamics, and without.
 const MOTIONS: &[&[(&str, f64)]] = &[&[], &[("QUASI_STATIC", 1.0)]];
