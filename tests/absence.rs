@@ -15,11 +15,11 @@ use haptize::{
     proxy::Chain,
     render::{coupling::Coupling, npmi, session, setup::Setup, trace::Trace},
     scene::{EFFECTS, Effect, Rendering, Scene},
-    sweep::{BackendChoice, Bake},
+    sweep,
 };
 use std::{
     collections::{BTreeMap, BTreeSet},
-    sync::{Arc, atomic::AtomicBool},
+    sync::Arc,
 };
 
 /// The sphere under the arm of three joints, every third line of its grid.
@@ -39,17 +39,7 @@ struct Baked {
 }
 
 fn baked(scene: Scene) -> Baked {
-    let stop = AtomicBool::new(false);
-    let bake = Bake {
-        scene: &scene,
-        backend: BackendChoice::Cpu,
-        measured: Some(0),
-        aim: None,
-        date: "",
-        stop: &stop,
-        progress: &mut |_| (),
-    };
-    let (data, _) = bake.in_memory().unwrap();
+    let (data, _) = sweep::baked(&scene).unwrap();
     let setup = Setup::new(&data).unwrap();
     Baked { scene, data, setup }
 }

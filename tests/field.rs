@@ -14,9 +14,9 @@ use haptize::{
     object::Object,
     proxy::Chain,
     scene::{Interpolation, Scene},
-    sweep::{BackendChoice, Bake},
+    sweep,
 };
-use std::{path::Path, sync::atomic::AtomicBool};
+use std::path::Path;
 
 fn vector(values: &[f64]) -> JointVector {
     JointVector::from_slice(values)
@@ -50,17 +50,7 @@ fn sphere(coarser: f64) -> Scene {
 }
 
 fn baked(scene: &Scene) -> Dataset {
-    let stop = AtomicBool::new(false);
-    let bake = Bake {
-        scene,
-        backend: BackendChoice::Cpu,
-        measured: Some(0),
-        aim: None,
-        date: "",
-        stop: &stop,
-        progress: &mut |_| (),
-    };
-    bake.in_memory().unwrap().0
+    sweep::baked(scene).unwrap().0
 }
 
 fn field(scene: &Scene, data: &Dataset, interpolation: Interpolation) -> TorqueField {

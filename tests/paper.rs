@@ -10,26 +10,12 @@ use haptize::{
     report::paper::{Comparison, Row, Scanned, Scans, Sphere, Value, procedure, specimen},
     scan::{LogHeader, LogWriter, Plan, Rig, ScanLog, Session, labels, simulated::SimulatedRig},
     scene::{Algorithm, PlanSpec, ScanScene, Scene, Waypoint},
-    sweep::{BackendChoice, Bake, SweepReport},
+    sweep::{SweepReport, baked},
 };
 use std::sync::atomic::AtomicBool;
 
 fn paper() -> Scene {
     Scene::parse(include_str!("../datasets/paper.toml"), "paper.toml").unwrap()
-}
-
-fn bake(scene: &Scene) -> (Dataset, SweepReport) {
-    let (stop, mut progress) = (AtomicBool::new(false), |_| {});
-    let bake = Bake {
-        scene,
-        backend: BackendChoice::Cpu,
-        measured: Some(0),
-        aim: None,
-        date: "",
-        stop: &stop,
-        progress: &mut progress,
-    };
-    bake.in_memory().unwrap()
 }
 
 /// `dataset` felt by a hand that follows one of its scene's motions.
@@ -46,7 +32,7 @@ fn the_papers_iteration_converges_for_95_percent_of_the_contacts_and_the_press_m
     let mut scene = paper();
     assert_eq!(scene.contact.algorithm, Algorithm::Paper);
     let share = |report: &SweepReport| 1.0 - report.unconverged as f64 / report.contact_points as f64;
-    let (dataset, report) = bake(&scene);
+    let (dataset, report) = baked(&scene).unwrap();
     assert!(report.contact_points > 4000 && share(&report) >= 0.95, "{report:?}");
 
     for (name, several) in [("press", 5), ("scrape", 3)] {
@@ -63,7 +49,7 @@ fn the_papers_iteration_converges_for_95_percent_of_the_contacts_and_the_press_m
 
     // The paper's remark that stiff contact does not converge, in a number.
     scene.contact.stiffness *= 5.0;
-    let (_, report) = bake(&scene);
+    let (_, report) = baked(&scene).unwrap();
     assert!(share(&report) < 0.9, "{report:?}");
 }
 
@@ -71,7 +57,7 @@ fn the_papers_iteration_converges_for_95_percent_of_the_contacts_and_the_press_m
 #[test]
 fn the_table_says_what_is_the_same_and_what_differs() {
     let scene = paper();
-    let (dataset, _) = bake(&scene);
+    let (dataset, _) = baked(&scene).unwrap();
     let (_, press) = felt(&dataset, |setup| &setup.scene.motion.press);
     let sphere = Sphere { scene: &scene, dataset: &dataset, press: &press };
 

@@ -32,9 +32,8 @@ use haptize::{
     },
     store::{Order, Space, Store},
     sweep::{
-        BackendChoice, Bake,
         ahead::{Ahead, Follower},
-        build_object, grid_of,
+        baked, build_object, grid_of,
     },
 };
 use std::{
@@ -241,16 +240,7 @@ fn sphere() -> Dataset {
     for axis in &mut scene.grid.axes {
         (axis.step, axis.count) = (3.0 * axis.step, axis.count.div_ceil(3));
     }
-    let bake = Bake {
-        scene: &scene,
-        backend: BackendChoice::Cpu,
-        measured: Some(0),
-        aim: None,
-        date: "2000-01-01T00:00:00Z",
-        stop: &AtomicBool::new(false),
-        progress: &mut |_| {},
-    };
-    bake.in_memory().unwrap().0
+    baked(&scene).unwrap().0
 }
 
 #[test]

@@ -80,6 +80,16 @@ pub struct Bake<'a> {
     pub progress: &'a mut dyn FnMut(Progress),
 }
 
+/// Haptizes `scene` in memory on the CPU; its error is not measured, and it bears no date.
+///
+/// # Errors
+/// Any [`BakeError`].
+pub fn baked(scene: &Scene) -> Result<(Dataset, SweepReport), BakeError> {
+    let (backend, stop) = (BackendChoice::Cpu, AtomicBool::new(false));
+    let bake = Bake { scene, backend, measured: Some(0), aim: None, date: "", stop: &stop, progress: &mut |_| () };
+    bake.in_memory()
+}
+
 impl Bake<'_> {
     /// Haptizes into the file `output`, in memory that does not grow with the grid; see
     /// [`Sweep::bake`].

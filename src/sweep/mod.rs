@@ -32,7 +32,7 @@ mod table;
 mod tally;
 
 pub use crate::contact::Backend;
-pub use bake::{Bake, BakeError, SceneObjectError, build_object, sample};
+pub use bake::{Bake, BakeError, SceneObjectError, baked, build_object, sample};
 pub use choice::{BackendChoice, BackendError, ChosenBackend, OTHER_ADAPTER, remedied};
 pub use cpu::CpuBackend;
 pub use direct::{Direct, DirectError};

@@ -198,25 +198,15 @@ mod tests {
     use crate::{
         gpu::AdapterChoice,
         scene::{Interpolation, Scene},
-        sweep::{BackendChoice, Bake},
+        sweep::baked,
     };
-    use std::sync::{atomic::AtomicBool, mpsc};
+    use std::sync::mpsc;
 
     #[test]
     fn what_is_felt_stays_until_another_loop_is_made() {
         let text = include_str!("../../tests/scenes/sphere.toml").replace("count = 36", "count = 3");
         let scene = Scene::parse(&text, "sphere.toml").unwrap();
-        let stop = AtomicBool::new(false);
-        let bake = Bake {
-            scene: &scene,
-            backend: BackendChoice::Cpu,
-            measured: Some(0),
-            aim: None,
-            date: "",
-            stop: &stop,
-            progress: &mut |_| (),
-        };
-        let loaded = Loaded::new(bake.in_memory().unwrap().0, None, None).unwrap();
+        let loaded = Loaded::new(baked(&scene).unwrap().0, None, None).unwrap();
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
         let mut session = Session::new(loaded, &context, TickSource::Steps, None, || ()).unwrap();
         let (open, gate) = mpsc::channel::<()>();

@@ -39,9 +39,8 @@ use haptize::{
         GraphicsEffects, GraphicsSpec, GroundNodes, GroundSpec, HapticsSpec, Material, ObjectSpec, Scene, Shape,
         SpringKind, SpringSpec, Waypoint,
     },
-    sweep::{BackendChoice, Bake},
+    sweep::baked,
 };
-use std::sync::atomic::AtomicBool;
 use synthetic::{grid, half_space};
 
 fn vector(values: &[f64]) -> JointVector {

@@ -5,16 +5,7 @@ use super::*;
 /// The paper's sphere scene, baked.
 fn baked_sphere() -> Dataset {
     let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml")).unwrap();
-    let bake = Bake {
-        scene: &scene,
-        backend: BackendChoice::Cpu,
-        measured: Some(0),
-        aim: None,
-        date: "2000-01-01T00:00:00Z",
-        stop: &AtomicBool::new(false),
-        progress: &mut |_| {},
-    };
-    bake.in_memory().unwrap().0
+    baked(&scene).unwrap().0
 }
 
 #[test]

@@ -56,16 +56,7 @@ fn the_proxy_leaves_the_grid_where_space_is_free_and_nowhere_else() {
     {
         (axis.start, axis.step, axis.count) = (start, step, count);
     }
-    let bake = Bake {
-        scene: &scene,
-        backend: BackendChoice::Cpu,
-        measured: Some(0),
-        aim: None,
-        date: "2000-01-01T00:00:00Z",
-        stop: &AtomicBool::new(false),
-        progress: &mut |_| {},
-    };
-    let data = bake.in_memory().unwrap().0;
+    let data = baked(&scene).unwrap().0;
     let mut chain = Chain::new(&scene.proxy);
     for (joint, limits) in chain.joints.iter_mut().zip([[-1.5, 1.5], [0.4, 2.2], [-2.8, -1.2]]) {
         joint.limits = limits;

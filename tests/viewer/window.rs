@@ -10,12 +10,12 @@ use haptize::{
     dataset::Dataset,
     gpu::{AdapterChoice, Context},
     scene::Scene,
-    sweep::{BackendChoice, Bake},
+    sweep,
     viewer::{self, DeviceChoice, Start, TickSource, Viewer},
 };
 use std::{
     path::{Path, PathBuf},
-    sync::{Arc, LazyLock, Mutex, MutexGuard, OnceLock, PoisonError, atomic::AtomicBool},
+    sync::{Arc, LazyLock, Mutex, MutexGuard, OnceLock, PoisonError},
 };
 
 /// One device for all tests, used by one at a time: software Vulkan compiles its pipelines anew on each.
@@ -37,18 +37,7 @@ pub static SPHERE: LazyLock<(tempfile::TempDir, PathBuf)> = LazyLock::new(|| {
 });
 
 fn bake(scene: &Path) -> Dataset {
-    let scene = Scene::load(scene).unwrap();
-    let (stop, date) = (AtomicBool::new(false), "2026-01-01T00:00:00Z");
-    let bake = Bake {
-        scene: &scene,
-        backend: BackendChoice::Cpu,
-        measured: Some(0),
-        aim: None,
-        date,
-        stop: &stop,
-        progress: &mut |_| (),
-    };
-    bake.in_memory().unwrap().0
+    sweep::baked(&Scene::load(scene).unwrap()).unwrap().0
 }
 
 pub struct Window {

@@ -1,18 +1,18 @@
 //! Grids of other spacings over the scene's region, looked up by each interpolation: error, bake time, size, loops.
 
-use super::{Accuracy, AccuracyError, BACKEND, Cost, Loops, Row, Study, timed};
+use super::{Accuracy, AccuracyError, Cost, Loops, Row, Study, timed};
 use crate::{
     JointVector,
     dataset::Dataset,
     field::{FieldError, TorqueField},
     scene::{Interpolation, Scene},
     sweep::{
-        Bake, SweepReport,
+        baked,
         reference::Reference,
         spacing::{points, spaced, spacing_of},
     },
 };
-use std::{hint::black_box, sync::atomic::AtomicBool};
+use std::hint::black_box;
 
 /// Spacings, relative to the scene's own: half an octave apart, from four times as coarse to a quarter.
 const COARSER: [f64; 9] = [4.0, 2.828, 2.0, 1.414, 1.0, std::f64::consts::FRAC_1_SQRT_2, 0.5, 0.354, 0.25];
@@ -25,14 +25,6 @@ const SIDES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 
 /// Loops of each size.
 const LOOPS: usize = 24;
-
-/// The dataset of `scene`, and what became of its points.
-pub(super) fn baked(scene: &Scene) -> Result<(Dataset, SweepReport), AccuracyError> {
-    let stop = AtomicBool::new(false);
-    let measured = Some(0);
-    let bake = Bake { scene, backend: BACKEND, measured, aim: None, date: "", stop: &stop, progress: &mut |_| () };
-    Ok(bake.in_memory()?)
-}
 
 pub(super) fn field(scene: &Scene, dataset: &Dataset, interpolation: Interpolation) -> Result<TorqueField, FieldError> {
     let spec = &scene.haptics;

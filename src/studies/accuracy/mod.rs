@@ -29,9 +29,7 @@ use crate::{
     proxy::Chain,
     render::{graphics::GraphicsError, session::SessionError, setup::SetupError},
     scene::{JointKind, Scene, SceneError},
-    sweep::{
-        BackendChoice, BackendError, BakeError, ReferenceError, build_object, reference::Reference, sample, spacing,
-    },
+    sweep::{BackendError, BakeError, ReferenceError, build_object, reference::Reference, sample, spacing},
 };
 use serde::Serialize;
 use std::time::Instant;
@@ -297,6 +295,3 @@ impl Cost {
         Self { median: self.median / baseline, least: self.least / baseline, greatest: self.greatest / baseline }
     }
 }
-
-/// The backend: the CPU, so that the figures are the same on every machine.
-const BACKEND: BackendChoice = BackendChoice::Cpu;

@@ -1,7 +1,7 @@
 //! The rounds in which the variants of a scene are haptized, felt and drawn.
 
 use super::{
-    super::{AccuracyError, Cost, dynamics::deepest, grids::baked},
+    super::{AccuracyError, Cost, dynamics::deepest},
     Baseline, Costs, Effects, Price,
 };
 use crate::{
@@ -16,7 +16,7 @@ use crate::{
         trace::Trace,
     },
     scene::{EFFECTS, Effect, Scene, Waypoint},
-    sweep::{OTHER_ADAPTER, remedied},
+    sweep::{OTHER_ADAPTER, baked, remedied},
 };
 use glam::DVec3;
 use std::{collections::BTreeSet, sync::Arc, time::Instant};

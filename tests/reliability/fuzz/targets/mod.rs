@@ -23,12 +23,9 @@ use haptize::{
         setup::{Setup, labels},
     },
     scene::{Rendering, ScanScene, Scene, Shape},
-    sweep::{BackendChoice, Bake},
+    sweep,
 };
-use std::{
-    path::Path,
-    sync::{LazyLock, atomic::AtomicBool},
-};
+use std::{path::Path, sync::LazyLock};
 
 /// A reader.
 pub struct Target {
@@ -114,17 +111,8 @@ fn baked(object: &str) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     program::write_scene(folder.path(), object, 4);
     let scene = Scene::load(folder.path().join("scene.toml")).unwrap();
-    let bake = Bake {
-        scene: &scene,
-        backend: BackendChoice::Cpu,
-        measured: Some(0),
-        aim: None,
-        date: "2026-01-01T00:00:00Z",
-        stop: &AtomicBool::new(false),
-        progress: &mut |_| (),
-    };
     let file = folder.path().join("x.haptize");
-    bake.in_memory().unwrap().0.save(&file).unwrap();
+    sweep::baked(&scene).unwrap().0.save(&file).unwrap();
     std::fs::read(file).unwrap()
 }
 
