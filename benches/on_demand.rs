@@ -103,7 +103,8 @@ impl World<'_> {
         for bounds in self.chain.jacobian_bounds(&self.chain.joints.iter().map(|j| j.limits).collect::<Vec<_>>()) {
             levers.iter_mut().zip(bounds.iter()).for_each(|(lever, bound)| *lever = lever.max(*bound));
         }
-        let (live, LiveEnds { mut whereabouts, solutions, .. }) = Live::new(&start, self.levels, &levers, 1, direct);
+        let (live, LiveEnds { mut whereabouts, solutions, mut answers }) =
+            Live::new(&start, self.levels, &levers, 1, direct);
         let mut solver = ahead.solver();
         ahead.prepare(&start, 1, Duration::from_secs(600));
         println!("prepared: {:?}", ahead.solved());
@@ -135,7 +136,7 @@ impl World<'_> {
             }
         }
         self.report(&ticks, &store);
-        println!("{:?}\n{:?}, {} blocks", driver.live().unwrap().answers(), ahead.solved(), store.horizon());
+        println!("{:?}\n{:?}, {} blocks", answers.read(), ahead.solved(), store.horizon());
         costs.sort_by(f64::total_cmp);
         if !costs.is_empty() {
             println!(

@@ -134,16 +134,17 @@ impl HostPart<'_> {
     ) -> Result<(), GpuError> {
         let Landed { configurations, detected: Detected { gaps, touching }, found } = landed;
         let begin = Instant::now();
-        let first = equilibria.len();
-        equilibria.extend(gaps.iter().zip(configurations).map(|(&gap, q)| free(gap, q.len())));
-        let results = &mut equilibria[first..];
+        let mut results: Vec<Equilibrium> =
+            gaps.iter().zip(configurations).map(|(&gap, q)| free(gap, q.len())).collect();
         let assembled = Instant::now();
-        self.decide_free(precision, configurations, &touching, results);
-        let settled = self.settle(precision, configurations, &touching, &found, results)?;
+        self.decide_free(precision, configurations, &touching, &mut results);
+        let settled = self.settle(precision, configurations, &touching, &found, &results)?;
         let done = Instant::now();
         for (&member, result) in touching.iter().zip(settled) {
             results[member as usize] = result;
         }
+        // All of a section or, where it fails, nothing: what has no equilibrium departs again.
+        equilibria.append(&mut results);
         time.settling += done - assembled;
         time.assembling += (assembled - begin) + done.elapsed();
         Ok(())

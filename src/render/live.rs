@@ -151,12 +151,6 @@ impl Live {
         (live, LiveEnds { whereabouts: outputs, solutions: direct.then_some(written), answers })
     }
 
-    /// Returns the count of answers so far.
-    #[must_use]
-    pub fn answers(&self) -> &Answers {
-        &self.answers
-    }
-
     /// The contact field at `x` in a tick of `period` [s].
     pub(super) fn sample(&mut self, field: &TorqueField, x: &JointVector, accounts: &Accounts, period: f64) -> Sample {
         let Self { wanted, levers, solutions, tick, last, passage, answers, .. } = self;

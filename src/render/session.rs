@@ -106,12 +106,6 @@ impl<'session> Driver<'session> {
         self
     }
 
-    /// The contact that is solved meanwhile.
-    #[must_use]
-    pub fn live(&self) -> Option<&Live> {
-        self.live.as_ref()
-    }
-
     /// Asks for a fault to be cleared at the next tick: the loop then starts again where the device is. Nothing happens
     /// where there is no fault, or the device still reports no position.
     pub fn clear_fault(&mut self) {

@@ -10,10 +10,10 @@
 //! | `feel`, `guide`, `history` | the haptic loop beside the window, who leads the hand, what was felt lately |
 //! | `lead` | a haptic device that leads in the place of all these |
 //! | `scene`, `overlay`, `body` | the 3-D panel, what lies on top of its picture, the object on the GPU |
-//! | `steering`, `grip`, `camera` | whence it is seen, and the pointer's grip on the proxy |
-//! | `stage`, `pipelines`, `shapes`, `pixels` | the renderer of that panel |
+//! | `steering`, `node_drag`, `camera` | whence it is seen, and the pointer's grip on the proxy |
+//! | `view_renderer`, `pipelines`, `shapes`, `links`, `pixels` | the renderer of that panel |
 //! | `slices`, `column`, `cloud`, `plots`, `controls`, `gains`, `files` | the other panels |
-//! | `legend` | a sample and its name |
+//! | `legend`, `steps` | a sample and its name, the first screen |
 //! | `prices` | what effects and interpolations cost |
 //!
 //! One device computes and draws: the object's nodes go from the frame update to the screen without a read-back. The
