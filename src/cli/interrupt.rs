@@ -71,12 +71,15 @@ pub fn over() {
 fn end(json: bool, resumes: bool) {
     discard_unfinished();
     let (told, done) = mpsc::channel();
-    thread::spawn(move || {
+    let speak = move || {
         let kept = if resumes { "; what is done is kept: --resume continues it" } else { "" };
         last_words(&format!("interrupted{kept}"), json);
         let _ = told.send(());
-    });
-    let _ = done.recv_timeout(LAST_WORDS);
+    };
+    // Without a thread for it the end comes in silence.
+    if thread::Builder::new().spawn(speak).is_ok() {
+        let _ = done.recv_timeout(LAST_WORDS);
+    }
     std::process::exit(INTERRUPTED);
 }
 

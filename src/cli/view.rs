@@ -128,7 +128,7 @@ fn explore(
     let on_demand = choices.open(scene, kept)?.on_demand;
     let (closed, stop) = (AtomicBool::new(false), interrupt::stop_flag());
     let shown = thread::scope(|scope| {
-        scope.spawn(|| {
+        let keep = || {
             while !closed.load(Ordering::Acquire) {
                 if stop.load(Ordering::Relaxed) {
                     // The program ends soon, as by any signal.
@@ -138,11 +138,12 @@ fn explore(
                 }
                 thread::sleep(LOOK);
             }
-        });
+        };
+        thread::Builder::new().name("keeper".into()).spawn_scoped(scope, keep)?;
         let shown = viewer::open(Start::OnDemand(Arc::clone(&on_demand)), device);
         closed.store(true, Ordering::Release);
-        shown
-    });
+        Ok::<_, std::io::Error>(shown)
+    })?;
     interrupt::over();
     on_demand.dataset().save(kept)?;
     shown?;

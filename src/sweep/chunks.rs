@@ -188,7 +188,8 @@ impl Sweep<'_> {
         let ((entries, to_keep), (back, room)) = (sync_channel(1 + BEHIND), sync_channel(1 + BEHIND));
         let kept = Kept { entries, room, columns: 0 };
         thread::scope(|scope| {
-            let keeper = scope.spawn(move || keep(store, to_keep, back));
+            let keeper = thread::Builder::new().name("keeper".into());
+            let keeper = keeper.spawn_scoped(scope, move || keep(store, to_keep, back)).map_err(SweepError::Threads)?;
             let solved = self.solve_chunks(backend, run, begun, footprint, part, kept);
             // What a store says comes first: a sweep whose store has failed only knows that nobody takes its results.
             keeper.join().unwrap_or_else(|panic| resume_unwind(panic))?;

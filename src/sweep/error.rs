@@ -74,6 +74,12 @@ pub enum SweepError {
         /// Error of the operating system.
         source: io::Error,
     },
+    /// The system gives no thread.
+    #[error(
+        "no thread can be had that keeps the results: {0}; close other programs, or raise the limits on processes and \
+         memory (ulimit -u, ulimit -v)"
+    )]
+    Threads(io::Error),
     /// There is a folder of the output's name.
     #[error("{path}: is a folder; name a file in it (-o)")]
     IsFolder {

@@ -126,24 +126,27 @@ impl<'a> Ahead<'a> {
         }
     }
 
-    /// Solves all levels of the cell around `position` on `threads` threads, for no longer than `most`.
+    /// Solves all levels of the cell around `position` on `threads` threads, this one among them, for no longer than `most`.
     pub fn prepare(&self, position: &JointVector, threads: usize, most: Duration) {
         let (at, began) = (Whereabouts::at_rest(position), Instant::now());
-        thread::scope(|scope| {
-            for _ in 0..threads.max(1) {
-                scope.spawn(|| {
-                    let mut solver = self.solver();
-                    while began.elapsed() < most && !self.is_full() {
-                        // What others have claimed is on its way.
-                        if !self.advance(&mut solver, &at, false) {
-                            if self.store.sample(position).whole == self.store.space().levels() {
-                                break;
-                            }
-                            thread::sleep(IDLE);
-                        }
+        let work = || {
+            let mut solver = self.solver();
+            while began.elapsed() < most && !self.is_full() {
+                // What others have claimed is on its way.
+                if !self.advance(&mut solver, &at, false) {
+                    if self.store.sample(position).whole == self.store.space().levels() {
+                        break;
                     }
-                });
+                    thread::sleep(IDLE);
+                }
             }
+        };
+        thread::scope(|scope| {
+            for _ in 1..threads {
+                // A thread that cannot be had leaves its share to the others.
+                let _ = thread::Builder::new().name("ahead".into()).spawn_scoped(scope, work);
+            }
+            work();
         });
     }
 
