@@ -6,7 +6,7 @@
 use super::{Failure, Report};
 use crate::{
     device::Kind,
-    gpu::{ADAPTER_VARIABLE, AdapterSummary, adapters},
+    gpu::{ADAPTER_VARIABLE, AdapterSummary, adapters, named_adapters},
 };
 use serde::Serialize;
 use std::{fmt::Write, thread};
@@ -37,44 +37,16 @@ struct Finding {
 /// Looks at the machine.
 pub fn run(_: &Arguments) -> Result<Report, Failure> {
     let threads = thread::available_parallelism().map_or(1, usize::from);
-    let adapters = adapters();
-    let named = std::env::var(ADAPTER_VARIABLE).ok().filter(|name| !name.is_empty() && adapters.is_empty());
-    let automatic = match &named {
-        Some(_) => "none",
-        None if adapters.iter().any(|adapter| adapter.hardware) => "gpu",
-        None => "cpu",
-    };
+    let graphics = Graphics::look();
     let findings = [writing(), scheduling(), locking()];
     let whole = findings.iter().all(|finding| finding.good || !finding.essential);
 
     let mut text = String::new();
     writeln!(text, "haptize {} on {} {}", env!("CARGO_PKG_VERSION"), std::env::consts::OS, std::env::consts::ARCH)?;
     writeln!(text, "CPU threads            {threads}")?;
-    match adapters.as_slice() {
-        [] if named.is_some() => writeln!(
-            text,
-            "graphics adapters      none whose name contains {:?}, which {ADAPTER_VARIABLE} asks for: set it to a \
-             part of a name, or unset it to see all",
-            named.as_deref().unwrap_or_default()
-        )?,
-        [] => writeln!(
-            text,
-            "graphics adapters      none found: `haptize bake --backend gpu` and `haptize view` need a Vulkan driver, \
-             nothing else does"
-        )?,
-        found => {
-            for (rank, adapter) in found.iter().enumerate() {
-                writeln!(text, "{:<22} {adapter}", if rank == 0 { "graphics adapters" } else { "" })?;
-                writeln!(text, "{:<22} -> {}", "", tier(adapter))?;
-            }
-            writeln!(
-                text,
-                "{:<22} (the first is taken; {ADAPTER_VARIABLE}, set to a part of a name, allows only that)",
-                ""
-            )?;
-        }
-    }
-    writeln!(text, "{:<22} {automatic} (a hardware GPU, else all CPU threads)", "haptize bake takes")?;
+    graphics.tell(&mut text)?;
+    let automatic = graphics.automatic();
+    writeln!(text, "{:<22} {automatic} (hardware GPUs, else all CPU threads)", "haptize bake takes")?;
     for finding in &findings {
         writeln!(text, "{:<22} {}", finding.subject, finding.seen)?;
         if !finding.good {
@@ -97,12 +69,103 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
         "system": std::env::consts::OS,
         "architecture": std::env::consts::ARCH,
         "threads": threads,
-        "adapters": adapters.iter().map(describe).collect::<Vec<_>>(),
+        "adapters": graphics.describe(),
         "automatic_backend": automatic,
         "findings": findings,
         "whole": whole,
     });
     Ok(Report { text, json, whole })
+}
+
+/// What there is to draw and to compute on.
+struct Graphics {
+    /// Best first.
+    adapters: Vec<AdapterSummary>,
+    /// Whether each solves when `haptize bake` takes GPUs.
+    solves: Vec<bool>,
+    /// What the environment names, and this machine does not have.
+    missing: Vec<String>,
+}
+
+impl Graphics {
+    fn look() -> Self {
+        let (adapters, names) = (adapters(), named_adapters());
+        let mut taken: Vec<&AdapterSummary> = Vec::new();
+        let mut solves = Vec::new();
+        for adapter in &adapters {
+            let joins = adapter.joins(taken.iter().copied(), !names.is_empty());
+            if joins {
+                taken.push(adapter);
+            }
+            solves.push(joins);
+        }
+        let missing = names.into_iter().filter(|(_, is_there)| !is_there).map(|(name, _)| name).collect();
+        Self { adapters, solves, missing }
+    }
+
+    /// What `haptize bake` takes by itself.
+    fn automatic(&self) -> &'static str {
+        match () {
+            () if !self.missing.is_empty() => "none",
+            () if self.adapters.iter().any(|adapter| adapter.hardware) => "gpu",
+            () => "cpu",
+        }
+    }
+
+    fn tell(&self, text: &mut String) -> std::fmt::Result {
+        for (rank, name) in self.missing.iter().enumerate() {
+            writeln!(
+                text,
+                "{:<22} none is called {name:?}, which {ADAPTER_VARIABLE} asks for: set it to parts of names or to \
+                 addresses, with commas between, or unset it to see all",
+                if rank == 0 { "graphics adapters" } else { "" }
+            )?;
+        }
+        if self.adapters.is_empty() && self.missing.is_empty() {
+            return writeln!(
+                text,
+                "graphics adapters      none found: `haptize bake --backend gpu` and `haptize view` need a Vulkan \
+                 driver, nothing else does"
+            );
+        }
+        for (rank, adapter) in self.adapters.iter().enumerate() {
+            let head = if rank == 0 && self.missing.is_empty() { "graphics adapters" } else { "" };
+            let address = if adapter.address.is_empty() { "" } else { " at " };
+            writeln!(text, "{head:<22} {adapter}{address}{}", adapter.address)?;
+            writeln!(text, "{:<22} -> {}", "", tier(adapter))?;
+        }
+        let solving = match self.solves.iter().filter(|solves| **solves).count() {
+            0 | 1 => "the first is taken".to_owned(),
+            all if all == self.solves.len() => "the first draws, all solve".to_owned(),
+            several => format!("the first draws, {several} solve: {}", self.solving()),
+        };
+        let list = "set to parts of names or to addresses, allows only those";
+        writeln!(text, "{:<22} ({solving}; {ADAPTER_VARIABLE}, {list})", "")
+    }
+
+    /// Ranks of those that solve, from one.
+    fn solving(&self) -> String {
+        let ranks = self.solves.iter().enumerate().filter(|(_, solves)| **solves);
+        ranks.map(|(rank, _)| (rank + 1).to_string()).collect::<Vec<_>>().join(", ")
+    }
+
+    fn describe(&self) -> Vec<serde_json::Value> {
+        let pairs = self.adapters.iter().zip(&self.solves);
+        let one = |(adapter, solves): (&AdapterSummary, &bool)| {
+            serde_json::json!({
+                "name": adapter.name,
+                "address": adapter.address,
+                "kind": adapter.kind,
+                "interface": adapter.interface,
+                "driver": adapter.driver,
+                "hardware": adapter.hardware,
+                "solves": solves,
+                "binding_limit_bytes": adapter.binding_limit,
+                "decides_in_f64": adapter.double,
+            })
+        };
+        pairs.map(one).collect()
+    }
 }
 
 /// Part of a bake that an adapter does.
@@ -112,18 +175,6 @@ fn tier(adapter: &AdapterSummary) -> &'static str {
     } else {
         "has no f64 in shaders: the CPU decides contact near none, and settles all forces"
     }
-}
-
-fn describe(adapter: &AdapterSummary) -> serde_json::Value {
-    serde_json::json!({
-        "name": adapter.name,
-        "kind": adapter.kind,
-        "interface": adapter.interface,
-        "driver": adapter.driver,
-        "hardware": adapter.hardware,
-        "binding_limit_bytes": adapter.binding_limit,
-        "decides_in_f64": adapter.double,
-    })
 }
 
 /// Can results be written to the current folder?

@@ -15,8 +15,9 @@
 /// Which adapter draws and computes, for the help of commands that use one.
 macro_rules! adapter_help {
     () => {
-        "\n\nWith several GPUs the fastest is used. Set WGPU_ADAPTER_NAME to part of a GPU's name to choose another; \
-         `haptize doctor` lists them."
+        "\n\nWith several GPUs the first that `haptize doctor` lists draws, and all of the best kind solve. Set \
+         WGPU_ADAPTER_NAME to parts of their names or to their addresses, with commas between, to choose others: \
+         \"RTX 4090\", \"01:00.0,02:00.0\"."
     };
 }
 

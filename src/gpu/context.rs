@@ -5,7 +5,7 @@
 //! store the first message, [`Context::check`] returns it, and every wait has a limit.
 
 use super::{
-    adapter::{AdapterChoice, AdapterSummary, asked_for, candidates, instance},
+    adapter::{AdapterChoice, AdapterSummary, asked_for, instance, qualified},
     kernel::Kernel,
     timing::Stopwatch,
 };
@@ -156,21 +156,37 @@ impl Context {
 
     fn open_with(choice: AdapterChoice, timed: bool) -> Result<Self, GpuError> {
         let instance = instance();
-        let found = candidates(&instance);
-        let names: Vec<String> = found.iter().map(|adapter| AdapterSummary::of(adapter).to_string()).collect();
-        let part = asked_for();
         let mut refusal = None;
-        for adapter in &found {
-            let summary = AdapterSummary::of(adapter);
-            if !choice.takes(&summary, part.as_deref()) {
-                continue;
-            }
-            match Self::open_on(&instance, adapter, summary, choice.clone(), timed) {
+        for (adapter, summary) in qualified(&instance, &choice)? {
+            match Self::open_on(&instance, &adapter, summary, choice.clone(), timed) {
                 Ok(context) => return Ok(context),
                 Err(error) => refusal = refusal.or(Some(error)),
             }
         }
-        Err(refusal.unwrap_or_else(|| choice.refusal(&names, part.as_deref())))
+        Err(refusal.unwrap_or_else(|| choice.refusal(&[], &[])))
+    }
+
+    /// Opens all adapters that qualify and are named by the environment or, if it names none, those of the best kind.
+    /// Each is reopened as itself.
+    ///
+    /// # Errors
+    /// As [`Context::open`], and where one that is named gives no device.
+    pub fn open_all(choice: &AdapterChoice) -> Result<Vec<Arc<Self>>, GpuError> {
+        let instance = instance();
+        let named = !asked_for().is_empty();
+        let (mut opened, mut refusal) = (Vec::<Arc<Self>>::new(), None);
+        for (adapter, summary) in qualified(&instance, choice)? {
+            if !summary.joins(opened.iter().map(|context| &context.adapter), named) {
+                continue;
+            }
+            let own = AdapterChoice::This(summary.clone());
+            match Self::open_on(&instance, &adapter, summary, own, false) {
+                Ok(context) => opened.push(Arc::new(context)),
+                Err(error) if named => return Err(error),
+                Err(error) => refusal = refusal.or(Some(error)),
+            }
+        }
+        if opened.is_empty() { Err(refusal.unwrap_or_else(|| choice.refusal(&[], &[]))) } else { Ok(opened) }
     }
 
     fn open_on(

@@ -40,7 +40,7 @@ pub mod stages;
 mod timing;
 mod unpack;
 
-pub use adapter::{ADAPTER_VARIABLE, AdapterChoice, AdapterSummary, adapters};
+pub use adapter::{ADAPTER_VARIABLE, AdapterChoice, AdapterSummary, adapters, named_adapters};
 pub use context::{Context, GpuError};
 pub use flights::HostTime;
 pub use frame::{FrameCost, FrameError, FrameMethod, FrameUpdate};

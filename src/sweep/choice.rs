@@ -4,20 +4,19 @@ use super::{Backend, CpuBackend, WithFallback};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Work},
-    gpu::{ADAPTER_VARIABLE, AdapterChoice, Context, GpuError, GpuSolver, adapters},
+    gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver, named_adapters},
     memory,
 };
-use std::sync::Arc;
 
 /// Choices of a backend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum BackendChoice {
-    /// A hardware GPU, else the CPU.
+    /// All hardware GPUs of the best kind, or those that WGPU_ADAPTER_NAME names; else the CPU.
     #[default]
     Auto,
     /// All cores, f64; never touches Vulkan.
     Cpu,
-    /// Any adapter, software Vulkan included, or an error.
+    /// The same of any adapters, software Vulkan included, or an error.
     Gpu,
 }
 
@@ -25,7 +24,7 @@ pub enum BackendChoice {
 pub enum ChosenBackend<'a> {
     /// All cores, f64.
     Cpu(CpuBackend<'a>),
-    /// Thousands of configurations at a time, f32; the CPU once the device is lost for good.
+    /// Thousands of configurations at a time, f32; the CPU once a device is lost for good.
     Gpu {
         /// Backend that solves.
         solver: Box<WithFallback<'a, GpuSolver<'a>>>,
@@ -78,16 +77,15 @@ impl<'a> ChosenBackend<'a> {
     }
 
     fn gpu(choice: AdapterChoice, model: &'a Model<'a>) -> Result<Self, GpuError> {
-        let context = Arc::new(Context::open(choice)?);
-        Ok(Self::on(GpuSolver::new(context, model)?, model))
+        let contexts = Context::open_all(&choice)?;
+        Ok(Self::on(GpuSolver::on(contexts, model, BatchCapacity::default())?, model))
     }
 
-    /// A device that is open already, to solve `model`, with the CPU behind it.
+    /// Devices that are open already, to solve `model`, with the CPU behind them.
     #[must_use]
-    pub fn on(device: GpuSolver<'a>, model: &'a Model<'a>) -> Self {
-        let adapters: Vec<String> = device.adapters().map(ToString::to_string).collect();
-        let (chunk, name) = (device.chunk(), adapters.join("; "));
-        Self::Gpu { solver: Box::new(WithFallback::new(device, name, model)), chunk }
+    pub fn on(devices: GpuSolver<'a>, model: &'a Model<'a>) -> Self {
+        let (chunk, name) = (devices.chunk(), counted(devices.adapters().map(ToString::to_string)));
+        Self::Gpu { solver: Box::new(WithFallback::new(devices, name, model)), chunk }
     }
 
     /// `cpu` or `gpu`, as a dataset's provenance says it.
@@ -130,7 +128,20 @@ pub fn remedied(message: &str, instead: &str) -> String {
 
 /// Whether the environment names an adapter that this machine does not have.
 fn is_named_in_vain() -> bool {
-    std::env::var(ADAPTER_VARIABLE).is_ok_and(|name| !name.is_empty()) && adapters().is_empty()
+    named_adapters().iter().any(|(_, is_there)| !is_there)
+}
+
+/// Returns `names` in their order, each once and with its number where there are several: `2 x A; B`.
+fn counted(names: impl Iterator<Item = String>) -> String {
+    let mut counts: Vec<(String, usize)> = Vec::new();
+    for name in names {
+        match counts.iter_mut().find(|(other, _)| *other == name) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((name, 1)),
+        }
+    }
+    let told = counts.into_iter().map(|(name, count)| if count > 1 { format!("{count} x {name}") } else { name });
+    told.collect::<Vec<_>>().join("; ")
 }
 
 impl Backend for ChosenBackend<'_> {

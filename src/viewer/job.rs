@@ -85,7 +85,10 @@ impl fmt::Display for Solver {
         match self {
             Self::Auto => f.write_str("auto"),
             Self::Cpu => f.write_str("CPU"),
-            Self::Adapter(adapter) => write!(f, "{}, {}", short(&adapter.name), adapter.interface),
+            Self::Adapter(adapter) => {
+                write!(f, "{}, {}", short(&adapter.name), adapter.interface)?;
+                if adapter.address.is_empty() { Ok(()) } else { write!(f, ", {}", adapter.address) }
+            }
         }
     }
 }
