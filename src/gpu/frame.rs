@@ -126,6 +126,21 @@ pub struct FrameCost {
     pub pipelines: usize,
 }
 
+impl FrameCost {
+    /// That of buffers of these sizes [B], and of stages.
+    fn of(buffers: &[u64], stages: &[FramePass]) -> Self {
+        let mut pipelines: Vec<_> = stages.iter().map(|stage| Arc::as_ptr(&stage.kernel)).collect();
+        pipelines.sort_unstable();
+        pipelines.dedup();
+        Self {
+            bytes: buffers.iter().sum(),
+            buffers: buffers.len(),
+            dispatches: stages.len(),
+            pipelines: pipelines.len(),
+        }
+    }
+}
+
 impl FrameUpdate {
     /// The object in equilibrium under no forces but its weight, where there is one, to be advanced by `period` [s] a
     /// frame. Smoothing is no matter of the device: forces are filtered before they come here.
@@ -143,94 +158,47 @@ impl FrameUpdate {
         if !(period > 0.0 && period.is_finite()) {
             return Err(FrameError::Period(period));
         }
-        let nodes = object.rest.len();
-        let gpu = context.as_ref();
         let stiffening = effects.stiffening.map(|spec| Stiffening::new(object, spec.factor, spec.strain));
         let weight: Vec<DVec3> =
             effects.gravity.map_or_else(Vec::new, |g| object.mass.iter().map(|m| *m * g).collect());
-        let mut start = vec![[0.0f32; 4]; if effects.quasi_static { nodes } else { 2 * nodes }];
-        if !weight.is_empty() {
-            for (start, u) in start.iter_mut().zip(settled(object, &weight, stiffening.as_ref())?) {
-                *start = u.as_vec3().extend(0.0).to_array();
-            }
-        }
-        let zero = vec![[0.0f32; 4]; nodes];
-        let state = StorageBuffer::from_slice(gpu, "frame state", &start)?;
-        let forces = StorageBuffer::from_slice(gpu, "frame forces", &zero)?;
-        let loads = (!weight.is_empty() || stiffening.is_some())
-            .then(|| StorageBuffer::from_slice(gpu, "frame loads", &zero))
-            .transpose()?;
+        let start = start(object, &weight, stiffening.as_ref(), effects)?;
         let stiffness = stiffening.as_ref().map_or(&object.stiffness, Stiffening::bound);
-        let mut structure: Vec<u32> = stiffness.offsets.iter().map(|&offset| offset as u32).collect();
-        structure.extend(&stiffness.columns);
-        let blocks: Vec<f32> =
-            stiffness.blocks.iter().flat_map(|block| block.to_cols_array()).map(|entry| entry as f32).collect();
-        let structure = StorageBuffer::from_slice(gpu, "stiffness structure", &structure)?;
-        let blocks = StorageBuffer::from_slice(gpu, "stiffness blocks", &blocks)?;
-        let inertia: Vec<[f32; 2]> =
-            object.mass.iter().zip(&object.damping).map(|(&mass, &damping)| [mass as f32, damping as f32]).collect();
-        let inertia = (!effects.quasi_static)
-            .then(|| StorageBuffer::from_slice(gpu, "masses and damping", &inertia))
-            .transpose()?;
-        let groups = (nodes as u32).div_ceil(WORKGROUP);
-        let parameters = |odd: u32| FrameParameters { nodes: nodes as u32, period: period as f32, odd, groups };
-        let even = StorageBuffer::uniform(gpu, "frame parameters", &parameters(0))?;
-        // Nothing reads masses where there are none: the binding takes any buffer.
-        let masses = inertia.as_ref().unwrap_or(&forces);
-        let common = [&structure, &blocks, masses, loads.as_ref().unwrap_or(&forces), &state];
-        let overrides: &[(&str, f64)] = if effects.quasi_static { &[("QUASI_STATIC", 1.0)] } else { &[] };
+        let gpu = context.as_ref();
+        let common = Common::new(gpu, object, stiffness, (period, effects), &start, !weight.is_empty())?;
         let mut stages = Vec::new();
-        let mut buffers = vec![state.size(), forces.size(), structure.size(), blocks.size(), even.size()];
-        buffers.extend(inertia.iter().chain(&loads).map(StorageBuffer::size));
-        if let (Some(stiffening), Some(loads), Some(spec)) = (&stiffening, &loads, effects.stiffening) {
+        let mut buffers = common.sizes();
+        if let (Some(stiffening), Some(loads), Some(spec)) = (&stiffening, &common.loads, effects.stiffening) {
             let reach: Vec<f32> = stiffening.unit_strain_force().iter().map(|&force| force as f32).collect();
             let reach = StorageBuffer::from_slice(gpu, "reach of the springs", &reach)?;
             buffers.push(reach.size());
-            let constants = [("FACTOR", spec.factor), ("STRAIN", spec.strain)];
-            let kernel = Arc::new(Kernel::new(gpu, &shaders::FRAME_STIFFENING, &constants, &DENSE)?);
-            let bound = kernel.bind(gpu, &[&even, &structure, &blocks, masses, &forces, &state, &reach, loads])?;
-            // Forces and what is added to them are read and written, displacements read.
-            let bytes = structure.size() + blocks.size() + reach.size() + 3 * VECTOR * nodes as u64;
-            stages.push(FramePass { kernel, bound, workgroups: groups, bytes });
+            stages.push(common.stiffening_stage(gpu, &reach, loads, [spec.factor, spec.strain])?);
         }
+        let mut overrides = if effects.quasi_static { vec![("QUASI_STATIC", 1.0)] } else { Vec::new() };
         match method {
             FrameMethod::Inverse => {
                 let (inverse, is_isotropic) = inverse(object, stiffness, period, effects)?;
-                let mut overrides = overrides.to_vec();
                 if is_isotropic {
                     overrides.push(("ISOTROPIC", 1.0));
                 }
                 let inverse = StorageBuffer::from_slice(gpu, "inverse", &inverse)?;
-                let right = StorageBuffer::new(gpu, "right-hand side", 12 * nodes as u64)?;
+                let right = StorageBuffer::new(gpu, "right-hand side", 12 * u64::from(common.parameters.nodes))?;
                 buffers.extend([inverse.size(), right.size()]);
-                stages.extend(dense_stages(
-                    gpu,
-                    &even,
-                    common,
-                    [&inverse, &right],
-                    [groups, nodes as u32],
-                    &overrides,
-                )?);
+                stages.extend(common.dense_stages(gpu, [&inverse, &right], &overrides)?);
             }
             FrameMethod::Iterations(iterations) => {
-                let odd = StorageBuffer::uniform(gpu, "frame parameters", &parameters(1))?;
-                let work = StorageBuffer::new(gpu, "conjugate gradients", WORK_VECTORS * VECTOR * nodes as u64)?;
-                let sums = StorageBuffer::new(gpu, "sums", 3 * 4 * u64::from(groups))?;
+                let odd =
+                    StorageBuffer::uniform(gpu, "frame parameters", &FrameParameters { odd: 1, ..common.parameters })?;
+                let vectors = WORK_VECTORS * VECTOR * u64::from(common.parameters.nodes);
+                let work = StorageBuffer::new(gpu, "conjugate gradients", vectors)?;
+                let sums = StorageBuffer::new(gpu, "sums", 3 * 4 * u64::from(common.parameters.groups))?;
                 buffers.extend([odd.size(), work.size(), sums.size()]);
-                let (own, uniforms) = ([&work, &sums], [&even, &odd]);
-                stages.extend(iterative_stages(gpu, uniforms, common, own, [groups, iterations], overrides)?);
+                stages.extend(common.iterative_stages(gpu, &odd, [&work, &sums], iterations, &overrides)?);
             }
         }
-        let mut pipelines: Vec<_> = stages.iter().map(|stage| Arc::as_ptr(&stage.kernel)).collect();
-        pipelines.sort_unstable();
-        pipelines.dedup();
-        let takes = FrameCost {
-            bytes: buffers.iter().sum(),
-            buffers: buffers.len(),
-            dispatches: stages.len(),
-            pipelines: pipelines.len(),
-        };
-        Ok(Self { nodes, state, forces, loads, weight, padded_forces: zero, stages, takes, context })
+        let takes = FrameCost::of(&buffers, &stages);
+        let nodes = object.rest.len();
+        let Common { state, forces, loads, .. } = common;
+        Ok(Self { nodes, state, forces, loads, weight, padded_forces: vec![[0.0; 4]; nodes], stages, takes, context })
     }
 
     /// Returns the resources of the update on the device.
@@ -289,6 +257,24 @@ impl FrameUpdate {
     }
 }
 
+/// State at the start: displacements under the nodes' `weight` [m], then velocities where there are any; four numbers a
+/// node.
+fn start(
+    object: &Object,
+    weight: &[DVec3],
+    stiffening: Option<&Stiffening>,
+    effects: &GraphicsEffects,
+) -> Result<Vec<[f32; 4]>, FactorError> {
+    let nodes = object.rest.len();
+    let mut start = vec![[0.0; 4]; if effects.quasi_static { nodes } else { 2 * nodes }];
+    if !weight.is_empty() {
+        for (start, u) in start.iter_mut().zip(settled(object, weight, stiffening)?) {
+            *start = u.as_vec3().extend(0.0).to_array();
+        }
+    }
+    Ok(start)
+}
+
 /// Inverse of 2M/T + B + (T/2) K, row-major; of (T/2) K in quasi-static graphics. One number for a pair of nodes where
 /// the three coordinates are alike, as the flag says, else 3 x 3. An inverse that would not fit in memory is an
 /// error before it is begun.
@@ -332,59 +318,149 @@ const ITERATIVE: [Access; 8] = {
     [Uniform, Read, Read, Read, Read, Write, Write, Write]
 };
 
-fn dense_stages(
-    context: &Context,
-    parameters: &StorageBuffer,
-    [structure, blocks, inertia, forces, state]: [&StorageBuffer; 5],
-    [inverse, right]: [&StorageBuffer; 2],
-    [groups, nodes]: [u32; 2],
-    overrides: &[(&str, f64)],
-) -> Result<Vec<FramePass>, GpuError> {
-    let buffers = [parameters, structure, blocks, inertia, forces, state, inverse, right];
-    let load = structure.size() + blocks.size() + inertia.size() + forces.size() + state.size() + right.size();
-    let advance = inverse.size() + right.size() + 2 * state.size();
-    let mut stages = Vec::new();
-    for (shader, workgroups, bytes) in [(&shaders::FRAME_LOAD, groups, load), (&shaders::FRAME_ADVANCE, nodes, advance)]
-    {
-        let kernel = Arc::new(Kernel::new(context, shader, overrides, &DENSE)?);
-        let bound = kernel.bind(context, &buffers)?;
-        stages.push(FramePass { kernel, bound, workgroups, bytes });
-    }
-    Ok(stages)
+/// Buffers that all stages bind.
+struct Common {
+    /// Of even iterations.
+    parameters: FrameParameters,
+    even: StorageBuffer,
+    structure: StorageBuffer,
+    blocks: StorageBuffer,
+    /// Masses and damping; none in quasi-static graphics.
+    inertia: Option<StorageBuffer>,
+    forces: StorageBuffer,
+    /// See [`FrameUpdate::loads`].
+    loads: Option<StorageBuffer>,
+    state: StorageBuffer,
 }
 
-fn iterative_stages(
-    context: &Context,
-    parameters: [&StorageBuffer; 2],
-    [structure, blocks, inertia, forces, state]: [&StorageBuffer; 5],
-    [work, sums]: [&StorageBuffer; 2],
-    [groups, iterations]: [u32; 2],
-    overrides: &[(&str, f64)],
-) -> Result<Vec<FramePass>, GpuError> {
-    let stage = |shader, bytes| -> Result<FramePass, GpuError> {
-        let kernel = Arc::new(Kernel::new(context, shader, overrides, &ITERATIVE)?);
-        let buffers = [parameters[0], structure, blocks, inertia, forces, state, work, sums];
-        let bound = kernel.bind(context, &buffers)?;
-        Ok(FramePass { kernel, bound, workgroups: groups, bytes })
-    };
-    // The same kernel with the bindings of the odd iterations.
-    let odd = |stage: &FramePass| -> Result<FramePass, GpuError> {
-        let buffers = [parameters[1], structure, blocks, inertia, forces, state, work, sums];
-        Ok(FramePass { bound: stage.kernel.bind(context, &buffers)?, ..stage.clone() })
-    };
-    // Of the five vectors of the iteration, how many are read and written.
-    let vectors = |count: u64| count * work.size() / WORK_VECTORS;
-    let matrix = structure.size() + blocks.size() + inertia.size();
-    let product = stage(&shaders::FRAME_PRODUCT, matrix + vectors(2))?;
-    let correct = stage(&shaders::FRAME_CORRECT, vectors(7))?;
-    let turn = stage(&shaders::FRAME_TURN, vectors(4))?;
-    let turns = [[product.clone(), correct.clone(), turn.clone()], [odd(&product)?, odd(&correct)?, odd(&turn)?]];
-    let mut stages = vec![stage(&shaders::FRAME_BEGIN, matrix + forces.size() + state.size() + vectors(4))?];
-    for iteration in 0..iterations.max(1) as usize {
-        stages.extend_from_slice(&turns[iteration % 2]);
+impl Common {
+    /// Of an object whose matrix is `stiffness`, from the state `start`; `is_heavy` where nodes have a weight.
+    fn new(
+        gpu: &Context,
+        object: &Object,
+        stiffness: &Stiffness,
+        (period, effects): (f64, &GraphicsEffects),
+        start: &[[f32; 4]],
+        is_heavy: bool,
+    ) -> Result<Self, GpuError> {
+        let nodes = object.rest.len();
+        let zero = vec![[0.0f32; 4]; nodes];
+        let has_loads = is_heavy || effects.stiffening.is_some();
+        let mut structure: Vec<u32> = stiffness.offsets.iter().map(|&offset| offset as u32).collect();
+        structure.extend(&stiffness.columns);
+        let blocks: Vec<f32> =
+            stiffness.blocks.iter().flat_map(|block| block.to_cols_array()).map(|entry| entry as f32).collect();
+        let inertia: Vec<[f32; 2]> =
+            object.mass.iter().zip(&object.damping).map(|(&mass, &damping)| [mass as f32, damping as f32]).collect();
+        let groups = (nodes as u32).div_ceil(WORKGROUP);
+        let parameters = FrameParameters { nodes: nodes as u32, period: period as f32, odd: 0, groups };
+        Ok(Self {
+            parameters,
+            even: StorageBuffer::uniform(gpu, "frame parameters", &parameters)?,
+            structure: StorageBuffer::from_slice(gpu, "stiffness structure", &structure)?,
+            blocks: StorageBuffer::from_slice(gpu, "stiffness blocks", &blocks)?,
+            inertia: (!effects.quasi_static)
+                .then(|| StorageBuffer::from_slice(gpu, "masses and damping", &inertia))
+                .transpose()?,
+            forces: StorageBuffer::from_slice(gpu, "frame forces", &zero)?,
+            loads: has_loads.then(|| StorageBuffer::from_slice(gpu, "frame loads", &zero)).transpose()?,
+            state: StorageBuffer::from_slice(gpu, "frame state", start)?,
+        })
     }
-    stages.push(stage(&shaders::FRAME_FINISH, vectors(1) + 2 * state.size())?);
-    Ok(stages)
+
+    /// Sizes of the buffers [B].
+    fn sizes(&self) -> Vec<u64> {
+        let Self { parameters: _, even, structure, blocks, inertia, forces, loads, state } = self;
+        let always = [state, forces, structure, blocks, even];
+        always.into_iter().chain(inertia).chain(loads).map(StorageBuffer::size).collect()
+    }
+
+    /// Nothing reads masses where there are none: the binding takes any buffer.
+    fn masses(&self) -> &StorageBuffer {
+        self.inertia.as_ref().unwrap_or(&self.forces)
+    }
+
+    /// What acts on the nodes.
+    fn acting(&self) -> &StorageBuffer {
+        self.loads.as_ref().unwrap_or(&self.forces)
+    }
+
+    /// Bindings of a stage that has two buffers of its own.
+    fn bindings<'a>(&'a self, parameters: &'a StorageBuffer, own: [&'a StorageBuffer; 2]) -> [&'a StorageBuffer; 8] {
+        let Self { structure, blocks, state, .. } = self;
+        [parameters, structure, blocks, self.masses(), self.acting(), state, own[0], own[1]]
+    }
+
+    /// Adds what stiffening by `factor` from the strain `strain` on adds to the `loads`.
+    fn stiffening_stage(
+        &self,
+        gpu: &Context,
+        reach: &StorageBuffer,
+        loads: &StorageBuffer,
+        [factor, strain]: [f64; 2],
+    ) -> Result<FramePass, GpuError> {
+        let Self { even, structure, blocks, forces, state, .. } = self;
+        let constants = [("FACTOR", factor), ("STRAIN", strain)];
+        let kernel = Arc::new(Kernel::new(gpu, &shaders::FRAME_STIFFENING, &constants, &DENSE)?);
+        let bound = kernel.bind(gpu, &[even, structure, blocks, self.masses(), forces, state, reach, loads])?;
+        // Forces and what is added to them are read and written, displacements read.
+        let vectors = 3 * VECTOR * u64::from(self.parameters.nodes);
+        let bytes = structure.size() + blocks.size() + reach.size() + vectors;
+        Ok(FramePass { kernel, bound, workgroups: self.parameters.groups, bytes })
+    }
+
+    fn dense_stages(
+        &self,
+        gpu: &Context,
+        [inverse, right]: [&StorageBuffer; 2],
+        overrides: &[(&str, f64)],
+    ) -> Result<[FramePass; 2], GpuError> {
+        let buffers = self.bindings(&self.even, [inverse, right]);
+        let stage = |shader, workgroups, bytes| -> Result<FramePass, GpuError> {
+            let kernel = Arc::new(Kernel::new(gpu, shader, overrides, &DENSE)?);
+            let bound = kernel.bind(gpu, &buffers)?;
+            Ok(FramePass { kernel, bound, workgroups, bytes })
+        };
+        let load = buffers[1..6].iter().map(|buffer| buffer.size()).sum::<u64>() + right.size();
+        let advance = inverse.size() + right.size() + 2 * self.state.size();
+        let FrameParameters { nodes, groups, .. } = self.parameters;
+        Ok([stage(&shaders::FRAME_LOAD, groups, load)?, stage(&shaders::FRAME_ADVANCE, nodes, advance)?])
+    }
+
+    fn iterative_stages(
+        &self,
+        gpu: &Context,
+        odd: &StorageBuffer,
+        [work, sums]: [&StorageBuffer; 2],
+        iterations: u32,
+        overrides: &[(&str, f64)],
+    ) -> Result<Vec<FramePass>, GpuError> {
+        let workgroups = self.parameters.groups;
+        let stage = |shader, bytes| -> Result<FramePass, GpuError> {
+            let kernel = Arc::new(Kernel::new(gpu, shader, overrides, &ITERATIVE)?);
+            let bound = kernel.bind(gpu, &self.bindings(&self.even, [work, sums]))?;
+            Ok(FramePass { kernel, bound, workgroups, bytes })
+        };
+        // The same kernel with the bindings of the odd iterations.
+        let odd = |stage: &FramePass| -> Result<FramePass, GpuError> {
+            let bound = stage.kernel.bind(gpu, &self.bindings(odd, [work, sums]))?;
+            Ok(FramePass { bound, ..stage.clone() })
+        };
+        // Of the five vectors of the iteration, how many are read and written.
+        let vectors = |count: u64| count * work.size() / WORK_VECTORS;
+        let matrix = self.structure.size() + self.blocks.size() + self.masses().size();
+        let product = stage(&shaders::FRAME_PRODUCT, matrix + vectors(2))?;
+        let correct = stage(&shaders::FRAME_CORRECT, vectors(7))?;
+        let turn = stage(&shaders::FRAME_TURN, vectors(4))?;
+        let turns = [[product.clone(), correct.clone(), turn.clone()], [odd(&product)?, odd(&correct)?, odd(&turn)?]];
+        let states = self.acting().size() + self.state.size();
+        let mut stages = vec![stage(&shaders::FRAME_BEGIN, matrix + states + vectors(4))?];
+        for iteration in 0..iterations.max(1) as usize {
+            stages.extend_from_slice(&turns[iteration % 2]);
+        }
+        stages.push(stage(&shaders::FRAME_FINISH, vectors(1) + 2 * self.state.size())?);
+        Ok(stages)
+    }
 }
 
 #[cfg(test)]

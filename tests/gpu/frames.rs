@@ -6,7 +6,7 @@ use haptize::{
     gpu::{FrameMethod, FrameUpdate},
     object::Object,
     render::graphics::ObjectMotion,
-    scene::{GraphicsEffects, Material, Scene, SpringKind, SpringSpec, StiffeningSpec},
+    scene::{GraphicsEffects, Material, Scene, SkinSpec, SpringKind, SpringSpec, StiffeningSpec},
 };
 
 /// A push on one node for some frames, then none: states of both sides after each frame.
@@ -69,6 +69,39 @@ fn frames_follow_the_cpus() {
     });
     let rotated: Vec<DVec3> = [DVec3::X, DVec3::Y].into();
     assert!(relative(&[DVec3::X, DVec3::X], &rotated) > 1.0, "the comparator tells fields apart");
+}
+
+/// Memory of the device for the inverse: what its method takes beyond the buffers of the other, whose sizes are known.
+fn inverse_bytes(object: &Object) -> u64 {
+    let takes = |method| {
+        let update = FrameUpdate::new(context(), object, 1.0 / 60.0, method, &GraphicsEffects::default()).unwrap();
+        update.takes().bytes
+    };
+    let nodes = object.rest.len() as u64;
+    // Five vectors of four numbers a node, three sums a workgroup of 64, and parameters once more.
+    let of_iterations = 5 * 16 * nodes + 12 * nodes.div_ceil(64) + 16;
+    let right_hand_side = 12 * nodes;
+    takes(FrameMethod::Inverse) - right_hand_side - (takes(FrameMethod::Iterations(1)) - of_iterations)
+}
+
+/// Where the three coordinates are alike, with a skin too, one number serves a pair of nodes.
+#[test]
+fn an_isotropic_body_binds_one_number_for_a_pair_of_nodes() {
+    let of = |change: &dyn Fn(&mut Scene)| {
+        let mut scene = load("sphere.toml").0;
+        change(&mut scene);
+        let object = Object::build(&scene.object).unwrap();
+        let pairs = (object.rest.len() as u64).pow(2);
+        (object.stiffness.is_isotropic(), inverse_bytes(&object) / 4, pairs)
+    };
+    let (is_isotropic, numbers, pairs) = of(&|_| ());
+    assert!(is_isotropic && numbers == pairs, "{numbers} numbers for {pairs} pairs");
+    let skin = SkinSpec { tension: 260.0, bending: 0.08, foundation: 1.6e5 };
+    let (is_isotropic, numbers, pairs) = of(&|scene| scene.object.skin = Some(skin));
+    assert!(is_isotropic && numbers == pairs, "{numbers} numbers for {pairs} pairs");
+    let axial = Material::Springs(SpringSpec { kind: SpringKind::Axial, stiffness: 300.0 });
+    let (is_isotropic, numbers, pairs) = of(&|scene| scene.object.material = axial.clone());
+    assert!(!is_isotropic && numbers == 9 * pairs, "{numbers} numbers for {pairs} pairs");
 }
 
 /// The method that is chosen for the sphere that ships, 2,562 nodes of which all are drawn, reaches the CPU's frames: a
