@@ -145,6 +145,24 @@ impl<'session> HapticLoop<'session> {
         self.tick_after(false);
     }
 
+    /// Lets `wait` take its time, and then does the ticks whose deadlines have come meanwhile, one behind the other and
+    /// each at its deadline's time: for a simulated hand at rest, which nobody sees tick. `wait` should not take longer
+    /// than [`Self::ARREARS`]; beyond that deadlines are left out as ever.
+    pub fn tick_in_arrears(&mut self, wait: impl FnOnce()) {
+        wait();
+        let now = clock::now();
+        loop {
+            let deadline = self.began + self.period * self.next;
+            if deadline > now {
+                return;
+            }
+            self.tick_at(if now - deadline > Self::ARREARS { now } else { deadline }, deadline);
+        }
+    }
+
+    /// Longest time for which ticks are done afterwards.
+    pub const ARREARS: Duration = Duration::from_secs(1);
+
     fn tick_after(&mut self, spins: bool) {
         let deadline = self.began + self.period * self.next;
         let now = clock::wait_until(deadline, spins);
@@ -178,6 +196,7 @@ impl<'session> HapticLoop<'session> {
     }
 
     fn tick_at(&mut self, now: Duration, deadline: Duration) {
+        let begun = clock::now();
         let by = now - deadline;
         self.lateness.record(by);
         if by > self.period / 2 {
@@ -191,7 +210,7 @@ impl<'session> HapticLoop<'session> {
         }
         self.missed += u64::from(skipped);
         self.next += 1 + skipped;
-        let elapsed = self.last.map_or(self.period, |last| now - last);
+        let elapsed = self.last.map_or(self.period, |last| now.saturating_sub(last));
         if self.last.is_some() {
             self.interval.record(elapsed);
         }
@@ -201,7 +220,7 @@ impl<'session> HapticLoop<'session> {
             self.driver.clear_fault();
         }
         let (tick, latest) = self.driver.tick(elapsed.as_secs_f64(), interval.as_secs_f64());
-        self.cost.record(clock::now() - now);
+        self.cost.record(clock::now() - begun);
         self.latest.write(latest);
         self.stopped |= tick.applied.halt.is_some_and(Halt::is_final);
         if self.recorder.push(tick).is_err() {

@@ -25,7 +25,7 @@ use std::{
         atomic::{AtomicBool, Ordering},
         mpsc,
     },
-    thread::JoinHandle,
+    thread::{JoinHandle, Thread, park_timeout},
     time::{Duration, Instant},
 };
 
@@ -52,6 +52,8 @@ pub struct Feel {
     returned: mpsc::Receiver<Box<dyn Device>>,
     threads: Vec<JoinHandle<()>>,
     exploration: Option<Exploration>,
+    /// Whether every tick is waited for, even while the hand is still.
+    keeps_pace: Arc<AtomicBool>,
 }
 
 /// How often the hand's goal is moved.
@@ -59,6 +61,13 @@ const GUIDE_PERIOD: Duration = Duration::from_millis(2);
 
 /// How often a goal at rest is looked at: what moves it again is felt after a hundredth of a second.
 const GUIDE_AT_REST: Duration = Duration::from_millis(10);
+
+/// Looks at a goal that has not moved after which the hand counts as still: half a second, in which it settles.
+const LOOKS_UNTIL_STILL: usize = 50;
+
+/// How long the loop waits at a time while the hand is still, unless its goal moves before: waking up takes longer than
+/// the ticks of that time, which are done afterwards.
+const LOOP_AT_REST: Duration = Duration::from_millis(25);
 
 /// Ticks and costs that wait for the window: sixteen seconds at 1 kHz. A window at rest looks at them once a minute;
 /// what does not fit then is a hand that has not moved.
@@ -73,6 +82,8 @@ struct Body {
     stop: Arc<AtomicBool>,
     /// Whether the device is the simulated one that is led, which may wait a little longer.
     is_led: bool,
+    /// Whether its hand is still; never that of another device.
+    is_still: Arc<AtomicBool>,
     /// Takes the device in the end.
     give_back: mpsc::Sender<Box<dyn Device>>,
 }
@@ -109,7 +120,9 @@ impl Feel {
         let (cost, costs) = rtrb::RingBuffer::new(RING);
         let device = Timed { device, read: Instant::now(), cost };
         let (give_back, returned) = mpsc::channel();
-        let body = Body { haptics, device, live, stop: Arc::clone(&stop), is_led, give_back };
+        let [is_still, keeps_pace] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+        let (still, pace_is_kept) = (Arc::clone(&is_still), Arc::clone(&keeps_pace));
+        let body = Body { haptics, device, live, stop: Arc::clone(&stop), is_led, is_still, give_back };
         let (report, began) = mpsc::channel();
         let (refuse, refused) = mpsc::channel();
         let (acknowledge, stepped) = mpsc::channel();
@@ -117,11 +130,15 @@ impl Feel {
         let mut threads = Vec::new();
         let steps = match pace {
             TickSource::Clock => {
+                let felt = spawn("haptic", move || body.by_the_clock(&report, &refuse))?;
+                let feeling = felt.thread().clone();
+                threads.push(felt);
                 if let Some(input) = input {
-                    let (leader, over) = (Arc::clone(&guide), Arc::clone(&stop));
-                    threads.push(spawn("guide", move || lead(&leader, input, &over))?);
+                    let leader =
+                        Leader { guide: Arc::clone(&guide), input, is_still: still, keeps_pace: pace_is_kept, feeling };
+                    let over = Arc::clone(&stop);
+                    threads.push(spawn("guide", move || leader.lead(&over))?);
                 }
-                threads.push(spawn("haptic", move || body.by_the_clock(&report, &refuse))?);
                 None
             }
             TickSource::Steps => {
@@ -132,7 +149,21 @@ impl Feel {
         };
         let ended = "the haptic thread ended before its first tick; start haptize again".to_owned();
         let (ticks, latest, clear) = began.recv().map_err(|_| ended)??;
-        Ok(Self { guide, ticks, costs, latest, clear, stop, steps, stepped, refused, returned, threads, exploration })
+        Ok(Self {
+            guide,
+            ticks,
+            costs,
+            latest,
+            clear,
+            stop,
+            steps,
+            stepped,
+            refused,
+            returned,
+            threads,
+            exploration,
+            keeps_pace,
+        })
     }
 
     /// Ends the loop and gives back the device, without torque; none where its thread ended before.
@@ -159,6 +190,18 @@ impl Feel {
             // The thread ended where there is no answer; there are no ticks then.
             let _ = self.stepped.recv();
         }
+    }
+
+    /// Whether ticks are waited for even while the hand is still, for whom looks at how punctual they are.
+    pub fn keep_pace(&self, keeps_pace: bool) {
+        self.keeps_pace.store(keeps_pace, Ordering::Release);
+    }
+
+    /// Whether a tick of the clock's was done afterwards, when nobody waited for it: its interval is then `period`, to
+    /// the nanosecond, which no other's is.
+    #[must_use]
+    pub fn was_in_arrears(&self, tick: &Tick, period: f64) -> bool {
+        self.steps.is_none() && tick.inputs.elapsed == period
     }
 
     /// Lets the loop start again after a fault.
@@ -216,18 +259,40 @@ fn lock(guide: &Mutex<Guide>) -> MutexGuard<'_, Guide> {
     guide.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Moves the hand's goal until the loop is over.
-fn lead(guide: &Mutex<Guide>, mut input: PointerInput, over: &AtomicBool) {
-    let mut last = Instant::now();
-    let mut before = None;
-    while !over.load(Ordering::Acquire) {
-        let now = Instant::now();
-        let goal = lock(guide).follow((now - last).as_secs_f64());
-        last = now;
-        // A goal that is none is refused, and the hand stays.
-        let _ = input.move_to(&goal);
-        std::thread::sleep(if before == Some(goal) { GUIDE_AT_REST } else { GUIDE_PERIOD });
-        before = Some(goal);
+/// What moves the hand's goal.
+struct Leader {
+    guide: Arc<Mutex<Guide>>,
+    input: PointerInput,
+    /// Whether the hand is still.
+    is_still: Arc<AtomicBool>,
+    /// See [`Feel::keeps_pace`].
+    keeps_pace: Arc<AtomicBool>,
+    /// The haptic thread, which waits while it is.
+    feeling: Thread,
+}
+
+impl Leader {
+    /// Moves the goal until the loop is over.
+    fn lead(mut self, over: &AtomicBool) {
+        let mut last = Instant::now();
+        let (mut before, mut looks) = (None, 0);
+        while !over.load(Ordering::Acquire) {
+            let now = Instant::now();
+            let goal = lock(&self.guide).follow((now - last).as_secs_f64());
+            last = now;
+            // A goal that is none is refused, and the hand stays.
+            let _ = self.input.move_to(&goal);
+            let rests = before == Some(goal);
+            looks = if rests { looks + 1 } else { 0 };
+            let is_still = looks >= LOOKS_UNTIL_STILL && !self.keeps_pace.load(Ordering::Acquire);
+            if self.is_still.swap(is_still, Ordering::AcqRel) && !is_still {
+                self.feeling.unpark();
+            }
+            std::thread::sleep(if rests { GUIDE_AT_REST } else { GUIDE_PERIOD });
+            before = Some(goal);
+        }
+        self.is_still.store(false, Ordering::Release);
+        self.feeling.unpark();
     }
 }
 
@@ -244,7 +309,9 @@ impl Body {
                     None => {
                         drop(refuse.send(body.begin()));
                         while goes_on() {
-                            if self.is_led {
+                            if self.is_still.load(Ordering::Acquire) {
+                                body.tick_in_arrears(|| park_timeout(LOOP_AT_REST));
+                            } else if self.is_led {
                                 body.tick_relaxed();
                             } else {
                                 body.tick();
@@ -326,5 +393,53 @@ impl Device for Timed {
 
     fn scheduler(&self) -> Option<Arc<dyn Scheduler>> {
         self.device.scheduler()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{scene::Scene, sweep::baked, viewer::loaded::Loaded};
+
+    /// Ticks until one for which `enough` holds; a loop that never has one fails after half a minute.
+    fn until(feel: &mut Feel, enough: impl Fn(&Feel, &Tick) -> bool) -> Vec<Tick> {
+        let mut ticks = Vec::new();
+        for _ in 0..3000 {
+            while let Some(tick) = feel.next_tick() {
+                ticks.push(tick);
+                if enough(feel, &tick) {
+                    return ticks;
+                }
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        panic!("{} ticks and none as wanted; the last: {:?}", ticks.len(), ticks.last());
+    }
+
+    #[test]
+    fn a_hand_that_is_still_costs_few_wake_ups_and_is_led_on_without_a_gap() {
+        let text = include_str!("../../tests/scenes/sphere.toml").replace("count = 36", "count = 3");
+        let scene = Scene::parse(&text, "sphere.toml").unwrap();
+        let loaded = Loaded::new(baked(&scene).unwrap().0, None, None).unwrap();
+        let haptics = Arc::clone(&loaded.setup.haptics);
+        let period = haptics.period();
+        let guide = Guide::new(&loaded);
+        let mut feel = Feel::start(haptics, &scene.haptics, guide, TickSource::Clock, None, None).unwrap();
+        let rests = |feel: &Feel, tick: &Tick| feel.was_in_arrears(tick, period);
+        let mut ticks = until(&mut feel, rests);
+        let at_rest = *ticks.last().unwrap();
+        let mut goal = at_rest.hand;
+        goal[0] += 0.1;
+        feel.guide().point(goal);
+        ticks.extend(until(&mut feel, |_, tick| (tick.device[0] - at_rest.device[0]).abs() > 0.01));
+        ticks.extend(until(&mut feel, |feel, tick| !rests(feel, tick)));
+        // As the clock has it: no time is lost between two of them.
+        for pair in ticks.windows(2) {
+            assert!((pair[1].time - pair[0].time - pair[1].inputs.elapsed).abs() < 1e-9);
+        }
+        // Who looks at punctuality has every tick waited for.
+        until(&mut feel, rests);
+        feel.keep_pace(true);
+        until(&mut feel, |feel, tick| !rests(feel, tick));
     }
 }

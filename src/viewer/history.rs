@@ -59,9 +59,11 @@ impl History {
     /// machine's own.
     pub fn hold_still(&mut self, feel: &mut Feel) {
         // What has been drawn is let through.
+        feel.keep_pace(true);
         thread::sleep(SETTLING);
         self.collect(feel);
         thread::sleep(STILL);
+        feel.keep_pace(false);
         if let Some(still) = Durations::new() {
             self.still = still;
         }
@@ -71,7 +73,9 @@ impl History {
     fn take(&mut self, feel: &mut Feel, jitter: fn(&mut Self) -> &mut Durations) {
         while let Some(tick) = feel.next_tick() {
             let tick = Tick { time: self.begun + tick.time, ..tick };
-            if let (false, Some(last)) = (std::mem::take(&mut self.new), self.ticks.back()) {
+            if let (false, false, Some(last)) =
+                (std::mem::take(&mut self.new), feel.was_in_arrears(&tick, self.period), self.ticks.back())
+            {
                 let late = (tick.time - last.time - self.period).abs();
                 jitter(self).record(Duration::from_secs_f64(late));
             }
