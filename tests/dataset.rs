@@ -285,20 +285,26 @@ fn place(header: &serde_json::Value, name: &str) -> usize {
     header[name]["data_offsets"][0].as_u64().unwrap() as usize
 }
 
-#[test]
-fn hostile_files_with_right_checksums_are_refused_in_small_memory() {
-    type Change = Box<dyn FnOnce(&mut serde_json::Value, &mut Vec<u8>)>;
-    let write = |name: &'static str, entry: usize, bytes: Vec<u8>| -> Change {
-        Box::new(move |header, data| {
-            let at = place(header, name) + entry * bytes.len();
-            data[at..at + bytes.len()].copy_from_slice(&bytes);
-        })
-    };
+/// A change of a file's header and data.
+type Change = Box<dyn FnOnce(&mut serde_json::Value, &mut Vec<u8>)>;
+
+/// A hostile file: its name, how it differs from a sound one, and what the refusal says.
+type Hostile = (&'static str, Change, &'static str);
+
+/// Overwrites an entry of a tensor.
+fn write(name: &'static str, entry: usize, bytes: Vec<u8>) -> Change {
+    Box::new(move |header, data| {
+        let at = place(header, name) + entry * bytes.len();
+        data[at..at + bytes.len()].copy_from_slice(&bytes);
+    })
+}
+
+/// Files with a wrong grid.
+fn hostile_grids() -> Vec<Hostile> {
     let axis = |key: &'static str, value: serde_json::Value| -> Change {
         Box::new(move |header, _| in_metadata(header, "grid", |grid| grid["axes"][1][key] = value))
     };
-    let huge: u64 = (1 << 61) - 1;
-    let cases: Vec<(&str, Change, &str)> = vec![
+    vec![
         ("a trillion points", axis("count", 1_000_000_000_000_u64.into()), "shape"),
         ("a count that overflows", axis("count", u64::MAX.into()), "too many points"),
         ("a negative count", axis("count", (-1).into()), "grid"),
@@ -316,6 +322,12 @@ fn hostile_files_with_right_checksums_are_refused_in_small_memory() {
             }),
             "7 axes",
         ),
+    ]
+}
+
+/// Files with a wrong number in a tensor.
+fn hostile_numbers() -> Vec<Hostile> {
+    vec![
         ("an unknown status", write("status", 5, vec![5]), "status 5 of point 5"),
         ("a torque that is no number", write("torque", 7, f64::NAN.to_le_bytes().into()), "entry 7 of torque"),
         ("infinite energy", write("energy", 1, f64::INFINITY.to_le_bytes().into()), "entry 1 of energy"),
@@ -335,9 +347,16 @@ fn hostile_files_with_right_checksums_are_refused_in_small_memory() {
         ("a row beyond the end", write("contact_offsets", 3, u64::MAX.to_le_bytes().into()), "descend"),
         ("a descending row", write("contact_offsets", 2, 4_u64.to_le_bytes().into()), "descend"),
         ("a last row too short", write("contact_offsets", 6, 4_u64.to_le_bytes().into()), "do not run"),
+    ]
+}
+
+/// Files whose tensors do not fit, or are not those of a dataset.
+fn hostile_headers() -> Vec<Hostile> {
+    vec![
         (
             "tensors whose lengths overflow together",
-            Box::new(move |header, _| {
+            Box::new(|header, _| {
+                let huge: u64 = (1 << 61) - 1;
                 let mut end = header["status"]["data_offsets"][1].as_u64().unwrap();
                 for k in 0..7 {
                     header[format!("x{k}")] =
@@ -374,7 +393,12 @@ fn hostile_files_with_right_checksums_are_refused_in_small_memory() {
         ("a grid that is no JSON", Box::new(|header, _| header["__metadata__"]["grid"] = "{".into()), "grid"),
         ("deep nesting", Box::new(|header, _| header["__metadata__"]["grid"] = "[".repeat(100_000).into()), "grid"),
         ("another version", Box::new(|header, _| header["__metadata__"]["format"] = "haptize dataset 99".into()), "99"),
-    ];
+    ]
+}
+
+#[test]
+fn hostile_files_with_right_checksums_are_refused_in_small_memory() {
+    let cases = [hostile_grids(), hostile_numbers(), hostile_headers()].into_iter().flatten();
     let folder = Folder::new();
     assert!(refusal(&folder.written(&forged(&sample(), |_, _| ()))).is_none(), "forging itself is not what is refused");
     for (name, change, reason) in cases {

@@ -142,39 +142,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let drawn = felt.draw(&folder, &played.trace)?;
         files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
     }
-    let summary = played.trace.summary();
-    let mut tally = Tally::default();
-    played.trace.ticks.iter().for_each(|tick| tally.add(tick.applied.clamps, tick.applied.halt));
-    let fault = played.trace.ticks.iter().find_map(|tick| Some((tick.time, tick.fault?.to_string())));
-    let mut json = serde_json::to_value(summary)?;
+    let outcome = Outcome::of(&played, told.is_some());
+    let mut json = outcome.json(arguments, &setup)?;
     felt.tell(&mut json);
-    json["notes"] = setup.exceeded.iter().map(ToString::to_string).collect();
-    json["bounds"] = serde_json::to_value(&setup.bounds)?;
-    json["timing"] = serde_json::to_value(&played.timing)?;
-    json["fault"] = fault.as_ref().map(|(time, reason)| json!({ "time": time, "reason": reason })).into();
-    json["replayed"] = told.is_some().into();
-    json["explored"] = played.explored.as_ref().map(Explored::json).into();
-    json["device"] = device_json(arguments, &tally)?;
     json["files"] = files.iter().map(|file| Value::from(file.display().to_string())).collect();
     let mut text = told.unwrap_or_default();
-    describe(&mut text, &summary)?;
-    if summary.held > 0 {
-        let stiffness = border_stiffness(&setup.scene.haptics, &dataset.grid);
-        writeln!(text, "  border       holds the device with the coupling's stiffness Kvc: {stiffness}")?;
-    }
-    felt.describe(&mut text)?;
-    if let Some(explored) = &played.explored {
-        explored.describe(&mut text)?;
-    }
-    if let Some((time, reason)) = &fault {
-        writeln!(text, "  fault        at {time:.4} s the torque went to zero: {reason}; play again to clear it")?;
-    }
-    if arguments.device.is_some() {
-        describe_tally(&mut text, &tally)?;
-    }
-    if let Some(timing) = &played.timing {
-        describe_timing(&mut text, timing)?;
-    }
+    outcome.describe(&mut text, arguments, &setup, &dataset, &felt)?;
     if let Some(file) = &arguments.record {
         writeln!(text, "recorded in {}", file.display())?;
     }
@@ -187,8 +160,75 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     writeln!(text, "traces and figures in {}", folder.display())?;
     filled.close(&files, &mut text, &mut json)?;
-    let whole = fault.is_none() && tally.stopped.is_none();
-    Ok(Report { text, json, whole })
+    Ok(Report { text, json, whole: outcome.is_whole() })
+}
+
+/// What became of a session, summed up.
+struct Outcome<'a> {
+    played: &'a Played,
+    summary: Summary,
+    tally: Tally,
+    /// When the torque went to zero, and why.
+    fault: Option<(f64, String)>,
+    /// Whether a recording was replayed.
+    is_replay: bool,
+}
+
+impl<'a> Outcome<'a> {
+    fn of(played: &'a Played, is_replay: bool) -> Self {
+        let mut tally = Tally::default();
+        played.trace.ticks.iter().for_each(|tick| tally.add(tick.applied.clamps, tick.applied.halt));
+        let fault = played.trace.ticks.iter().find_map(|tick| Some((tick.time, tick.fault?.to_string())));
+        Self { played, summary: played.trace.summary(), tally, fault, is_replay }
+    }
+
+    /// Whether it went as it should to the end.
+    fn is_whole(&self) -> bool {
+        self.fault.is_none() && self.tally.stopped.is_none()
+    }
+
+    fn json(&self, arguments: &Arguments, setup: &Setup) -> Result<Value, Failure> {
+        let Self { played, summary, tally, fault, is_replay } = self;
+        let mut json = serde_json::to_value(summary)?;
+        json["notes"] = setup.exceeded.iter().map(ToString::to_string).collect();
+        json["bounds"] = serde_json::to_value(&setup.bounds)?;
+        json["timing"] = serde_json::to_value(&played.timing)?;
+        json["fault"] = fault.as_ref().map(|(time, reason)| json!({ "time": time, "reason": reason })).into();
+        json["replayed"] = (*is_replay).into();
+        json["explored"] = played.explored.as_ref().map(Explored::json).into();
+        json["device"] = device_json(arguments, tally)?;
+        Ok(json)
+    }
+
+    fn describe(
+        &self,
+        text: &mut String,
+        arguments: &Arguments,
+        setup: &Setup,
+        dataset: &Dataset,
+        felt: &PlaybackReport,
+    ) -> Result<(), Failure> {
+        let Self { played, summary, tally, fault, .. } = self;
+        describe(text, summary)?;
+        if summary.held > 0 {
+            let stiffness = border_stiffness(&setup.scene.haptics, &dataset.grid);
+            writeln!(text, "  border       holds the device with the coupling's stiffness Kvc: {stiffness}")?;
+        }
+        felt.describe(text)?;
+        if let Some(explored) = &played.explored {
+            explored.describe(text)?;
+        }
+        if let Some((time, reason)) = fault {
+            writeln!(text, "  fault        at {time:.4} s the torque went to zero: {reason}; play again to clear it")?;
+        }
+        if arguments.device.is_some() {
+            describe_tally(text, tally)?;
+        }
+        if let Some(timing) = &played.timing {
+            describe_timing(text, timing)?;
+        }
+        Ok(())
+    }
 }
 
 /// Returns the device that `arguments` named and how often it was clamped and stopped; null if none was named.

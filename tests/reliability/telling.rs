@@ -158,6 +158,33 @@ fn foreign_options(helps: &BTreeMap<&str, String>, command: &str, said: &str) ->
     foreign
 }
 
+/// Command lines, most of which are refused without an adapter or with files of the wrong kind.
+const REFUSED: &[&[&str]] = &[
+    &["accuracy", "none.toml", "-o", "a"],
+    &["bake", "scene.toml", "-o", "y.haptize"],
+    &["bake", "scene.toml", "-o", "y.haptize", "--backend", "gpu"],
+    &["bake", "scene.toml", "-o", "y.haptize", "--max-error", "1%", "--max-points", "10"],
+    &["completions", "bash", "--json"],
+    &["device", "check", "touch"],
+    &["device", "list"],
+    &["doctor"],
+    &["export", "bytes", "--format", "csv"],
+    &["gridize", "bytes", "--step", "1"],
+    &["import", "bytes"],
+    &["info", "bytes"],
+    &["inspect", "x.haptize", "--q", "0"],
+    &["man", "-o", "bytes"],
+    &["new", "none"],
+    &["new", "sphere", "-o", "full.toml"],
+    &["paper", "-o", "bytes"],
+    &["play", "x.haptize", "--device", "touch", "--seconds", "0.1"],
+    &["play", "x.haptize", "--replay", "bytes"],
+    &["scan", "sponge.toml", "-o", "full.toml"],
+    &["stability", "none"],
+    &["view", "x.haptize", "--screenshot", "x.png"],
+    &["view", "none.toml", "--screenshot", "x.png"],
+];
+
 #[test]
 fn every_option_that_a_message_names_is_one_of_its_command() {
     let home = home();
@@ -196,31 +223,7 @@ fn every_option_that_a_message_names_is_one_of_its_command() {
     std::fs::write(home.path().join("full.toml"), "name = 3\n").unwrap();
     let mut refusals = BTreeSet::new();
     for (variable, value) in [("VK_DRIVER_FILES", "/none"), ("WGPU_ADAPTER_NAME", "nosuch")] {
-        for arguments in [
-            &["accuracy", "none.toml", "-o", "a"][..],
-            &["bake", "scene.toml", "-o", "y.haptize"],
-            &["bake", "scene.toml", "-o", "y.haptize", "--backend", "gpu"],
-            &["bake", "scene.toml", "-o", "y.haptize", "--max-error", "1%", "--max-points", "10"],
-            &["completions", "bash", "--json"],
-            &["device", "check", "touch"],
-            &["device", "list"],
-            &["doctor"],
-            &["export", "bytes", "--format", "csv"],
-            &["gridize", "bytes", "--step", "1"],
-            &["import", "bytes"],
-            &["info", "bytes"],
-            &["inspect", "x.haptize", "--q", "0"],
-            &["man", "-o", "bytes"],
-            &["new", "none"],
-            &["new", "sphere", "-o", "full.toml"],
-            &["paper", "-o", "bytes"],
-            &["play", "x.haptize", "--device", "touch", "--seconds", "0.1"],
-            &["play", "x.haptize", "--replay", "bytes"],
-            &["scan", "sponge.toml", "-o", "full.toml"],
-            &["stability", "none"],
-            &["view", "x.haptize", "--screenshot", "x.png"],
-            &["view", "none.toml", "--screenshot", "x.png"],
-        ] {
+        for arguments in REFUSED {
             let output = command(home.path(), arguments).env(variable, value).output().unwrap();
             for said in [&output.stdout, &output.stderr].map(|said| String::from_utf8_lossy(said)) {
                 // A script and an echo of the usage are no messages.
