@@ -1,4 +1,5 @@
-//! The cost of one look-up and of many from Rust, at the same configurations as time.c and time.py: see `benches/bindings.sh`.
+//! The cost of one look-up and of many from Rust, at the same configurations as time.c and time.py: see
+//! `benches/bindings.sh`.
 //!
 //!     cargo run -p haptize-capi --profile dist --example time -- DATASET
 

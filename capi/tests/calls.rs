@@ -1,4 +1,5 @@
-//! Every function, as a program in C would call it: what it gives is what the library gives, and what cannot be taken is refused.
+//! Every function, as a program in C would call it: what it gives is what the library gives, and what cannot be taken
+//! is refused.
 
 #![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 

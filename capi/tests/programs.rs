@@ -1,4 +1,5 @@
-//! The example programs, installed, compiled and run as a user would, under the address sanitiser where the compiler has it.
+//! The example programs, installed, compiled and run as a user would, under the address sanitiser where the compiler
+//! has it.
 
 #![allow(clippy::unwrap_used)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 #![cfg(target_os = "linux")]

@@ -12,8 +12,8 @@ use std::sync::atomic::AtomicBool;
 
 /// The object and the arm of a scene, ready to be solved at any configuration. Threads may share it.
 ///
-/// Solver(scene): builds the object, which takes seconds where it is large; Ctrl-C ends it. BakeError where it cannot be
-/// built.
+/// Solver(scene): builds the object, which takes seconds where it is large; Ctrl-C ends it. BakeError where it cannot
+/// be built.
 #[pyclass(frozen, module = "haptize")]
 pub struct Solver {
     direct: Direct,

@@ -102,8 +102,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     Ok(Report { text, json, whole: true })
 }
 
-/// Opens the window on a scene whose contact is solved while it is felt, and keeps what was explored, however the window
-/// ends, by a signal, too.
+/// Opens the window on a scene whose contact is solved while it is felt, and keeps what was explored, however the
+/// window ends, by a signal, too.
 #[cfg(feature = "viewer")]
 fn explore(
     scene: &std::path::Path,

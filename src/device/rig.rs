@@ -26,9 +26,9 @@ pub struct DeviceRig<'a> {
 }
 
 impl<'a> DeviceRig<'a> {
-    /// Returns the joint-true `device` as a rig. While the key `hand` is held, a hand is taken to lead the device. `wait` waits until
-    /// so many seconds after the last tick, and returns how many there were. Raising `stop` ends the scan with an error
-    /// at the next tick.
+    /// Returns the joint-true `device` as a rig. While the key `hand` is held, a hand is taken to lead the device.
+    /// `wait` waits until so many seconds after the last tick, and returns how many there were. Raising `stop` ends the
+    /// scan with an error at the next tick.
     #[must_use]
     pub fn new(
         device: impl Device + 'a,

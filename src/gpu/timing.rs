@@ -97,8 +97,8 @@ impl Stopwatch {
 }
 
 impl Context {
-    /// Returns the time of every kernel since the last call, in the order in which they first ran; nothing where kernels
-    /// are not timed. Waits for the device.
+    /// Returns the time of every kernel since the last call, in the order in which they first ran; nothing where
+    /// kernels are not timed. Waits for the device.
     ///
     /// # Errors
     /// When the device has failed.

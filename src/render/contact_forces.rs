@@ -1,13 +1,13 @@
-//! Contact forces on the object's nodes, for what is drawn: interpolated between the grid points of a dataset that holds
-//! them, or solved where the proxy is.
+//! Contact forces on the object's nodes, for what is drawn: interpolated between the grid points of a dataset that
+//! holds them, or solved where the proxy is.
 //!
-//! *Interpolated.* The extended contact force f_ex(q) of a grid point has f_j at its contacting nodes and zero elsewhere.
-//! Between grid points `f_ex_bar(q) = share sum_c w_c f_ex(q_c)`, with the corners and weights of the torque and the
-//! factor that boundary layer and fade put on it, so that what is seen and what is felt stay
+//! *Interpolated.* The extended contact force f_ex(q) of a grid point has f_j at its contacting nodes and zero
+//! elsewhere. Between grid points `f_ex_bar(q) = share sum_c w_c f_ex(q_c)`, with the corners and weights of the torque
+//! and the factor that boundary layer and fade put on it, so that what is seen and what is felt stay
 //! `tau_bar = -sum_i J_i^T f`.
 //!
-//! *Solved.* A store of nodes at several levels keeps no forces. There a thread of its own solves the equilibrium of the
-//! scene in the dataset once a frame; its forces are those of the configuration itself.
+//! *Solved.* A store of nodes at several levels keeps no forces. There a thread of its own solves the equilibrium of
+//! the scene in the dataset once a frame; its forces are those of the configuration itself.
 
 use super::graphics::GraphicsError;
 use crate::{

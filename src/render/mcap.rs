@@ -2,8 +2,8 @@
 //!
 //! Four topics of joint states, one message a tick: `/device` (position y, velocity, torque that the device held),
 //! `/proxy` (position x, contact torque), `/hand` (where the hand wants the device), `/command` (position y, torque
-//! that the loop asked for). Stamps count from the session's start. `/hand` is a motion that `play` takes again; what is
-//! needed to replay a session bit for bit is in its CSV recording only.
+//! that the loop asked for). Stamps count from the session's start. `/hand` is a motion that `play` takes again; what
+//! is needed to replay a session bit for bit is in its CSV recording only.
 
 use super::trace::{Tick, Trace};
 use crate::{

@@ -2,7 +2,8 @@
 //!
 //! A GPU is lost by a driver's reset, by sleep, by being pulled out, or by other programs that take its memory. Its
 //! solver first tries again by itself with smaller batches; what it cannot mend ends here. The batches under way
-//! and all that follow are then solved by the CPU, so that a sweep of hours goes on, and [`Backend::notices`] reports it.
+//! and all that follow are then solved by the CPU, so that a sweep of hours goes on, and [`Backend::notices`] reports
+//! it.
 
 use super::{Backend, CpuBackend};
 use crate::{

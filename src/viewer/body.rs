@@ -144,8 +144,8 @@ fn extremes(loaded: &Loaded) -> [f64; 2] {
     [size(&displacement), force]
 }
 
-/// The configuration of the motions, or else of the whole dataset, at which the energy is greatest, or the torque. Where
-/// a dataset is only being made, that with the greatest forces.
+/// The configuration of the motions, or else of the whole dataset, at which the energy is greatest, or the torque.
+/// Where a dataset is only being made, that with the greatest forces.
 fn deepest(loaded: &Loaded) -> Option<JointVector> {
     let dataset = &loaded.dataset;
     let motions = loaded.motions();

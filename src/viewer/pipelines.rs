@@ -1,5 +1,5 @@
-//! The drawing pipelines: the object's surface, pulled from the frame update's buffers, shapes of links, and instances of
-//! one rounded cone. All share view and light (`shaders/draw_common.wgsl`), samples a pixel, and a depth buffer.
+//! The drawing pipelines: the object's surface, pulled from the frame update's buffers, shapes of links, and instances
+//! of one rounded cone. All share view and light (`shaders/draw_common.wgsl`), samples a pixel, and a depth buffer.
 
 use super::{links::Corner, shapes::Shape};
 use crate::tolerances::GPU_LEAST_DIVISOR;

@@ -155,7 +155,8 @@ impl<F: Firmware + 'static> Emulator<F> {
         self.beside(false, open)
     }
 
-    /// Runs beside `open`, which waits for replies, and gives both back; the hand moves with the clock if it is `alive`.
+    /// Runs beside `open`, which waits for replies, and gives both back; the hand moves with the clock if it is
+    /// `alive`.
     pub fn beside<T>(mut self, alive: bool, open: impl FnOnce(&str) -> T) -> (Self, T) {
         let over = Arc::new(AtomicBool::new(false));
         let (ends, path) = (Arc::clone(&over), self.line.path.clone());
@@ -179,8 +180,8 @@ impl<F: Firmware + 'static> Emulator<F> {
     }
 }
 
-/// Lets this thread run before the host's: a device does not wait for the host's other programs. Left as it is where the
-/// system refuses.
+/// Lets this thread run before the host's: a device does not wait for the host's other programs. Left as it is where
+/// the system refuses.
 fn run_like_a_device() {
     let priority = libc::sched_param { sched_priority: 90 };
     // SAFETY: the call reads the number, and concerns this thread alone.

@@ -1,5 +1,5 @@
-//! How punctual the loop is against each emulator, as a table, and that each of its deadlines is accounted for. The times
-//! depend on the machine; docs/devices.md has those of sessions of 20 s:
+//! How punctual the loop is against each emulator, as a table, and that each of its deadlines is accounted for. The
+//! times depend on the machine; docs/devices.md has those of sessions of 20 s:
 //!
 //!     HAPTIZE_SECONDS=20 cargo test --locked --test devices -- --nocapture accounted_for
 

@@ -126,7 +126,8 @@ impl<'a> Ahead<'a> {
         }
     }
 
-    /// Solves all levels of the cell around `position` on `threads` threads, this one among them, for no longer than `most`.
+    /// Solves all levels of the cell around `position` on `threads` threads, this one among them, for no longer than
+    /// `most`.
     pub fn prepare(&self, position: &JointVector, threads: usize, most: Duration) {
         let (at, began) = (Whereabouts::at_rest(position), Instant::now());
         let work = || {
