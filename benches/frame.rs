@@ -1,11 +1,21 @@
 //! What one frame of the object in motion costs at 10,000 and 100,000 nodes. On the CPU: isotropic springs, which are
 //! solved coordinate by coordinate, beside axial ones, which need the whole matrix; and the time and memory of what is
 //! made once. On the GPU, where there is one: conjugate gradients, as many iterations as usual and a quarter of them.
+//! Before that, what substitution with the factor takes of it (`src/object/substitution.rs`), beside faer's own solve.
 //!
 //!     cargo bench --bench frame
 
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 
+use faer::{
+    Conj, Mat, Par, Side,
+    dyn_stack::{MemBuffer, MemStack},
+    perm::PermRef,
+    sparse::{
+        SparseColMat, Triplet,
+        linalg::cholesky::{LltRef, SymmetricOrdering, factorize_symbolic_cholesky},
+    },
+};
 use glam::DVec3;
 use haptize::{
     gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate},
@@ -42,7 +52,75 @@ fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (start.elapsed().as_secs_f64(), made)
 }
 
+/// The vector whose coordinates are those numbers.
+fn coordinates(of: impl Fn(usize) -> f64) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(of))
+}
+
+/// Times of a solve with the factor of the object's stiffness, least of some [ms]: this crate's on all cores and on one,
+/// and faer's on one, with the same order of elimination.
+fn solves(object: &Object, is_isotropic: bool) -> [f64; 3] {
+    let (nodes, rows) = (object.rest.len(), if is_isotropic { 1 } else { 3 });
+    let entries = (0..nodes).flat_map(|node| {
+        object.stiffness.row(node).filter(move |(other, _)| *other >= node).flat_map(move |(other, block)| {
+            let at = (0..rows * rows).map(|k| (k / rows, k % rows));
+            at.map(move |(a, b)| Triplet::new(rows * other + a, rows * node + b, block.row(b)[a]))
+                .filter(|entry| entry.row >= entry.col)
+                .collect::<Vec<_>>()
+        })
+    });
+    let matrix = SparseColMat::try_new_from_triplets(rows * nodes, rows * nodes, &entries.collect::<Vec<_>>()).unwrap();
+    let of_node = |&node: &u32| (0..rows).map(move |a| rows * node as usize + a);
+    let order: Vec<usize> = object.stiffness.ordering.iter().flat_map(of_node).collect();
+    let mut rank = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(k, &row)| rank[row] = k);
+    let ordering = SymmetricOrdering::Custom(PermRef::new_checked(&order, &rank, order.len()));
+    let symbolic = factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, ordering, Default::default()).unwrap();
+    let mut values = vec![0.0; symbolic.len_val()];
+    let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+    symbolic
+        .factorize_numeric_llt(
+            &mut values,
+            matrix.as_ref(),
+            Side::Lower,
+            Default::default(),
+            Par::Seq,
+            MemStack::new(&mut MemBuffer::new(scratch)),
+            Default::default(),
+        )
+        .unwrap();
+    let factor = LltRef::new(&symbolic, &values);
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let mut least = [f64::INFINITY; 3];
+    for _ in 0..FRAMES {
+        let mut vectors: Vec<DVec3> = (0..nodes).map(|k| DVec3::new(1e-4, 0.0, -1e-3 * (k % 7) as f64)).collect();
+        let right = Mat::from_fn(rows * nodes, 3 / rows, |row, column| vectors[row / rows][row % rows + column]);
+        let mut again = vectors.clone();
+        least[0] = least[0].min(timed(|| object.factor.solve(&mut vectors)).0);
+        least[1] = least[1].min(alone.install(|| timed(|| object.factor.solve(&mut again)).0));
+        let mut solved = right.clone();
+        let mut scratch = MemBuffer::new(symbolic.solve_in_place_scratch::<f64>(solved.ncols(), Par::Seq));
+        let solve = || {
+            factor.solve_in_place_with_conj(Conj::No, solved.as_mut(), Par::Seq, MemStack::new(&mut scratch));
+        };
+        least[2] = least[2].min(timed(solve).0);
+        let error = |k: usize| (coordinates(|a| solved[(rows * k + a % rows, a / rows)]) - vectors[k]).length();
+        let greatest = vectors.iter().map(|u| u.length()).fold(0.0, f64::max);
+        assert!((0..nodes).all(|k| error(k) < 1e-9 * greatest), "the two solve different problems");
+    }
+    least.map(|time| 1e3 * time)
+}
+
 fn main() {
+    println!("  nodes  springs    a solve [ms]: this crate's  on one thread  faer's on one thread");
+    for rings in RINGS {
+        for kind in [SpringKind::Isotropic, SpringKind::Axial] {
+            let object = sphere(kind, rings);
+            let [all, one, faer] = solves(&object, kind == SpringKind::Isotropic);
+            let (nodes, kind) = (object.rest.len(), format!("{kind:?}"));
+            println!("{nodes:7}  {kind:9}  {all:27.2}  {one:13.2}  {faer:20.2}");
+        }
+    }
     let effects = [
         ("dynamics", GraphicsEffects::default()),
         (

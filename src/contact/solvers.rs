@@ -2,7 +2,7 @@
 
 use super::{Model, Solver};
 use rayon::prelude::*;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard};
 
 /// Items that one thread takes at a time: enough that sharing them out costs nothing, few enough that no thread waits
 /// long for the last.
@@ -29,20 +29,18 @@ impl<'a> Solvers<'a> {
     /// Applies `solve` to each item and returns the results in the same order. Runs on the thread pool of the caller,
     /// else on the program's.
     pub fn map<T: Sync, R: Send>(&self, items: &[T], solve: impl Fn(&mut Solver<'a>, &T) -> R + Sync) -> Vec<R> {
-        items
-            .par_iter()
-            .with_min_len(SHARE)
-            .map(|item| {
-                let solver = &self.solvers[rayon::current_thread_index().unwrap_or(0) % self.solvers.len()];
-                let mut solver = solver.lock().unwrap_or_else(|poisoned| {
-                    // A panic may have left it in the middle of its work.
-                    let mut solver = poisoned.into_inner();
-                    *solver = Solver::new(self.model);
-                    solver
-                });
-                solve(&mut solver, item)
-            })
-            .collect()
+        items.par_iter().with_min_len(SHARE).map(|item| solve(&mut self.own(), item)).collect()
+    }
+
+    /// The solver of this thread of the pool.
+    pub fn own(&self) -> MutexGuard<'_, Solver<'a>> {
+        let solver = &self.solvers[rayon::current_thread_index().unwrap_or(0) % self.solvers.len()];
+        solver.lock().unwrap_or_else(|poisoned| {
+            // A panic may have left it in the middle of its work.
+            let mut solver = poisoned.into_inner();
+            *solver = Solver::new(self.model);
+            solver
+        })
     }
 }
 

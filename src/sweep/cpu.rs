@@ -3,16 +3,29 @@
 use super::Backend;
 use crate::{
     JointVector,
-    contact::{Equilibrium, Model, SHARE, Solvers},
+    contact::{Equilibrium, Model, SHARE, Solvers, Work},
     dataset::Provenance,
     scene::Scene,
 };
-use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::{convert::Infallible, time::SystemTime};
+use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
+use std::{
+    collections::VecDeque,
+    convert::Infallible,
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+        mpsc::{Receiver, SyncSender, sync_channel},
+    },
+    time::SystemTime,
+};
 
 /// Shares of each thread in a chunk: progress is reported several times a second, and threads rarely wait at a chunk's
 /// end.
 const SHARES: usize = 32;
+
+/// Chunks that are shared out at once: threads go on with the next where nothing is left of one, and nobody waits for
+/// the thread that hands chunks out and takes them back.
+const SHARED_OUT: usize = 2;
 
 /// Solves configurations on all cores.
 pub struct CpuBackend<'a> {
@@ -70,6 +83,86 @@ impl Backend for CpuBackend<'_> {
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Infallible> {
         Ok(self.pool.install(|| self.solvers.map(configurations, |solver, q| solver.solve(q))))
     }
+
+    fn stream(&mut self, work: &mut dyn Work) -> Result<(), Infallible> {
+        self.pool.in_place_scope(|scope| {
+            let (mut shared_out, mut solved) = (VecDeque::new(), None);
+            loop {
+                while shared_out.len() < SHARED_OUT
+                    && let Some(configurations) = work.next()
+                {
+                    shared_out.push_back(Chunk::share_out(scope, &self.solvers, configurations));
+                }
+                // Others are shared out first: there is time to take these while they are solved.
+                if let Some(equilibria) = solved.take() {
+                    work.take(equilibria);
+                }
+                // Nothing comes of a chunk in which a thread has panicked, which the scope passes on.
+                solved = shared_out.pop_front().and_then(|chunk| chunk.recv().ok());
+                if solved.is_none() {
+                    return;
+                }
+            }
+        });
+        Ok(())
+    }
+}
+
+/// A chunk of which all threads solve shares.
+struct Chunk {
+    configurations: Vec<JointVector>,
+    /// Equilibria of each share that is solved.
+    shares: Vec<Mutex<Vec<Equilibrium>>>,
+    /// Number of shares that are not.
+    left: AtomicUsize,
+    /// Where the equilibria go.
+    whole: SyncSender<Vec<Equilibrium>>,
+}
+
+impl Chunk {
+    /// Lets the threads of `scope` solve `configurations`; all equilibria come at once.
+    fn share_out<'s>(
+        scope: &Scope<'s>,
+        solvers: &'s Solvers<'_>,
+        configurations: Vec<JointVector>,
+    ) -> Receiver<Vec<Equilibrium>> {
+        let (whole, equilibria) = sync_channel(1);
+        let count = configurations.len().div_ceil(SHARE);
+        let shares = (0..count).map(|_| Mutex::default()).collect();
+        let chunk = Arc::new(Self { configurations, shares, left: AtomicUsize::new(count), whole });
+        if count == 0 {
+            chunk.conclude();
+        }
+        // In the pool, whose threads take shares from the one that has them without a queue that all wait for.
+        scope.spawn(move |scope| {
+            for share in 0..count {
+                let chunk = Arc::clone(&chunk);
+                scope.spawn(move |_| chunk.solve(share, solvers));
+            }
+        });
+        equilibria
+    }
+
+    fn solve(&self, share: usize, solvers: &Solvers<'_>) {
+        let configurations = self.configurations.chunks(SHARE).nth(share).unwrap_or_default();
+        let mut solver = solvers.own();
+        let equilibria = configurations.iter().map(|q| solver.solve(q)).collect();
+        drop(solver);
+        *self.shares[share].lock().unwrap_or_else(PoisonError::into_inner) = equilibria;
+        if self.left.fetch_sub(1, Ordering::AcqRel) == 1 {
+            self.conclude();
+        }
+    }
+
+    /// Hands all equilibria over.
+    fn conclude(&self) {
+        let mut all = Vec::with_capacity(self.configurations.len());
+        for share in &self.shares {
+            all.append(&mut share.lock().unwrap_or_else(PoisonError::into_inner));
+        }
+        // Where nobody waits for them any more nobody needs them.
+        let _ = self.whole.send(all);
+    }
 }
 
 #[cfg(test)]
@@ -77,6 +170,55 @@ mod tests {
     use super::*;
     use crate::{object::Object, proxy::Chain};
     use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    /// Chunks, what came back of them, and how many others were out at each time.
+    struct Noted {
+        chunks: VecDeque<Vec<JointVector>>,
+        out: usize,
+        others: Vec<usize>,
+        torques: Vec<JointVector>,
+    }
+
+    impl Noted {
+        /// `configurations` in chunks of so many.
+        fn of(configurations: &[JointVector], sizes: &[usize]) -> Self {
+            let mut rest = configurations;
+            let chunks = sizes.iter().map(|&size| rest.split_off(..size).unwrap().to_vec()).collect();
+            Self { chunks, out: 0, others: Vec::new(), torques: Vec::new() }
+        }
+    }
+
+    impl Work for Noted {
+        fn next(&mut self) -> Option<Vec<JointVector>> {
+            let chunk = self.chunks.pop_front();
+            self.out += usize::from(chunk.is_some());
+            chunk
+        }
+
+        fn take(&mut self, equilibria: Vec<Equilibrium>) {
+            self.out -= 1;
+            self.others.push(self.out);
+            self.torques.extend(equilibria.into_iter().map(|equilibrium| equilibrium.torque));
+        }
+
+        fn note(&mut self, _: String) {}
+    }
+
+    #[test]
+    fn chunks_come_back_in_order_while_the_next_is_shared_out() {
+        let scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
+        let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+        let model = Model::new(&object, &chain, scene.contact);
+        let configurations: Vec<JointVector> = super::super::sample(&scene).into_iter().step_by(37).take(101).collect();
+        let mut backend = CpuBackend::new(&model, 3).unwrap();
+        let at_once = backend.solve(&configurations).unwrap();
+        assert!(at_once.iter().any(|equilibrium| equilibrium.torque.norm() > 0.0), "some are in contact");
+        // The last of a chunk is not solved last, and some chunks have fewer shares than there are threads.
+        let mut work = Noted::of(&configurations, &[50, 1, 0, 8, 42]);
+        backend.stream(&mut work).unwrap();
+        assert_eq!(work.torques, at_once.into_iter().map(|equilibrium| equilibrium.torque).collect::<Vec<_>>());
+        assert_eq!(work.others, [2, 2, 2, 1, 0], "while one is taken two others are solved");
+    }
 
     #[test]
     fn a_solver_that_a_panic_has_left_solves_like_a_new_one() {

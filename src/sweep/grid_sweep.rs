@@ -54,7 +54,8 @@ pub struct Progress {
 pub struct Run<'a> {
     /// Configurations handed to the backend at once, at least 1.
     pub chunk: usize,
-    /// When this becomes true the sweep stops after the current chunk, or while the file is put together.
+    /// When this becomes true the sweep stops after the chunks that are with the backend, or while the file is put
+    /// together.
     pub stop: &'a AtomicBool,
     /// Called at the start and after every chunk.
     pub progress: &'a mut dyn FnMut(Progress),

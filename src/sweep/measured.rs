@@ -102,7 +102,7 @@ impl ErrorCheck<'_> {
             let lever = |unit: &str| if unit == "m" { LEVER_ARM } else { 1.0 };
             tau.iter().zip(&grid.axes).map(|(tau, axis)| (lever(&axis.unit) * tau).powi(2)).sum::<f64>().sqrt()
         };
-        let errors = Interpolation::ALL.into_iter().map(|interpolation| {
+        let errors = Interpolation::ALL.into_par_iter().map(|interpolation| {
             let found = interpolated(grid, table, &exact, (interpolation, self.threshold, &self.slope), WHOLE)?;
             let errors = found.iter().zip(&exact).map(|(found, (_, exact))| {
                 let mut error = *found;
@@ -137,7 +137,7 @@ fn interpolated(
     if grid.points() <= whole {
         let all: Vec<_> = grid.counts().into_iter().map(|count| 0..count).collect();
         let field = field(&all)?;
-        return Ok(places.iter().map(|(place, _)| field.sample(&place.q).torque).collect());
+        return Ok(places.par_iter().map(|(place, _)| field.sample(&place.q).torque).collect());
     }
     // As many lines on either side as there is room for, at least the next: differences reach so far.
     let side = (AROUND as f64).powf(1.0 / grid.joints() as f64) as usize;

@@ -5,6 +5,10 @@ use super::{
     table::{PointResult, Table},
 };
 use crate::{contact::Status, dataset::StatusCounts};
+use rayon::prelude::*;
+
+/// Points that one thread counts at a time.
+const SHARE: usize = 1 << 12;
 
 /// Sums over the points done.
 #[derive(Clone, Copy, Default)]
@@ -19,14 +23,24 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Counts the `points` points of `table`.
+    /// Counts the `points` points of `table`, on all cores.
     pub fn of(table: &Table<'_>, points: usize) -> Self {
-        let mut tally = Self { points, ..Self::default() };
-        (0..points).for_each(|point| {
+        let count = |mut tally: Self, point| {
             let PointResult { status, iterations, residual, .. } = table.result(point);
             tally.count(status, iterations, residual);
-        });
-        tally
+            tally
+        };
+        let shares = (0..points).into_par_iter().with_min_len(SHARE).fold(Self::default, count);
+        Self { points, ..shares.reduce(Self::default, Self::merged) }
+    }
+
+    fn merged(mut self, other: Self) -> Self {
+        self.points += other.points;
+        self.statuses.merge(other.statuses);
+        self.max_residual = self.max_residual.max(other.max_residual);
+        self.iterations += other.iterations;
+        self.max_iterations = self.max_iterations.max(other.max_iterations);
+        self
     }
 
     /// Counts the points of `chunk`.
