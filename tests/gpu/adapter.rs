@@ -31,7 +31,8 @@ mod twice {
         let found = folders.iter().filter_map(|folder| folder.read_dir().ok()).flatten().flatten().map(|it| it.path());
         let is_lavapipe =
             |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("lvp_icd"));
-        named.into_iter().chain(found).find(is_lavapipe).expect("lavapipe: apt-get install mesa-vulkan-drivers")
+        let place = named.into_iter().chain(found).find(is_lavapipe);
+        place.unwrap_or_else(|| panic!("lavapipe is missing: apt-get install mesa-vulkan-drivers"))
     }
 
     /// The program in `folder`, for which there are two adapters, of which the environment names some.
