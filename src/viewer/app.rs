@@ -14,12 +14,12 @@ use super::{
 use crate::{
     JointVector,
     gpu::{ADAPTER_VARIABLE, Context, GpuError},
+    input,
     render::{on_demand::OnDemand, timing::Timing},
     scene::Scene,
 };
 use eframe::{egui, egui_wgpu::RenderState};
 use std::{
-    fs::File,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -42,14 +42,9 @@ impl Start {
     /// When it cannot.
     pub fn check(&self) -> Result<(), ViewError> {
         let Self::File(path) = self else { return Ok(()) };
-        let readable = File::open(path).and_then(|file| match file.metadata()? {
-            found if found.is_dir() => Err(std::io::ErrorKind::IsADirectory.into()),
-            _ => Ok(()),
-        });
-        readable.map_err(|error| {
-            let remedy = "give a scene (.toml) or a dataset (.haptize)";
-            ViewError::Open(format!("{}: cannot be read: {error}; {remedy}", path.display()))
-        })
+        let remedy = "give a scene (.toml) or a dataset (.haptize)";
+        let unreadable = |error| ViewError::Open(format!("{}: cannot be read: {error}; {remedy}", path.display()));
+        input::open(path).map(drop).map_err(unreadable)
     }
 }
 
