@@ -414,7 +414,16 @@ pub fn write(setup: &Setup, dataset: &Dataset, played: &Played, folder: &Path) -
         replace_file(&frames, |out| played.trace.write_frames(out)).map_err(|error| unwritten(&frames, error))?;
         files.push(frames);
     }
-    files.extend(report::write_figures(folder, dataset, Some((&setup.chain, &played.trace)))?);
+    let recorded = Some((&setup.chain, &played.trace));
+    let report::Figures { written, left_out } =
+        report::write_figures_while(&interrupt::has_time, folder, dataset, recorded)?;
+    files.extend(written);
+    if left_out > 0 {
+        tell(format_args!(
+            "haptize: note: {left_out} figures are left out after the signal: `haptize play` draws a session that \
+             --record wrote (--replay FILE), and a dataset that was explored"
+        ));
+    }
     if let Some(timing) = &played.timing {
         let jitter = report::jitter::jitter(timing);
         files.extend(report::write_both(folder, "jitter", &jitter)?);
