@@ -60,15 +60,23 @@ fn size(text: &str) -> Result<[f32; 2], String> {
 /// Opens the window, or draws it.
 #[cfg(feature = "viewer")]
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
-    use super::output::{self, Kind};
+    use super::{
+        interrupt,
+        output::{self, Kind},
+    };
     use crate::viewer::{self, DeviceChoice, Picture, Start};
-    let device = arguments.device.clone().map(|address| DeviceChoice { address, hold_key: arguments.hold_key });
+    let device = arguments.device.clone().map(|address| {
+        let (hold_key, stop) = (arguments.hold_key, interrupt::stop_flag());
+        DeviceChoice { address, hold_key, stop }
+    });
     if let (Some(scene), Some(kept)) = (&arguments.file, &arguments.on_demand) {
         return explore(scene, kept, arguments.choices, device);
     }
     let start = arguments.file.clone().map_or(Start::Sphere, Start::File);
     let Some(file) = &arguments.screenshot else {
-        viewer::open(start, device)?;
+        let shown = viewer::open(start, device);
+        interrupt::over();
+        shown?;
         return Ok(Report { text: String::new(), json: serde_json::json!({}), whole: true });
     };
     if !file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {

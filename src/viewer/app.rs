@@ -21,7 +21,7 @@ use crate::{
 use eframe::{egui, egui_wgpu::RenderState};
 use std::{
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{Arc, atomic::AtomicBool},
 };
 
 /// The scene or file that is opened first.
@@ -181,6 +181,12 @@ impl Viewer {
              Update the GPU's driver if this comes back, or draw on another adapter: set {ADAPTER_VARIABLE} to a part \
              of its name before haptize starts; haptize doctor lists them"
         ));
+    }
+
+    /// The flag that ends the session of the device that leads, where there is one.
+    #[must_use]
+    pub fn stop(&self) -> Option<&'static AtomicBool> {
+        self.device.as_ref().map(|device| device.stop)
     }
 
     /// Lets a haptic device lead in everything that is opened from now on.
