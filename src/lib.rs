@@ -98,6 +98,7 @@ pub mod cli;
 
 pub mod tolerances;
 
+mod input;
 mod joint_matrix;
 mod joint_vector;
 pub mod memory;

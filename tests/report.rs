@@ -509,6 +509,18 @@ fn parts_that_do_not_belong_together_are_refused() {
 }
 
 #[test]
+fn figures_are_left_out_when_there_is_no_time_for_them_and_counted() {
+    let (chain, object) = (arm(3), sphere());
+    let (dataset, trace) = (dataset(&chain, &object, counts(3)), recording(&chain, &object, 20));
+    let drawn = |goes_on: &(dyn Fn() -> bool + Sync)| {
+        report::write_figures_while(goes_on, &folder("in time"), &dataset, Some((&chain, &trace))).unwrap()
+    };
+    let (all, none) = (drawn(&|| true), drawn(&|| false));
+    assert!(all.left_out == 0 && all.written.len() > 6, "{all:?}");
+    assert!(none.left_out >= 5 && none.written.is_empty(), "{none:?}");
+}
+
+#[test]
 fn lateness_is_counted_in_logarithmic_bins_with_its_quantiles() {
     let values = (0..20_000_u64).map(|k| 300 + k * k % 5_003 + if k == 9 { 400_000 } else { 0 });
     let canvas = report::jitter::jitter(&timing(values));

@@ -112,12 +112,13 @@ fn examine(arguments: &Check) -> Result<Report, Failure> {
             break;
         }
     }
-    let (unit, limits) = (guard.coordinates().effort_unit(), *guard.limits());
+    let (coordinates, limits) = (guard.coordinates(), *guard.limits());
+    let unit = coordinates.effort_unit();
     let description = guard.description();
     let limit: Vec<f64> = limits.effort.to_vec();
     drop(guard);
     interrupt::over();
-    let whole = reports.len() == phases.len() && reports.iter().all(|report| report.tally.stopped.is_none());
+    let whole = reports.len() == phases.len() && reports.iter().all(CheckReport::is_good);
     let mut text = String::new();
     writeln!(text, "{}: {description}", arguments.device)?;
     writeln!(text, "  limit        {limit:.4?} {unit}; used: {LIMIT_SHARE} of it, {PUSH_SHARE} in this check")?;
@@ -135,7 +136,7 @@ fn examine(arguments: &Check) -> Result<Report, Failure> {
              keep its power switch at hand"
         )?,
     }
-    reports.iter().try_for_each(|report| describe(&mut text, report))?;
+    reports.iter().try_for_each(|report| describe(&mut text, report, coordinates.unit()))?;
     let json = json!({
         "device": arguments.device.to_string(),
         "description": description,
@@ -154,7 +155,7 @@ fn instruction(phase: Phase) -> &'static str {
     }
 }
 
-fn describe(text: &mut String, report: &CheckReport) -> fmt::Result {
+fn describe(text: &mut String, report: &CheckReport, unit: &str) -> fmt::Result {
     let name = match report.phase {
         Phase::Reading => "reading",
         Phase::ZeroTorque => "zero torque",
@@ -163,14 +164,16 @@ fn describe(text: &mut String, report: &CheckReport) -> fmt::Result {
     let rate = report.fresh as f64 / report.seconds.max(f64::MIN_POSITIVE);
     writeln!(text, "  {name:<12} {rate:.0} new positions a second, the oldest {:.1} ms old", 1e3 * report.oldest)?;
     for (a, [least, most]) in report.range.iter().enumerate() {
-        write!(text, "    {a}: {least:.4} to {most:.4}")?;
-        if report.phase == Phase::Push {
-            let along = report.moves_along[a];
-            write!(
-                text,
-                ", work of the push {along:.1e} J{}",
-                if along < 0.0 { ": it moves AGAINST the push" } else { "" }
-            )?;
+        // Without a sign of zero.
+        let [least, most] = [least, most].map(|end| (1e4 * end).round() / 1e4 + 0.0);
+        write!(text, "    {a}: {least:.4} to {most:.4} {unit}")?;
+        match (report.phase, report.moves_along[a]) {
+            (Phase::Push, _) if !report.pushed[a] => write!(text, ", NOT pushed: hold the space bar all the time")?,
+            (Phase::Push, along) => {
+                let how = if along < 0.0 { ": it moves AGAINST the push" } else { "" };
+                write!(text, ", work of the push {along:.1e} J{how}")?;
+            }
+            _ => (),
         }
         writeln!(text)?;
     }

@@ -2,18 +2,20 @@
 //!
 //! Work that can stop at a good place takes [`stop_flag`] and looks at it. What has not stopped after [`GRACE`] is
 //! left: files that are half written are removed, and the program ends. A bake's part and a scan's log are on the disk
-//! by then. All other work ends at once, and so does everything at a second signal. A signal that the program was
+//! by then. What follows such work, and may be left out, is begun while there [is time](has_time). All other work ends
+//! at once, and so does everything at a second signal. A signal that the program was
 //! started to ignore (`nohup`) stays ignored.
 
 use super::{Failure, last_words};
 use crate::dataset::discard_unfinished;
 use std::{
     sync::{
+        Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
         mpsc,
     },
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 /// Exit code of a program that Ctrl-C ended, as shells have it: 128 and the signal's number.
@@ -22,11 +24,17 @@ const INTERRUPTED: i32 = 130;
 /// How long work may take to stop: with all that follows, less than a second.
 const GRACE: Duration = Duration::from_millis(700);
 
+/// How long after a signal work may be begun that may be left out: a figure, which takes some tenths of a second.
+const LAST_BEGINNING: Duration = Duration::from_millis(300);
+
 /// How long saying so may take where nobody reads.
 const LAST_WORDS: Duration = Duration::from_millis(100);
 
 /// Raised when work is to stop.
 static STOP: AtomicBool = AtomicBool::new(false);
+
+/// When the first signal came.
+static SINCE: Mutex<Option<Instant>> = Mutex::new(None);
 
 /// Whether there is work that looks at [`STOP`].
 static IS_STOPPABLE: AtomicBool = AtomicBool::new(false);
@@ -36,6 +44,7 @@ static IS_STOPPABLE: AtomicBool = AtomicBool::new(false);
 pub fn listen(json: bool, resumes: bool) -> Result<(), Failure> {
     let ignored = ignored();
     ctrlc::set_handler(move || {
+        SINCE.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(Instant::now);
         let is_first = !STOP.swap(true, Ordering::Relaxed);
         if is_first && IS_STOPPABLE.load(Ordering::Relaxed) {
             thread::sleep(GRACE);
@@ -60,6 +69,12 @@ pub fn stop_flag() -> &'static AtomicBool {
     STOP.store(false, Ordering::Relaxed);
     IS_STOPPABLE.store(true, Ordering::Relaxed);
     &STOP
+}
+
+/// Whether there is time to begin what may be left out after a signal.
+pub fn has_time() -> bool {
+    let since = *SINCE.lock().unwrap_or_else(PoisonError::into_inner);
+    since.is_none_or(|since| since.elapsed() < LAST_BEGINNING)
 }
 
 /// Ends the work that looked at the flag: what follows is ended by a signal at once.

@@ -74,8 +74,8 @@ mod unix {
                 // It has no result.
                 let _ = reader.join();
             }
-            // Nothing could be done about it.
-            let _ = tcsetattr(stdin(), OptionalActions::Now, &self.before);
+            // What the key has typed and nobody read is thrown away. Nothing could be done about a failure.
+            let _ = tcsetattr(stdin(), OptionalActions::Flush, &self.before);
         }
     }
 }

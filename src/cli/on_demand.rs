@@ -15,10 +15,25 @@ use crate::{
 use serde_json::json;
 use std::{
     fmt::{self, Write},
-    path::Path,
-    sync::Arc,
-    time::Instant,
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+        mpsc::{self, RecvTimeoutError},
+    },
+    thread,
+    time::{Duration, Instant},
 };
+
+/// How often what was explored is saved while it is felt: a session that is killed loses as much at most, which is
+/// solved again in the same time. Oftener, and writing would take a share of the processor and the disk that is felt.
+const KEPT_EVERY: Duration = Duration::from_secs(5);
+
+/// Pause after each saving [times that it took]: however large the store, a tenth of one processor at most saves it.
+const PAUSE: u32 = 9;
+
+/// How often the thread that saves looks for a signal.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// How it is solved.
 #[derive(Clone, Copy, Debug, clap::Args)]
@@ -36,13 +51,15 @@ impl Choices {
     pub fn open(self, path: &Path, file: &Path) -> Result<Exploring, Failure> {
         let began = Instant::now();
         let on_demand = OnDemand::open(path, file, self.levels, self.threads.map(usize::from))?;
-        Ok(Exploring { on_demand: Arc::new(on_demand), began })
+        Ok(Exploring { on_demand: Arc::new(on_demand), file: file.into(), began })
     }
 }
 
 /// A scene that is solved while it is felt, and since when the program has been at work.
 pub struct Exploring {
     pub on_demand: Arc<OnDemand>,
+    /// What was explored is kept here.
+    file: PathBuf,
     began: Instant,
 }
 
@@ -55,6 +72,56 @@ pub struct Explored {
 }
 
 impl Exploring {
+    /// Runs `session` while a thread of its own saves what is explored from time to time; what there is in the end is
+    /// saved whether the session succeeds or not. A process that is killed leaves what was last saved, whole. With a
+    /// `signal`, which ends the program without ending `session`, all is saved once more when it is raised.
+    pub fn keep<T>(
+        &self,
+        signal: Option<&AtomicBool>,
+        session: impl FnOnce() -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        let before = self.on_demand.blocks();
+        let (under_way, over) = mpsc::channel::<()>();
+        let played = thread::scope(|scope| {
+            let save = move || self.save_until(&over, signal);
+            thread::Builder::new().name("keeper".into()).spawn_scoped(scope, save)?;
+            let played = session();
+            drop(under_way);
+            played
+        });
+        if played.is_ok() || self.on_demand.blocks() > before {
+            self.on_demand.dataset().save(self.file.as_path())?;
+        }
+        played
+    }
+
+    /// Saves what is explored every [`KEPT_EVERY`] until the session is `over`, or `signal` is raised.
+    fn save_until(&self, over: &mpsc::Receiver<()>, signal: Option<&AtomicBool>) {
+        let (file, mut failed) = (self.file.display(), false);
+        let (mut kept, mut due) = (self.on_demand.blocks(), Instant::now() + KEPT_EVERY);
+        while over.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+            let is_last = signal.is_some_and(|signal| signal.load(Ordering::Relaxed));
+            let (blocks, began) = (self.on_demand.blocks(), Instant::now());
+            if !is_last && (began < due || blocks == kept) {
+                continue;
+            }
+            let saved = self.on_demand.dataset().save(self.file.as_path());
+            if is_last {
+                let what = saved.map_or_else(|error| error.to_string(), |()| format!("kept in {file}"));
+                return tell(format_args!("haptize: {blocks} blocks explored, {what}"));
+            }
+            due = Instant::now() + KEPT_EVERY.max(PAUSE * began.elapsed());
+            match saved {
+                Ok(()) => (kept, failed) = (blocks, false),
+                Err(error) if !failed => {
+                    failed = true;
+                    tell(format_args!("haptize: note: what is explored is not kept yet: {error}"));
+                }
+                Err(_) => (),
+            }
+        }
+    }
+
     /// Plays `device` against the clock while contact is solved where it goes.
     pub fn play(
         &self,

@@ -84,7 +84,8 @@ pub struct Arguments {
     #[arg(long, value_name = "DATASET", conflicts_with = "replay")]
     beside: Option<PathBuf>,
     /// Begin at once, against the clock, from a scene of which nothing was baked: contact is solved ahead of the
-    /// motion, coarse before fine, and kept in this file, a dataset. What it holds already is used.
+    /// motion, coarse before fine, and kept in this file, a dataset, from time to time and in the end. What it holds
+    /// already is used.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "record", "beside"])]
     on_demand: Option<PathBuf>,
     #[command(flatten)]
@@ -116,12 +117,14 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     let (played, told) = match &arguments.replay {
         Some(file) => replay(&setup, &dataset, file)?,
-        None => (perform(&setup, &dataset, arguments, exploring.as_ref())?, None),
+        None => {
+            let session = || perform(&setup, &dataset, arguments, exploring.as_ref());
+            (exploring.as_ref().map_or_else(session, |exploring| exploring.keep(None, session))?, None)
+        }
     };
-    if let (Some(file), Some(exploring)) = (kept, &exploring) {
+    if let Some(exploring) = &exploring {
         // With what was solved meanwhile.
         dataset = exploring.on_demand.dataset();
-        dataset.save(file.as_path())?;
     }
     if let Some(timing) = &played.timing {
         timing.refused.iter().for_each(|refused| tell(format_args!("haptize: note: {refused}")));
@@ -451,7 +454,16 @@ pub fn write(setup: &Setup, dataset: &Dataset, played: &Played, folder: &Path) -
         replace_file(&frames, |out| played.trace.write_frames(out)).map_err(|error| unwritten(&frames, error))?;
         files.push(frames);
     }
-    files.extend(report::write_figures(folder, dataset, Some((&setup.chain, &played.trace)))?);
+    let recorded = Some((&setup.chain, &played.trace));
+    let report::Figures { written, left_out } =
+        report::write_figures_while(&interrupt::has_time, folder, dataset, recorded)?;
+    files.extend(written);
+    if left_out > 0 {
+        tell(format_args!(
+            "haptize: note: {left_out} figures are left out after the signal: `haptize play` draws a session that \
+             --record wrote (--replay FILE), and a dataset that was explored"
+        ));
+    }
     if let Some(timing) = &played.timing {
         let jitter = report::jitter::jitter(timing);
         files.extend(report::write_both(folder, "jitter", &jitter)?);

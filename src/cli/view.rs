@@ -25,8 +25,8 @@ pub struct Arguments {
     /// Torque only while the space bar is held in the window (a dead-man key).
     #[arg(long, requires = "device")]
     hold_key: bool,
-    /// Bake nothing: solve contact ahead of the motion while it is felt, and keep what was explored in this file when
-    /// the window is closed. Of an earlier session of the same scene, it is where this one goes on.
+    /// Bake nothing: solve contact ahead of the motion while it is felt, and keep what was explored in this file,
+    /// from time to time and when the window is closed. Of an earlier session of the same scene, it is where this one goes on.
     #[arg(long, value_name = "FILE", requires = "file", conflicts_with = "screenshot")]
     on_demand: Option<PathBuf>,
     #[command(flatten)]
@@ -51,10 +51,6 @@ pub struct Arguments {
 /// Greatest side of a picture [points].
 const GREATEST: f32 = 4000.0;
 
-/// How often a session on demand looks for a signal.
-#[cfg(feature = "viewer")]
-const LOOK: std::time::Duration = std::time::Duration::from_millis(50);
-
 fn size(text: &str) -> Result<[f32; 2], String> {
     let sides = text.split_once('x').and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]));
     let within = |sides: &[f32; 2]| sides.iter().all(|side| (0.0..=GREATEST).contains(side));
@@ -64,15 +60,23 @@ fn size(text: &str) -> Result<[f32; 2], String> {
 /// Opens the window, or draws it.
 #[cfg(feature = "viewer")]
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
-    use super::output::{self, Kind};
+    use super::{
+        interrupt,
+        output::{self, Kind},
+    };
     use crate::viewer::{self, DeviceChoice, Picture, Start};
-    let device = arguments.device.clone().map(|address| DeviceChoice { address, hold_key: arguments.hold_key });
+    let device = arguments.device.clone().map(|address| {
+        let (hold_key, stop) = (arguments.hold_key, interrupt::stop_flag());
+        DeviceChoice { address, hold_key, stop }
+    });
     if let (Some(scene), Some(kept)) = (&arguments.file, &arguments.on_demand) {
         return explore(scene, kept, arguments.choices, device);
     }
     let start = arguments.file.clone().map_or(Start::Sphere, Start::File);
     let Some(file) = &arguments.screenshot else {
-        viewer::open(start, device)?;
+        let shown = viewer::open(start, device);
+        interrupt::over();
+        shown?;
         return Ok(Report { text: String::new(), json: serde_json::json!({}), whole: true });
     };
     if !file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
@@ -114,41 +118,19 @@ fn explore(
     use super::{
         interrupt,
         output::{self, Kind},
-        tell,
     };
     use crate::viewer::{self, Start};
-    use std::{
-        sync::{
-            Arc,
-            atomic::{AtomicBool, Ordering},
-        },
-        thread,
-    };
     let earlier = output::check(kept, Kind::Dataset, Some(scene))?;
-    let on_demand = choices.open(scene, kept)?.on_demand;
-    let (closed, stop) = (AtomicBool::new(false), interrupt::stop_flag());
-    let shown = thread::scope(|scope| {
-        let keep = || {
-            while !closed.load(Ordering::Acquire) {
-                if stop.load(Ordering::Relaxed) {
-                    // The program ends soon, as by any signal.
-                    let saved = on_demand.dataset().save(kept);
-                    let what = saved.map_or_else(|error| error.to_string(), |()| format!("kept in {}", kept.display()));
-                    return tell(format_args!("haptize: {} blocks explored, {what}", on_demand.blocks()));
-                }
-                thread::sleep(LOOK);
-            }
-        };
-        thread::Builder::new().name("keeper".into()).spawn_scoped(scope, keep)?;
-        let shown = viewer::open(Start::OnDemand(Arc::clone(&on_demand)), device);
-        closed.store(true, Ordering::Release);
-        Ok::<_, std::io::Error>(shown)
+    let exploring = choices.open(scene, kept)?;
+    // The program ends soon after a signal, as by any.
+    exploring.keep(Some(interrupt::stop_flag()), || {
+        let shown = viewer::open(Start::OnDemand(std::sync::Arc::clone(&exploring.on_demand)), device);
+        interrupt::over();
+        Ok(shown?)
     })?;
-    interrupt::over();
-    on_demand.dataset().save(kept)?;
-    shown?;
-    let mut text = format!("{} blocks explored, kept in {}\n", on_demand.blocks(), kept.display());
-    let mut json = serde_json::json!({ "blocks": on_demand.blocks(), "file": kept.display().to_string() });
+    let blocks = exploring.on_demand.blocks();
+    let mut text = format!("{blocks} blocks explored, kept in {}\n", kept.display());
+    let mut json = serde_json::json!({ "blocks": blocks, "file": kept.display().to_string() });
     earlier.tell(&mut text, &mut json);
     Ok(Report { text, json, whole: true })
 }

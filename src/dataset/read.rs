@@ -6,7 +6,7 @@ use super::{
     store,
 };
 use crate::{
-    JointMatrix,
+    JointMatrix, input,
     memory::{self, Shortage},
 };
 use memmap2::{Mmap, MmapMut};
@@ -27,7 +27,7 @@ impl Dataset {
     /// Missing, foreign, of another version, cut short, or altered in any bit.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let read = |source| Error::Read { path: path.into(), source };
-        let file = regular_file(path).map_err(read)?;
+        let file = input::open(path).map_err(read)?;
         // SAFETY: the map is read-only and private to this process; what changing the file meanwhile does is said in
         // `file.rs`.
         let map = unsafe { Mmap::map(&file) }.map_err(|source| match source.kind() {
@@ -45,7 +45,7 @@ impl Dataset {
     /// As [`Dataset::open`]; also when it does not fit in memory.
     pub fn load(path: &Path) -> Result<Self, Error> {
         let read = |source| Error::Read { path: path.into(), source };
-        let mut file = regular_file(path).map_err(read)?;
+        let mut file = input::open(path).map_err(read)?;
         let length = file.metadata().map_err(read)?.len();
         // A map of no bytes is refused by some systems; one zero byte is refused by the checks.
         let bytes = usize::try_from(length).map_err(|error| read(io::Error::other(error)))?;
@@ -60,14 +60,6 @@ impl Dataset {
 fn no_room(path: &Path, file: &File) -> Error {
     let needed = file.metadata().map_or(0, |file| usize::try_from(file.len()).unwrap_or(usize::MAX));
     Error::Memory { path: path.into(), shortage: Shortage { needed, left: memory::left().unwrap_or(0) } }
-}
-
-/// Opens `path` unless it is a folder, a pipe or a device, which cannot be mapped or might never end.
-fn regular_file(path: &Path) -> io::Result<File> {
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
-    }
-    File::open(path)
 }
 
 /// Checks a whole file and makes a dataset of windows into it.

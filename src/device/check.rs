@@ -41,8 +41,20 @@ pub struct CheckReport {
     pub range: Vec<[f64; 2]>,
     /// Work of the push on each coordinate [J]: positive if the device moves the way it is pushed.
     pub moves_along: Vec<f64>,
+    /// Whether each coordinate was pushed at all: not while the dead-man key is up.
+    pub pushed: Vec<bool>,
     /// Clamps and stops.
     pub tally: Tally,
+}
+
+impl CheckReport {
+    /// Whether the phase found nothing wrong: the device went on, and in the last phase each coordinate was pushed and
+    /// moved the way it was pushed.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        let moved = || self.pushed.iter().zip(&self.moves_along).all(|(pushed, work)| *pushed && *work >= 0.0);
+        self.tally.stopped.is_none() && (self.phase != Phase::Push || moved())
+    }
 }
 
 /// Runs `phase` for `seconds` on `guard`. `tick` waits for the next tick and returns the time since the last [s], or
@@ -70,6 +82,7 @@ pub fn check(
         oldest: 0.0,
         range: vec![[f64::INFINITY, f64::NEG_INFINITY]; count],
         moves_along: vec![0.0; count],
+        pushed: vec![false; count],
         tally: Tally::default(),
     };
     let (mut before, mut effort) = (guard.latest().position, JointVector::zeros(count));
@@ -94,6 +107,7 @@ pub fn check(
         if phase != Phase::Reading {
             let held = guard.write(&wanted);
             effort = held.effort;
+            report.pushed.iter_mut().zip(effort.iter()).for_each(|(pushed, effort)| *pushed |= *effort != 0.0);
             report.tally.add(held.clamps, held.halt);
         } else if let Some(halt) = guard.stopped() {
             report.tally.add(super::Clamps::empty(), Some(halt));

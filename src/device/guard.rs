@@ -7,7 +7,8 @@
 //!   or the device is not ready;
 //! - from the first error, unplugging, answer that is none, or effort that is no number on ([`Halt::is_final`]);
 //! - once motors have been warm for [`WARM_TIME`], over which efforts are scaled down;
-//! - when the layer is dropped, be it by a panic, a signal or the end of the session.
+//! - once a flag is raised that [ends](Guard::end_with) the session, by a signal, say;
+//! - when the layer is dropped, be it by a panic or the end of the session.
 //!
 //! A stop takes effect at the very tick that finds it. Every clamp and every stop is part of the [`Held`] that each
 //! tick returns.
@@ -16,7 +17,10 @@ use super::{
     Clamps, Coordinates, Halt, Hardware, Key, Limits, Measurement, Scheduler, halt::LONGEST_AGE, hardware::Command,
 };
 use crate::{JointVector, tolerances::GREATEST_INTERVAL};
-use std::sync::Arc;
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
+};
 
 /// Part of the device's own limit that is used [1]. Larger: rounding in a device's units may trip the device's own
 /// protection.
@@ -41,6 +45,8 @@ pub struct Guard {
     /// Clamp of each effort [N m or N].
     most: JointVector,
     key: Option<Key>,
+    /// Raised when the session is to end.
+    over: Option<&'static AtomicBool>,
     latest: Measurement,
     /// Before the last reading [s].
     elapsed: f64,
@@ -85,6 +91,7 @@ impl Guard {
             limits,
             most: limits.effort,
             key,
+            over: None,
             latest,
             elapsed: 0.0,
             ramp: 0.0,
@@ -114,6 +121,11 @@ impl Guard {
         }
         self.most.iter_mut().zip(limits.iter()).for_each(|(most, limit)| *most = most.min(limit.max(0.0)));
         Ok(())
+    }
+
+    /// Ends all torque at the first tick after `over` is raised, whatever else the program still has to do.
+    pub fn end_with(&mut self, over: &'static AtomicBool) {
+        self.over = Some(over);
     }
 
     /// Switches motors and watchdog on, at zero torque. Before it no effort reaches the device.
@@ -239,7 +251,9 @@ impl Guard {
     fn reason(&self, wanted: &JointVector) -> Option<Halt> {
         let fresh = self.latest.age <= LONGEST_AGE;
         let held = self.latest.held && self.key.as_ref().is_none_or(Key::is_held);
+        let over = self.over.is_some_and(|over| over.load(Ordering::Relaxed));
         self.stopped
+            .or(over.then_some(Halt::Over))
             .or((wanted.len() != self.coordinates.count() || !wanted.is_finite()).then_some(Halt::NotFinite))
             .or((self.heat >= 1.0).then_some(Halt::Hot))
             .or((!fresh).then_some(Halt::Stale))

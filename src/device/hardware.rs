@@ -26,6 +26,15 @@ impl Coordinates {
         }
     }
 
+    /// Returns the unit of a coordinate, for messages.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Joints(_) => "rad",
+            Self::Tip => "m",
+        }
+    }
+
     /// Returns the unit of an effort, for messages.
     #[must_use]
     pub fn effort_unit(self) -> &'static str {

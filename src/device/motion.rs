@@ -4,10 +4,9 @@
 //! `q(s) = q_0 + (q_1 - q_0)(10 s^3 - 15 s^4 + 6 s^5)`, s from 0 to 1. Files give samples, joined by straight lines:
 //! one row a sample, comma-separated, time in seconds and then one coordinate per joint.
 
-use crate::{JointVector, scene::Waypoint, tolerances::GREATEST_INPUT};
+use crate::{JointVector, input, scene::Waypoint, tolerances::GREATEST_INPUT};
 use std::{
-    fs::File,
-    io::{self, BufRead, BufReader, Read},
+    io::{self, BufRead, BufReader},
     path::{Path, PathBuf},
 };
 
@@ -121,12 +120,11 @@ impl Motion {
     /// When the file cannot be read or a line is not a sample; the error names file and line.
     pub fn from_csv(file: &Path, joints: usize) -> Result<Self, MotionError> {
         let unreadable = |source| MotionError::Read { file: file.into(), source };
-        let opened = File::open(file).map_err(unreadable)?;
+        let opened = input::open(file).map_err(unreadable)?;
         if opened.metadata().map_err(unreadable)?.len() > GREATEST_FILE {
             return Err(MotionError::Size { file: file.into() });
         }
-        // A pipe or device has no length: the limit holds for it, too.
-        let mut reader = BufReader::new(opened.take(GREATEST_FILE));
+        let mut reader = BufReader::new(opened);
         let mut waypoints: Vec<Waypoint> = Vec::new();
         let (mut bytes, mut number) = (Vec::new(), 0);
         let mut header_possible = true;

@@ -22,12 +22,12 @@ pub use mapping::{BadRows, ColumnName, Filter, Joint, Keep, Mapping, MappingErro
 use crate::{
     JointVector,
     gridize::Samples,
+    input,
     ros::{JointStateTable, RosError, is_mcap},
 };
 use cells::{Cells, Direction};
 use rows::{ReadRowResult, Row, Rows};
 use std::{
-    fs::File,
     io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
 };
@@ -158,7 +158,7 @@ pub fn import(
         let opened: Box<dyn Read> = if of_robot {
             Box::new(JointStateTable::open(path, mapping.table.topic.as_deref())?)
         } else {
-            Box::new(File::open(path).map_err(|source| ImportError::Read { file: file.clone(), source })?)
+            Box::new(input::open(path).map_err(|source| ImportError::Read { file: file.clone(), source })?)
         };
         bytes += import.read(BufReader::with_capacity(1 << 16, opened), &file, &mut |read, rows| {
             progress(ImportProgress { bytes: bytes + read, rows });

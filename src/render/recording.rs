@@ -18,10 +18,10 @@ use super::{
 use crate::{
     JointVector,
     device::{Applied, Device, Reading},
+    input,
 };
 use std::{
-    fs::File,
-    io::{self, BufRead, BufReader, Read, Write},
+    io::{self, BufRead, BufReader, Write},
     path::{Path, PathBuf},
 };
 
@@ -58,6 +58,12 @@ pub enum RecordingError {
         file: PathBuf,
         /// Why.
         source: io::Error,
+    },
+    /// The file is too large to be a recording.
+    #[error("{}: larger than {GREATEST_FILE} bytes: take a file that `haptize play --record` wrote", .file.display())]
+    Size {
+        /// The recording's file.
+        file: PathBuf,
     },
     /// A line is not what it should be.
     #[error("{}:{line}: {what}; take a file that `haptize play --record` wrote for a proxy of {joints} joints", .file.display())]
@@ -157,7 +163,11 @@ impl Recording {
     /// When the file cannot be read or is no such recording; the error names file and line.
     pub fn read(file: &Path, joints: usize) -> Result<Self, RecordingError> {
         let unreadable = |source| RecordingError::Read { file: file.into(), source };
-        let mut reader = BufReader::new(File::open(file).map_err(unreadable)?.take(GREATEST_FILE));
+        let opened = input::open(file).map_err(unreadable)?;
+        if opened.metadata().map_err(unreadable)?.len() > GREATEST_FILE {
+            return Err(RecordingError::Size { file: file.into() });
+        }
+        let mut reader = BufReader::new(opened);
         let mut recording = Self { start: JointVector::zeros(0), kept: Vec::new(), rows: Vec::new() };
         let (mut bytes, mut line, mut header) = (Vec::new(), 0, false);
         loop {

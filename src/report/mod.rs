@@ -28,6 +28,7 @@ use crate::{
     render::trace::Trace,
 };
 use canvas::Canvas;
+use rayon::prelude::*;
 use std::{
     io::Write,
     path::{Path, PathBuf},
@@ -85,6 +86,15 @@ pub const FIGURES: [&str; 10] = [
 /// Instants shown of the deforming object.
 const INSTANTS: usize = 6;
 
+/// Figures of a folder.
+#[derive(Debug)]
+pub struct Figures {
+    /// Their files.
+    pub written: Vec<PathBuf>,
+    /// How many were not begun.
+    pub left_out: usize,
+}
+
 /// Writes all figures that the data allow into `folder`, which is made if it is missing, and returns their paths.
 ///
 /// `cspace.png` (Fig. 3) and `torque.{svg,png}` show the dataset; with a recording of the proxy `chain` also
@@ -99,20 +109,44 @@ pub fn write_figures(
     dataset: &Dataset,
     recording: Option<(&Chain, &Trace)>,
 ) -> Result<Vec<PathBuf>, ReportError> {
-    let mut written = vec![write_png(folder, "cspace", &space::space(dataset))?];
-    written.extend(write_both(folder, "torque", &slices::slices(dataset))?);
+    Ok(write_figures_while(&|| true, folder, dataset, recording)?.written)
+}
+
+/// Writes the same figures, on all processors, but leaves out those that are to begin when `goes_on` says no.
+///
+/// # Errors
+/// As [`write_figures`].
+pub fn write_figures_while(
+    goes_on: &(dyn Fn() -> bool + Sync),
+    folder: &Path,
+    dataset: &Dataset,
+    recording: Option<(&Chain, &Trace)>,
+) -> Result<Figures, ReportError> {
+    type Figure<'a> = Box<dyn Fn() -> Result<Vec<PathBuf>, ReportError> + Send + Sync + 'a>;
+    let png = |name, canvas: Canvas| Ok(vec![write_png(folder, name, &canvas)?]);
+    let both = |name, canvas: Canvas| Ok(write_both(folder, name, &canvas)?.into());
+    let mut figures: Vec<Figure<'_>> = vec![
+        Box::new(move || png("cspace", space::space(dataset))),
+        Box::new(move || both("torque", slices::slices(dataset))),
+    ];
     if let Some((chain, trace)) = recording {
-        written.extend(write_both(folder, "motion", &press::press(trace))?);
-        written.extend(write_both(folder, "energy", &press::energy(trace))?);
-        if let Some(force) = force::EndForce::new("", chain, trace) {
-            written.extend(write_both(folder, "force", &force::force(&[force], trace))?);
+        figures.push(Box::new(move || both("motion", press::press(trace))));
+        figures.push(Box::new(move || both("energy", press::energy(trace))));
+        if let Some(end) = force::EndForce::new("", chain, trace) {
+            figures.push(Box::new(move || both("force", force::force(std::slice::from_ref(&end), trace))));
         }
         if !trace.frames.is_empty() && dataset.surface.is_some() {
-            let instants = object::instants(dataset, chain, trace, INSTANTS)?;
-            written.push(write_png(folder, "object", &object::object(dataset, chain, &instants)?)?);
+            figures.push(Box::new(move || {
+                let instants = object::instants(dataset, chain, trace, INSTANTS)?;
+                png("object", object::object(dataset, chain, &instants)?)
+            }));
         }
     }
-    Ok(written)
+    let draw = |figure: &Figure<'_>| goes_on().then(figure).transpose();
+    let drawn: Result<Vec<Option<Vec<PathBuf>>>, ReportError> = figures.par_iter().with_max_len(1).map(draw).collect();
+    let drawn = drawn?;
+    let left_out = drawn.iter().filter(|files| files.is_none()).count();
+    Ok(Figures { written: drawn.into_iter().flatten().flatten().collect(), left_out })
 }
 
 /// Writes `NAME.svg` and `NAME.png` into `folder`, which is made if it is missing.

@@ -21,6 +21,7 @@ use crate::{
     scene::Rendering,
 };
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// The object and the proxy at one instant.
 pub struct Instant {
@@ -130,7 +131,8 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
         entries.remove(0);
     }
     plot::legend(&mut canvas, (WIDTH - chart::MARGIN, chart::MARGIN + 12.0), &entries);
-    for (number, instant) in instants.iter().enumerate() {
+    let pictures: Vec<Picture> = instants.par_iter().map(|instant| scene.picture(instant)).collect();
+    for (number, (instant, picture)) in instants.iter().zip(pictures).enumerate() {
         let x = chart::MARGIN + (number % COLUMNS) as f64 * (CELL[0] + 6.0);
         let y = top + (number / COLUMNS) as f64 * (CELL[1] + 34.0);
         let total: DVec3 = instant.forces.iter().map(|force| force.force).sum();
@@ -141,7 +143,7 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
             nodes => format!("{nodes} nodes in contact, {} N", ticks::number(total.length(), 1)),
         };
         canvas.text((x + plot::TITLE.width(&time) + 10.0, y), &what, plot::NOTE);
-        canvas.picture((x, y + 8.0), scene.picture(instant));
+        canvas.picture((x, y + 8.0), picture);
         canvas.frame(Area { x, y: y + 8.0, width: CELL[0], height: CELL[1] }, GRID, 1.0);
     }
     let height = 180.0;

@@ -5,6 +5,7 @@
 //! than its chunk for one that is not. Memory is that of the longest record or chunk.
 
 use super::{MESSAGE_ENCODING, RosError, TYPE, chunk::Chunk, is_mcap};
+use crate::input;
 use mcap::{
     McapError,
     records::op,
@@ -47,7 +48,7 @@ struct Topics {
 impl Messages {
     pub fn open(path: &Path) -> Result<Self, RosError> {
         let unreadable = |source| RosError::File { file: path.to_owned(), source };
-        let file = File::open(path).map_err(unreadable)?;
+        let file = input::open(path).map_err(unreadable)?;
         if !is_mcap(path) {
             return Err(RosError::mcap(path, &McapError::BadMagic));
         }

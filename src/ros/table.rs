@@ -6,10 +6,10 @@
 //! zero, the time at which it was logged.
 
 use super::{JointState, RosError, TYPE, messages::Messages};
+use crate::input;
 use std::{
     collections::{BTreeMap, BTreeSet},
     fmt::Write as _,
-    fs::File,
     io::{self, Read},
     path::Path,
 };
@@ -30,7 +30,7 @@ pub struct Topic {
 #[must_use]
 pub fn is_mcap(path: &Path) -> bool {
     let mut start = [0; mcap::MAGIC.len()];
-    File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *mcap::MAGIC
+    input::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *mcap::MAGIC
 }
 
 /// Returns the topics of joint states in the file at `path`, by name.

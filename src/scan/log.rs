@@ -9,6 +9,7 @@
 use crate::{
     JointVector, MAX_JOINTS,
     gridize::{JointLabel, Samples},
+    input,
 };
 use std::{
     fmt::Write as _,
@@ -245,7 +246,7 @@ impl ScanLog {
     #[must_use]
     pub fn is_one(path: &Path) -> bool {
         let mut start = vec![0; SIGNATURE.len()];
-        File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == SIGNATURE.as_bytes()
+        input::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == SIGNATURE.as_bytes()
     }
 
     /// Whether the file at `path` begins like the log of a simulated scan, or is empty as one that was ended before its
@@ -254,7 +255,7 @@ impl ScanLog {
     pub fn is_simulated(path: &Path) -> bool {
         let opening = LogHeader { simulated: true, ..LogHeader::default() }.opening();
         let mut start = Vec::new();
-        let read = File::open(path).and_then(|file| file.take(opening.len() as u64).read_to_end(&mut start));
+        let read = input::open(path).and_then(|file| file.take(opening.len() as u64).read_to_end(&mut start));
         read.is_ok() && (start.is_empty() || start == opening.as_bytes())
     }
 
@@ -263,7 +264,7 @@ impl ScanLog {
     /// # Errors
     /// [`LogError`] names the file and the line.
     pub fn read(path: &Path) -> Result<Self, LogError> {
-        let file = File::open(path).map_err(|source| LogError::File { path: path.to_owned(), source })?;
+        let file = input::open(path).map_err(|source| LogError::File { path: path.to_owned(), source })?;
         Self::parse(path, file)
     }
 

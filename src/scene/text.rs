@@ -1,7 +1,7 @@
 //! Text files that people write: scenes, robots, mappings of columns.
 
+use crate::input;
 use std::{
-    fs::File,
     io::{ErrorKind, Read},
     path::Path,
 };
@@ -15,7 +15,7 @@ const MAX_BYTES: u64 = 1 << 24;
 /// When it cannot be read, is no text, or is longer than [`MAX_BYTES`]: why, and what to do.
 pub(crate) fn read(path: &Path) -> Result<String, String> {
     let mut text = String::new();
-    let read = File::open(path).and_then(|stream| stream.take(MAX_BYTES + 1).read_to_string(&mut text));
+    let read = input::open(path).and_then(|stream| stream.take(MAX_BYTES + 1).read_to_string(&mut text));
     match read {
         Ok(_) if text.len() as u64 > MAX_BYTES => {
             Err(format!("it is longer than {MAX_BYTES} bytes, which no file of this kind is; check the path"))

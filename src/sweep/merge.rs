@@ -16,6 +16,7 @@ use super::{
 use crate::{
     JointVector,
     contact::Equilibrium,
+    input,
     object::ObjectError,
     proxy::Chain,
     scene::{Algorithm, Scene, SceneError},
@@ -25,8 +26,7 @@ use memmap2::Mmap;
 use std::{
     collections::BTreeMap,
     convert::Infallible,
-    fs::{self, File},
-    io,
+    fs, io,
     ops::Range,
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
@@ -48,7 +48,7 @@ impl Contents {
     /// Reads the file at `path`. What is behind the first damage does not count.
     pub fn read(path: &Path) -> Result<Self, SweepError> {
         let failed = |source| SweepError::Part { path: path.into(), source };
-        let file = File::open(path).map_err(failed)?;
+        let file = input::open(path).map_err(failed)?;
         // SAFETY: the mapping is read-only, and a shard that has its name is not written to any more. Another program
         // that truncates it ends this process, as it would with any mapped file; no haptic loop reads it.
         let map = unsafe { Mmap::map(&file) }.map_err(failed)?;

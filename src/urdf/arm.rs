@@ -166,8 +166,15 @@ fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, UrdfE
 fn way(robot: &Robot, tip: &str) -> Result<Vec<usize>, UrdfError> {
     let Some(mut link) = robot.links.iter().position(|link| link.name == tip) else {
         let parents: std::collections::HashSet<usize> = robot.joints.iter().map(|joint| joint.parent).collect();
-        let ends = robot.links.iter().enumerate().filter(|(number, _)| !parents.contains(number));
-        let message = format!("there is no link {tip:?}; chains end at {}", listed(ends.map(|(_, link)| &link.name)));
+        let ends: Vec<_> = robot.links.iter().enumerate().filter(|(number, _)| !parents.contains(number)).collect();
+        let known = if robot.links.is_empty() {
+            "the robot has no links at all: give a file that describes one".into()
+        } else if ends.is_empty() {
+            "no chain ends, for its joints form a circle: a URDF is a tree; remove one of them".into()
+        } else {
+            format!("chains end at {}", listed(ends.iter().map(|(_, link)| &link.name)))
+        };
+        let message = format!("there is no link {tip:?}; {known}");
         return Err(UrdfError::Request { path: robot.path.clone(), message });
     };
     let movers: HashMap<usize, usize> =

@@ -14,14 +14,14 @@ use super::{
 use crate::{
     JointVector,
     gpu::{ADAPTER_VARIABLE, Context, GpuError},
+    input,
     render::{on_demand::OnDemand, timing::Timing},
     scene::Scene,
 };
 use eframe::{egui, egui_wgpu::RenderState};
 use std::{
-    fs::File,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{Arc, atomic::AtomicBool},
 };
 
 /// The scene or file that is opened first.
@@ -42,14 +42,9 @@ impl Start {
     /// When it cannot.
     pub fn check(&self) -> Result<(), ViewError> {
         let Self::File(path) = self else { return Ok(()) };
-        let readable = File::open(path).and_then(|file| match file.metadata()? {
-            found if found.is_dir() => Err(std::io::ErrorKind::IsADirectory.into()),
-            _ => Ok(()),
-        });
-        readable.map_err(|error| {
-            let remedy = "give a scene (.toml) or a dataset (.haptize)";
-            ViewError::Open(format!("{}: cannot be read: {error}; {remedy}", path.display()))
-        })
+        let remedy = "give a scene (.toml) or a dataset (.haptize)";
+        let unreadable = |error| ViewError::Open(format!("{}: cannot be read: {error}; {remedy}", path.display()));
+        input::open(path).map(drop).map_err(unreadable)
     }
 }
 
@@ -186,6 +181,12 @@ impl Viewer {
              Update the GPU's driver if this comes back, or draw on another adapter: set {ADAPTER_VARIABLE} to a part \
              of its name before haptize starts; haptize doctor lists them"
         ));
+    }
+
+    /// The flag that ends the session of the device that leads, where there is one.
+    #[must_use]
+    pub fn stop(&self) -> Option<&'static AtomicBool> {
+        self.device.as_ref().map(|device| device.stop)
     }
 
     /// Lets a haptic device lead in everything that is opened from now on.

@@ -2,6 +2,7 @@
 
 use super::loaded::Loaded;
 use crate::device::{Address, Device, Guard, Key, KeyInput, Kind, attach, open};
+use std::sync::atomic::AtomicBool;
 
 /// The device that the window is driven by.
 #[derive(Clone, Debug)]
@@ -10,6 +11,8 @@ pub struct DeviceChoice {
     pub address: Address,
     /// Whether there is torque only while the space bar is held.
     pub hold_key: bool,
+    /// Raised when the program is to end: the torque does so at the next tick, and the window is closed.
+    pub stop: &'static AtomicBool,
 }
 
 /// Description of the device that leads, for the window.
@@ -38,7 +41,9 @@ impl DeviceChoice {
         };
         let (key, input) = Key::new();
         let hardware = open(address, hand).map_err(|error| error.to_string())?;
-        let guard = Guard::new(hardware, self.hold_key.then_some(key)).map_err(|halt| format!("{address}: {halt}"))?;
+        let mut guard =
+            Guard::new(hardware, self.hold_key.then_some(key)).map_err(|halt| format!("{address}: {halt}"))?;
+        guard.end_with(self.stop);
         let lead = Lead {
             description: guard.description(),
             caution: address.caution(guard.limits()),

@@ -11,7 +11,12 @@ use std::{
     cell::Cell,
     panic::{AssertUnwindSafe, catch_unwind},
     rc::Rc,
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+        mpsc::{self, RecvTimeoutError},
+    },
+    thread,
     time::{Duration, Instant},
 };
 
@@ -25,6 +30,9 @@ const AT_REST: Duration = Duration::from_secs(60);
 /// Least time that a window lasts which was opened again, for another one to be opened when its device is lost, too
 /// [s]: one that is lost again and again is no use.
 const LEAST_LIFE: Duration = Duration::from_secs(30);
+
+/// How often a window that a device leads looks whether the program is to end.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// Longest wait for the last frame of a window that is closed.
 const LAST_WORK: Duration = Duration::from_secs(1);
@@ -90,7 +98,8 @@ fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<(Rescue, String)>
             }
             Begin::Resume(rescue, why) => viewer.resume(*rescue, &why, &creation.egui_ctx),
         }
-        Ok(Box::new(App { viewer, last: Instant::now(), egui: creation.egui_ctx.clone(), leave }))
+        let open = viewer.stop().map(|stop| close_by(stop, creation.egui_ctx.clone())).transpose()?;
+        Ok(Box::new(App { viewer, last: Instant::now(), egui: creation.egui_ctx.clone(), leave, _open: open }))
     });
     // egui's renderer panics where its device is lost while it paints; winit, where the display is. After that there is
     // no other window to be had from them.
@@ -109,6 +118,20 @@ fn show(context: &Arc<Context>, begin: Begin) -> Result<Option<(Rescue, String)>
     }
 }
 
+/// Closes the window of `egui` when `stop` is raised, until what is returned is dropped.
+fn close_by(stop: &'static AtomicBool, egui: egui::Context) -> std::io::Result<mpsc::Sender<()>> {
+    let (open, closed) = mpsc::channel();
+    thread::Builder::new().name("closer".into()).spawn(move || {
+        while closed.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+            if stop.load(Ordering::Relaxed) {
+                egui.send_viewport_cmd(egui::ViewportCommand::Close);
+                return egui.request_repaint();
+            }
+        }
+    })?;
+    Ok(open)
+}
+
 /// Returns the message of a panic.
 fn words(panic: &(dyn Any + Send)) -> &str {
     let whole = panic.downcast_ref::<String>().map(String::as_str);
@@ -121,6 +144,8 @@ struct App {
     egui: egui::Context,
     /// Its state, once it is closed.
     leave: Rc<Cell<Option<Rescue>>>,
+    /// While it is there, a thread may close the window.
+    _open: Option<mpsc::Sender<()>>,
 }
 
 impl eframe::App for App {

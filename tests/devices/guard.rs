@@ -11,7 +11,10 @@ use haptize::{
     render::{recording::Recording, trace::Trace},
     scene::DeviceSpec,
 };
-use std::sync::{Arc, Mutex};
+use std::sync::{
+    Arc, Mutex,
+    atomic::{AtomicBool, Ordering},
+};
 
 /// Maximum torque of the simulated devices [N m].
 const MOST: f64 = 1.0;
@@ -164,6 +167,27 @@ fn a_torque_that_is_no_number_stops_the_device_for_good() {
         assert_eq!(guard.write(&all(2, 0.1)).halt, Some(Halt::NotFinite));
         assert_eq!(torque.lock().unwrap()[0], 0.0);
     }
+}
+
+#[test]
+fn a_raised_flag_ends_torque_at_the_next_tick_and_for_good_whatever_the_loop_does() {
+    static OVER: AtomicBool = AtomicBool::new(false);
+    let (mut guard, torque) = guarded(&[], None);
+    guard.end_with(&OVER);
+    let push = |guard: &mut Guard| {
+        guard.read(PERIOD);
+        guard.write(&all(2, 0.5))
+    };
+    for _ in 0..800 {
+        push(&mut guard);
+    }
+    assert_eq!(torque.lock().unwrap()[0], 0.5);
+    OVER.store(true, Ordering::Relaxed);
+    let held = push(&mut guard);
+    assert_eq!((held.halt, held.effort, torque.lock().unwrap()[0]), (Some(Halt::Over), all(2, 0.0), 0.0));
+    OVER.store(false, Ordering::Relaxed);
+    (0..800).for_each(|_| assert_eq!(push(&mut guard).halt, Some(Halt::Over)));
+    assert_eq!(torque.lock().unwrap()[0], 0.0);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The program: `haptize device`, and `play` with a device.
 
+use haptize::scan::{RowStatus, ScanLog};
 use serde_json::Value;
 use std::{
     path::Path,
@@ -99,4 +100,232 @@ fn play_drives_a_device_and_records_its_clamps_and_stops() {
     let report = json(&played);
     assert!(report["device"]["tally"]["stopped"].as_str().unwrap().contains("unplugged"), "{report}");
     assert!(report["seconds"].as_f64().unwrap() < 0.9, "the session ends with the device");
+}
+
+/// The Touch's arm without weight, and a plan of 3 x 4 x 2 configurations around those of the stand-in, half of them
+/// behind its wall.
+const PLAN: &str = r#"name = "plan"
+[[proxy.joint]]
+name = "waist"
+kind = "revolute"
+axis = [0.0, 0.0, 1.0]
+limits = [-0.98, 0.98]
+rotor_inertia = 5e-4
+[[proxy.joint]]
+name = "shoulder"
+kind = "revolute"
+origin = [0.0, 0.0, 0.125]
+axis = [1.0, 0.0, 0.0]
+limits = [0.0, 1.75]
+rotor_inertia = 5e-4
+[[proxy.joint]]
+name = "elbow"
+kind = "revolute"
+origin = [0.0, 0.134, 0.0]
+axis = [1.0, 0.0, 0.0]
+limits = [-0.739, 1.32]
+rotor_inertia = 5e-4
+nodes = [{ at = [0.0, 0.0, -0.1325] }]
+[scan.joints]
+axes = [
+    { start = -0.12, stop = -0.06, count = 3 },
+    { start = 0.18, stop = 0.36, count = 4 },
+    { start = 0.08, stop = 0.12, count = 2 },
+]
+[scan.control]
+stiffness = 4.0
+damping = 0.15
+window = 0.05
+average = 0.05
+still = 5e-4
+drift = 1e-3
+epsilon = 0.005
+[scan.limits]
+torque = 0.19
+workspace = [[-0.3, -0.1, -0.3], [0.3, 0.3, 0.3]]
+[scan.simulated]
+corner = [0.0, 0.0, 0.0]
+size = [0.1, 0.1, 0.1]
+[device]
+map = [[-1, 0, 0], [0, 1, 0], [0, -1, 1]]
+"#;
+
+/// A user's whole way: plan, log, dataset. The library's thread drives the scan; what it measures is the wall.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_whole_plan_is_scanned_with_a_touch_by_the_command_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(path.join("plan.toml"), PLAN).unwrap();
+    let device = format!("touch:{}", crate::vendor::built("hd").display());
+    let scan = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_haptize"));
+        command.args(["scan", "plan.toml", "--device", &device, "--json"]).args(more).current_dir(path);
+        command.env("STAND_IN_FREE", "1").output().unwrap()
+    };
+    let mut output = scan(&[]);
+    // Where other programs held the scan up, its user continues it.
+    for _ in 0..10 {
+        if json(&output)["error"].as_str().is_some_and(|error| error.contains("busy") || error.contains("5 ms")) {
+            output = scan(&["--resume"]);
+        }
+    }
+    let report = json(&output);
+    assert_eq!(output.status.code(), Some(0), "{report} {}", String::from_utf8_lossy(&output.stderr));
+    assert!(report["whole"] == true && report["points"] == 24 && report["simulated"] == false, "{report}");
+    let rows = ScanLog::read(&path.join("plan.csv")).unwrap().rows;
+    assert_eq!(rows.len(), 24);
+    let mut pressed = 0;
+    for row in &rows {
+        assert_eq!(row.status, RowStatus::Steady, "{row:?}");
+        // Only the shoulder meets the wall, of 1 N m/rad at 0.3 rad; what counts as still moves it by 4 N m/rad times
+        // 5e-4 rad, and half the drift.
+        let expected = [0.0, -(row.q[1] - 0.3).max(0.0), 0.0];
+        assert!((0..3).all(|a| (row.torque[a] - expected[a]).abs() < 2.5e-3), "{row:?}: {expected:?}");
+        pressed += usize::from(row.torque[1] < -0.02);
+    }
+    assert!(pressed >= 6, "{pressed} points behind the wall");
+    // Nothing is left to do, and nothing is measured twice.
+    let again = json(&scan(&["--resume"]));
+    assert!(again["whole"] == true && ScanLog::read(&path.join("plan.csv")).unwrap().rows.len() == 24, "{again}");
+    let gridized = haptize(path, &["gridize", "plan.csv", "--step", "0.03,0.05,0.04", "--json"]);
+    assert_eq!(gridized.status.code(), Some(0), "{}", String::from_utf8_lossy(&gridized.stderr));
+}
+
+/// Two slides above a ball, led by the two joints of a 2DIY.
+#[cfg(unix)]
+const SLIDES: &str = r#"name = "slides"
+[object]
+node_mass = 0.005
+sphere = { radius = 0.05, rings = 10, segments = 10 }
+springs = { kind = "isotropic", stiffness = 300.0 }
+ground = { stiffness = 100.0 }
+[[proxy.joint]]
+name = "slide"
+kind = "prismatic"
+axis = [1.0, 0.0, 0.0]
+limits = [-0.05, 0.05]
+mass = 0.1
+[[proxy.joint]]
+name = "press"
+kind = "prismatic"
+axis = [0.0, 0.0, -1.0]
+origin = [0.0, 0.0, 0.06]
+limits = [-0.03, 0.05]
+mass = 0.1
+nodes = [{ at = [0.0, 0.0, 0.0] }]
+[contact]
+stiffness = 1000.0
+[grid]
+axes = [{ start = -0.03, stop = 0.04, count = 8 }, { start = 0.0, stop = 0.04, count = 9 }]
+[device]
+map = [[0.1, 0.0], [0.0, 0.1]]
+offset = [-0.29365, -0.021817]
+"#;
+
+/// The torque that a firmware was sent with each command, and when.
+#[cfg(unix)]
+type Sent = std::sync::Arc<std::sync::Mutex<Vec<(std::time::Instant, f64)>>>;
+
+/// A firmware that keeps what it was sent.
+#[cfg(unix)]
+struct Watched {
+    firmware: crate::emulator::TwoDiyFirmware,
+    sent: Sent,
+}
+
+#[cfg(unix)]
+impl crate::emulator::Firmware for Watched {
+    fn take(&mut self, bytes: &[u8], angles: &haptize::JointVector) -> Vec<Vec<u8>> {
+        let replies = self.firmware.take(bytes, angles);
+        let sent = (std::time::Instant::now(), self.firmware.torque().norm());
+        self.sent.lock().unwrap().extend(replies.iter().map(|_| sent));
+        replies
+    }
+
+    fn torque(&self) -> haptize::JointVector {
+        self.firmware.torque()
+    }
+
+    fn other(&self) -> Vec<u8> {
+        self.firmware.other()
+    }
+}
+
+/// Plays in `folder` with an emulated 2DIY, sends `signal` once it is pushed, and returns with how many commands it was
+/// still pushed afterwards.
+#[cfg(unix)]
+fn pushed_after(folder: &Path, signal: libc::c_int) -> usize {
+    use std::{
+        os::unix::process::CommandExt,
+        process::Stdio,
+        time::{Duration, Instant},
+    };
+    let middle = haptize::JointVector::from_slice(&[168.25_f64.to_radians(), 12.5_f64.to_radians()]);
+    let sent = Sent::default();
+    let firmware = Watched { firmware: crate::emulator::TwoDiyFirmware::default(), sent: sent.clone() };
+    let emulator = crate::emulator::Emulator::new(firmware, crate::felt::pressing(2, &middle));
+    let (_, (output, signalled)) = emulator.beside(true, |line| {
+        let mut play = Command::new(env!("CARGO_BIN_EXE_haptize"));
+        play.args(["play", "s.haptize", "--seconds", "60", "--record", "r.csv", "-o", "felt", "--json"])
+            .args(["--device", &format!("2diy:{line}")])
+            .current_dir(folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        // As from a terminal, whoever has started this process to ignore the signal.
+        // SAFETY: the call is one that may be made between fork and exec.
+        unsafe {
+            play.pre_exec(move || {
+                libc::signal(signal, libc::SIG_DFL);
+                Ok(())
+            })
+        };
+        let mut play = play.spawn().unwrap();
+        let patience = Instant::now() + Duration::from_secs(60);
+        while !sent.lock().unwrap().last().is_some_and(|(_, torque)| *torque > 0.02) {
+            let goes_on = play.try_wait().unwrap().is_none() && Instant::now() < patience;
+            if !goes_on {
+                let _ = play.kill();
+                panic!("no torque: {}", String::from_utf8_lossy(&play.wait_with_output().unwrap().stderr));
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let signalled = Instant::now();
+        // SAFETY: the process is ours, and not waited for yet.
+        assert_eq!(unsafe { libc::kill(play.id() as libc::pid_t, signal) }, 0);
+        (play.wait_with_output().unwrap(), signalled)
+    });
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{told}");
+    let report = json(&output);
+    assert!(report["seconds"].as_f64().unwrap() < 50.0 && report["device"]["tally"]["stopped"].is_null(), "{report}");
+    for file in report["files"].as_array().unwrap() {
+        assert!(folder.join(file.as_str().unwrap()).is_file(), "{file}");
+    }
+    assert!(folder.join("felt/trace.csv").is_file() && folder.join("r.csv").is_file(), "{report}");
+    let replayed = haptize(folder, &["play", "s.haptize", "--replay", "r.csv", "--json", "-o", "again"]);
+    assert_eq!(json(&replayed)["replayed"], true);
+    let sent = sent.lock().unwrap();
+    let after: Vec<f64> = sent.iter().filter(|(at, _)| *at > signalled).map(|(_, torque)| *torque).collect();
+    let pushed = after.iter().position(|torque| *torque == 0.0).expect("zero torque is sent");
+    assert!(after[pushed..].iter().all(|torque| *torque == 0.0), "{after:?}");
+    pushed
+}
+
+/// Of some sessions the one counts in which nobody held up the thread that hears signals: the machine may be busy.
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_the_torque_within_two_ticks_and_the_session_keeps_its_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(path.join("s.toml"), SLIDES).unwrap();
+    assert_eq!(haptize(path, &["bake", "s.toml", "-o", "s.haptize", "--backend", "cpu"]).status.code(), Some(0));
+    for signal in [libc::SIGINT, libc::SIGTERM] {
+        let mut ticks = Vec::new();
+        while ticks.len() < 10 && !ticks.iter().any(|ticks| *ticks <= 2) {
+            ticks.push(pushed_after(path, signal));
+        }
+        eprintln!("signal {signal}: torque for {ticks:?} more commands");
+        assert!(ticks.iter().any(|ticks| *ticks <= 2), "signal {signal}: torque for {ticks:?} more commands");
+    }
 }

@@ -26,7 +26,7 @@ use std::{
 use tempfile::TempDir;
 
 /// Builds the stand-in `name` once; each test loads a copy of its own, with a state of its own.
-fn built(name: &'static str) -> PathBuf {
+pub fn built(name: &'static str) -> PathBuf {
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     static DRD: OnceLock<PathBuf> = OnceLock::new();
     static HD: OnceLock<PathBuf> = OnceLock::new();

@@ -5,7 +5,7 @@
 
 use crate::{
     fuzz::Random,
-    program::{OBJECTS, command, message, succeed, write_scene},
+    program::{BLOCK, OBJECTS, command, message, succeed, write_scene},
 };
 use std::{
     path::Path,
@@ -118,6 +118,40 @@ fn a_bake_killed_at_any_moment_continues_to_the_same_dataset_on_software_vulkan(
     kill_at_random("gpu", 40);
 }
 
+/// Nothing that is seen of a body changes when a node inside of it moves, but its stiffness does.
+#[test]
+fn a_part_is_not_continued_after_only_an_inner_node_has_moved() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let moved = BLOCK.replace("9 0.01 -0.02 0.03", "9 0.01 -0.02 0.06");
+    let bodies = [BLOCK, &moved].map(|mesh| {
+        write_scene(folder.path(), OBJECTS[2].1, 4);
+        std::fs::write(path("block.msh"), mesh).unwrap();
+        succeed(folder.path(), &["bake", "scene.toml", "-o", "y.haptize", "--backend", "cpu"]);
+        let dataset = haptize::dataset::Dataset::load(&path("y.haptize")).unwrap();
+        (dataset.surface.as_ref().unwrap().nodes.to_vec(), dataset.torque.to_vec())
+    });
+    assert!(bodies[0].0 == bodies[1].0 && bodies[0].1 != bodies[1].1, "the same surface, another torque");
+    write_scene(folder.path(), OBJECTS[2].1, 300);
+    let mut begun = command(folder.path(), &bake("cpu")).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+    while std::fs::metadata(path("x.haptize.part")).map_or(0, |part| part.len()) < 100_000 {
+        assert!(begun.try_wait().unwrap().is_none(), "ended before it was killed");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    begun.kill().unwrap();
+    begun.wait().unwrap();
+    let part = std::fs::read(path("x.haptize.part")).unwrap();
+    std::fs::write(path("block.msh"), moved).unwrap();
+    let refused = command(folder.path(), &bake("cpu")).output().unwrap();
+    assert!(refused.status.code() == Some(1) && message(&refused).contains("another object"), "{}", message(&refused));
+    assert!(std::fs::read(path("x.haptize.part")).unwrap() == part && !path("x.haptize").exists());
+    // The part of the body that it was begun with goes on.
+    std::fs::write(path("block.msh"), BLOCK).unwrap();
+    let told = succeed(folder.path(), &[&bake("cpu")[..], &["--json"]].concat());
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert!(told["resumed_points"].as_u64().unwrap() > 0, "{told}");
+}
+
 #[test]
 fn a_killed_command_leaves_one_file_at_most_which_the_next_removes() {
     let whole = Undisturbed::new("cpu", 60);
@@ -143,6 +177,29 @@ fn a_killed_command_leaves_one_file_at_most_which_the_next_removes() {
     }
     succeed(folder, &export);
     assert_eq!(unfinished(), 0);
+}
+
+/// What is felt without a bake is saved while it is felt: a process that is killed loses some seconds of it.
+#[test]
+fn a_killed_session_on_demand_leaves_a_whole_dataset_that_the_next_goes_on_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/organ.toml").display().to_string();
+    let play = |seconds| ["play", &scene, "--on-demand", "x.haptize", "-o", "felt", "--json", "--seconds", seconds];
+    let mut session = command(folder.path(), &play("600")).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+    let (file, began) = (folder.path().join("x.haptize"), Instant::now());
+    while !file.exists() {
+        assert!(
+            session.try_wait().unwrap().is_none() && began.elapsed() < Duration::from_secs(120),
+            "nothing is saved"
+        );
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    session.kill().unwrap();
+    session.wait().unwrap();
+    let kept = haptize::dataset::Dataset::load(&file).unwrap().refinement.unwrap().horizon();
+    assert!(kept > 100, "{kept} blocks");
+    let felt: serde_json::Value = serde_json::from_str(&succeed(folder.path(), &play("0.2"))).unwrap();
+    assert_eq!(felt["explored"]["known_blocks"].as_u64(), Some(kept));
 }
 
 #[test]

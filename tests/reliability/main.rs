@@ -7,6 +7,7 @@
 mod alone;
 mod crash;
 mod fuzz;
+mod inputs;
 mod outputs;
 mod program;
 mod signals;

@@ -88,6 +88,30 @@ fn every_command_ends_within_a_second_of_a_signal() {
     assert!(left.iter().find(is_half).is_none(), "{left:?}");
 }
 
+/// A signal ends a session as its time does: what was explored and the trace are kept. Figures take as long as they
+/// may: those are left out for which there is no time, and told.
+#[test]
+fn a_session_on_demand_ends_within_a_second_of_a_signal_and_keeps_what_it_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/organ.toml").display().to_string();
+    for signal in listened() {
+        let play = ["play", &scene, "--on-demand", "x.haptize", "--seconds", "60", "-o", "p", "--json"];
+        let (output, took) = interrupted(folder.path(), &play, Duration::from_millis(2500), signal);
+        assert!(took < LONGEST, "{signal}: went on for {took:?}");
+        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        // A machine too busy for the loop gives it a fault.
+        let code = i32::from(!told["fault"].is_null());
+        assert_eq!(output.status.code(), Some(code), "{signal}: {told} {}", message(&output));
+        assert!(told["seconds"].as_f64().unwrap() > 0.0 && told["explored"]["blocks"].as_u64().unwrap() > 0, "{told}");
+        let files: Vec<&str> = told["files"].as_array().unwrap().iter().map(|file| file.as_str().unwrap()).collect();
+        assert!(files.contains(&"x.haptize") && files.contains(&"p/trace.csv"), "{files:?}");
+        assert!(files.iter().all(|file| folder.path().join(file).exists()), "{files:?}");
+        let drawn = files.iter().any(|file| file.ends_with("object.png"));
+        assert!(drawn || message(&output).contains("left out"), "{}", message(&output));
+        eprintln!("{signal} took {took:?}, {} files", files.len());
+    }
+}
+
 #[test]
 fn a_scan_that_is_interrupted_keeps_its_rows() {
     let folder = tempfile::tempdir().unwrap();

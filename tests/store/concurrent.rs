@@ -3,10 +3,11 @@
 use crate::fixture::{blocks, nodes, space};
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use haptize::store::{
-    Order, Place, Store,
+    Nodes, Order, Place, Store,
     record::{slope, width},
 };
 use std::{
+    collections::HashSet,
     sync::atomic::{AtomicBool, Ordering},
     thread,
 };
@@ -73,4 +74,36 @@ fn readers_see_whole_blocks_beside_writers_and_never_allocate() {
             }
         });
     }
+}
+
+#[test]
+fn a_list_of_blocks_beside_writers_has_all_on_which_each_rests() {
+    let space = space(3, 3);
+    let all: Vec<_> = (0..3).flat_map(|level| blocks(&space, level).into_iter().map(move |b| (level, b))).collect();
+    let mut beside = 0;
+    // Again and again, until a list was taken while blocks were published.
+    for _ in 0..2000 {
+        let store = Store::new(space.clone(), Order::Linear, all.len());
+        thread::scope(|scope| {
+            let writer = scope.spawn(|| {
+                for (level, block) in &all {
+                    store.publish(*level, block, Nodes::default()).unwrap();
+                }
+            });
+            while !writer.is_finished() {
+                let (before, list) = (store.horizon(), store.blocks());
+                beside += usize::from(store.horizon() > before);
+                let keys: HashSet<u64> = list.iter().map(|(key, _)| *key).collect();
+                for key in &keys {
+                    let (level, place) = space.block(*key).unwrap();
+                    let rests = |(below, place)| keys.contains(&space.key(below, &place));
+                    assert!(store.foundation(level, &place).all(rests), "of {} blocks", keys.len());
+                }
+            }
+        });
+        if beside > 1000 {
+            return;
+        }
+    }
+    panic!("{beside} lists were taken beside the writer");
 }

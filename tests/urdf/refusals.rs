@@ -109,7 +109,12 @@ fn other_files_are_told_apart() {
 #[test]
 fn hostile_xml_is_refused_soon() {
     let deep = format!("<robot>{}{}</robot>", "<a>".repeat(100_000), "</a>".repeat(100_000));
-    assert!(refusal(&deep).contains("no link \"hand\""));
+    assert!(refusal(&deep).contains("no link \"hand\"; the robot has no links at all"));
+    let joint = |from: &str, to: &str| {
+        format!("<joint name=\"{from}{to}\" type=\"fixed\"><parent link=\"{from}\"/><child link=\"{to}\"/></joint>")
+    };
+    let circle = format!("<robot><link name=\"a\"/><link name=\"b\"/>{}{}</robot>", joint("a", "b"), joint("b", "a"));
+    assert!(refusal(&circle).contains("circle"), "{}", refusal(&circle));
     assert!(refusal(&format!("<robot>{}", "<a>".repeat(100_000))).contains("not well-formed"));
     assert!(refusal(&format!("<robot>{}</robot>", "<a/>".repeat(2 << 20))).contains("not well-formed"));
     let chain: String = (0..2000)

@@ -15,7 +15,7 @@ use haptize::{
 };
 use std::{
     path::{Path, PathBuf},
-    sync::{Arc, LazyLock, Mutex, MutexGuard, OnceLock, PoisonError},
+    sync::{Arc, LazyLock, Mutex, MutexGuard, OnceLock, PoisonError, atomic::AtomicBool},
 };
 
 /// One device for all tests, used by one at a time: software Vulkan compiles its pipelines anew on each.
@@ -75,7 +75,8 @@ impl Window {
     /// The sphere, led by the device at `address`.
     pub fn driven(address: &str, hold_key: bool) -> Self {
         let mut window = Self::empty([1200.0, 800.0], Theme::Light);
-        let device = DeviceChoice { address: address.parse().unwrap(), hold_key };
+        static STOP: AtomicBool = AtomicBool::new(false);
+        let device = DeviceChoice { address: address.parse().unwrap(), hold_key, stop: &STOP };
         let ctx = window.harness.ctx.clone();
         window.harness.state_mut().drive(device);
         window.harness.state_mut().start(&Start::File(SPHERE.1.clone()), &ctx);

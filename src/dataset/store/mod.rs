@@ -183,10 +183,12 @@ impl Store {
         self.blocks.get(self.space.key(level, block))
     }
 
-    /// All blocks, ascending by key: those of the base first.
+    /// All blocks that are there now, each with those on which it rests, whatever others publish meanwhile. Ascending by
+    /// key: those of the base first.
     #[must_use]
     pub fn blocks(&self) -> Vec<(u64, &Block)> {
-        let mut blocks: Vec<_> = self.blocks.iter().collect();
+        let horizon = self.horizon();
+        let mut blocks: Vec<_> = self.blocks.iter().filter(|(_, block)| block.number < horizon).collect();
         blocks.sort_unstable_by_key(|(key, _)| *key);
         blocks
     }

@@ -11,6 +11,7 @@ mod obj;
 mod ply;
 
 use super::{Body, ObjectError, topology::place};
+use crate::input;
 use glam::DVec3;
 use std::collections::HashMap;
 use std::fs::File;
@@ -75,13 +76,13 @@ pub(super) fn read_tetrahedra(
     Ok(ordered)
 }
 
-/// Opens a plain file of bounded length.
+/// Opens a file of bounded length.
 fn open(file: &Path) -> Result<File, ObjectError> {
     let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
-    let stream = File::open(file).map_err(|error| unreadable(error.to_string()))?;
+    let stream = input::open(file).map_err(|error| unreadable(error.to_string()))?;
     let attributes = stream.metadata().map_err(|error| unreadable(error.to_string()))?;
-    if !attributes.is_file() || attributes.len() > MAX_BYTES {
-        return Err(unreadable(format!("it is not a plain file of at most {MAX_BYTES} bytes")));
+    if attributes.len() > MAX_BYTES {
+        return Err(unreadable(format!("it has more than {MAX_BYTES} bytes")));
     }
     Ok(stream)
 }

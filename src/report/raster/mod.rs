@@ -160,7 +160,7 @@ impl Raster {
                 } else {
                     0.0
                 };
-                if (x - along * along_x).hypot(y - along * along_y) > half {
+                if (x - along * along_x).powi(2) + (y - along * along_y).powi(2) > half * half {
                     continue;
                 }
                 let nearness = (a.nearness + along * (b.nearness - a.nearness)) * (1.0 + lift);

@@ -44,6 +44,8 @@ struct State {
     calibration: c_uint,
     absent: bool,
     frames: u64,
+    /// Whether no hand holds it; then its second joint meets a wall.
+    free: bool,
 }
 
 static STATE: Mutex<State> = Mutex::new(State {
@@ -60,6 +62,7 @@ static STATE: Mutex<State> = Mutex::new(State {
     calibration: 0x5001,
     absent: false,
     frames: 0,
+    free: false,
 });
 static RUNS: AtomicBool = AtomicBool::new(false);
 /// Whether the scheduler calls nobody any more.
@@ -80,6 +83,7 @@ fn state(call: &str) -> MutexGuard<'static, State> {
 #[unsafe(no_mangle)]
 pub extern "C" fn hdInitDevice(_: *const c_char) -> c_uint {
     let mut state = state("hdInitDevice");
+    state.free = std::env::var_os("STAND_IN_FREE").is_some();
     if state.absent {
         state.errors.push(0x0302);
         return 0xffff_ffff;
@@ -145,10 +149,17 @@ pub unsafe extern "C" fn hdGetDoublev(what: c_uint, values: *mut f64) {
     if !state.in_frame {
         state.errors.push(0x0402);
     }
-    // A hand of 3e-3 kg m^2 that holds the joints by 20 N m/rad, for a millisecond.
+    // A millisecond of a hand of 3e-3 kg m^2 that holds the joints by 20 N m/rad; or of as heavy an arm before a wall of
+    // 1 N m/rad at 0.3 rad.
     for a in 0..3 {
         let rest = [0.1, 0.2, 0.3][a];
-        let push = state.torque[a] - 20.0 * (state.angles[a] - rest) - 0.3 * state.velocity[a];
+        let wall = if a == 1 { (state.angles[a] - 0.3).max(0.0) } else { 0.0 };
+        let held = if state.free {
+            wall + 0.02 * state.velocity[a]
+        } else {
+            20.0 * (state.angles[a] - rest) + 0.3 * state.velocity[a]
+        };
+        let push = state.torque[a] - held;
         state.velocity[a] += 1e-3 * push / 3e-3;
         state.angles[a] += 1e-3 * state.velocity[a];
     }
