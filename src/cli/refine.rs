@@ -5,7 +5,7 @@ use crate::{
     contact::Model,
     dataset::{Dataset, Provenance, Surface},
     proxy::Chain,
-    scene::Scene,
+    scene::{Interpolation, Scene},
     store::Order,
     sweep::{
         Aim, CpuBackend, build_object, check_algorithm, grid_of,
@@ -47,20 +47,14 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
     };
     let base = grid_of(scene);
     let uniform: usize = base.axes.iter().map(|axis| ((axis.count - 1) << (wanted.levels - 1)) + 1).product();
+    let order = if scene.haptics.interpolation == Interpolation::Linear { Order::Linear } else { Order::Potential };
     let percent = 100.0 * aim;
     tell(format_args!(
         "haptize: for an rms error of {percent:.2} %: {} points of the scene's grid, and of up to {uniform} where it \
          errs",
         base.points()
     ));
-    let refine = Refine {
-        model: &model,
-        base: base.clone(),
-        levels: wanted.levels,
-        order: Order::Potential,
-        aim,
-        most: wanted.most,
-    };
+    let refine = Refine { model: &model, base: base.clone(), levels: wanted.levels, order, aim, most: wanted.most };
     let refined = refine.fill(&seen)?;
     let measured = unseen.relative_error(|q| refined.store.sample(q).torque());
     let (bytes, blocks) = (refined.store.bytes(), refined.store.blocks().len());

@@ -201,6 +201,25 @@ fn a_refined_bake_keeps_its_error_and_refines_nothing_that_keeps_it_already() {
     assert!(code == Some(1) && json["kept"] == false && json["nodes"] == 63, "{json:#}");
 }
 
+/// The store is of the scene's own interpolation, which takes more nodes for the same error.
+#[test]
+fn a_scene_with_linear_interpolation_is_refined_for_that() {
+    let refined = |interpolation: &str| {
+        let folder = Folder::new();
+        let text = format!("{SCENE}\n[haptics]\ninterpolation = \"{interpolation}\"\n");
+        std::fs::write(folder.0.path().join("a.toml"), text).unwrap();
+        let output = haptize(folder.0.path(), &["bake", "a.toml", "--max-error", "0.2%", "--refine", "4", "--json"]);
+        let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let error = json["error"].as_f64().unwrap();
+        assert!(output.status.success() && json["kept"] == true && error <= 0.002, "{interpolation}: {json:#}");
+        let between = error_between(&folder.output());
+        assert!((0.5..2.0).contains(&(between / error)), "{interpolation}: {between} beside {error}");
+        json["nodes"].as_u64().unwrap()
+    };
+    let [linear, potential] = ["linear", "potential"].map(refined);
+    assert!(linear > potential, "{linear} nodes beside {potential}");
+}
+
 #[test]
 fn what_no_refined_bake_can_do_is_refused_before_anything_is_written() {
     let folder = Folder::new();
