@@ -3,8 +3,8 @@
 //! Work that can stop at a good place takes [`stop_flag`] and looks at it. What has not stopped after [`GRACE`] is
 //! left: files that are half written are removed, and the program ends. A bake's part and a scan's log are on the disk
 //! by then. What follows such work, and may be left out, is begun while there [is time](has_time). All other work ends
-//! at once, and so does everything at a second signal. A signal that the program was
-//! started to ignore (`nohup`) stays ignored.
+//! at once, and so does everything at a second signal. A signal that the program was started to ignore (`nohup`) stays
+//! ignored.
 
 use super::{Failure, last_words};
 use crate::dataset::discard_unfinished;

@@ -38,7 +38,8 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
-    model.with_tangent = true;
+    let order = if scene.haptics.interpolation == Interpolation::Linear { Order::Linear } else { Order::Potential };
+    model.with_tangent = order == Order::Potential;
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
     let unseen = Judge::new(scene, &model, 2, JUDGED)?;
     let aim = match wanted.aim {
@@ -47,7 +48,6 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
     };
     let base = grid_of(scene);
     let uniform: usize = base.axes.iter().map(|axis| ((axis.count - 1) << (wanted.levels - 1)) + 1).product();
-    let order = if scene.haptics.interpolation == Interpolation::Linear { Order::Linear } else { Order::Potential };
     let percent = 100.0 * aim;
     tell(format_args!(
         "haptize: for an rms error of {percent:.2} %: {} points of the scene's grid, and of up to {uniform} where it \

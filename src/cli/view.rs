@@ -25,8 +25,9 @@ pub struct Arguments {
     /// Torque only while the space bar is held in the window (a dead-man key).
     #[arg(long, requires = "device")]
     hold_key: bool,
-    /// Bake nothing: solve contact ahead of the motion while it is felt, and keep what was explored in this file,
-    /// from time to time and when the window is closed. Of an earlier session of the same scene, it is where this one goes on.
+    /// Bake nothing: solve contact ahead of the motion while it is felt, and keep what was explored in this file, from
+    /// time to time and when the window is closed. Of an earlier session of the same scene, it is where this one goes
+    /// on.
     #[arg(long, value_name = "FILE", requires = "file", conflicts_with = "screenshot")]
     on_demand: Option<PathBuf>,
     #[command(flatten)]
