@@ -22,14 +22,6 @@ override SMOOTH: bool = false;
 @group(0) @binding(5) var<storage, read> placed: array<f64>;
 @group(0) @binding(6) var<storage, read_write> gaps: array<f64>;
 
-const ABSENT: u32 = 0xffffffffu;
-
-// Distance of x to a bounding sphere; below zero inside.
-fn distance_to_sphere(number: u32, x: vec3<f64>) -> f64 {
-    let at = 4u * number;
-    return distance(x, vec3<f64>(surface[at], surface[at + 1u], surface[at + 2u])) - surface[at + 3u];
-}
-
 // Where the radii of the proxy nodes begin.
 fn radii() -> u32 {
     return 4u * (parameters.clusters + parameters.groups + parameters.triangles);
@@ -40,84 +32,38 @@ fn control(facet: u32, k: u32, x: vec3<f64>) -> vec3<f64> {
     return vec3<f64>(surface[at], surface[at + 1u], surface[at + 2u]) - x;
 }
 
-struct Closest {
-    distance: f64,
-    facet: u32,
-    point: ClosestPoint,
+// The facet in place `entry` of the clusters.
+fn facet_in_order(entry: u32) -> u32 {
+    return order[entry];
 }
 
-// The facet closest to x, if there is one no farther than `within`.
-fn closest_facet(x: vec3<f64>, within: f64) -> Closest {
-    var best = Closest();
-    best.distance = within;
-    best.facet = ABSENT;
-    var entry = 0u;
-    loop {
-        // The next facet that may be closer.
-        var facet = ABSENT;
-        while entry < parameters.triangles {
-            if entry % (GROUP * CLUSTER) == 0u
-                && distance_to_sphere(parameters.clusters + entry / (GROUP * CLUSTER), x) > best.distance {
-                entry += GROUP * CLUSTER;
-                continue;
-            }
-            if entry % CLUSTER == 0u && distance_to_sphere(entry / CLUSTER, x) > best.distance {
-                entry += CLUSTER;
-                continue;
-            }
-            entry += 1u;
-            if distance_to_sphere(parameters.clusters + parameters.groups + entry - 1u, x) <= best.distance {
-                facet = order[entry - 1u];
-                break;
-            }
-        }
-        if facet == ABSENT {
-            break;
-        }
-        form(facet, x);
-        let point = closest_on_facet();
-        let away = length(jet_at(point.weights).point);
-        if away < best.distance || (away == best.distance && facet < best.facet) {
-            best = Closest(away, facet, point);
-        }
+// Takes `facet` for the current one.
+fn form(facet: u32, x: vec3<f64>) {
+    net[0] = control(facet, 0u, x);
+    if !SMOOTH {
+        net[10] = control(facet, 1u, x);
+        net[14] = control(facet, 2u, x);
+        return;
     }
-    return best;
+    net[1] = control(facet, 1u, x);
+    net[2] = control(facet, 2u, x);
+    net[3] = control(facet, 3u, x);
+    net[4] = control(facet, 4u, x);
+    net[5] = control(facet, 5u, x);
+    net[6] = control(facet, 6u, x);
+    net[7] = control(facet, 7u, x);
+    net[8] = control(facet, 8u, x);
+    net[9] = control(facet, 9u, x);
+    net[10] = control(facet, 10u, x);
+    net[11] = control(facet, 11u, x);
+    net[12] = control(facet, 12u, x);
+    net[13] = control(facet, 13u, x);
+    net[14] = control(facet, 14u, x);
 }
 
-// Pseudonormal at a point of a facet, outward, not of length one.
-fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<f64>) -> vec3<f64> {
-    var first = 0u;
-    var last = 1u;
-    var node = 0u;
-    if point.feature < FEATURE_EDGE {
-        node = corner(facet, point.feature);
-        first = around_start(node);
-        last = around_start(node + 1u);
-    } else if point.feature < FEATURE_FACE {
-        last = 2u;
-    }
-    var sum = vec3<f64>(0.0);
-    for (var entry = first; entry < last; entry += 1u) {
-        // One loop for all features: a facet formed at each of three places would triple the program.
-        var face = facet;
-        var there = point.weights;
-        var k = 0u;
-        if point.feature < FEATURE_EDGE {
-            face = around(entry);
-            k = place_of_corner(face, node);
-            there = one_hot(k);
-        } else if entry == 1u {
-            let edge = point.feature - FEATURE_EDGE;
-            face = across(facet, edge);
-            let back = place_of_corner(face, corner(facet, (edge + 1u) % 3u));
-            there = dot(point.weights, one_hot((edge + 1u) % 3u)) * one_hot(back)
-                + dot(point.weights, one_hot(edge)) * one_hot((back + 1u) % 3u);
-        }
-        form(face, x);
-        let jet = jet_at(there);
-        sum += select(f64(1.0), angle_at(jet, k), point.feature < FEATURE_EDGE) * normal_of(jet);
-    }
-    return sum;
+// Whether it is known without forming the facet that it is farther than `distance` from x.
+fn is_beyond(facet: u32, x: vec3<f64>, distance: f64) -> bool {
+    return false;
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -145,7 +91,7 @@ fn main(
         let at = 3u * (first + node);
         let x = vec3<f64>(placed[at], placed[at + 1u], placed[at + 2u]);
         let radius = surface[radii() + node];
-        let closest = closest_facet(x, abs(known + radius) + 2.0 * parameters.gap_band);
+        let closest = closest_facet(x, abs(known + radius) + 2.0 * parameters.gap_band, f64(0.0), ABSENT);
         if closest.facet == ABSENT {
             continue;
         }

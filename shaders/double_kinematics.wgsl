@@ -18,11 +18,6 @@ fn vector_at(at: u32) -> vec3<f64> {
     return vec3<f64>(chain[at], chain[at + 1u], chain[at + 2u]);
 }
 
-// Rodrigues: v turned about the unit vector `axis` by the angle with the given cosine and sine.
-fn turn(axis: vec3<f64>, motion: vec2<f64>, v: vec3<f64>) -> vec3<f64> {
-    return motion.x * v + motion.y * cross(axis, v) + ((1.0 - motion.x) * dot(axis, v)) * axis;
-}
-
 @compute @workgroup_size(WORKGROUP)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,

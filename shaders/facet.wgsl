@@ -2,7 +2,7 @@
 // src/contact/geometry/facet.rs and quartic.rs). For one invocation; geometry is relative to the point in question,
 // which is the origin.
 //
-// The stage declares SMOOTH, and `control(facet, k, x)`: control point k of a facet less x, of a flat one corner k.
+// The stage declares SMOOTH, and `form(facet, x)`, which takes a facet for the current one, relative to x.
 
 // Control points of the current facet, in the twin's order; of a flat one only the corners, in places 0, 10 and 14.
 var<private> net: array<vec3<f64>, 15>;
@@ -30,31 +30,6 @@ struct Jet {
 
 fn blend(w: vec3<f64>, a: vec3<f64>, b: vec3<f64>, c: vec3<f64>) -> vec3<f64> {
     return w.x * a + w.y * b + w.z * c;
-}
-
-// Takes `facet` for the current one.
-fn form(facet: u32, x: vec3<f64>) {
-    if !SMOOTH {
-        net[0] = control(facet, 0u, x);
-        net[10] = control(facet, 1u, x);
-        net[14] = control(facet, 2u, x);
-        return;
-    }
-    net[0] = control(facet, 0u, x);
-    net[1] = control(facet, 1u, x);
-    net[2] = control(facet, 2u, x);
-    net[3] = control(facet, 3u, x);
-    net[4] = control(facet, 4u, x);
-    net[5] = control(facet, 5u, x);
-    net[6] = control(facet, 6u, x);
-    net[7] = control(facet, 7u, x);
-    net[8] = control(facet, 8u, x);
-    net[9] = control(facet, 9u, x);
-    net[10] = control(facet, 10u, x);
-    net[11] = control(facet, 11u, x);
-    net[12] = control(facet, 12u, x);
-    net[13] = control(facet, 13u, x);
-    net[14] = control(facet, 14u, x);
 }
 
 // Its point at weights w, by de Casteljau's algorithm. Without loops, so that compilers keep all control points in

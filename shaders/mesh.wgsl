@@ -4,6 +4,9 @@
 // neighbours a triangle (across edge k), the starts of the lists of triangles around each node (one more than there are
 // nodes), and those lists; where the compliance leaves out surface nodes, the place of each among those that it covers.
 
+// No triangle, node or place.
+const ABSENT: u32 = 0xffffffffu;
+
 fn corner(triangle: u32, k: u32) -> u32 {
     return mesh[3u * triangle + k];
 }

@@ -35,8 +35,6 @@ override ISOTROPIC: bool = false;
 // triangles.
 @group(0) @binding(8) var<storage, read_write> workspace: array<vec4<f32>>;
 
-const ABSENT: u32 = 0xffffffffu;
-
 // First entry of the workspace and first proxy node of this workgroup's configuration.
 var<private> workspace_base: u32;
 var<private> position_base: u32;

@@ -27,6 +27,15 @@ impl Random {
     }
 }
 
+/// A number in `[-1, 1)` that looks random and follows from `number` alone: a permuted congruential generator (O'Neill
+/// 2014), in integers that shaders have, too.
+#[must_use]
+pub fn scattered(number: u32) -> f64 {
+    let state = number.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    f64::from((word >> 22) ^ word) / 2_147_483_648.0 - 1.0
+}
+
 /// Numbers in `[-1, 1)`.
 #[cfg(test)]
 pub(crate) fn sequence(seed: u64) -> impl FnMut() -> f64 {

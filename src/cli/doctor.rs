@@ -171,7 +171,7 @@ impl Graphics {
 /// Part of a bake that an adapter does.
 fn tier(adapter: &AdapterSummary) -> &'static str {
     if adapter.double {
-        "decides contact or not in f64, and searches forces in f32, which the CPU settles"
+        "solves in f64, from contact or not to torque; of `paper` and `linearised` forces in f32, which the CPU settles"
     } else {
         "has no f64 in shaders: the CPU decides contact near none, and settles all forces"
     }

@@ -44,7 +44,7 @@ pub struct Model<'a> {
     /// sqrt(mobility) times |u| in the energy norm [m/N].
     pub mobility: f64,
     /// The same for what facets stand off the flat triangles by, where contact is with a smooth surface [m/N].
-    bulge_mobility: f64,
+    pub(crate) bulge_mobility: f64,
     /// Whether the compliance covers all nodes of the facets of a leaf (leaves of the surface's tree).
     pub(super) covered_leaves: Arc<Vec<bool>>,
 }

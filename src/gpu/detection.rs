@@ -58,6 +58,8 @@ struct Buffers {
     double_parameters: Option<StorageBuffer>,
     motions: StorageBuffer,
     positions: StorageBuffer,
+    /// Three coordinates of each proxy node, in f64.
+    placed: Option<StorageBuffer>,
     gaps: StorageBuffer,
     list: StorageBuffer,
 }
@@ -107,14 +109,19 @@ impl Detection {
             double_parameters: uniform.transpose()?,
             motions: buffer("joint motions", 2 * size * chunk * u64::from(single.joints))?,
             positions: buffer("proxy positions", 16 * chunk * u64::from(single.proxy_nodes))?,
+            placed: in_double
+                .then(|| buffer("proxy positions in f64", 24 * chunk * u64::from(single.proxy_nodes)))
+                .transpose()?,
             gaps: buffer("gaps", size * chunk)?,
             list: buffer("list of contacts", 4 * (chunk + 1))?,
         };
         let Buffers { parameters, positions, .. } = &buffers;
         let bindings = [(Uniform, parameters), (Read, rest), (Read, mesh), (Write, positions), (Read, clusters)];
         let distances = BoundKernel::new(context, (&shaders::DETECTION, WORKGROUP), &[], &bindings)?;
-        let ends = match (&buffers.double_parameters, double_model) {
-            (Some(uniform), Some(double)) => Ends::double(context, double, device, (&buffers, uniform), chunk)?,
+        let ends = match (&buffers.double_parameters, &buffers.placed, double_model) {
+            (Some(uniform), Some(placed), Some(double)) => {
+                Ends::double(context, double, device, &buffers, (uniform, placed))?
+            }
             _ => Ends::single(context, device, &buffers)?,
         };
         Ok(Self {
@@ -134,6 +141,16 @@ impl Detection {
     /// Proxy nodes in f32 with their gaps to the flat triangles, configuration by configuration.
     pub fn positions(&self) -> &StorageBuffer {
         &self.buffers.positions
+    }
+
+    /// The same in f64, three coordinates each, where the device has it.
+    pub fn placed(&self) -> Option<&StorageBuffer> {
+        self.buffers.placed.as_ref()
+    }
+
+    /// Joint motions, configuration by configuration.
+    pub fn motions(&self) -> &StorageBuffer {
+        &self.buffers.motions
     }
 
     /// One more than there are configurations in contact, then their numbers.
@@ -247,14 +264,12 @@ impl Ends {
         context: &Context,
         DoubleModel { chain, surface, smooth }: &DoubleModel,
         device: &DeviceModel,
-        (buffers, uniform): (&Buffers, &StorageBuffer),
-        chunk: u64,
+        buffers: &Buffers,
+        (uniform, placed): (&StorageBuffer, &StorageBuffer),
     ) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let Buffers { motions, positions, gaps, list, .. } = buffers;
         let DeviceModel { mesh, clusters, .. } = device;
-        let nodes = u64::from(device.parameters.proxy_nodes);
-        let placed = &StorageBuffer::new(context, "proxy positions in f64", 24 * chunk * nodes)?;
         let places = [(Uniform, uniform), (Read, chain), (Read, motions), (Write, placed), (Write, positions)];
         let smallest = [
             (Uniform, uniform),
@@ -279,7 +294,7 @@ impl Ends {
 
 /// Arm and surface in f64 on the device.
 pub(super) struct DoubleModel {
-    chain: StorageBuffer,
+    pub chain: StorageBuffer,
     surface: StorageBuffer,
     /// Whether the surface is smooth.
     smooth: bool,
@@ -327,27 +342,37 @@ fn chain(model: &contact::Model<'_>) -> Vec<f64> {
     numbers
 }
 
-/// Bounding spheres, radii of proxy nodes and control points: see `shaders/double_gap.wgsl`.
-fn surface(model: &contact::Model<'_>) -> Vec<f64> {
-    let controls = |t: u32| {
-        let facet = model.surface.facet_at_rest(t);
-        facet.net.map_or_else(|| facet.corners.to_vec(), |net| net.to_vec())
-    };
+/// The control points of facet `t` at rest, of a flat one its corners [m].
+pub(super) fn controls(model: &contact::Model<'_>, t: u32) -> Vec<DVec3> {
+    let facet = model.surface.facet_at_rest(t);
+    facet.net.map_or_else(|| facet.corners.to_vec(), |net| net.to_vec())
+}
+
+/// Spheres around the facets, `together` of them in their order: centre and radius.
+fn spheres(model: &contact::Model<'_>, together: usize) -> Vec<[f64; 4]> {
     let slack = CULLING_SLACK * model.surface.extent;
     let sphere = |facets: &[u32]| {
         // No point of a facet lies outside its control points.
-        let points: Vec<DVec3> = facets.iter().flat_map(|&t| controls(t)).collect();
+        let points: Vec<DVec3> = facets.iter().flat_map(|&t| controls(model, t)).collect();
         let centre = points.iter().sum::<DVec3>() / points.len() as f64;
         let radius = points.iter().map(|point| point.distance(centre)).fold(0.0, f64::max);
         [centre.x, centre.y, centre.z, radius + slack]
     };
     let order: Vec<u32> = model.surface.bounds.order().collect();
-    let mut numbers = Vec::new();
-    for together in [CLUSTER, GROUP * CLUSTER, 1] {
-        numbers.extend(order.chunks(together).flat_map(sphere));
-    }
+    order.chunks(together).map(sphere).collect()
+}
+
+/// The spheres of the clusters of facets, of the groups of clusters, and of the facets in the order of the clusters:
+/// see `shaders/bounding_spheres.wgsl`.
+pub(super) fn bounding_spheres(model: &contact::Model<'_>) -> Vec<f64> {
+    [CLUSTER, GROUP * CLUSTER, 1].into_iter().flat_map(|together| spheres(model, together)).flatten().collect()
+}
+
+/// Bounding spheres, radii of proxy nodes and control points: see `shaders/double_gap.wgsl`.
+fn surface(model: &contact::Model<'_>) -> Vec<f64> {
+    let mut numbers = bounding_spheres(model);
     numbers.extend(model.chain.nodes.iter().map(|node| node.radius));
     let facets = 0..model.object.triangles.len() as u32;
-    numbers.extend(facets.flat_map(controls).flat_map(|point| point.to_array()));
+    numbers.extend(facets.flat_map(|t| controls(model, t)).flat_map(|point| point.to_array()));
     numbers
 }

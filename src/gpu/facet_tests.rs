@@ -35,8 +35,10 @@ override SMOOTH: bool = true;
 fn question(place: u32) -> vec3<f64> {
     return vec3<f64>(questions[3u * place], questions[3u * place + 1u], questions[3u * place + 2u]);
 }
-fn control(facet: u32, k: u32, x: vec3<f64>) -> vec3<f64> {
-    return question(16u * facet + 1u + k) - x;
+fn form(facet: u32, x: vec3<f64>) {
+    for (var k = 0u; k < 15u; k += 1u) {
+        net[k] = question(16u * facet + 1u + k) - x;
+    }
 }
 fn answer(at: u32, v: vec3<f64>) {
     answers[at] = v.x;

@@ -305,7 +305,7 @@ impl<S: Stages> Fleet<'_, S> {
         ticket: Option<S::Ticket>,
         since: Instant,
     ) -> Result<Found, GpuError> {
-        let Some(ticket) = ticket else { return Ok(Found::default()) };
+        let Some(ticket) = ticket else { return Ok(Found::nothing()) };
         let paced = &mut self.devices[device];
         let found = HostTime::of(&mut self.time.reading, || paced.stages.found(lane, count, &ticket))?;
         let time = paced.worked(since);
@@ -383,10 +383,10 @@ mod tests {
         fn found(&mut self, _: usize, _: usize, _: &usize) -> Result<Found, GpuError> {
             match self.until_lost.checked_sub(1) {
                 None if self.opened == 1 => Err(GpuError::Lost("on purpose".into())),
-                None => Ok(Found::default()),
+                None => Ok(Found::nothing()),
                 Some(left) => {
                     self.until_lost = left;
-                    Ok(Found::default())
+                    Ok(Found::nothing())
                 }
             }
         }

@@ -308,7 +308,18 @@ impl Staging {
 
     /// Records a copy of the first `bytes` bytes of `source` to `place`.
     pub fn copy(&self, encoder: &mut wgpu::CommandEncoder, place: u64, source: &StorageBuffer, bytes: u64) {
-        encoder.copy_buffer_to_buffer(&source.raw, 0, &self.raw, place, bytes);
+        self.copy_from(encoder, place, (source, 0), bytes);
+    }
+
+    /// Records a copy of `bytes` bytes of a buffer, from an offset on, to `place`.
+    pub fn copy_from(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        place: u64,
+        (source, offset): (&StorageBuffer, u64),
+        bytes: u64,
+    ) {
+        encoder.copy_buffer_to_buffer(&source.raw, offset, &self.raw, place, bytes);
     }
 
     /// Waits for `submission` and hands the first `bytes` bytes to `use_bytes`.

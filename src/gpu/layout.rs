@@ -41,6 +41,60 @@ pub struct DoubleParameters {
     pub gap_band: f64,
 }
 
+/// `SearchParameters` of `shaders/search_types.wgsl` (uniform).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented where the shader reads them")]
+pub struct SearchParameters {
+    pub configurations: u32,
+    pub joints: u32,
+    pub proxy_nodes: u32,
+    pub surface_nodes: u32,
+    pub triangles: u32,
+    pub clusters: u32,
+    pub groups: u32,
+    pub covered: u32,
+    pub contacts: u32,
+    pub support: u32,
+    pub carriers: u32,
+    pub max_iterations: u32,
+    pub reals: u32,
+    pub words: u32,
+    pub room: u32,
+    pub with_tangent: u32,
+    pub at_rest: u32,
+    pub at_offsets: u32,
+    pub at_masks: u32,
+    pub at_spheres: u32,
+    pub at_order: u32,
+    pub at_carriers: u32,
+    pub at_shapes: u32,
+    pub at_covered: u32,
+    pub at_places: u32,
+    pub at_links: u32,
+    pub gap_band: f64,
+    pub first_kc: f64,
+    pub kc: f64,
+    pub tolerance: f64,
+    pub mobility: f64,
+    pub bulge_mobility: f64,
+    pub bulge: f64,
+    pub least_scale: f64,
+}
+
+/// `SearchTouch` of `shaders/search_types.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented where the shader writes them")]
+pub struct SearchTouch {
+    pub proxy_node: u32,
+    pub facet: u32,
+    pub feature: u32,
+    pub padding: u32,
+    pub weights: [f64; 3],
+    pub force: [f64; 3],
+}
+
 /// `Joint` of `shaders/types.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -138,6 +192,8 @@ mod tests {
         let expected = [
             layout!(Parameters: configurations, first, joints, proxy_nodes, surface_nodes, triangles, max_iterations, stiffness, kc, tolerance, softest, least_distance, depth_rounding, covered, clusters, mobility),
             layout!(DoubleParameters: configurations, joints, proxy_nodes, surface_nodes, triangles, clusters, groups, padding, gap_band),
+            layout!(SearchParameters: configurations, joints, proxy_nodes, surface_nodes, triangles, clusters, groups, covered, contacts, support, carriers, max_iterations, reals, words, room, with_tangent, at_rest, at_offsets, at_masks, at_spheres, at_order, at_carriers, at_shapes, at_covered, at_places, at_links, gap_band, first_kc, kc, tolerance, mobility, bulge_mobility, bulge, least_scale),
+            layout!(SearchTouch: proxy_node, facet, feature, padding, weights, force),
             layout!(Joint: origin, kind, axis, padding),
             layout!(ProxyNode: position, link),
             layout!(SolverResult: status, iterations, residual, elastic, touches, padding_0, padding_1, padding_2),

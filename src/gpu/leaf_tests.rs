@@ -3,6 +3,7 @@
 use super::{
     adapter::AdapterChoice,
     context::{Context, GpuError},
+    forces::ForceSearch,
     kernel::{Access, Dispatch, Kernel, StorageBuffer},
     layout::{Joint, Parameters, ProxyNode},
     model::DeviceModel,
@@ -305,7 +306,8 @@ fn one_number_for_a_pair_of_nodes_holds_the_compliance_of_isotropic_objects() {
         let chain = Chain::new(&scene.proxy);
         let model = Model::new(&object, &chain, scene.contact);
         let device = DeviceModel::new(&context(), &model).unwrap();
-        assert_eq!(device.compliance.size(), 4 * numbers * (object.surface_nodes as u64).pow(2), "{kind:?}");
+        let search = ForceSearch::new(&context(), &model, &device, BatchCapacity::default()).unwrap();
+        assert_eq!(search.compliance.size(), 4 * numbers * (object.surface_nodes as u64).pow(2), "{kind:?}");
     }
 }
 

@@ -8,6 +8,9 @@
 //! | `shaders` | shaders embedded, assembled from parts, with their override sets |
 //! | `model` | object, proxy and contact law as buffers |
 //! | `detection` | the stages that place the proxy and test it for contact at rest |
+//! | `forces` | the search for forces in f32, for devices without f64 and other algorithms |
+//! | `search` | the search for equilibria in f64: kernels, buffers, rounds |
+//! | `search_model` | object, proxy and contact law for the search |
 //! | `pipeline` | the stages of a batch and their buffers |
 //! | `stages` | what a batch goes through, whoever does it; a device that returns stored results |
 //! | `flights` | sections of configurations in flight on some devices, and back in order |
@@ -17,9 +20,10 @@
 //! | `kernel` | one compute pipeline with its bindings and dispatches; buffers, poison, read-back |
 //! | `timing` | how long each kernel takes, where that is asked for |
 //!
-//! A shader in `shaders/` and its CPU twin share names and order of statements. The GPU searches forces in f32 with
-//! coordinates relative to the object's centroid; the host settles them in f64. Contact or not is decided in f64 on the
-//! device, where it has that.
+//! A shader in `shaders/` and its CPU twin share names and order of statements. Where the device has f64, contact or not
+//! is decided in it, and the energy form is solved in it from the rest state to the result, in the steps of the CPU.
+//! Elsewhere, and by the other algorithms, the device searches forces in f32, with coordinates relative to the object's
+//! centre, and the host settles them in f64.
 
 mod adapter;
 mod context;
@@ -27,6 +31,7 @@ mod detection;
 #[cfg(test)]
 mod facet_tests;
 mod flights;
+mod forces;
 mod frame;
 mod kernel;
 pub mod layout;
@@ -34,6 +39,8 @@ pub mod layout;
 mod leaf_tests;
 mod model;
 mod pipeline;
+mod search;
+mod search_model;
 pub mod shaders;
 mod solver;
 pub mod stages;

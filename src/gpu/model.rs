@@ -1,13 +1,13 @@
 //! Object, proxy and contact law as buffers on the device: what stays the same for all configurations of a sweep.
 //!
 //! Positions are relative to the contact model's centre, so that f32 resolves the object and not its distance from the
-//! origin. Compliance entries are rounded from f64 one by one: each keeps 24 bits whatever the condition number of K.
+//! origin.
 
 use super::{
     context::{Context, GpuError},
     kernel::StorageBuffer,
     layout::{Joint, Parameters, ProxyNode},
-    shaders::CLUSTER,
+    shaders::{CLUSTER, GROUP},
 };
 use crate::{
     contact, proxy,
@@ -29,7 +29,6 @@ pub struct DeviceModel {
     pub(super) rest: StorageBuffer,
     pub(super) mesh: StorageBuffer,
     pub(super) clusters: StorageBuffer,
-    pub(super) compliance: StorageBuffer,
     /// Gaps in f32, to the flat triangles, are those to the contact surface but for this [m].
     pub(super) gap_band: f64,
 }
@@ -62,7 +61,6 @@ impl DeviceModel {
         let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
         let longest_edge = object.triangles.iter().map(|t| edge(corners(t))).fold(0.0, f64::max);
         let clusters: Vec<u32> = model.surface.bounds.order().collect();
-        let entries: Vec<f32> = compliance.entries.iter().map(|&entry| entry as f32).collect();
         Ok(Self {
             parameters: Parameters {
                 joints: chain.joints.len() as u32,
@@ -86,7 +84,6 @@ impl DeviceModel {
             rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, &clusters, extent))?,
             mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(model, &clusters))?,
             clusters: StorageBuffer::from_slice(context, "clusters", &clusters)?,
-            compliance: StorageBuffer::from_slice(context, "compliance", &entries)?,
             gap_band,
         })
     }
@@ -104,11 +101,6 @@ impl DeviceModel {
     /// Size of what the proxy is tested against for contact at rest [B].
     pub(super) fn surface_bytes(&self) -> u64 {
         self.rest.size() + self.mesh.size() + self.clusters.size()
-    }
-
-    /// Size of what contact is solved with [B].
-    pub(super) fn object_bytes(&self) -> u64 {
-        self.rest.size() + self.mesh.size() + self.compliance.size()
     }
 }
 
@@ -155,7 +147,7 @@ fn proxy_nodes(chain: &proxy::Chain) -> Vec<ProxyNode> {
 }
 
 /// Surface nodes, bounding spheres of the triangles, radii of the proxy nodes, bounding spheres of the clusters of
-/// triangles, one behind the other.
+/// triangles and of the groups of clusters, one behind the other.
 fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 4]> {
     let around = |nodes: &[u32]| {
         let corners = nodes.iter().map(|&j| model.surface.positions[j as usize]);
@@ -172,7 +164,8 @@ fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 
     let nodes = model.surface.positions.iter().map(|&n| padded(n));
     let spheres = triangles.iter().map(|nodes| around(nodes));
     let radii = model.chain.nodes.iter().map(|node| [node.radius as f32, 0.0, 0.0, 0.0]);
-    nodes.chain(spheres).chain(radii).chain(clusters.chunks(CLUSTER).map(cluster)).collect()
+    let together = [CLUSTER, GROUP * CLUSTER].into_iter().flat_map(|count| clusters.chunks(count).map(cluster));
+    nodes.chain(spheres).chain(radii).chain(together).collect()
 }
 
 /// Corners, neighbours, lists around nodes and places, then the clusters' triangles and nodes, one behind the other:

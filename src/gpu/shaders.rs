@@ -4,7 +4,12 @@
 //! own file. Constants that both sides need have one source, here in Rust; sizes and switches are override constants.
 
 use crate::{
-    contact::{Status, geometry::facet},
+    contact::{
+        Status,
+        equilibrium::{energy, newton, tangent},
+        geometry::facet,
+        law::depth,
+    },
     tolerances,
 };
 
@@ -27,6 +32,16 @@ pub(super) const SURFACE: &str = include_str!("../../shaders/surface.wgsl");
 pub(super) const DEPTH: &str = include_str!("../../shaders/depth.wgsl");
 pub(super) const DOUBLE_TYPES: &str = include_str!("../../shaders/double_types.wgsl");
 pub(super) const FACET: &str = include_str!("../../shaders/facet.wgsl");
+const ROTATION: &str = include_str!("../../shaders/rotation.wgsl");
+const BOUNDING_SPHERES: &str = include_str!("../../shaders/bounding_spheres.wgsl");
+const CLOSEST_FACET: &str = include_str!("../../shaders/closest_facet.wgsl");
+const DEFORMED_FACET: &str = include_str!("../../shaders/deformed_facet.wgsl");
+const SEARCH_TYPES: &str = include_str!("../../shaders/search_types.wgsl");
+const SEARCH_STATE: &str = include_str!("../../shaders/search_state.wgsl");
+const SEARCH_SUPPORT: &str = include_str!("../../shaders/search_support.wgsl");
+const SEARCH_RESULTS: &str = include_str!("../../shaders/search_results.wgsl");
+const WORKSPACE: &str = include_str!("../../shaders/workspace.wgsl");
+const LISTING: &str = include_str!("../../shaders/listing.wgsl");
 const PREFIX_SUM: &str = include_str!("../../shaders/prefix_sum.wgsl");
 const COMPACT: &str = include_str!("../../shaders/compaction.wgsl");
 const RESULTS: &str = include_str!("../../shaders/results.wgsl");
@@ -71,7 +86,7 @@ pub static COMPACTION: Shader =
 pub static DOUBLE_KINEMATICS: Shader = Shader {
     name: "double_kinematics",
     entry: "main",
-    parts: &[DOUBLE_TYPES, include_str!("../../shaders/double_kinematics.wgsl")],
+    parts: &[DOUBLE_TYPES, ROTATION, include_str!("../../shaders/double_kinematics.wgsl")],
     overrides: &[&[]],
 };
 
@@ -79,7 +94,15 @@ pub static DOUBLE_KINEMATICS: Shader = Shader {
 pub static DOUBLE_GAP: Shader = Shader {
     name: "double_gap",
     entry: "main",
-    parts: &[DOUBLE_TYPES, CLOSEST_POINT, MESH, FACET, include_str!("../../shaders/double_gap.wgsl")],
+    parts: &[
+        DOUBLE_TYPES,
+        CLOSEST_POINT,
+        MESH,
+        FACET,
+        BOUNDING_SPHERES,
+        CLOSEST_FACET,
+        include_str!("../../shaders/double_gap.wgsl"),
+    ],
     overrides: &[&[], SMOOTH],
 };
 
@@ -92,6 +115,9 @@ pub(super) const CLUSTER: usize = 8;
 
 /// Clusters in a group of them, for searches in f64.
 pub(super) const GROUP: usize = 8;
+
+/// Object nodes that the search displaces together.
+pub(super) const NODES_TOGETHER: usize = 64;
 
 /// Facets are of degree four.
 const SMOOTH: &[(&str, f64)] = &[("SMOOTH", 1.0)];
@@ -129,6 +155,90 @@ pub static PAPER: Shader = Shader {
         include_str!("../../shaders/paper.wgsl"),
     ],
     overrides: &[&[], ISOTROPIC, CRAMPED],
+};
+
+/// Search in f64: workspaces and joint axes.
+pub static SEARCH_ARM: Shader = Shader {
+    name: "search_arm",
+    entry: "main",
+    parts: &[SEARCH_TYPES, ROTATION, include_str!("../../shaders/search_arm.wgsl")],
+    overrides: &[&[], ISOTROPIC],
+};
+
+/// Search in f64: the trial's displacement, and its contacts and near misses.
+pub static SEARCH_DETECT: Shader = Shader {
+    name: "search_detect",
+    entry: "main",
+    parts: &[
+        SEARCH_TYPES,
+        WORKSPACE,
+        SEARCH_STATE,
+        LISTING,
+        CLOSEST_POINT,
+        MESH,
+        FACET,
+        BOUNDING_SPHERES,
+        DEFORMED_FACET,
+        CLOSEST_FACET,
+        include_str!("../../shaders/depth_rows.wgsl"),
+        include_str!("../../shaders/search_detect.wgsl"),
+    ],
+    overrides: &[&[], SMOOTH, ISOTROPIC],
+};
+
+/// Search in f64: the trial judged.
+pub static SEARCH_JUDGE: Shader = Shader {
+    name: "search_judge",
+    entry: "main",
+    parts: &[
+        SEARCH_TYPES,
+        WORKSPACE,
+        SEARCH_STATE,
+        LISTING,
+        SEARCH_SUPPORT,
+        include_str!("../../shaders/search_judge.wgsl"),
+    ],
+    overrides: &[&[], ISOTROPIC],
+};
+
+/// Search in f64: from one trial to the next.
+pub static SEARCH_STEP: Shader = Shader {
+    name: "search_step",
+    entry: "main",
+    parts: &[
+        SEARCH_TYPES,
+        WORKSPACE,
+        SEARCH_STATE,
+        LISTING,
+        BOUNDING_SPHERES,
+        SEARCH_SUPPORT,
+        include_str!("../../shaders/search_step.wgsl"),
+    ],
+    overrides: &[&[], ISOTROPIC],
+};
+
+/// Search in f64: what is not done.
+pub static SEARCH_UNFINISHED: Shader = Shader {
+    name: "search_unfinished",
+    entry: "main",
+    parts: &[SEARCH_TYPES, PREFIX_SUM, include_str!("../../shaders/search_unfinished.wgsl")],
+    overrides: &[&[], ISOTROPIC],
+};
+
+/// Search in f64: where the touches of each configuration go.
+pub static SEARCH_COUNT: Shader = Shader {
+    name: "search_results",
+    entry: "count",
+    parts: &[SEARCH_TYPES, PREFIX_SUM, WORKSPACE, SEARCH_RESULTS],
+    overrides: &[&[], ISOTROPIC],
+};
+
+/// Search in f64: records, and touches without gaps.
+pub static SEARCH_GATHER: Shader = Shader {
+    name: "search_results",
+    entry: "gather",
+    parts: &[SEARCH_TYPES, PREFIX_SUM, WORKSPACE, SEARCH_RESULTS],
+    overrides: &[&[], ISOTROPIC],
 };
 
 /// Where the touches of each configuration go.
@@ -211,6 +321,13 @@ pub static ALL: &[&Shader] = &[
     &DOUBLE_KINEMATICS,
     &DOUBLE_GAP,
     &DOUBLE_COMPACTION,
+    &SEARCH_ARM,
+    &SEARCH_DETECT,
+    &SEARCH_JUDGE,
+    &SEARCH_STEP,
+    &SEARCH_UNFINISHED,
+    &SEARCH_COUNT,
+    &SEARCH_GATHER,
     &ENERGY,
     &PAPER,
     &RESULTS_COUNT,
@@ -241,8 +358,11 @@ fn constants(double: bool) -> String {
         ("INNER_ITERATIONS_PER_UNKNOWN", tolerances::INNER_ITERATIONS_PER_UNKNOWN),
         ("MODEL_PASSES", tolerances::MODEL_PASSES),
         ("FACET_ITERATIONS", facet::FACET_ITERATIONS),
+        ("DAMPING_ATTEMPTS", newton::DAMPING_ATTEMPTS as usize),
+        ("NUDGE_HALVINGS", energy::NUDGE_HALVINGS as usize),
         ("CLUSTER", CLUSTER),
         ("GROUP", GROUP),
+        ("NODES_TOGETHER", NODES_TOGETHER),
     ] {
         text.push_str(&format!("const {name}: u32 = {count}u;\n"));
     }
@@ -281,6 +401,28 @@ fn double_constants() -> String {
         ("FAR_AWAY", f64::from(tolerances::GPU_FAR_AWAY)),
         ("LEAST_DIVISOR", tolerances::MINIMUM_SQUARE),
         ("FACET_STEP", facet::FACET_STEP),
+        ("LENGTH_ROUNDING", tolerances::LENGTH_ROUNDING),
+        ("ENERGY_ROUNDING", tolerances::ENERGY_ROUNDING),
+        ("PIVOT_ROUNDING", f64::EPSILON),
+        ("MINIMUM_CURVATURE_RADIUS", depth::MINIMUM_CURVATURE_RADIUS),
+        ("LEAST_CONVEXITY", depth::LEAST_CONVEXITY),
+        ("RESIDUAL_FLOOR", tolerances::RESIDUAL_FLOOR),
+        ("ACCEPTED_SHARE", tolerances::ACCEPTED_SHARE),
+        ("POOR_SHARE", tolerances::POOR_SHARE),
+        ("GOOD_SHARE", tolerances::GOOD_SHARE),
+        ("INNER_TOLERANCE", tolerances::INNER_TOLERANCE),
+        ("INNER_TOLERANCE_FLOOR", tolerances::INNER_TOLERANCE_FLOOR),
+        ("PROBE_TOLERANCE", energy::PROBE_TOLERANCE),
+        ("RESPONSE_TOLERANCE", tangent::RESPONSE_TOLERANCE),
+        ("CONTINUATION_FACTOR", tolerances::CONTINUATION_FACTOR),
+        ("STAGE_TOLERANCE", tolerances::STAGE_TOLERANCE),
+        ("STALLED_LENGTH", tolerances::STALLED_LENGTH),
+        ("GIVE_UP_LENGTH", energy::GIVE_UP_LENGTH),
+        ("NUDGE_LENGTH", energy::NUDGE_LENGTH),
+        ("LEAST_DAMPING", newton::LEAST_DAMPING),
+        ("DAMPING_GROWTH", newton::DAMPING_GROWTH),
+        ("DAMPING_DECAY", newton::DAMPING_DECAY),
+        ("CURVATURE_MARGIN", newton::CURVATURE_MARGIN),
     ];
     constants.map(|(name, value)| format!("const {name}: f64 = {value:e}lf;\n")).concat()
 }
@@ -288,7 +430,7 @@ fn double_constants() -> String {
 impl Shader {
     /// Whether it computes in f64.
     pub(super) fn is_double(&self) -> bool {
-        self.parts.contains(&DOUBLE_TYPES)
+        self.parts.contains(&DOUBLE_TYPES) || self.parts.contains(&SEARCH_TYPES)
     }
 
     /// The whole text, as the device compiles it.

@@ -14,7 +14,7 @@ use super::{
     flights::{HostTime, Landed, PacedDevice, Queue, fly},
     pipeline::{BatchCapacity, Pipeline},
     stages::{Detected, Found, GapPrecision, Recorded, Stages},
-    unpack::unpack,
+    unpack::{solved, unpack},
 };
 use crate::{
     JointVector,
@@ -184,9 +184,10 @@ impl HostPart<'_> {
         found: &Found,
         at_rest: &[Equilibrium],
     ) -> Result<Vec<Equilibrium>, GpuError> {
-        let counts = found.results.iter().map(|result| result.touches as usize);
+        let counts = found.counts();
         let starts: Vec<usize> = counts
-            .scan(0_usize, |end, count| {
+            .iter()
+            .scan(0_usize, |end, &count| {
                 let start = *end;
                 *end = end.saturating_add(count);
                 Some(start)
@@ -194,21 +195,32 @@ impl HostPart<'_> {
             .collect();
         let places: Vec<usize> = (0..touching.len()).collect();
         let model = self.model;
-        let solved = self.cpu.map(&places, |solver, &place| {
+        let settled = self.cpu.map(&places, |solver, &place| {
             let member = touching[place] as usize;
-            let (outcome, list) = (found.results.get(place)?, found.touches.get(*starts.get(place)?..)?);
-            let mut result = unpack(model, solver, &section[member], outcome, list)?;
-            if model.contact.algorithm == Algorithm::Paper {
-                result.gap = at_rest[member].gap;
-            }
-            let undecided = self.is_undecided(precision, &result);
-            Some(if undecided { (solver.solve(&section[member]), 1) } else { (result, 0) })
+            let (q, start) = (&section[member], *starts.get(place)?);
+            let (result, is_undecided) = match found {
+                Found::Solved(found) => {
+                    let result = solved(model, solver, (q, at_rest[member].gap), found, (place, start))?;
+                    let is_undecided = result.status == Status::Overflow;
+                    (result, is_undecided)
+                }
+                Found::Forces(found) => {
+                    let (outcome, list) = (found.results.get(place)?, found.touches.get(start..)?);
+                    let mut result = unpack(model, solver, q, outcome, list)?;
+                    if model.contact.algorithm == Algorithm::Paper {
+                        result.gap = at_rest[member].gap;
+                    }
+                    let is_undecided = self.is_undecided(precision, &result);
+                    (result, is_undecided)
+                }
+            };
+            Some(if is_undecided { (solver.solve(q), 1) } else { (result, 0) })
         });
-        let unwritten = solved.iter().filter(|result| result.is_none()).count();
+        let unwritten = settled.iter().filter(|result| result.is_none()).count();
         if unwritten > 0 {
             return Err(GpuError::NeverWritten { count: unwritten, total: touching.len() });
         }
-        let (results, left): (Vec<_>, Vec<usize>) = solved.into_iter().flatten().unzip();
+        let (results, left): (Vec<_>, Vec<usize>) = settled.into_iter().flatten().unzip();
         self.left_to_cpu += left.into_iter().sum::<usize>();
         Ok(results)
     }

@@ -2,7 +2,7 @@
 
 use super::{
     context::GpuError,
-    layout::{SolverResult, Touch},
+    layout::{SearchTouch, SolverResult, Touch},
 };
 use crate::JointVector;
 use std::ops::Range;
@@ -17,12 +17,83 @@ pub struct Detected {
 }
 
 /// What the kernels found of the configurations in contact.
+#[derive(Clone, Debug)]
+pub enum Found {
+    /// Forces in f32, which are to be settled.
+    Forces(Forces),
+    /// Equilibria in f64.
+    Solved(Solved),
+}
+
+/// Forces in f32.
 #[derive(Clone, Debug, Default)]
-pub struct Found {
-    /// One for each.
+pub struct Forces {
+    /// One for each configuration.
     pub results: Vec<SolverResult>,
     /// Of one after the other.
     pub touches: Vec<Touch>,
+}
+
+/// Equilibria in f64: see `shaders/search_results.wgsl`.
+#[derive(Clone, Debug, Default)]
+pub struct Solved {
+    /// One for each configuration.
+    pub records: Vec<[u32; 4]>,
+    /// As many for each.
+    pub amounts: Vec<f64>,
+    /// Of one after the other.
+    pub touches: Vec<SearchTouch>,
+}
+
+impl Found {
+    /// Nothing of no configuration.
+    #[must_use]
+    pub fn nothing() -> Self {
+        Self::Solved(Solved::default())
+    }
+
+    /// Number of touches of each configuration.
+    #[must_use]
+    pub fn counts(&self) -> Vec<usize> {
+        match self {
+            Self::Forces(forces) => forces.results.iter().map(|result| result.touches as usize).collect(),
+            Self::Solved(solved) => solved.records.iter().map(|[_, _, touches, _]| *touches as usize).collect(),
+        }
+    }
+
+    /// What was found of `configurations`, whose touches are in `touches`.
+    fn part(&self, configurations: Range<usize>, touches: Range<usize>) -> Self {
+        match self {
+            Self::Forces(forces) => Self::Forces(Forces {
+                results: forces.results[configurations].to_vec(),
+                touches: forces.touches[touches].to_vec(),
+            }),
+            Self::Solved(solved) => {
+                let each = solved.amounts.len() / solved.records.len().max(1);
+                Self::Solved(Solved {
+                    amounts: solved.amounts[each * configurations.start..each * configurations.end].to_vec(),
+                    records: solved.records[configurations].to_vec(),
+                    touches: solved.touches[touches].to_vec(),
+                })
+            }
+        }
+    }
+
+    /// Adds what was found of other configurations, in the same precision.
+    fn extend(&mut self, other: Self) {
+        match (self, other) {
+            (Self::Forces(own), Self::Forces(other)) => {
+                own.results.extend(other.results);
+                own.touches.extend(other.touches);
+            }
+            (Self::Solved(own), Self::Solved(other)) => {
+                own.records.extend(other.records);
+                own.amounts.extend(other.amounts);
+                own.touches.extend(other.touches);
+            }
+            (own, other) => *own = other,
+        }
+    }
 }
 
 /// How far gaps can be trusted.
@@ -93,9 +164,8 @@ pub struct Recorded {
     precision: GapPrecision,
     gaps: Vec<f64>,
     is_touching: Vec<bool>,
-    results: Vec<SolverResult>,
-    touches: Vec<Touch>,
-    /// Configurations, results and touches that were returned, of the list as it is gone through now.
+    found: Found,
+    /// Configurations, those in contact and touches that were returned, of the list as it is gone through now.
     returned: [usize; 3],
 }
 
@@ -103,9 +173,8 @@ impl Recorded {
     /// What `stages` find of `configurations`.
     pub(super) fn of<S: Stages>(stages: &mut S, configurations: &[JointVector]) -> Result<Self, GpuError> {
         let (room, precision) = (stages.room(), stages.precision());
-        let (gaps, is_touching) = (Vec::new(), Vec::new());
-        let (results, touches, returned) = (Vec::new(), Vec::new(), [0; 3]);
-        let mut recorded = Self { room, precision, gaps, is_touching, results, touches, returned };
+        let (gaps, is_touching, found) = (Vec::new(), Vec::new(), Found::nothing());
+        let mut recorded = Self { room, precision, gaps, is_touching, found, returned: [0; 3] };
         for section in configurations.chunks(room.section) {
             let ticket = stages.detect(0, section);
             let Detected { gaps, touching } = stages.detected(0, section.len(), &ticket)?;
@@ -115,9 +184,7 @@ impl Recorded {
             touching.iter().for_each(|&member| recorded.is_touching[before + member as usize] = true);
             if !touching.is_empty() {
                 let ticket = stages.solve(0, touching.len(), room.batch);
-                let found = stages.found(0, touching.len(), &ticket)?;
-                recorded.results.extend(found.results);
-                recorded.touches.extend(found.touches);
+                recorded.found.extend(stages.found(0, touching.len(), &ticket)?);
             }
         }
         Ok(recorded)
@@ -154,11 +221,11 @@ impl Stages for Recorded {
     fn solve(&mut self, _: usize, _: usize, _: usize) {}
 
     fn found(&mut self, _: usize, count: usize, (): &()) -> Result<Found, GpuError> {
-        let places = self.next(1, self.results.len(), count);
-        let results = self.results[places].to_vec();
-        let touches = results.iter().map(|result| result.touches as usize).sum();
-        let places = self.next(2, self.touches.len(), touches);
-        Ok(Found { results, touches: self.touches[places].to_vec() })
+        let counts = self.found.counts();
+        let configurations = self.next(1, counts.len(), count);
+        let touches = counts[configurations.clone()].iter().sum();
+        let touches = self.next(2, counts.iter().sum(), touches);
+        Ok(self.found.part(configurations, touches))
     }
 
     fn reopen(&mut self) -> Result<(), GpuError> {

@@ -1,22 +1,84 @@
 //! From what the kernels wrote of one configuration to its equilibrium, in f64.
 //!
-//! Of the energy form, and of linearised contact, the kernel returns the forces on the object's nodes. A depth in f32 is
+//! The search in f64 leaves little to do: carriers of its touches, and sums of their forces on the object's nodes.
+//!
+//! Of the kernels in f32 that of the energy form, and of linearised contact, returns the forces on the object's nodes. A depth in f32 is
 //! known to some nanometres, which shallow contact feels in its energy and stiff contact in its forces; worse, the
 //! kernel cannot see it. So the CPU's search settles each result from these forces on, a step or two away: on the
 //! smooth surface, which the kernel knows at rest only, and to a residual that owes nothing to f32. The paper's iteration is taken as it is:
 //! what it leads to is defined by its steps.
 
 use super::{
-    layout::{SolverResult, Touch},
+    layout::{SearchTouch, SolverResult, Touch},
     model::stiffness,
     solver::free,
+    stages::Solved,
 };
 use crate::{
-    contact::{self, Equilibrium, NodeForce, Status, equilibrium::energy::StoppingCriteria},
+    JointMatrix, JointVector,
+    contact::{
+        self, Equilibrium, NodeForce, Status,
+        equilibrium::energy::StoppingCriteria,
+        geometry::closest_point::{ClosestPoint, Feature},
+        law::depth::Carriers,
+    },
     scene::Algorithm,
     tolerances::{GPU_RESOLVED_RESIDUAL, GPU_SETTLED_RESIDUAL, MINIMUM_SQUARE, SETTLING_STEPS},
 };
 use glam::DVec3;
+
+/// The equilibrium at `q`, where the gap at rest is `gap`, that the search on the device `found` for the configuration
+/// in this place, whose touches begin there; `None` when it wrote nothing. What it gave up for want of room, or what is
+/// not finite, has overflown.
+pub(super) fn solved(
+    model: &contact::Model<'_>,
+    solver: &mut contact::Solver<'_>,
+    (q, gap): (&[f64], f64),
+    found: &Solved,
+    (place, start): (usize, usize),
+) -> Option<Equilibrium> {
+    let &[status, iterations, touches, flags] = found.records.get(place)?;
+    let status = Status::from_number(u8::try_from(status).ok()?).filter(|status| *status != Status::Free)?;
+    let each = found.amounts.len() / found.records.len();
+    let (&[residual, energy], amounts) = found.amounts.get(each * place..each * (place + 1))?.split_first_chunk()?;
+    let (torque, tangent) = amounts.split_at_checked(q.len())?;
+    let mut parts = Vec::new();
+    let touches = found.touches.get(start..start + touches as usize)?;
+    let touches = touches.iter().map(|touch| {
+        let touch = touch_of(model, touch)?;
+        let pressing = touch.carriers.iter().filter(|(_, weight)| *weight != 0.0);
+        parts.extend(pressing.map(|&(node, weight)| (node, -touch.force * weight)));
+        Some(touch)
+    });
+    let touches = touches.collect::<Option<_>>()?;
+    let torque = JointVector::from_slice(torque);
+    let mut result = Equilibrium { status, iterations, residual, energy, torque, touches, ..free(gap, q.len()) };
+    if flags & HAS_TANGENT != 0 {
+        let mut matrix = JointMatrix::zeros(q.len());
+        (0..q.len()).for_each(|k| (0..=k).for_each(|l| matrix.add(k, l, tangent[q.len() * k + l])));
+        result.tangent = Some(matrix);
+    }
+    add_up(parts, &mut result);
+    let is_finite = energy.is_finite() && residual.is_finite() && result.torque.is_finite();
+    if !is_finite || flags & IS_DOUBTFUL != 0 && !solver.covers(q, &result) {
+        result.status = Status::Overflow;
+    }
+    Some(result)
+}
+
+/// Bits of the last word of a record: see `shaders/search_results.wgsl`.
+const HAS_TANGENT: u32 = 1;
+const IS_DOUBTFUL: u32 = 2;
+
+/// The touch that the search wrote; `None` where no facet or feature is what it wrote.
+fn touch_of(model: &contact::Model<'_>, touch: &SearchTouch) -> Option<contact::Touch> {
+    let point = ClosestPoint { weights: touch.weights, feature: Feature::from_number(touch.feature)? };
+    if touch.facet as usize >= model.object.triangles.len() {
+        return None;
+    }
+    let carriers = Carriers::new(model.surface.carriers(touch.facet), &point).iter().collect();
+    Some(contact::Touch { proxy_node: touch.proxy_node, carriers, force: DVec3::from_array(touch.force) })
+}
 
 /// The equilibrium at `q` by what the kernel wrote; `None` when it wrote nothing: outcomes are zero before, which is
 /// the status of free configurations, and no kernel is given these. Of the paper's iteration the gap is left at zero,

@@ -127,15 +127,33 @@ fn broken_law(model: &Model, q: &JointVector, result: &Equilibrium) -> Option<St
     None
 }
 
+/// Room for all, with f64 on the device where that is asked for and there.
+fn room(double: bool) -> BatchCapacity {
+    BatchCapacity { double, ..BatchCapacity::default() }
+}
+
+/// Whether f64 on the device is used: both for the energy form, which is solved there in two ways.
+fn precisions(algorithm: Algorithm) -> &'static [bool] {
+    if algorithm == Algorithm::Energy { &[true, false] } else { &[true] }
+}
+
 /// Solves a part of a scene on both sides; asserts agreement and, of the energy form, its laws.
 fn check_scene(name: &str, material: Option<Material>, algorithm: Algorithm, stride: usize) {
     let (scene, object, chain) = load_of(name, material.clone());
     let configurations = configurations(&scene, 11, stride);
     let model = Model::new(&object, &chain, ContactSpec { algorithm, ..scene.contact });
     assert_eq!(model.compliance.rows_per_node, if material.is_some() { 3 } else { 1 });
-    let mut cpu = Solver::new(&model);
-    let mut gpu = GpuSolver::new(context(), &model).unwrap();
-    let results = gpu.solve(&configurations).unwrap();
+    for &double in precisions(algorithm) {
+        let gpu = GpuSolver::with_room(context(), &model, room(double)).unwrap();
+        check_solver(name, &model, gpu, &configurations);
+    }
+}
+
+/// The same by one solver.
+fn check_solver(name: &str, model: &Model, mut gpu: GpuSolver, configurations: &[JointVector]) {
+    let algorithm = model.contact.algorithm;
+    let mut cpu = Solver::new(model);
+    let results = gpu.solve(configurations).unwrap();
     assert_eq!(results.len(), configurations.len());
     let (mut touching, mut unlike) = (0, Vec::new());
     for (q, result) in configurations.iter().zip(&results) {
@@ -143,7 +161,7 @@ fn check_scene(name: &str, material: Option<Material>, algorithm: Algorithm, str
         if reference.status == Status::Contact {
             touching += 1;
             if algorithm != Algorithm::Paper && result.status == Status::Contact {
-                assert_eq!(broken_law(&model, q, result), None, "{name}, {algorithm:?}, {q:?}");
+                assert_eq!(broken_law(model, q, result), None, "{name}, {algorithm:?}, {q:?}");
             }
         }
         unlike.extend(difference(algorithm, &reference, result).map(|difference| format!("{q:?}: {difference}")));
@@ -174,16 +192,17 @@ fn the_mesh_has_the_same_equilibria_on_gpu_and_cpu() {
     check_scene("mesh.toml", None, Algorithm::Paper, 101);
 }
 
-/// The kernels search on the triangles; what they find is settled on the smooth surface.
+/// In f32 the kernels search on the triangles; what they find is settled on the smooth surface.
 #[test]
 fn the_smooth_surface_has_the_same_equilibria_on_gpu_and_cpu() {
-    for (name, stride) in [("sphere.toml", 131), ("mesh.toml", 101)] {
+    let scenes = [("sphere.toml", 131), ("mesh.toml", 101)];
+    for ((name, stride), double) in scenes.into_iter().flat_map(|scene| [(scene, true), (scene, false)]) {
         let (scene, object, chain) = load(name);
         let contact = ContactSpec { surface: ContactSurface::Smooth, ..scene.contact };
         let model = Model::new(&object, &chain, contact);
         let configurations = configurations(&scene, 11, stride);
         let mut cpu = Solver::new(&model);
-        let mut gpu = GpuSolver::new(context(), &model).unwrap();
+        let mut gpu = GpuSolver::with_room(context(), &model, room(double)).unwrap();
         let results = gpu.solve(&configurations).unwrap();
         let mut touching = 0;
         for (q, result) in configurations.iter().zip(&results) {
@@ -192,7 +211,9 @@ fn the_smooth_surface_has_the_same_equilibria_on_gpu_and_cpu() {
             assert_eq!(difference(Algorithm::Energy, &reference, result), None, "{name}, {q:?}");
         }
         println!("{name}, smooth: {touching} touch, {} by the CPU", gpu.left_to_cpu());
-        assert!(touching >= 15 && gpu.left_to_cpu() * 5 <= touching, "{touching} touch, {}", gpu.left_to_cpu());
+        assert!(touching >= 15, "{touching} touch");
+        // Without f64 all that is as near to the flat triangles as the surface is bent is left to the CPU.
+        assert!(!double || gpu.left_to_cpu() * 5 <= touching, "{touching} touch, {}", gpu.left_to_cpu());
     }
 }
 
@@ -226,13 +247,17 @@ fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
     {
         let model = part(of, algorithm);
         let mut cpu = Solver::new(&model);
-        let results = GpuSolver::new(context(), &model).unwrap().solve(&configurations).unwrap();
         let (mut touching, mut beyond) = (0, 0);
-        for (q, result) in configurations.iter().zip(&results) {
-            let reference = cpu.solve(q);
-            assert_eq!(difference(algorithm, &reference, result), None, "{algorithm:?}, {q:?}");
-            touching += usize::from(reference.status == Status::Contact);
-            beyond += usize::from(reference.status == Status::Overflow);
+        for &double in precisions(algorithm) {
+            let mut gpu = GpuSolver::with_room(context(), &model, room(double)).unwrap();
+            let results = gpu.solve(&configurations).unwrap();
+            (touching, beyond) = (0, 0);
+            for (q, result) in configurations.iter().zip(&results) {
+                let reference = cpu.solve(q);
+                assert_eq!(difference(algorithm, &reference, result), None, "{algorithm:?}, {q:?}");
+                touching += usize::from(reference.status == Status::Contact);
+                beyond += usize::from(reference.status == Status::Overflow);
+            }
         }
         println!("{algorithm:?}: {touching} touch, {beyond} reach beyond");
         assert!(touching >= 3 && beyond >= 3, "{algorithm:?}: {touching}, {beyond}");
@@ -277,8 +302,7 @@ fn contact_within_rounding_of_none_is_decided_in_f64() {
         for wanted in [-1e-9, -1e-11, 1e-11, 1e-9] {
             let near = grazing(&mut cpu, &path, wanted);
             assert!(near.len() >= 5, "{name}: only {} configurations", near.len());
-            let room = BatchCapacity { double: false, ..BatchCapacity::default() };
-            let mut gpu = GpuSolver::with_room(context(), &model, room).unwrap();
+            let mut gpu = GpuSolver::with_room(context(), &model, room(false)).unwrap();
             for (q, result) in near.iter().zip(gpu.solve(&near).unwrap()) {
                 let reference = cpu.solve(q);
                 let status = if wanted < 0.0 { Status::Contact } else { Status::Free };
@@ -470,20 +494,22 @@ fn contacts_beyond_the_kernels_room_are_solved_on_the_cpu() {
     for algorithm in [Algorithm::Energy, Algorithm::Paper] {
         let model = Model::new(&object, &chain, ContactSpec { algorithm, ..scene.contact });
         let mut cpu = Solver::new(&model);
-        let mut gpu =
-            GpuSolver::with_room(context(), &model, BatchCapacity { contacts: 2, ..BatchCapacity::default() }).unwrap();
-        let results = gpu.solve(&configurations).unwrap();
-        let mut crowded = 0;
-        for (q, result) in configurations.iter().zip(&results) {
-            assert_ne!(result.status, Status::Overflow);
-            let reference = cpu.solve(q);
-            if reference.touches.len() > 2 {
-                crowded += 1;
-                assert_eq!(format!("{result:?}"), format!("{reference:?}"), "the f64 result itself");
+        for &double in precisions(algorithm) {
+            let mut gpu =
+                GpuSolver::with_room(context(), &model, BatchCapacity { contacts: 2, ..room(double) }).unwrap();
+            let results = gpu.solve(&configurations).unwrap();
+            let mut crowded = 0;
+            for (q, result) in configurations.iter().zip(&results) {
+                assert_ne!(result.status, Status::Overflow);
+                let reference = cpu.solve(q);
+                if reference.touches.len() > 2 {
+                    crowded += 1;
+                    assert_eq!(format!("{result:?}"), format!("{reference:?}"), "the f64 result itself");
+                }
             }
+            assert!(crowded > 1, "{algorithm:?}: only {crowded}");
+            assert!(gpu.left_to_cpu() >= crowded);
         }
-        assert!(crowded > 1, "{algorithm:?}: only {crowded}");
-        assert!(gpu.left_to_cpu() >= crowded);
     }
 }
 
@@ -529,7 +555,7 @@ fn a_rougher_tolerance_takes_fewer_steps_and_is_kept() {
     let configurations = configurations(&scene, 11, 131);
     let [fine, rough] = [1e-8, 1e-4].map(|tolerance| {
         let model = Model::new(&object, &chain, ContactSpec { tolerance, ..scene.contact });
-        GpuSolver::new(context(), &model).unwrap().solve(&configurations).unwrap()
+        GpuSolver::with_room(context(), &model, room(false)).unwrap().solve(&configurations).unwrap()
     });
     let steps = |results: &[Equilibrium]| results.iter().map(|result| result.iterations).sum::<u32>();
     assert!(20 * steps(&rough) < 17 * steps(&fine), "{} and {}", steps(&rough), steps(&fine));

@@ -24,7 +24,7 @@ use crate::contact::law::springs::{Slots, Springs, add_contact_forces};
 use crate::contact::linear::support::{Support, dot, root};
 use crate::contact::model::{Model, MotionBound};
 use crate::proxy::Pose;
-use crate::random::Random;
+use crate::random::scattered;
 use crate::tolerances::{
     ACCEPTED_SHARE, CONTINUATION_FACTOR, CONTINUATION_START, DEPTH_ROUNDING, ENERGY_ROUNDING, GOOD_SHARE,
     INNER_TOLERANCE, INNER_TOLERANCE_FLOOR, POOR_SHARE, RESIDUAL_FLOOR, STAGE_TOLERANCE, STALLED_LENGTH,
@@ -33,19 +33,19 @@ use glam::DVec3;
 
 /// Length of a refused step, relative to the greatest there can be, at which a configuration is given up [1]: the
 /// energy of a step scales with its length, so below 1e-12 nothing measurable can be gained any more.
-const GIVE_UP_LENGTH: f64 = 1e-12;
+pub const GIVE_UP_LENGTH: f64 = 1e-12;
 
 /// Relative residual of the linear solve that looks for negative curvature at an equilibrium [1]. Its random load has a
 /// share of one over the root of the number of unknowns, a tenth or so, in a direction of negative curvature, which
 /// conjugate gradients meet before the residual is as small as this.
-const PROBE_TOLERANCE: f64 = 1e-2;
+pub const PROBE_TOLERANCE: f64 = 1e-2;
 
 /// First length of the step away from a saddle, over the length of the displacement there, in the energy norm [1]; it
 /// is halved until the energy falls by more than its rounding, at most [`NUDGE_HALVINGS`] times.
-const NUDGE: f64 = 0.1;
+pub const NUDGE_LENGTH: f64 = 0.1;
 
-/// See [`NUDGE`]: after these, the fall of the energy, of second order, would be below rounding.
-const NUDGE_HALVINGS: u32 = 20;
+/// See [`NUDGE_LENGTH`]: after these, the fall of the energy, of second order, would be below rounding.
+pub const NUDGE_HALVINGS: u32 = 20;
 
 /// Where depth comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -189,6 +189,16 @@ impl EnergySearch {
         SolverStats { residual: self.imbalance, ..outcome }
     }
 
+    /// Takes up `forces` on the object's nodes, for their displacement alone.
+    pub fn hold(&mut self, forces: &[NodeForce]) {
+        self.support.clear();
+        self.state.forces.clear();
+        for &NodeForce { node, force } in forces {
+            self.support.add(node);
+            self.state.forces.extend(force.to_array());
+        }
+    }
+
     /// Takes what the trial's forces lead to for the state.
     fn take_trial(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
         self.evaluate(model, detection, geometry);
@@ -294,15 +304,16 @@ impl EnergySearch {
         self.weigh_curvature();
         let Self { state, slots, support, newton, kc, product, .. } = self;
         let springs = Springs { contacts: &state.contacts, slots, kc: *kc };
-        let mut random = Random::new(1);
-        product.fill_with(|| random.between(-1.0, 1.0));
+        for (number, load) in (0..).zip(product.iter_mut()) {
+            *load = scattered(number);
+        }
         newton.factorise(support, springs);
         if newton.respond(support, springs, product, PROBE_TOLERANCE).is_some() {
             return false;
         }
         let (descent, length) = newton.descent();
         let descent = descent.to_vec();
-        let mut step = NUDGE * root(2.0 * self.state.energy) / length;
+        let mut step = NUDGE_LENGTH * root(2.0 * self.state.energy) / length;
         let fallen = self.state.energy - self.energy_rounding(detection.nodes());
         for _ in 0..NUDGE_HALVINGS {
             for side in [step, -step] {

@@ -2,7 +2,7 @@
 //! iteration.
 
 pub mod energy;
-mod newton;
+pub mod newton;
 pub mod paper;
-mod tangent;
+pub mod tangent;
 mod woodbury;

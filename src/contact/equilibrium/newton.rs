@@ -30,27 +30,27 @@ use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES};
 /// Least damping of a Newton step that is not zero, in the object's own stiffness [1]: less changes a step by less than
 /// the tenth that its model is good for where damping is needed at all. With 0.01, 64 hard balls on 2,027 nodes
 /// converge all the same, in the same time.
-const LEAST_DAMPING: f64 = 0.1;
+pub const LEAST_DAMPING: f64 = 0.1;
 
 /// Factor by which damping grows after the first step that E refuses, doubled with each that follows [1] (Nielsen
 /// 1999): five refusals in a row multiply it by a million, which is what rigid contact is stiffer than the object
 /// ([`RIGID_STIFFNESS`]).
-const DAMPING_GROWTH: f64 = 4.0;
+pub const DAMPING_GROWTH: f64 = 4.0;
 
 /// Factor by which damping fades after a step that kept most of its promise [1]: with 0.1 points in soft contact on
 /// 1,026 nodes take 10.1 steps instead of 9.1, and 64 hard balls on 2,027 nodes as long; with 0.5 the eight hardest of
 /// these took twice as long, without [`CURVATURE_MARGIN`].
-const DAMPING_DECAY: f64 = 0.25;
+pub const DAMPING_DECAY: f64 = 0.25;
 
 /// Damping that is added to what a direction of negative curvature lacks, in the object's own stiffness [1]. Without,
 /// the model is nearly flat in that direction, and the step so long that neighbouring configurations end at different
 /// equilibria: of 2,300 with points deeper than half the object's radius 34 have one within 2e-6 rad, with 5 only 7; 10
 /// takes a third more iterations where contact is stiff.
-const CURVATURE_MARGIN: f64 = 5.0;
+pub const CURVATURE_MARGIN: f64 = 5.0;
 
 /// Attempts to find a damping with which the model is convex [1]: it doubles at least from one to the next, so that the
 /// last is 1e9, a thousand times what rigid contact is stiffer than the object ([`RIGID_STIFFNESS`]).
-const DAMPING_ATTEMPTS: u32 = 30;
+pub const DAMPING_ATTEMPTS: u32 = 30;
 
 /// How much the model is damped: more from step to step where E refuses them, less where it keeps what they promise
 /// (Nielsen 1999).

@@ -21,7 +21,7 @@ use glam::DVec3;
 
 /// Relative residual of the linear solves behind a tangent d tau/d q [1]: the tangent errs by its square, relative to
 /// the response, below the 6e-8 to which f32 stores it.
-const RESPONSE_TOLERANCE: f64 = 1e-4;
+pub const RESPONSE_TOLERANCE: f64 = 1e-4;
 
 /// The tangent at the equilibrium that `springs` and `support` describe, multipliers being the forces of the contacts,
 /// with the proxy in `pose`; `None` where the equilibrium is no strict minimum, so that there is no derivative

@@ -19,6 +19,19 @@ pub enum Feature {
     Face,
 }
 
+impl Feature {
+    /// The feature of this number, which is how shaders tell it; `None` where there is none.
+    #[must_use]
+    pub fn from_number(number: u32) -> Option<Self> {
+        match number {
+            0..3 => Some(Self::Vertex(number as usize)),
+            3..6 => Some(Self::Edge(number as usize - 3)),
+            6 => Some(Self::Face),
+            _ => None,
+        }
+    }
+}
+
 /// The closest point of one triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct ClosestPoint {

@@ -105,6 +105,16 @@ impl Shape {
         Facet::bent(net)
     }
 
+    /// The weight of node `j` in each control point [1].
+    #[must_use]
+    pub fn mask_of(&self, j: usize) -> [f64; CONTROLS] {
+        let weight = |mask: &Vec<(u8, f64)>| {
+            let own = mask.iter().filter(|(node, _)| usize::from(*node) == j);
+            own.map(|(_, weight)| weight).sum()
+        };
+        self.masks.each_ref().map(weight)
+    }
+
     /// The weights of its nodes in its point at barycentric weights `w` [1].
     #[inline]
     #[must_use]
@@ -220,6 +230,24 @@ impl SmoothSurface {
     pub fn facet(&self, positions: &[DVec3], t: u32) -> Facet {
         let nodes = self.nodes(t);
         self.shape(t).facet(|j| positions[nodes[j] as usize] + self.offsets[nodes[j] as usize])
+    }
+
+    /// From `node` to its point of the control net, at rest [m].
+    #[must_use]
+    pub fn offset(&self, node: u32) -> DVec3 {
+        self.offsets[node as usize]
+    }
+
+    /// All shapes.
+    #[must_use]
+    pub fn shapes(&self) -> &[Shape] {
+        &self.shapes
+    }
+
+    /// The number of the shape of facet `t` among them.
+    #[must_use]
+    pub fn shape_number(&self, t: u32) -> u32 {
+        self.shape[t as usize]
     }
 
     /// By how much the facets at rest stand off the flat triangles of the mesh at most, whose nodes are at `positions`

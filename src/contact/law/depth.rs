@@ -25,12 +25,12 @@ use std::ops::Neg;
 
 /// Least distance of a proxy node to its closest edge or vertex that curvature is divided by [m]: below a nanometre the
 /// direction between the two is rounding (coordinates of 0.1 m carry 1e-17 m, a direction good to 1e-6 needs 1e-11 m).
-const MINIMUM_CURVATURE_RADIUS: f64 = 1e-11;
+pub const MINIMUM_CURVATURE_RADIUS: f64 = 1e-11;
 
 /// Least convexity of the distance to a bent facet, over that to a flat one, at which its second derivative is used
 /// [1]: beyond, the point is within a hundredth of the surface's radius of curvature from where the closest point
 /// leaps, and a step by it would be a hundred times as far.
-const LEAST_CONVEXITY: f64 = 1e-2;
+pub const LEAST_CONVEXITY: f64 = 1e-2;
 
 /// One proxy node and the closest feature of the surface: a row of the contact problem.
 #[derive(Clone, Copy, Debug)]

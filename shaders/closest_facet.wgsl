@@ -1,0 +1,90 @@
+// The facet that is closest to a point, and the surface's pseudonormal there (twins: src/contact/detection.rs and
+// src/contact/geometry/rest.rs).
+//
+// Facets are searched group by group of clusters, past those whose bounding sphere at rest leaves no room for the
+// closest one; ties go to the lower number. The stage declares `parameters`, `mesh`, `facet_in_order`, `form` and
+// `is_beyond`.
+
+struct Closest {
+    distance: f64,
+    facet: u32,
+    point: ClosestPoint,
+}
+
+// The facet closest to x, if there is one no farther than `within`; facet `likely`, where there is one, is tried first.
+// No facet has left its place at rest by more than `moved`.
+fn closest_facet(x: vec3<f64>, within: f64, moved: f64, likely: u32) -> Closest {
+    var best = Closest();
+    best.distance = within;
+    best.facet = ABSENT;
+    var entry = 0u;
+    var facet = likely;
+    loop {
+        // The next facet that may be closer.
+        while facet == ABSENT && entry < parameters.triangles {
+            let reach = best.distance + moved;
+            if entry % (GROUP * CLUSTER) == 0u
+                && distance_to_sphere(parameters.clusters + entry / (GROUP * CLUSTER), x) > reach {
+                entry += GROUP * CLUSTER;
+                continue;
+            }
+            if entry % CLUSTER == 0u && distance_to_sphere(entry / CLUSTER, x) > reach {
+                entry += CLUSTER;
+                continue;
+            }
+            entry += 1u;
+            if distance_to_sphere(parameters.clusters + parameters.groups + entry - 1u, x) <= reach {
+                facet = facet_in_order(entry - 1u);
+            }
+        }
+        if facet == ABSENT {
+            break;
+        }
+        if facet != best.facet && !is_beyond(facet, x, best.distance) {
+            form(facet, x);
+            let point = closest_on_facet();
+            let away = length(jet_at(point.weights).point);
+            if away < best.distance || (away == best.distance && facet < best.facet) {
+                best = Closest(away, facet, point);
+            }
+        }
+        facet = ABSENT;
+    }
+    return best;
+}
+
+// Pseudonormal at a point of a facet, outward, not of length one.
+fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<f64>) -> vec3<f64> {
+    var first = 0u;
+    var last = 1u;
+    var node = 0u;
+    if point.feature < FEATURE_EDGE {
+        node = corner(facet, point.feature);
+        first = around_start(node);
+        last = around_start(node + 1u);
+    } else if point.feature < FEATURE_FACE {
+        last = 2u;
+    }
+    var sum = vec3<f64>(0.0);
+    for (var entry = first; entry < last; entry += 1u) {
+        // One loop for all features: a facet formed at each of three places would triple the program.
+        var face = facet;
+        var there = point.weights;
+        var k = 0u;
+        if point.feature < FEATURE_EDGE {
+            face = around(entry);
+            k = place_of_corner(face, node);
+            there = one_hot(k);
+        } else if entry == 1u {
+            let edge = point.feature - FEATURE_EDGE;
+            face = across(facet, edge);
+            let back = place_of_corner(face, corner(facet, (edge + 1u) % 3u));
+            there = dot(point.weights, one_hot((edge + 1u) % 3u)) * one_hot(back)
+                + dot(point.weights, one_hot(edge)) * one_hot((back + 1u) % 3u);
+        }
+        form(face, x);
+        let jet = jet_at(there);
+        sum += select(f64(1.0), angle_at(jet, k), point.feature < FEATURE_EDGE) * normal_of(jet);
+    }
+    return sum;
+}

@@ -1,0 +1,163 @@
+// Where the trial's forces leave the surface, and the rows that this makes: contacts, and near misses of proxy nodes
+// that have touched (twin: src/contact/detection.rs). One workgroup a configuration.
+//
+// A facet matters to a proxy node whose distance to the surface at rest is d only where it is within d + m of it, with
+// m the most that a point of the surface has moved; at rest, within d + 2 m. Only nodes of such facets are displaced.
+
+override WORKGROUP: u32 = 32u;
+
+// Whether there is a trial that waits for this.
+var<workgroup> waits: u32;
+
+// Lists the proxy nodes that can touch, in ascending order; returns how many there are.
+fn list_candidates(local: u32) -> u32 {
+    let reach = scalar(MOVED) + parameters.gap_band;
+    begin_list(0u, local);
+    for (var first = 0u; first < parameters.proxy_nodes; first += WORKGROUP) {
+        let node = first + local;
+        var is_candidate = false;
+        if node < parameters.proxy_nodes {
+            is_candidate = rest_distance(node) - proxy_radius(node) <= reach;
+        }
+        let entry = place_in_list(is_candidate, local);
+        if is_candidate {
+            set_word(at_candidate(entry), node);
+        }
+    }
+    sync();
+    return listed;
+}
+
+// Lists the groups of covered nodes that matter to one of `candidates` proxy nodes; returns how many there are.
+fn list_groups(candidates: u32, local: u32) -> u32 {
+    let widened = 2.0 * (scalar(MOVED) + parameters.gap_band);
+    let groups = (parameters.covered + NODES_TOGETHER - 1u) / NODES_TOGETHER;
+    begin_list(0u, local);
+    for (var first = 0u; first < groups; first += WORKGROUP) {
+        let group = first + local;
+        var matters = false;
+        if group < groups {
+            let sphere = parameters.at_spheres + 4u * group;
+            let centre = surface_vector(sphere);
+            let reach = surface[sphere + 3u] + widened;
+            for (var entry = 0u; entry < candidates && !matters; entry += 1u) {
+                let node = word(at_candidate(entry));
+                matters = distance(proxy_position(node), centre) <= abs(rest_distance(node)) + reach;
+            }
+        }
+        let entry = place_in_list(matters, local);
+        if matters {
+            set_word(at_group(entry), group);
+        }
+    }
+    sync();
+    return listed;
+}
+
+// Place of node `index` of the listed groups, or ABSENT behind the last.
+fn place_of(index: u32, groups: u32) -> u32 {
+    if index / NODES_TOGETHER >= groups {
+        return ABSENT;
+    }
+    let entry = word(at_group(index / NODES_TOGETHER)) * NODES_TOGETHER + index % NODES_TOGETHER;
+    if entry >= parameters.covered {
+        return ABSENT;
+    }
+    return mesh[parameters.at_places + entry];
+}
+
+fn displace_node(place: u32, displacement: vec3<f64>) {
+    if place != ABSENT {
+        set_vector(at_displacement(place), displacement);
+    }
+}
+
+// Displaces the nodes of the listed groups.
+fn displace(groups: u32, local: u32) {
+    for (var first = local; first < groups * NODES_TOGETHER; first += 4u * WORKGROUP) {
+        let places = vec4<u32>(place_of(first, groups), place_of(first + WORKGROUP, groups),
+            place_of(first + 2u * WORKGROUP, groups), place_of(first + 3u * WORKGROUP, groups));
+        let moved = responses(1u - word(HALF), select(places, vec4<u32>(0u), places == vec4<u32>(ABSENT)));
+        displace_node(places.x, moved[0]);
+        displace_node(places.y, moved[1]);
+        displace_node(places.z, moved[2]);
+        displace_node(places.w, moved[3]);
+    }
+    sync();
+}
+
+// The facet closest to proxy node `node` at x, if it is near enough to matter.
+fn closest_to(node: u32, x: vec3<f64>) -> Closest {
+    let band = parameters.gap_band;
+    let moved = scalar(MOVED);
+    let rest = rest_distance(node);
+    // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than
+    // that.
+    let within = abs(rest) + band + moved;
+    let is_followed = rest <= band || word(at_watched(node)) != 0u;
+    let matters = select(max(proxy_radius(node), moved - rest + band), within, is_followed);
+    // The last one is a start as good as any, but far from x it may not have been displaced.
+    var likely = word(at_last(node)) - 1u;
+    if likely != ABSENT {
+        let corners = surface_vector(parameters.at_rest + 3u * carrier(likely, 0u));
+        likely = select(ABSENT, likely, distance(x, corners) <= within + moved);
+    }
+    return closest_facet(x, min(within, matters), moved, likely);
+}
+
+// Writes the rows of `candidates` proxy nodes.
+fn write_rows(candidates: u32, local: u32) {
+    let half = 1u - word(HALF);
+    begin_list(0u, local);
+    for (var first = 0u; first < candidates; first += WORKGROUP) {
+        var is_row = false;
+        var node = 0u;
+        var x = vec3<f64>(0.0);
+        var closest = Closest();
+        var outward = vec3<f64>(0.0);
+        if first + local < candidates {
+            node = word(at_candidate(first + local));
+            x = proxy_position(node);
+            closest = closest_to(node, x);
+            if closest.facet != ABSENT {
+                set_word(at_last(node), closest.facet + 1u);
+                outward = pseudonormal(closest.facet, closest.point, x);
+                form(closest.facet, x);
+                let is_inside = dot(jet_at(closest.point.weights).point, outward) >= 0.0;
+                let touches = proxy_radius(node) + select(-closest.distance, closest.distance, is_inside) > 0.0;
+                is_row = touches || word(at_watched(node)) != 0u;
+                if touches {
+                    set_word(at_watched(node), 1u);
+                }
+            }
+        }
+        let row = place_in_list(is_row, local);
+        if is_row && row < parameters.contacts {
+            write_row(half, row, node, x, closest.facet, closest.point, outward);
+        }
+    }
+    if local == 0u {
+        set_word(ROWS + half, min(listed, parameters.contacts));
+        if listed > parameters.contacts {
+            set_word(OVERFLOW, 1u);
+        }
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let is_there = take_up(unfold(group, groups));
+    if is_there && local == 0u {
+        waits = select(0u, 1u, word(PHASE) == PLACED);
+    }
+    workgroupBarrier();
+    if waits != 0u {
+        let candidates = list_candidates(local);
+        displace(list_groups(candidates, local), local);
+        write_rows(candidates, local);
+    }
+}

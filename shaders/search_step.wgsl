@@ -1,0 +1,568 @@
+// From one trial to the next: a damped Newton step, a step away from a saddle, or the response to a joint's motion
+// (twins: src/contact/equilibrium/newton.rs, woodbury.rs and tangent.rs). Phases stand in the order in which they
+// mostly follow each other: software rasterisers pass through the code of those that are not wanted.
+
+// --- One damped Newton step ---
+
+fn begin_step(local: u32) {
+    sync();
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        clear_step(slot);
+        put(LEFT_OVER, slot, vector_entry(OUT_OF_BALANCE, slot));
+        put(LEFT_PRODUCT, slot, vector_entry(BALANCE_PRODUCT, slot));
+    }
+    for (var row = local; row < row_count; row += WORKGROUP) {
+        set_word(at_active(row), select(0u, 1u, scalar(numbers(row) + DEPTH) > 0.0));
+    }
+    if local == 0u {
+        begin_solve(FOR_STEP, 1.0 + scalar(DAMPING));
+        go_to(FACTORISE, STEP);
+    }
+}
+
+// Sets up the preconditioner for the rows that touch: see the twin woodbury.rs. Instead of a factor it has the inverse
+// of the small system.
+fn factorise(local: u32) {
+    if local == 0u {
+        var taken = 0u;
+        for (var row = 0u; row < row_count; row += 1u) {
+            if is_active(row) {
+                set_word(at_taken(taken), row);
+                taken += 1u;
+            }
+        }
+        set_word(TAKEN, taken);
+    }
+    sync();
+    let taken = word(TAKEN);
+    let kc = scalar(STIFFNESS);
+    let stiffening = scalar(STIFFENING);
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        put(PREVIOUS_FORCE, slot, vector_entry(STEP_FORCE, slot));
+        put(PREVIOUS_DISPLACEMENT, slot, vector_entry(STEP_DISPLACEMENT, slot));
+        let place = word(at_place(slot));
+        for (var a = 0u; a < taken; a += 1u) {
+            let row = word(at_taken(a));
+            let places = row_words(row) + ROW_WORDS;
+            let weights = numbers(row) + NODE_WEIGHTS;
+            let normal = vector_at(numbers(row) + NORMAL);
+            if ISOTROPIC {
+                var size = f64(0.0);
+                for (var j = 0u; j < parameters.carriers; j += 4u) {
+                    size += scalar(weights + j) * along_row(places, j, place);
+                    size += scalar(weights + j + 1u) * along_row(places, j + 1u, place);
+                    size += scalar(weights + j + 2u) * along_row(places, j + 2u, place);
+                    size += scalar(weights + j + 3u) * along_row(places, j + 3u, place);
+                }
+                set_scalar(at_column(a, slot), size);
+            } else {
+                var moved = vec3<f64>(0.0);
+                for (var j = 0u; j < parameters.carriers; j += 1u) {
+                    moved += moved_by(word(places + j), scalar(weights + j) * normal, place);
+                }
+                set_vector(at_column(a, slot), moved);
+            }
+        }
+    }
+    sync();
+    for (var b = local; b < taken; b += WORKGROUP) {
+        let row = word(at_taken(b));
+        let normal = vector_at(numbers(row) + NORMAL);
+        let weights = numbers(row) + NODE_WEIGHTS;
+        for (var a = 0u; a < taken; a += 1u) {
+            var deepened = f64(0.0);
+            for (var j = 0u; j < parameters.carriers; j += 1u) {
+                if ISOTROPIC {
+                    deepened += scalar(weights + j) * scalar(at_column(a, slot_of(row, j)));
+                } else {
+                    deepened += scalar(weights + j) * dot(normal, vector_at(at_column(a, slot_of(row, j))));
+                }
+            }
+            if ISOTROPIC {
+                deepened *= dot(normal, vector_at(numbers(word(at_taken(a))) + NORMAL));
+            }
+            if a == b {
+                deepened += stiffening / (kc * scalar(numbers(row) + SHARE));
+                set_scalar(at_push(b), deepened);
+            }
+            set_scalar(at_inverse(a, b), deepened);
+        }
+    }
+    sync();
+    invert(taken, local);
+    if local == 0u {
+        set_word(IS_FIRST, 1u);
+        go_to(select(PRECONDITION, RESPOND, word(PURPOSE) == FOR_TANGENT), FACTORISE);
+    }
+}
+
+fn along_row(places: u32, j: u32, place: u32) -> f64 {
+    return compliance[word(places + j) * parameters.covered + place];
+}
+
+// Inverts the system of the pushes in place, by Gauss-Jordan elimination, which a positive definite matrix lets do
+// without pivoting. What rounding leaves of a pivot is not believed below its own rounding; the diagonal as it was is
+// among the pushes.
+fn invert(order: u32, local: u32) {
+    for (var k = 0u; k < order; k += 1u) {
+        let pivot = 1.0 / max(scalar(at_inverse(k, k)), PIVOT_ROUNDING * scalar(at_push(k)));
+        sync();
+        for (var column = local; column < order; column += WORKGROUP) {
+            if column != k {
+                let share = scalar(at_inverse(k, column)) * pivot;
+                for (var row = 0u; row < order; row += 4u) {
+                    eliminate(row, order, column, k, share);
+                    eliminate(row + 1u, order, column, k, share);
+                    eliminate(row + 2u, order, column, k, share);
+                    eliminate(row + 3u, order, column, k, share);
+                }
+                set_scalar(at_inverse(k, column), share);
+            }
+        }
+        sync();
+        for (var row = local; row < order; row += WORKGROUP) {
+            let at = at_inverse(row, k);
+            set_scalar(at, select(-scalar(at) * pivot, pivot, row == k));
+        }
+        sync();
+    }
+}
+
+fn eliminate(row: u32, order: u32, column: u32, k: u32, share: f64) {
+    let at = at_inverse(row, column);
+    if row != k && row < order {
+        set_scalar(at, scalar(at) - scalar(at_inverse(row, k)) * share);
+    }
+}
+
+// P r as force and displacement, from r = LEFT_OVER and C r = LEFT_PRODUCT, and the direction in which it is best to go
+// on.
+fn precondition(local: u32) {
+    let taken = word(TAKEN);
+    let stiffening = scalar(STIFFENING);
+    for (var row = local; row < row_count; row += WORKGROUP) {
+        if !is_active(row) {
+            set_reaction(row, Variation(vec3<f64>(0.0), vec3<f64>(0.0), vec3<f64>(0.0)));
+        }
+    }
+    for (var a = local; a < taken; a += WORKGROUP) {
+        let row = word(at_taken(a));
+        set_scalar(at_deepening(a), -dot(vector_at(numbers(row) + NORMAL), moved_point(row, LEFT_PRODUCT)));
+    }
+    sync();
+    for (var a = local; a < taken; a += WORKGROUP) {
+        var push = f64(0.0);
+        for (var b = 0u; b < taken; b += 1u) {
+            push += scalar(at_inverse(b, a)) * scalar(at_deepening(b));
+        }
+        let row = word(at_taken(a));
+        set_scalar(at_push(a), push);
+        set_reaction(row, Variation(push * vector_at(numbers(row) + NORMAL), vec3<f64>(0.0), vec3<f64>(0.0)));
+    }
+    sync();
+    var square = vec3<f64>(0.0);
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        let residual = vector_entry(LEFT_OVER, slot);
+        var displacement = vector_entry(LEFT_PRODUCT, slot);
+        for (var a = 0u; a < taken; a += 1u) {
+            if ISOTROPIC {
+                displacement += scalar(at_column(a, slot)) * vector_at(at_reaction(word(at_taken(a))));
+            } else {
+                displacement += scalar(at_push(a)) * vector_at(at_column(a, slot));
+            }
+        }
+        displacement = displacement / stiffening;
+        put(PRECONDITIONED_FORCE, slot, (residual + gather(slot)) / stiffening);
+        put(PRECONDITIONED, slot, displacement);
+        square.x += dot(residual, displacement);
+    }
+    let next = add_up(square, local).x;
+    let is_first = word(IS_FIRST) != 0u;
+    let ratio = select(next / scalar(SQUARE), f64(0.0), is_first);
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        var force = vector_entry(PRECONDITIONED_FORCE, slot);
+        var displacement = vector_entry(PRECONDITIONED, slot);
+        if !is_first {
+            force += ratio * vector_entry(DIRECTION_FORCE, slot);
+            displacement += ratio * vector_entry(DIRECTION, slot);
+        }
+        put(DIRECTION_FORCE, slot, force);
+        put(DIRECTION, slot, displacement);
+    }
+    sync();
+    if local == 0u {
+        if is_first && word(PASS) == 0u {
+            set_scalar(STOP, inner_tolerance() * inner_tolerance() * next);
+        }
+        set_word(IS_FIRST, 0u);
+        set_scalar(SQUARE, next);
+        go_to(after_iteration(), PRECONDITION);
+    }
+}
+
+// Relative residual to which a linear solve is asked for.
+fn inner_tolerance() -> f64 {
+    let purpose = word(PURPOSE);
+    if purpose == FOR_STEP {
+        return clamp(scalar(RESIDUAL), INNER_TOLERANCE_FLOOR, INNER_TOLERANCE);
+    }
+    return select(RESPONSE_TOLERANCE, PROBE_TOLERANCE, purpose == FOR_PROBE);
+}
+
+// What follows an iteration of the linear solve; for one invocation.
+fn after_iteration() -> u32 {
+    if word(LEFT) > 0u && scalar(SQUARE) > scalar(STOP) {
+        return ITERATE;
+    }
+    let purpose = word(PURPOSE);
+    if purpose == FOR_PROBE {
+        return converged();
+    }
+    return select(RESPONDED, MODEL, purpose == FOR_STEP);
+}
+
+// What follows a direction of negative curvature; for one invocation.
+fn after_negative_curvature(lacking: f64) -> u32 {
+    let purpose = word(PURPOSE);
+    if purpose == FOR_PROBE {
+        return NUDGE;
+    }
+    if purpose == FOR_TANGENT {
+        return ACCOUNT;
+    }
+    let attempts = word(ATTEMPTS) + 1u;
+    let damping = scalar(DAMPING);
+    set_word(ATTEMPTS, attempts);
+    set_scalar(DAMPING, damping + max(lacking + CURVATURE_MARGIN, damping));
+    // No step is as good as one of no length, which ends the search.
+    set_scalar(LENGTH, select(scalar(LENGTH), f64(0.0), attempts >= DAMPING_ATTEMPTS));
+    return select(STEP, DECIDE, attempts >= DAMPING_ATTEMPTS);
+}
+
+// One iteration of conjugate gradients: a step along the direction.
+fn iterate(local: u32) {
+    let kc = scalar(STIFFNESS);
+    let stiffening = scalar(STIFFENING);
+    let before = scalar(SQUARE);
+    for (var row = local; row < row_count; row += WORKGROUP) {
+        let at = numbers(row);
+        let v = variation(row, DIRECTION);
+        let push = select(f64(0.0), kc * scalar(at + SHARE) * dot(vector_at(at + NORMAL), v.point), is_active(row));
+        set_reaction(row, stretched_and_bent(at, push, v));
+    }
+    sync();
+    var work = vec3<f64>(0.0);
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        let force = vector_entry(DIRECTION_FORCE, slot);
+        let product = stiffening * force + gather(slot);
+        put(HESSIAN_DIRECTION, slot, product);
+        work.x += dot(vector_entry(DIRECTION, slot), product);
+        work.y += dot(vector_entry(DIRECTION, slot), force);
+    }
+    let sum = add_up(work, local);
+    let is_convex = sum.x > 0.0;
+    let share = select(f64(0.0), before / sum.x, is_convex);
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        put(STEP_FORCE, slot, vector_entry(STEP_FORCE, slot) + share * vector_entry(DIRECTION_FORCE, slot));
+        put(STEP_DISPLACEMENT, slot, vector_entry(STEP_DISPLACEMENT, slot) + share * vector_entry(DIRECTION, slot));
+        put(LEFT_OVER, slot, vector_entry(LEFT_OVER, slot) - share * vector_entry(HESSIAN_DIRECTION, slot));
+    }
+    sync();
+    if local == 0u {
+        set_word(LEFT, word(LEFT) - 1u);
+        if is_convex {
+            go_to(multiply_for(PRECONDITION), ITERATE);
+        } else {
+            set_scalar(DESCENT, root(sum.y));
+            go_to(after_negative_curvature(-sum.x / sum.y), ITERATE);
+        }
+    }
+}
+
+// C times what the linear solve leaves, or times the trial's forces.
+fn take_product(local: u32) {
+    let next = word(NEXT);
+    multiply(select(LEFT_OVER, 1u - own, next == PLACE), LEFT_PRODUCT, local);
+    sync();
+    if local == 0u {
+        go_to(next, PRODUCT);
+    }
+}
+
+// By how much the model is less at the step than at the state; notes the rows' forces there, and which then touch.
+fn model(local: u32) {
+    let kc = scalar(STIFFNESS);
+    var sum = vec3<f64>(0.0);
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        let displacement = vector_entry(STEP_DISPLACEMENT, slot);
+        let force = vector_entry(STEP_FORCE, slot);
+        sum.x += dot(displacement, vector_entry(OUT_OF_BALANCE, slot))
+            - 0.5 * scalar(STIFFENING) * dot(displacement, force);
+        sum.z += dot(displacement, force);
+    }
+    for (var row = local; row < row_count; row += WORKGROUP) {
+        let at = numbers(row);
+        let depth = scalar(at + DEPTH);
+        let v = variation(row, STEP_DISPLACEMENT);
+        let change = dot(vector_at(at + NORMAL), v.point);
+        if scalar(at + MULTIPLIER) != 0.0 {
+            let bent = second_variation(at, v);
+            sum.x -= 0.5 * scalar(at + MULTIPLIER)
+                * (dot(bent.point, v.point) + dot(bent.tangent_0, v.tangent_0) + dot(bent.tangent_1, v.tangent_1));
+        }
+        let force = scalar(at + SHARE) * max(depth + change, f64(0.0));
+        let before = force_over_kc(at);
+        // The part that is of first order is in the residual.
+        let same = (depth > 0.0) == (force > 0.0);
+        let stretch =
+            select(force * (depth + change) - before * (depth + 2.0 * change), (force - before) * change, same);
+        sum.x -= 0.5 * kc * stretch;
+        set_scalar(at_force(row), force);
+        if (force > 0.0) != is_active(row) {
+            sum.y += 1.0;
+            set_word(at_active(row), select(0u, 1u, force > 0.0));
+        }
+    }
+    sum = add_up(sum, local);
+    if local == 0u {
+        go_to(after_model(sum.x, sum.y > 0.0, sum.z), MODEL);
+    }
+}
+
+// What follows a pass of the step, by which the model decreases, other rows may touch, and the square of the step's
+// length; for one invocation.
+fn after_model(decrease: f64, has_changed: bool, square: f64) -> u32 {
+    let number = word(PASS);
+    if word(RESTORED) == 0u {
+        if number > 0u && !(decrease > scalar(DECREASE)) {
+            // Contacts came and went to no avail: the pass before was better.
+            set_word(RESTORED, 1u);
+            return RESTORE;
+        }
+        set_scalar(DECREASE, decrease);
+        if has_changed && number + 1u < MODEL_PASSES {
+            return GO_ON;
+        }
+    }
+    set_scalar(PREDICTED, scalar(DECREASE) + 0.5 * scalar(DAMPING) * square);
+    set_scalar(STEP_LENGTH, root(square));
+    return TRY;
+}
+
+fn restore(local: u32) {
+    sync();
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        put(STEP_FORCE, slot, vector_entry(PREVIOUS_FORCE, slot));
+        put(STEP_DISPLACEMENT, slot, vector_entry(PREVIOUS_DISPLACEMENT, slot));
+    }
+    if local == 0u {
+        go_to(MODEL, RESTORE);
+    }
+}
+
+// The residual force of the model at the step, for another pass.
+fn go_on(local: u32) {
+    let kc = scalar(STIFFNESS);
+    for (var row = local; row < row_count; row += WORKGROUP) {
+        let at = numbers(row);
+        let push = kc * (scalar(at_force(row)) - force_over_kc(at));
+        set_reaction(row, stretched_and_bent(at, push, variation(row, STEP_DISPLACEMENT)));
+    }
+    sync();
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        let own = scalar(STIFFENING) * vector_entry(STEP_FORCE, slot);
+        put(LEFT_OVER, slot, vector_entry(OUT_OF_BALANCE, slot) - own - gather(slot));
+    }
+    if local == 0u {
+        set_word(PASS, word(PASS) + 1u);
+        go_to(multiply_for(FACTORISE), GO_ON);
+    }
+}
+
+// The forces to which the step leads, and what it predicts for the rows.
+fn try_step(local: u32) {
+    for (var node = local; node < parameters.proxy_nodes; node += WORKGROUP) {
+        set_scalar(at_predicted(node), f64(0.0));
+    }
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        put(1u - own, slot, vector_entry(own, slot) + vector_entry(STEP_FORCE, slot));
+    }
+    sync();
+    for (var row = local; row < row_count; row += WORKGROUP) {
+        set_scalar(at_predicted(word(row_words(row))), scalar(at_force(row)));
+    }
+    if local == 0u {
+        set_word(TRIAL_KIND, STEPPED);
+        go_to(multiply_for(PLACE), TRY);
+    }
+}
+
+// The energy that the trial's forces store, and how far from rest that can move the surface.
+fn place(local: u32) {
+    let trial = 1u - own;
+    var work = vec3<f64>(0.0);
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        work.x += dot(vector_entry(trial, slot), vector_entry(LEFT_PRODUCT, slot));
+    }
+    let elastic = 0.5 * add_up(work, local).x;
+    if local == 0u {
+        let norm = sqrt(2.0 * max(elastic, f64(0.0))) * (1.0 + LENGTH_ROUNDING);
+        let bulging = parameters.bulge_mobility * norm;
+        set_scalar(TRIAL_ELASTIC, elastic);
+        set_scalar(MOVED, parameters.mobility * norm + bulging);
+        set_scalar(BULGE, parameters.bulge + bulging);
+        go_to(PLACED, PLACE);
+    }
+}
+
+// Tries a step from a saddle along a direction of negative curvature, to one side and the other, ever shorter.
+fn nudge(local: u32) {
+    sync();
+    let number = word(NUDGES);
+    var length = NUDGE_LENGTH * root(2.0 * scalar(ENERGY)) / scalar(DESCENT);
+    for (var k = 0u; k < number / 2u; k += 1u) {
+        length *= 0.5;
+    }
+    let side = select(length, -length, number % 2u == 1u);
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        put(1u - own, slot, vector_entry(own, slot) + side * vector_entry(DIRECTION_FORCE, slot));
+    }
+    if local == 0u {
+        set_word(TRIAL_KIND, NUDGED);
+        go_to(multiply_for(PLACE), NUDGE);
+    }
+}
+
+// Begins the solve for the response to one joint's motion.
+fn respond(local: u32) {
+    let joint = word(JOINT);
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        clear_step(slot);
+        put(LEFT_OVER, slot, vector_entry(load_of(joint), slot));
+    }
+    sync();
+    if local == 0u {
+        begin_solve(FOR_TANGENT, f64(1.0));
+        go_to(multiply_for(PRECONDITION), RESPOND);
+    }
+}
+
+// Adds what a response adds to the tangent.
+fn take_response(local: u32) {
+    let joint = word(JOINT);
+    for (var slot = local; slot < slots; slot += WORKGROUP) {
+        put(response_to(joint), slot, vector_entry(STEP_DISPLACEMENT, slot));
+    }
+    sync();
+    for (var l = 0u; l <= joint; l += 1u) {
+        var sum = vec3<f64>(0.0);
+        for (var slot = local; slot < slots; slot += WORKGROUP) {
+            // What the residual adds makes the error a product of those of both responses.
+            sum.x += dot(vector_entry(load_of(l), slot), vector_entry(STEP_DISPLACEMENT, slot))
+                + dot(vector_entry(response_to(l), slot), vector_entry(LEFT_OVER, slot));
+        }
+        sum = add_up(sum, local);
+        if local == 0u {
+            set_scalar(at_tangent(joint, l), scalar(at_tangent(joint, l)) + sum.x);
+        }
+    }
+    if local == 0u {
+        set_word(JOINT, joint + 1u);
+        let is_last = joint + 1u == parameters.joints;
+        set_word(HAS_TANGENT, select(0u, 1u, is_last));
+        go_to(select(RESPOND, ACCOUNT, is_last), RESPONDED);
+    }
+}
+
+// --- Results ---
+
+// Torque, number of touches, and whether the compliance covers all that the result depends on (src/contact/reach.rs).
+fn account(local: u32) {
+    let kc = parameters.kc;
+    var sum = vec3<f64>(0.0);
+    // How far the state has moved the surface.
+    let norm = sqrt(2.0 * max(scalar(ELASTIC), f64(0.0))) * (1.0 + LENGTH_ROUNDING);
+    let moved = (parameters.mobility + parameters.bulge_mobility) * norm;
+    for (var row = local; row < row_count; row += WORKGROUP) {
+        if scalar(numbers(row) + DEPTH) > 0.0 {
+            sum.x += 1.0;
+            sum.y += select(f64(1.0), f64(0.0), is_covered(word(row_words(row)), moved));
+        }
+    }
+    sum = add_up(sum, local);
+    for (var joint = 0u; joint < parameters.joints; joint += 1u) {
+        var torque = vec3<f64>(0.0);
+        for (var row = local; row < row_count; row += WORKGROUP) {
+            let at = numbers(row);
+            torque.x += kc * force_over_kc(at)
+                * dot(vector_at(at + NORMAL), jacobian(word(row_words(row)), joint));
+        }
+        torque = add_up(torque, local);
+        if local == 0u {
+            set_scalar(at_torque(joint), torque.x);
+        }
+    }
+    if local == 0u {
+        set_word(TOUCHES, u32(sum.x));
+        set_word(IS_DOUBTFUL, select(0u, 1u, sum.y > 0.0));
+        go_to(DONE, ACCOUNT);
+    }
+}
+
+// Whether the compliance covers all facets that may lie as near to proxy node `node` as its closest one.
+fn is_covered(node: u32, moved: f64) -> bool {
+    let x = proxy_position(node);
+    let reach = abs(rest_distance(node)) + parameters.gap_band + 2.0 * moved;
+    // A compliance that covers all nodes covers all facets.
+    var entry = select(0u, parameters.triangles, parameters.covered == parameters.surface_nodes);
+    while entry < parameters.triangles {
+        if entry % (GROUP * CLUSTER) == 0u
+            && distance_to_sphere(parameters.clusters + entry / (GROUP * CLUSTER), x) > reach {
+            entry += GROUP * CLUSTER;
+        } else if entry % CLUSTER == 0u && distance_to_sphere(entry / CLUSTER, x) > reach {
+            entry += CLUSTER;
+        } else {
+            if distance_to_sphere(parameters.clusters + parameters.groups + entry, x) <= reach
+                && mesh[parameters.at_covered + mesh[parameters.at_order + entry]] == 0u {
+                return false;
+            }
+            entry += 1u;
+        }
+    }
+    return true;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let is_there = resume(unfold(group, groups), local);
+    while phase > TANGENT && phase != DONE && spent < LOOP_BUDGET {
+        if is_next(STEP) { begin_step(local); }
+        if is_next(GO_ON) { go_on(local); }
+        if is_next(FACTORISE) { factorise(local); }
+        if is_next(RESPOND) { respond(local); }
+        loop {
+            if is_next(PRECONDITION) { precondition(local); }
+            if is_next(ITERATE) { iterate(local); }
+            if is_next(PRODUCT) { take_product(local); }
+            if !is_next(PRECONDITION) {
+                break;
+            }
+        }
+        if is_next(PLACE) { place(local); }
+        if is_next(MODEL) { model(local); }
+        if is_next(RESTORE) { restore(local); }
+        if is_next(RESPONDED) { take_response(local); }
+        if is_next(TRY) { try_step(local); }
+        if is_next(NUDGE) { nudge(local); }
+        if is_next(ACCOUNT) { account(local); }
+        sync();
+        workgroupBarrier();
+    }
+    if local == 0u && is_there {
+        set_word(PHASE, phase);
+    }
+}

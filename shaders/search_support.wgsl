@@ -1,0 +1,287 @@
+// What the two stages of the search have in common that take it from phase to phase (twins:
+// src/contact/linear/support.rs, law/springs.rs and law/depth.rs). One workgroup a configuration.
+//
+// A stage goes through its phases until the search has to wait for another one, or until it has done what one dispatch
+// may do; then it goes on in the next round. Scalars are written by the first invocation alone, at the end of a phase,
+// and read by all in the next.
+
+override WORKGROUP: u32 = 32u;
+
+// Passes through loops that an invocation may make in one dispatch: llvmpipe stops all loops after 65,535.
+const LOOP_BUDGET: u32 = 30000u;
+
+// What the search has to do now, and what it has done.
+var<workgroup> phase: u32;
+var<workgroup> spent: u32;
+var<workgroup> sums: array<vec3<f64>, WORKGROUP>;
+
+// Of the state: which half is its own, where its rows begin, how many there are, and slots in use.
+var<private> own: u32;
+var<private> numbers_base: u32;
+var<private> row_words_base: u32;
+var<private> row_count: u32;
+var<private> slots: u32;
+
+// Looks up what the phases of a state have in common.
+fn look_up() {
+    own = word(HALF);
+    numbers_base = at_numbers(own, 0u);
+    row_words_base = at_row(own, 0u);
+    row_count = word(ROWS + own);
+    slots = word(SLOTS);
+}
+
+// Sum of `value` over all invocations, in every one.
+fn add_up(value: vec3<f64>, local: u32) -> vec3<f64> {
+    sums[local] = value;
+    workgroupBarrier();
+    var sum = vec3<f64>(0.0);
+    for (var k = 0u; k < WORKGROUP; k += 1u) {
+        sum += sums[k];
+    }
+    workgroupBarrier();
+    return sum;
+}
+
+// Root of a square; rounding below zero counts as zero, what is not a number stays so.
+fn root(square: f64) -> f64 {
+    return select(sqrt(square), f64(0.0), square < 0.0);
+}
+
+// --- Support ---
+
+fn vector_entry(vector: u32, slot: u32) -> vec3<f64> {
+    return vector_at(at_entry_of(vector, slot));
+}
+
+fn put(vector: u32, slot: u32, value: vec3<f64>) {
+    set_vector(at_entry_of(vector, slot), value);
+}
+
+// product = C vector on the support.
+fn multiply(vector: u32, product: u32, local: u32) {
+    for (var slot = local; slot < slots; slot += 4u * WORKGROUP) {
+        let parts = responses(vector, places_from(slot));
+        put_four(product, slot, parts);
+    }
+}
+
+// Places of four slots that an invocation takes together; behind the last slot any.
+fn places_from(slot: u32) -> vec4<u32> {
+    let last = slots - 1u;
+    return vec4<u32>(word(at_place(slot)), word(at_place(min(slot + WORKGROUP, last))),
+        word(at_place(min(slot + 2u * WORKGROUP, last))), word(at_place(min(slot + 3u * WORKGROUP, last))));
+}
+
+fn put_four(vector: u32, slot: u32, values: array<vec3<f64>, 4>) {
+    put(vector, slot, values[0]);
+    if slot + WORKGROUP < slots {
+        put(vector, slot + WORKGROUP, values[1]);
+    }
+    if slot + 2u * WORKGROUP < slots {
+        put(vector, slot + 2u * WORKGROUP, values[2]);
+    }
+    if slot + 3u * WORKGROUP < slots {
+        put(vector, slot + 3u * WORKGROUP, values[3]);
+    }
+}
+
+// --- Rows of the state ---
+
+fn numbers(row: u32) -> u32 {
+    return numbers_base + row * (NODE_WEIGHTS + 3u * parameters.carriers);
+}
+
+fn row_words(row: u32) -> u32 {
+    return row_words_base + row * (ROW_WORDS + 3u * parameters.carriers);
+}
+
+fn is_active(row: u32) -> bool {
+    return word(at_active(row)) != 0u;
+}
+
+// max(0, depth) times the node's share, of the row with these numbers.
+fn force_over_kc(at: u32) -> f64 {
+    return scalar(at + SHARE) * max(scalar(at + DEPTH), f64(0.0));
+}
+
+// How displacements of a row's nodes move its closest point, and turn the surface there; or a reaction to that.
+struct Variation {
+    point: vec3<f64>,
+    tangent_0: vec3<f64>,
+    tangent_1: vec3<f64>,
+}
+
+fn slot_of(row: u32, j: u32) -> u32 {
+    return word(row_words(row) + ROW_WORDS + parameters.carriers + j);
+}
+
+fn moved_point(row: u32, vector: u32) -> vec3<f64> {
+    let weights = numbers(row) + NODE_WEIGHTS;
+    var sum = vec3<f64>(0.0);
+    for (var j = 0u; j < parameters.carriers; j += 1u) {
+        sum += scalar(weights + j) * vector_entry(vector, slot_of(row, j));
+    }
+    return sum;
+}
+
+fn variation(row: u32, vector: u32) -> Variation {
+    let at = numbers(row);
+    var v = Variation(moved_point(row, vector), vec3<f64>(0.0), vec3<f64>(0.0));
+    if scalar(at + MULTIPLIER) != 0.0 {
+        let slopes = at + NODE_WEIGHTS + parameters.carriers;
+        for (var j = 0u; j < parameters.carriers; j += 1u) {
+            let entry = vector_entry(vector, slot_of(row, j));
+            v.tangent_0 += scalar(slopes + j) * entry;
+            v.tangent_1 += scalar(slopes + parameters.carriers + j) * entry;
+        }
+    }
+    return v;
+}
+
+// Product of a symmetric matrix of two rows, its entries 00, 01, 11, and a vector.
+fn apply(m: vec3<f64>, v: vec2<f64>) -> vec2<f64> {
+    return vec2<f64>(dot(m.xy, v), dot(m.yz, v));
+}
+
+// The reaction whose work along another variation is the second variation of the depth of both.
+fn second_variation(at: u32, v: Variation) -> Variation {
+    let normal = vector_at(at + NORMAL);
+    let t_0 = vector_at(at + TANGENT_0);
+    let t_1 = vector_at(at + TANGENT_1);
+    let along = vector_at(at + ALONG);
+    let sliding = vec2<f64>(dot(t_0, v.point), dot(t_1, v.point));
+    let tilting = vec2<f64>(dot(normal, v.tangent_0), dot(normal, v.tangent_1));
+    let turned = apply(vector_at(at + TURNING), tilting);
+    let carried = apply(vector_at(at + TURNING), sliding);
+    let slide = apply(vector_at(at + BENDING), sliding) - turned;
+    let turn = carried + scalar(at + DISTANCE) * turned;
+    let across = v.point - dot(normal, v.point) * normal - dot(along, v.point) * along;
+    return Variation(scalar(at + INVERSE_DISTANCE) * across + slide.x * t_0 + slide.y * t_1,
+        -turn.x * normal, -turn.y * normal);
+}
+
+// The reaction of a row whose spring takes `push` more under the variation v.
+fn stretched_and_bent(at: u32, push: f64, v: Variation) -> Variation {
+    let multiplier = scalar(at + MULTIPLIER);
+    var reaction = Variation(push * vector_at(at + NORMAL), vec3<f64>(0.0), vec3<f64>(0.0));
+    if multiplier != 0.0 {
+        let bent = second_variation(at, v);
+        reaction.point += multiplier * bent.point;
+        reaction.tangent_0 = multiplier * bent.tangent_0;
+        reaction.tangent_1 = multiplier * bent.tangent_1;
+    }
+    return reaction;
+}
+
+fn set_reaction(row: u32, reaction: Variation) {
+    let at = at_reaction(row);
+    set_vector(at, reaction.point);
+    set_vector(at + 3u, reaction.tangent_0);
+    set_vector(at + 6u, reaction.tangent_1);
+}
+
+// Sum of what the rows' reactions press on the node in `slot`.
+fn gather(slot: u32) -> vec3<f64> {
+    var sum = vec3<f64>(0.0);
+    let carriers = parameters.carriers;
+    var entry = word(at_head(slot));
+    while entry != 0u {
+        let row = (entry - 1u) >> NODE_BITS;
+        let j = (entry - 1u) & ((1u << NODE_BITS) - 1u);
+        let weights = numbers(row) + NODE_WEIGHTS + j;
+        let reaction = at_reaction(row);
+        sum += scalar(weights) * vector_at(reaction) + scalar(weights + carriers) * vector_at(reaction + 3u)
+            + scalar(weights + 2u * carriers) * vector_at(reaction + 6u);
+        entry = word(row_words(row) + ROW_WORDS + 2u * carriers + j);
+    }
+    return sum;
+}
+
+// Sets the multipliers to the rows' forces, and notes which of them touch.
+fn weigh_curvature(local: u32) {
+    for (var row = local; row < row_count; row += WORKGROUP) {
+        let at = numbers(row);
+        set_scalar(at + MULTIPLIER, scalar(STIFFNESS) * force_over_kc(at));
+        set_word(at_active(row), select(0u, 1u, scalar(at + DEPTH) > 0.0));
+    }
+}
+
+// Zero is the first displacement of a linear solve, for one invocation with what it is for.
+fn begin_solve(purpose: u32, stiffening: f64) {
+    set_scalar(STIFFENING, stiffening);
+    set_word(PURPOSE, purpose);
+    set_word(PASS, 0u);
+    set_word(RESTORED, 0u);
+    set_word(IS_FIRST, 1u);
+    set_word(LEFT, 3u * INNER_ITERATIONS_PER_UNKNOWN * slots);
+}
+
+fn clear_step(slot: u32) {
+    put(STEP_FORCE, slot, vec3<f64>(0.0));
+    put(STEP_DISPLACEMENT, slot, vec3<f64>(0.0));
+}
+
+// Derivative of the position of proxy node `node` by joint `joint`.
+fn jacobian(node: u32, joint: u32) -> vec3<f64> {
+    if joint > proxy_link(node) {
+        return vec3<f64>(0.0);
+    }
+    let at = at_joint(joint);
+    let axis = vector_at(at + 3u);
+    return select(cross(axis, proxy_position(node) - vector_at(at)), axis, scalar(at + 6u) != 0.0);
+}
+
+// Notes that `next` follows a product with C, which comes first; for one invocation.
+fn multiply_for(next: u32) -> u32 {
+    set_word(NEXT, next);
+    return PRODUCT;
+}
+
+// What follows an equilibrium; for one invocation.
+fn converged() -> u32 {
+    set_word(STATUS, STATUS_CONTACT);
+    return select(ACCOUNT, TANGENT, parameters.with_tangent != 0u);
+}
+
+// Passes through loops that an invocation makes in a phase, about.
+fn passes_of(now: u32) -> u32 {
+    let runs = slots / WORKGROUP + 1u;
+    let rows = row_count / WORKGROUP + 1u;
+    if now == FACTORISE {
+        return runs * row_count * parameters.carriers + rows * row_count * (parameters.carriers + row_count / 4u + 1u);
+    }
+    if now == ACCOUNT {
+        return rows * (parameters.triangles / 4u + 8u * parameters.joints);
+    }
+    return runs * (slots / 2u + row_count + 32u) + (rows + WORKGROUP) * (4u * parameters.carriers + row_count)
+        + parameters.proxy_nodes / WORKGROUP + parameters.support / WORKGROUP;
+}
+
+// Sets what the search has to do after phase `now`; for one invocation.
+fn go_to(next: u32, now: u32) {
+    phase = next;
+    spent += passes_of(now);
+}
+
+// Whether `now` is what the search has to do, and may do in this dispatch; for all invocations together. Nothing but a
+// phase, behind its first barrier, may change what is looked at here.
+fn is_next(now: u32) -> bool {
+    sync();
+    workgroupBarrier();
+    look_up();
+    return phase == now && spent < LOOP_BUDGET;
+}
+
+// Takes up a search in the phase in which it was left; for all invocations together.
+fn resume(index: u32, local: u32) -> bool {
+    let is_there = take_up(index);
+    if local == 0u {
+        phase = DONE;
+        if is_there {
+            phase = word(PHASE);
+        }
+    }
+    workgroupBarrier();
+    return is_there;
+}

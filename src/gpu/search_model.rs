@@ -1,0 +1,241 @@
+//! Object, proxy and contact law in f64 on the device, as the search for equilibria wants them, and the size of its
+//! workspaces.
+
+use super::{
+    context::{Context, GpuError},
+    detection::{bounding_spheres, controls},
+    kernel::StorageBuffer,
+    layout::SearchParameters,
+    shaders::{CLUSTER, GROUP, NODES_TOGETHER},
+};
+use crate::{
+    contact::{self, geometry::bounding_volumes::CULLING_SLACK},
+    tolerances::{CONTINUATION_START, DEPTH_ROUNDING},
+};
+use glam::DVec3;
+
+/// Most rows of a configuration: contacts, and proxy nodes that have touched. What exceeds them is left to the CPU.
+const CONTACTS: usize = 64;
+
+/// Most object nodes that carry contact force in a configuration: three for each row, which neighbouring contacts share.
+const SUPPORT: usize = 3 * CONTACTS;
+
+/// No place, behind the last node of a facet.
+const ABSENT: u32 = u32::MAX;
+
+/// The device's copy of a contact model for the search.
+pub(super) struct SearchModel {
+    /// Without the configurations, and the room for them.
+    pub parameters: SearchParameters,
+    pub surface: StorageBuffer,
+    pub mesh: StorageBuffer,
+    pub compliance: StorageBuffer,
+    /// Whether the compliance has one number for a pair of nodes, and whether facets are bent.
+    pub is_isotropic: bool,
+    pub is_smooth: bool,
+}
+
+impl SearchModel {
+    /// Uploads a model whose gaps in f32 are known to `gap_band` [m], for at most `contacts` rows a configuration.
+    pub fn new(
+        context: &Context,
+        model: &contact::Model<'_>,
+        gap_band: f64,
+        contacts: usize,
+    ) -> Result<Self, GpuError> {
+        let nodes = model.chain.nodes.len();
+        let is_isotropic = model.compliance.rows_per_node == 1;
+        let parts = Parts::new(model);
+        let contacts = CONTACTS.min(contacts).min(nodes);
+        let support = SUPPORT.min(model.compliance.nodes.len());
+        let mut parameters = SearchParameters {
+            joints: model.chain.joints.len() as u32,
+            proxy_nodes: nodes as u32,
+            contacts: contacts as u32,
+            support: support as u32,
+            max_iterations: model.contact.max_iterations,
+            with_tangent: u32::from(model.with_tangent),
+            gap_band,
+            first_kc: model.kc.min(CONTINUATION_START / model.max_nodal_compliance),
+            kc: model.kc,
+            tolerance: model.contact.tolerance,
+            mobility: model.mobility.sqrt(),
+            bulge_mobility: model.bulge_mobility.sqrt(),
+            bulge: model.surface.bulge,
+            least_scale: DEPTH_ROUNDING * model.surface.extent / model.contact.tolerance
+                * model.max_nodal_compliance.sqrt(),
+            ..parts.parameters
+        };
+        parameters.words = words(&parameters);
+        parameters.reals = reals(&parameters, is_isotropic);
+        Ok(Self {
+            parameters,
+            surface: StorageBuffer::from_slice(context, "surface for the search", &parts.surface)?,
+            mesh: StorageBuffer::from_slice(context, "mesh for the search", &parts.mesh)?,
+            compliance: StorageBuffer::from_slice(context, "compliance in f64", &model.compliance.entries)?,
+            is_isotropic,
+            is_smooth: model.surface.smooth.is_some(),
+        })
+    }
+
+    /// Bytes of the reals of one workspace, which are most of it [B].
+    pub fn workspace(&self) -> usize {
+        size_of::<f64>() * self.parameters.reals as usize
+    }
+}
+
+/// Words of a workspace: see `shaders/search_types.wgsl`.
+fn words(p: &SearchParameters) -> u32 {
+    const HEADER: u32 = 22;
+    const ROW_WORDS: u32 = 4;
+    HEADER
+        + 3 * p.proxy_nodes
+        + p.covered.div_ceil(NODES_TOGETHER as u32)
+        + p.covered
+        + p.support
+        + 2 * p.contacts * (ROW_WORDS + 3 * p.carriers)
+        + 2 * p.contacts
+        + p.support
+}
+
+/// Reals of a workspace: see there.
+fn reals(p: &SearchParameters, is_isotropic: bool) -> u32 {
+    const SCALARS: u32 = 20;
+    const ROW_REALS: u32 = 26;
+    const VECTORS: u32 = 16;
+    SCALARS
+        + 7 * p.joints
+        + p.proxy_nodes
+        + 3 * p.covered
+        + 2 * p.contacts * (ROW_REALS + 3 * p.carriers)
+        + (1 + 9 + 1 + 1) * p.contacts
+        + p.contacts * p.contacts
+        + if is_isotropic { 1 } else { 3 } * p.contacts * p.support
+        + 3 * (VECTORS + 2 * p.joints) * p.support
+        + p.joints * p.joints
+        + p.joints
+}
+
+/// The contents of the buffers, and where their parts begin.
+struct Parts {
+    parameters: SearchParameters,
+    surface: Vec<f64>,
+    mesh: Vec<u32>,
+}
+
+impl Parts {
+    fn new(model: &contact::Model<'_>) -> Self {
+        let (object, surface) = (model.object, &model.surface);
+        let triangles = object.triangles.len() as u32;
+        let facets = 0..triangles;
+        let most = facets.clone().map(|t| surface.carriers(t).0.len()).max().unwrap_or(0);
+        let order: Vec<u32> = surface.bounds.order().collect();
+        let numbering = Numbering::new(model, &order);
+        let carriers = most.next_multiple_of(4);
+        let clusters = order.len().div_ceil(CLUSTER) as u32;
+        let mut parameters = SearchParameters {
+            surface_nodes: object.surface_nodes as u32,
+            triangles,
+            clusters,
+            groups: clusters.div_ceil(GROUP as u32),
+            covered: model.compliance.nodes.len() as u32,
+            carriers: carriers as u32,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        let mut numbers = bounding_spheres(model);
+        numbers.extend(model.chain.nodes.iter().map(|node| node.radius));
+        numbers.extend(&model.shares);
+        parameters.at_rest = numbers.len() as u32;
+        numbers.extend(numbering.nodes.iter().flat_map(|&node| surface.positions[node as usize].to_array()));
+        parameters.at_offsets = numbers.len() as u32;
+        if let Some(smooth) = &surface.smooth {
+            numbers.extend(numbering.nodes.iter().flat_map(|&node| smooth.offset(node).to_array()));
+            parameters.at_masks = numbers.len() as u32;
+            numbers.extend(smooth.shapes().iter().flat_map(|shape| (0..carriers).flat_map(|j| shape.mask_of(j))));
+        }
+        parameters.at_spheres = numbers.len() as u32;
+        numbers.extend(numbering.spheres(model).into_iter().flatten());
+        let mut mesh: Vec<u32> = object.triangles.iter().flatten().copied().collect();
+        mesh.extend(object.topology.across.iter().flatten());
+        mesh.extend(&object.topology.around_offsets);
+        mesh.extend(&object.topology.around);
+        parameters.at_order = mesh.len() as u32;
+        mesh.extend(&order);
+        parameters.at_carriers = mesh.len() as u32;
+        for t in facets.clone() {
+            let places = surface.carriers(t).0.iter().map(|&node| numbering.places[node as usize]);
+            mesh.extend(places.chain(std::iter::repeat(ABSENT)).take(carriers));
+        }
+        parameters.at_shapes = mesh.len() as u32;
+        if let Some(smooth) = &surface.smooth {
+            mesh.extend(facets.clone().map(|t| smooth.shape_number(t)));
+        }
+        parameters.at_covered = mesh.len() as u32;
+        let is_covered = |&node: &u32| model.compliance.place(node).is_some();
+        mesh.extend(facets.map(|t| u32::from(surface.carriers(t).0.iter().all(is_covered))));
+        parameters.at_places = mesh.len() as u32;
+        mesh.extend(&numbering.near);
+        parameters.at_links = mesh.len() as u32;
+        mesh.extend(model.chain.nodes.iter().map(|node| node.link as u32));
+        Self { parameters, surface: numbers, mesh }
+    }
+}
+
+/// Places of the surface nodes: those that the compliance covers come first, in its order.
+struct Numbering {
+    /// Place of each node, and node in each place.
+    places: Vec<u32>,
+    nodes: Vec<u32>,
+    /// Places of the covered nodes, neighbours near each other.
+    near: Vec<u32>,
+}
+
+impl Numbering {
+    /// With neighbours in the `order` of facets.
+    fn new(model: &contact::Model<'_>, order: &[u32]) -> Self {
+        let mut nodes = model.compliance.nodes.clone();
+        let is_covered = |node: &u32| model.compliance.place(*node).is_some();
+        nodes.extend((0..model.object.surface_nodes as u32).filter(|node| !is_covered(node)));
+        let mut places = vec![0; nodes.len()];
+        (0..).zip(&nodes).for_each(|(place, &node)| places[node as usize] = place);
+        let mut is_listed = vec![false; nodes.len()];
+        let mut near = Vec::new();
+        for node in order.iter().flat_map(|&t| model.object.triangles[t as usize]) {
+            if is_covered(&node) && !std::mem::replace(&mut is_listed[node as usize], true) {
+                near.push(places[node as usize]);
+            }
+        }
+        Self { places, nodes, near }
+    }
+
+    /// Spheres around all facets at rest that hang on a node of a group of covered ones: centre and radius.
+    fn spheres(&self, model: &contact::Model<'_>) -> Vec<[f64; 4]> {
+        let slack = CULLING_SLACK * model.surface.extent;
+        let mut hanging = vec![Vec::new(); self.nodes.len()];
+        for t in 0..model.object.triangles.len() as u32 {
+            for &node in model.surface.carriers(t).0 {
+                hanging[self.places[node as usize] as usize].push(t);
+            }
+        }
+        let sphere = |group: &[u32]| {
+            let facets = group.iter().flat_map(|&place| &hanging[place as usize]);
+            let points: Vec<DVec3> = facets.flat_map(|&t| controls(model, t)).collect();
+            let centre = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
+            let radius = points.iter().map(|point| point.distance(centre)).fold(0.0, f64::max);
+            // A facet is taken for near by its own sphere, which is no farther from its points than it is wide.
+            let width = 2.0 * radius_of_facets(model, group, &hanging);
+            [centre.x, centre.y, centre.z, radius + width + slack]
+        };
+        self.near.chunks(NODES_TOGETHER).map(sphere).collect()
+    }
+}
+
+/// Greatest radius of a facet that hangs on a node of `group`, about the middle of its control points [m].
+fn radius_of_facets(model: &contact::Model<'_>, group: &[u32], hanging: &[Vec<u32>]) -> f64 {
+    let radius = |&t: &u32| {
+        let points = controls(model, t);
+        let centre = points.iter().sum::<DVec3>() / points.len() as f64;
+        points.iter().map(|point| point.distance(centre)).fold(0.0, f64::max)
+    };
+    group.iter().flat_map(|&place| &hanging[place as usize]).map(radius).fold(0.0, f64::max)
+}
