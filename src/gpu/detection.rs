@@ -6,7 +6,7 @@
 
 use super::{
     context::{Context, GpuError},
-    kernel::{Access, Dispatch, Kernel, Staging, StorageBuffer},
+    kernel::{Dispatch, Kernel, Staging, StorageBuffer},
     layout::{DoubleParameters, Parameters},
     model::DeviceModel,
     shaders::{self, CLUSTER, GROUP, Shader},
@@ -38,11 +38,10 @@ impl BoundKernel {
         context: &Context,
         (shader, workgroup): (&Shader, u32),
         overrides: &[(&str, f64)],
-        bindings: &[(Access, &StorageBuffer)],
+        buffers: &[(&str, &StorageBuffer)],
     ) -> Result<Self, GpuError> {
-        let (accesses, buffers): (Vec<_>, Vec<_>) = bindings.iter().copied().unzip();
-        let kernel = Kernel::new(context, shader, overrides, &accesses)?;
-        let bound = kernel.bind(context, &buffers)?;
+        let kernel = Kernel::new(context, shader, overrides)?;
+        let bound = kernel.bind(context, buffers)?;
         Ok(Self { kernel, bound, workgroup })
     }
 
@@ -97,7 +96,6 @@ impl Detection {
         chunk: usize,
         double_model: Option<&DoubleModel>,
     ) -> Result<Self, GpuError> {
-        use Access::{Read, Uniform, Write};
         let (chunk, in_double) = (chunk as u64, double_model.is_some());
         let DeviceModel { parameters: single, rest, mesh, clusters, .. } = device;
         let buffer = |what, bytes| StorageBuffer::new(context, what, bytes);
@@ -116,7 +114,13 @@ impl Detection {
             list: buffer("list of contacts", 4 * (chunk + 1))?,
         };
         let Buffers { parameters, positions, .. } = &buffers;
-        let bindings = [(Uniform, parameters), (Read, rest), (Read, mesh), (Write, positions), (Read, clusters)];
+        let bindings = [
+            ("parameters", parameters),
+            ("rest", rest),
+            ("mesh", mesh),
+            ("positions", positions),
+            ("clusters", clusters),
+        ];
         let distances = BoundKernel::new(context, (&shaders::DETECTION, WORKGROUP), &[], &bindings)?;
         let ends = match (&buffers.double_parameters, &buffers.placed, double_model) {
             (Some(uniform), Some(placed), Some(double)) => {
@@ -245,16 +249,21 @@ impl Detection {
 
 impl Ends {
     fn single(context: &Context, device: &DeviceModel, buffers: &Buffers) -> Result<Self, GpuError> {
-        use Access::{Read, Uniform, Write};
         let Buffers { parameters, motions, positions, gaps, list, .. } = buffers;
         let DeviceModel { joints, proxy_nodes, .. } = device;
-        let places = [(Uniform, parameters), (Read, joints), (Read, proxy_nodes), (Read, motions), (Write, positions)];
-        let smallest = [(Uniform, parameters), (Read, positions), (Write, gaps)];
-        let compaction = [(Uniform, parameters), (Read, gaps), (Write, list)];
+        let buffers = [
+            ("parameters", parameters),
+            ("joints", joints),
+            ("proxy_nodes", proxy_nodes),
+            ("motions", motions),
+            ("positions", positions),
+            ("gaps", gaps),
+            ("list", list),
+        ];
         Ok(Self {
-            kinematics: BoundKernel::new(context, (&shaders::KINEMATICS, WORKGROUP), &[], &places)?,
-            smallest: BoundKernel::new(context, (&shaders::CLASSIFICATION, WORKGROUP), &[], &smallest)?,
-            compaction: BoundKernel::new(context, (&shaders::COMPACTION, WORKGROUP), &[], &compaction)?,
+            kinematics: BoundKernel::new(context, (&shaders::KINEMATICS, WORKGROUP), &[], &buffers)?,
+            smallest: BoundKernel::new(context, (&shaders::CLASSIFICATION, WORKGROUP), &[], &buffers)?,
+            compaction: BoundKernel::new(context, (&shaders::COMPACTION, WORKGROUP), &[], &buffers)?,
             arm_bytes: device.arm_bytes(),
             surface_bytes: 0,
         })
@@ -267,25 +276,25 @@ impl Ends {
         buffers: &Buffers,
         (uniform, placed): (&StorageBuffer, &StorageBuffer),
     ) -> Result<Self, GpuError> {
-        use Access::{Read, Uniform, Write};
         let Buffers { motions, positions, gaps, list, .. } = buffers;
         let DeviceModel { mesh, clusters, .. } = device;
-        let places = [(Uniform, uniform), (Read, chain), (Read, motions), (Write, placed), (Write, positions)];
-        let smallest = [
-            (Uniform, uniform),
-            (Read, surface),
-            (Read, mesh),
-            (Read, clusters),
-            (Read, positions),
-            (Read, placed),
-            (Write, gaps),
+        let buffers = [
+            ("parameters", uniform),
+            ("chain", chain),
+            ("motions", motions),
+            ("placed", placed),
+            ("positions", positions),
+            ("surface", surface),
+            ("mesh", mesh),
+            ("order", clusters),
+            ("gaps", gaps),
+            ("list", list),
         ];
-        let compaction = [(Uniform, uniform), (Read, gaps), (Write, list)];
         let overrides = [("WORKGROUP", f64::from(IN_STEP)), ("SMOOTH", f64::from(u8::from(*smooth)))];
         Ok(Self {
-            kinematics: BoundKernel::new(context, (&shaders::DOUBLE_KINEMATICS, WORKGROUP), &[], &places)?,
-            smallest: BoundKernel::new(context, (&shaders::DOUBLE_GAP, IN_STEP), &overrides, &smallest)?,
-            compaction: BoundKernel::new(context, (&shaders::DOUBLE_COMPACTION, WORKGROUP), &[], &compaction)?,
+            kinematics: BoundKernel::new(context, (&shaders::DOUBLE_KINEMATICS, WORKGROUP), &[], &buffers)?,
+            smallest: BoundKernel::new(context, (&shaders::DOUBLE_GAP, IN_STEP), &overrides, &buffers)?,
+            compaction: BoundKernel::new(context, (&shaders::DOUBLE_COMPACTION, WORKGROUP), &[], &buffers)?,
             arm_bytes: chain.size(),
             surface_bytes: surface.size(),
         })

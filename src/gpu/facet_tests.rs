@@ -3,7 +3,7 @@
 use super::{
     adapter::AdapterChoice,
     context::Context,
-    kernel::{Access, Dispatch, Kernel, StorageBuffer},
+    kernel::{Dispatch, Kernel, StorageBuffer},
     layout::DoubleParameters,
     shaders::{self, Shader},
 };
@@ -77,8 +77,9 @@ fn ask(context: &Context, questions: &[f64]) -> Vec<f64> {
     let input = StorageBuffer::from_slice(context, "questions", questions).unwrap();
     let output = StorageBuffer::new(context, "answers", (8 * ANSWER * count) as u64).unwrap();
     output.poison(context, output.size());
-    let kernel = Kernel::new(context, &LEAF_SHADER, &[], &[Access::Uniform, Access::Read, Access::Write]).unwrap();
-    let bound = kernel.bind(context, &[&parameters, &input, &output]).unwrap();
+    let kernel = Kernel::new(context, &LEAF_SHADER, &[]).unwrap();
+    let bound =
+        kernel.bind(context, &[("parameters", &parameters), ("questions", &input), ("answers", &output)]).unwrap();
     let mut encoder = context.device.create_command_encoder(&Default::default());
     let workgroups = (count as u32).div_ceil(32);
     context.record(&mut encoder, [Dispatch { kernel: &kernel, bound: &bound, workgroups, bytes: 0 }]);

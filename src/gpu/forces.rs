@@ -4,7 +4,7 @@
 use super::{
     context::{Context, GpuError},
     detection::Detection,
-    kernel::{Access, Dispatch, Kernel, Staging, StorageBuffer},
+    kernel::{Dispatch, Kernel, Staging, StorageBuffer},
     layout::{Parameters, SolverResult, Touch},
     model::{DeviceModel, LANES},
     pipeline::BatchCapacity,
@@ -66,7 +66,6 @@ impl ForceSearch {
         device: &DeviceModel,
         room: BatchCapacity,
     ) -> Result<Self, GpuError> {
-        use Access::{Read, Uniform, Write};
         let shader = match model.contact.algorithm {
             Algorithm::Paper => &shaders::PAPER,
             Algorithm::Energy | Algorithm::Linearised => &shaders::ENERGY,
@@ -84,13 +83,12 @@ impl ForceSearch {
         if model.compliance.rows_per_node == 1 {
             overrides.push(("ISOTROPIC", 1.0));
         }
-        let accesses = [Uniform, Read, Read, Read, Read, Read, Write, Write, Write];
-        let results = |shader| Kernel::new(context, shader, &[contacts], &[Uniform, Read, Read, Write, Write, Write]);
+        let results = |shader| Kernel::new(context, shader, &[contacts]);
         // Rounded one by one: each keeps 24 bits whatever the condition number of K.
         let entries: Vec<f32> = model.compliance.entries.iter().map(|&entry| entry as f32).collect();
         let compliance = StorageBuffer::from_slice(context, "compliance", &entries)?;
         Ok(Self {
-            equilibrium: Kernel::new(context, shader, &overrides, &accesses)?,
+            equilibrium: Kernel::new(context, shader, &overrides)?,
             count: results(&shaders::RESULTS_COUNT)?,
             gather: results(&shaders::RESULTS_GATHER)?,
             object_bytes: device.rest.size() + device.mesh.size() + compliance.size(),
@@ -128,17 +126,24 @@ impl ForceLane {
         let staged = size_of::<Touch>() * search.contacts.min(STAGED_TOUCHES) * room.chunk;
         let staging = Staging::new(context, TOTAL_BYTES + (size_of::<SolverResult>() * room.chunk + staged) as u64)?;
         let equilibrium = [
-            &parameters,
-            &device.rest,
-            &device.mesh,
-            &search.compliance,
-            detection.positions(),
-            detection.list(),
-            &results,
-            &listed,
-            &workspace,
+            ("parameters", &parameters),
+            ("rest", &device.rest),
+            ("mesh", &device.mesh),
+            ("compliance", &search.compliance),
+            ("positions", detection.positions()),
+            ("list", detection.list()),
+            ("outcomes", &results),
+            ("touches", &listed),
+            ("workspace", &workspace),
         ];
-        let compacted = [&parameters, &results, &listed, &starts, &total, &touches];
+        let compacted = [
+            ("parameters", &parameters),
+            ("results", &results),
+            ("listed", &listed),
+            ("starts", &starts),
+            ("total", &total),
+            ("touches", &touches),
+        ];
         Ok(Self {
             equilibrium: search.equilibrium.bind(context, &equilibrium)?,
             count: search.count.bind(context, &compacted)?,

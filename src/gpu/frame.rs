@@ -12,7 +12,7 @@
 
 use super::{
     context::{Context, GpuError},
-    kernel::{Access, Dispatch, Kernel, StorageBuffer},
+    kernel::{Dispatch, Kernel, StorageBuffer},
     layout::FrameParameters,
     shaders,
 };
@@ -305,18 +305,8 @@ fn check_memory(nodes: usize, is_isotropic: bool) -> Result<(), FrameError> {
     enough.map_err(|shortage| FrameError::Memory { nodes, shortage })
 }
 
-const DENSE: [Access; 8] = {
-    use Access::{Read, Uniform, Write};
-    [Uniform, Read, Read, Read, Read, Write, Read, Write]
-};
-
 /// Vectors of the iteration: v_hat, residual, direction, product, diagonal.
 const WORK_VECTORS: u64 = 5;
-
-const ITERATIVE: [Access; 8] = {
-    use Access::{Read, Uniform, Write};
-    [Uniform, Read, Read, Read, Read, Write, Write, Write]
-};
 
 /// Buffers that all stages bind.
 struct Common {
@@ -385,10 +375,23 @@ impl Common {
         self.loads.as_ref().unwrap_or(&self.forces)
     }
 
-    /// Bindings of a stage that has two buffers of its own.
-    fn bindings<'a>(&'a self, parameters: &'a StorageBuffer, own: [&'a StorageBuffer; 2]) -> [&'a StorageBuffer; 8] {
-        let Self { structure, blocks, state, .. } = self;
-        [parameters, structure, blocks, self.masses(), self.acting(), state, own[0], own[1]]
+    /// Bindings of a stage on which `forces` act and that has two buffers of its own.
+    fn bindings<'a>(
+        &'a self,
+        parameters: &'a StorageBuffer,
+        forces: &'a StorageBuffer,
+        own: [(&'a str, &'a StorageBuffer); 2],
+    ) -> [(&'a str, &'a StorageBuffer); 8] {
+        [
+            ("parameters", parameters),
+            ("structure", &self.structure),
+            ("blocks", &self.blocks),
+            ("inertia", self.masses()),
+            ("forces", forces),
+            ("state", &self.state),
+            own[0],
+            own[1],
+        ]
     }
 
     /// Adds what stiffening by `factor` from the strain `strain` on adds to the `loads`.
@@ -399,10 +402,10 @@ impl Common {
         loads: &StorageBuffer,
         [factor, strain]: [f64; 2],
     ) -> Result<FramePass, GpuError> {
-        let Self { even, structure, blocks, forces, state, .. } = self;
+        let Self { even, structure, blocks, forces, .. } = self;
         let constants = [("FACTOR", factor), ("STRAIN", strain)];
-        let kernel = Arc::new(Kernel::new(gpu, &shaders::FRAME_STIFFENING, &constants, &DENSE)?);
-        let bound = kernel.bind(gpu, &[even, structure, blocks, self.masses(), forces, state, reach, loads])?;
+        let kernel = Arc::new(Kernel::new(gpu, &shaders::FRAME_STIFFENING, &constants)?);
+        let bound = kernel.bind(gpu, &self.bindings(even, forces, [("reach", reach), ("loads", loads)]))?;
         // Forces and what is added to them are read and written, displacements read.
         let vectors = 3 * VECTOR * u64::from(self.parameters.nodes);
         let bytes = structure.size() + blocks.size() + reach.size() + vectors;
@@ -415,13 +418,13 @@ impl Common {
         [inverse, right]: [&StorageBuffer; 2],
         overrides: &[(&str, f64)],
     ) -> Result<[FramePass; 2], GpuError> {
-        let buffers = self.bindings(&self.even, [inverse, right]);
+        let buffers = self.bindings(&self.even, self.acting(), [("inverse", inverse), ("right", right)]);
         let stage = |shader, workgroups, bytes| -> Result<FramePass, GpuError> {
-            let kernel = Arc::new(Kernel::new(gpu, shader, overrides, &DENSE)?);
+            let kernel = Arc::new(Kernel::new(gpu, shader, overrides)?);
             let bound = kernel.bind(gpu, &buffers)?;
             Ok(FramePass { kernel, bound, workgroups, bytes })
         };
-        let load = buffers[1..6].iter().map(|buffer| buffer.size()).sum::<u64>() + right.size();
+        let load = buffers[1..6].iter().map(|(_, buffer)| buffer.size()).sum::<u64>() + right.size();
         let advance = inverse.size() + right.size() + 2 * self.state.size();
         let FrameParameters { nodes, groups, .. } = self.parameters;
         Ok([stage(&shaders::FRAME_LOAD, groups, load)?, stage(&shaders::FRAME_ADVANCE, nodes, advance)?])
@@ -436,14 +439,15 @@ impl Common {
         overrides: &[(&str, f64)],
     ) -> Result<Vec<FramePass>, GpuError> {
         let workgroups = self.parameters.groups;
+        let own = [("work", work), ("sums", sums)];
         let stage = |shader, bytes| -> Result<FramePass, GpuError> {
-            let kernel = Arc::new(Kernel::new(gpu, shader, overrides, &ITERATIVE)?);
-            let bound = kernel.bind(gpu, &self.bindings(&self.even, [work, sums]))?;
+            let kernel = Arc::new(Kernel::new(gpu, shader, overrides)?);
+            let bound = kernel.bind(gpu, &self.bindings(&self.even, self.acting(), own))?;
             Ok(FramePass { kernel, bound, workgroups, bytes })
         };
         // The same kernel with the bindings of the odd iterations.
         let odd = |stage: &FramePass| -> Result<FramePass, GpuError> {
-            let bound = stage.kernel.bind(gpu, &self.bindings(odd, [work, sums]))?;
+            let bound = stage.kernel.bind(gpu, &self.bindings(odd, self.acting(), own))?;
             Ok(FramePass { bound, ..stage.clone() })
         };
         // Of the five vectors of the iteration, how many are read and written.

@@ -1,11 +1,12 @@
 //! One compute pipeline with its bindings, its dispatches, and the storage buffers it works on.
 //!
-//! Group 0 holds all bindings, numbered in the order of the kernel's [`Access`] list. Counts of workgroups above the
+//! Group 0 holds all bindings. Their kinds and least sizes are read from the shader, and buffers are bound by the names
+//! that it gives them. Counts of workgroups above the
 //! limit of one dimension are folded into two; the shader unfolds them and guards the tail.
 
 use super::{
     context::{Context, GpuError},
-    shaders::Shader,
+    shaders::{self, Shader},
 };
 use bytemuck::Pod;
 use std::sync::PoisonError;
@@ -15,28 +16,45 @@ use std::sync::PoisonError;
 #[cfg(test)]
 pub const POISON: u8 = 0xD5;
 
-/// How a kernel uses a binding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
-    /// Uniform buffer.
-    Uniform,
-    /// Storage buffer that is only read.
-    Read,
-    /// Storage buffer that is written.
-    Write,
+/// A binding of a kernel, as the shader declares it.
+#[derive(Clone, Debug)]
+struct Binding {
+    number: u32,
+    name: String,
+    ty: wgpu::BufferBindingType,
+    /// Least size of the buffer: that of the struct, or of one element [B].
+    least: u64,
 }
 
-impl Access {
-    fn layout(self, binding: u32) -> wgpu::BindGroupLayoutEntry {
-        let ty = match self {
-            Self::Uniform => wgpu::BufferBindingType::Uniform,
-            Self::Read => wgpu::BufferBindingType::Storage { read_only: true },
-            Self::Write => wgpu::BufferBindingType::Storage { read_only: false },
+impl Binding {
+    /// Those that the entry point of `shader` uses.
+    fn of(shader: &Shader) -> Result<Vec<Self>, GpuError> {
+        let module = shaders::parse(shader).map_err(GpuError::Refused)?;
+        let info = shaders::validate(shader, &module).map_err(GpuError::Refused)?;
+        let entry = module.entry_points.iter().position(|point| point.name == shader.entry);
+        let entry = entry.ok_or_else(|| GpuError::Refused(format!("{} has no {}", shader.name, shader.entry)))?;
+        let used = info.get_entry_point(entry);
+        let binding = |(handle, global): (naga::Handle<naga::GlobalVariable>, &naga::GlobalVariable)| {
+            let number = global.binding.as_ref().filter(|_| !used[handle].is_empty())?.binding;
+            let ty = match global.space {
+                naga::AddressSpace::Storage { access } => {
+                    let read_only = !access.contains(naga::StorageAccess::STORE);
+                    wgpu::BufferBindingType::Storage { read_only }
+                }
+                _ => wgpu::BufferBindingType::Uniform,
+            };
+            let least = module.types[global.ty].inner.size(module.to_ctx()).into();
+            Some(Self { number, name: global.name.clone().unwrap_or_default(), ty, least })
         };
+        Ok(module.global_variables.iter().filter_map(binding).collect())
+    }
+
+    fn layout(&self) -> wgpu::BindGroupLayoutEntry {
+        let min_binding_size = std::num::NonZeroU64::new(self.least);
         wgpu::BindGroupLayoutEntry {
-            binding,
+            binding: self.number,
             visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+            ty: wgpu::BindingType::Buffer { ty: self.ty, has_dynamic_offset: false, min_binding_size },
             count: None,
         }
     }
@@ -49,6 +67,7 @@ pub struct Kernel {
     pub(super) name: String,
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
+    bindings: Vec<Binding>,
 }
 
 impl Kernel {
@@ -56,12 +75,7 @@ impl Kernel {
     ///
     /// # Errors
     /// When the device refuses the shader or runs out of memory.
-    pub fn new(
-        context: &Context,
-        shader: &Shader,
-        overrides: &[(&str, f64)],
-        accesses: &[Access],
-    ) -> Result<Self, GpuError> {
+    pub fn new(context: &Context, shader: &Shader, overrides: &[(&str, f64)]) -> Result<Self, GpuError> {
         let name = match shader.entry {
             "main" => shader.name.to_owned(),
             entry => format!("{} {entry}", shader.name),
@@ -72,8 +86,9 @@ impl Kernel {
         if let Some(kernel) = compiled.get(&key) {
             return Ok(kernel.clone());
         }
-        let (pipeline, layout) = Self::compile(context, shader, overrides, accesses)?;
-        let kernel = Self { name, pipeline, layout };
+        let bindings = Binding::of(shader)?;
+        let (pipeline, layout) = Self::compile(context, shader, overrides, &bindings)?;
+        let kernel = Self { name, pipeline, layout, bindings };
         compiled.insert(key, kernel.clone());
         Ok(kernel)
     }
@@ -82,14 +97,14 @@ impl Kernel {
         context: &Context,
         shader: &Shader,
         overrides: &[(&str, f64)],
-        accesses: &[Access],
+        bindings: &[Binding],
     ) -> Result<(wgpu::ComputePipeline, wgpu::BindGroupLayout), GpuError> {
         context.scoped(|device| {
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(shader.name),
                 source: wgpu::ShaderSource::Wgsl(shader.source().into()),
             });
-            let entries: Vec<_> = (0u32..).zip(accesses).map(|(binding, access)| access.layout(binding)).collect();
+            let entries: Vec<_> = bindings.iter().map(Binding::layout).collect();
             let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
                 label: Some(shader.name),
                 entries: &entries,
@@ -111,16 +126,20 @@ impl Kernel {
         })
     }
 
-    /// Binds `buffers`, in the order of the kernel's accesses.
+    /// Binds what the kernel uses of `buffers`, which have the names that the shader gives them.
     ///
     /// # Errors
-    /// When number, kind or size do not fit.
-    pub fn bind(&self, context: &Context, buffers: &[&StorageBuffer]) -> Result<wgpu::BindGroup, GpuError> {
+    /// When one is missing, or kind or size do not fit.
+    pub fn bind(&self, context: &Context, buffers: &[(&str, &StorageBuffer)]) -> Result<wgpu::BindGroup, GpuError> {
+        let entry = |binding: &Binding| {
+            let named = buffers.iter().find(|(name, _)| *name == binding.name);
+            let (_, buffer) = named.ok_or_else(|| {
+                GpuError::Refused(format!("the kernel {} is bound to no {}", self.name, binding.name))
+            })?;
+            Ok(wgpu::BindGroupEntry { binding: binding.number, resource: buffer.raw.as_entire_binding() })
+        };
+        let entries = self.bindings.iter().map(entry).collect::<Result<Vec<_>, GpuError>>()?;
         context.scoped(|device| {
-            let entries: Vec<_> = (0u32..)
-                .zip(buffers)
-                .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.raw.as_entire_binding() })
-                .collect();
             device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: None,
                 layout: &self.layout,

@@ -4,7 +4,7 @@ use super::{
     adapter::AdapterChoice,
     context::{Context, GpuError},
     forces::ForceSearch,
-    kernel::{Access, Dispatch, Kernel, StorageBuffer},
+    kernel::{Dispatch, Kernel, StorageBuffer},
     layout::{Joint, Parameters, ProxyNode},
     model::DeviceModel,
     pipeline::BatchCapacity,
@@ -99,12 +99,13 @@ fn ask(questions: &[Question]) -> Vec<Answer> {
     let input = StorageBuffer::from_slice(&context, "questions", questions).unwrap();
     let output = StorageBuffer::new(&context, "answers", (size_of::<Answer>() * questions.len()) as u64).unwrap();
     output.poison(&context, output.size());
-    let kernel = Kernel::new(&context, &LEAF_SHADER, &[], &[Access::Uniform, Access::Read, Access::Write]).unwrap();
-    run(&context, &kernel, &[&parameters, &input, &output], (questions.len() as u32).div_ceil(64));
+    let kernel = Kernel::new(&context, &LEAF_SHADER, &[]).unwrap();
+    let buffers = [("parameters", &parameters), ("questions", &input), ("answers", &output)];
+    run(&context, &kernel, &buffers, (questions.len() as u32).div_ceil(64));
     output.read(&context, questions.len()).unwrap()
 }
 
-fn run(context: &Context, kernel: &Kernel, buffers: &[&StorageBuffer], workgroups: u32) {
+fn run(context: &Context, kernel: &Kernel, buffers: &[(&str, &StorageBuffer)], workgroups: u32) {
     let bound = kernel.bind(context, buffers).unwrap();
     let mut encoder = context.device.create_command_encoder(&Default::default());
     context.record(&mut encoder, [Dispatch { kernel, bound: &bound, workgroups, bytes: 0 }]);
@@ -255,14 +256,13 @@ fn proxy_nodes_are_placed_to_f32() {
         let count = poses.len() * nodes.len();
         let output = StorageBuffer::new(&context, "positions", 16 * count as u64).unwrap();
         output.poison(&context, output.size());
-        use Access::{Read, Uniform, Write};
-        let kernel = Kernel::new(&context, &shaders::KINEMATICS, &[], &[Uniform, Read, Read, Read, Write]).unwrap();
+        let kernel = Kernel::new(&context, &shaders::KINEMATICS, &[]).unwrap();
         let buffers = [
-            &StorageBuffer::uniform(&context, "parameters", &parameters).unwrap(),
-            &StorageBuffer::from_slice(&context, "joints", &joints).unwrap(),
-            &StorageBuffer::from_slice(&context, "nodes", &nodes).unwrap(),
-            &StorageBuffer::from_slice(&context, "motions", &motions).unwrap(),
-            &output,
+            ("parameters", &StorageBuffer::uniform(&context, "parameters", &parameters).unwrap()),
+            ("joints", &StorageBuffer::from_slice(&context, "joints", &joints).unwrap()),
+            ("proxy_nodes", &StorageBuffer::from_slice(&context, "nodes", &nodes).unwrap()),
+            ("motions", &StorageBuffer::from_slice(&context, "motions", &motions).unwrap()),
+            ("positions", &output),
         ];
         run(&context, &kernel, &buffers, (count as u32).div_ceil(64));
         let positions: Vec<[f32; 4]> = output.read(&context, count).unwrap();
@@ -314,8 +314,14 @@ fn one_number_for_a_pair_of_nodes_holds_the_compliance_of_isotropic_objects() {
 #[test]
 fn a_refused_shader_is_an_error_and_the_device_lives_on() {
     let broken = Shader { name: "broken", entry: "nowhere", parts: &[shaders::TYPES], overrides: &[&[]] };
-    let refused = Kernel::new(&context(), &broken, &[], &[]);
+    let refused = Kernel::new(&context(), &broken, &[]);
     assert!(matches!(refused, Err(GpuError::Refused(_))));
+    let kernel = Kernel::new(&context(), &shaders::COMPACTION, &[]).unwrap();
+    let some = StorageBuffer::new(&context(), "some", 4096).unwrap();
+    let Err(GpuError::Refused(missing)) = kernel.bind(&context(), &[("parameters", &some), ("gaps", &some)]) else {
+        panic!("a binding is missing");
+    };
+    assert!(missing.contains("list"), "{missing}");
     assert!(context().check().is_ok());
     let limit = context().binding_limit();
     assert!(matches!(StorageBuffer::new(&context(), "too much", limit + 1), Err(GpuError::TooLarge { .. })));

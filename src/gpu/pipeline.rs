@@ -7,7 +7,7 @@ use super::{
     layout::Touch,
     model::DeviceModel,
     search::{Search, SearchLane},
-    search_model::SearchModel,
+    search_model::{CONTACTS, SearchModel},
     shaders,
     stages::{Detected, Found, GapPrecision, StageRoom, Stages},
 };
@@ -32,7 +32,7 @@ pub struct BatchCapacity {
 impl Default for BatchCapacity {
     /// Enough to keep a large GPU busy while the host turns to what it has found.
     fn default() -> Self {
-        Self { chunk: 1 << 16, batch: 1 << 15, contacts: 64, double: true, in_flight: 3 }
+        Self { chunk: 1 << 16, batch: 1 << 15, contacts: CONTACTS, double: true, in_flight: 3 }
     }
 }
 
@@ -54,7 +54,7 @@ impl BatchCapacity {
         let fit = |bytes: usize| (budget as usize / bytes.max(1)).max(1);
         let nodes = model.chain.nodes.len();
         // A proxy node has one contact.
-        let contacts = self.contacts.clamp(1, 64).min(nodes);
+        let contacts = self.contacts.clamp(1, CONTACTS).min(nodes);
         let clusters = model.object.triangles.len().div_ceil(shaders::CLUSTER);
         let workspace = 16 * (model.compliance.nodes.len() + 2 * clusters);
         let touches = size_of::<Touch>() * contacts;

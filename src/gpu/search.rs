@@ -8,7 +8,7 @@ use super::{
     context::{Context, GpuError},
     detection::{Detection, DoubleModel},
     forces::TOUCHES_MARGIN,
-    kernel::{Access, Dispatch, Kernel, Staging, StorageBuffer},
+    kernel::{Dispatch, Kernel, Staging, StorageBuffer},
     layout::{SearchParameters, SearchTouch},
     search_model::SearchModel,
     shaders::{self, Shader},
@@ -57,9 +57,12 @@ pub(super) struct SearchLane {
     touches: StorageBuffer,
     staging: Staging,
     arm: wgpu::BindGroup,
-    searching: wgpu::BindGroup,
+    detect: wgpu::BindGroup,
+    judge: wgpu::BindGroup,
+    step: wgpu::BindGroup,
     unfinished: wgpu::BindGroup,
-    results: wgpu::BindGroup,
+    count: wgpu::BindGroup,
+    gather: wgpu::BindGroup,
     /// Touches that one configuration is expected to have.
     touches_each: f64,
     /// How many touches were brought to `staging`.
@@ -69,24 +72,21 @@ pub(super) struct SearchLane {
 impl Search {
     /// Compiles the kernels for `model`.
     pub fn new(context: &Context, model: SearchModel) -> Result<Self, GpuError> {
-        use Access::{Read, Uniform, Write};
         let lanes = if context.adapter().hardware { HARDWARE_LANES } else { SOFTWARE_LANES };
         let lanes = ("WORKGROUP", f64::from(lanes));
         let isotropic = ("ISOTROPIC", f64::from(u8::from(model.is_isotropic)));
         let smooth = ("SMOOTH", f64::from(u8::from(model.is_smooth)));
-        let kernel = |shader: &Shader, overrides: &[(&str, f64)], accesses: &[Access]| {
-            Kernel::new(context, shader, &[&[isotropic], overrides].concat(), accesses)
+        let kernel = |shader: &Shader, overrides: &[(&str, f64)]| {
+            Kernel::new(context, shader, &[&[isotropic], overrides].concat())
         };
-        let searching = [Uniform, Read, Read, Read, Read, Read, Read, Write, Write];
-        let results = [Uniform, Read, Write, Write, Write, Write, Write, Write];
         Ok(Self {
-            arm: kernel(&shaders::SEARCH_ARM, &[], &[Uniform, Read, Read, Read, Write, Write])?,
-            detect: kernel(&shaders::SEARCH_DETECT, &[smooth, lanes], &searching)?,
-            judge: kernel(&shaders::SEARCH_JUDGE, &[lanes], &searching)?,
-            step: kernel(&shaders::SEARCH_STEP, &[lanes], &searching)?,
-            unfinished: kernel(&shaders::SEARCH_UNFINISHED, &[], &[Uniform, Write])?,
-            count: kernel(&shaders::SEARCH_COUNT, &[], &results)?,
-            gather: kernel(&shaders::SEARCH_GATHER, &[], &results)?,
+            arm: kernel(&shaders::SEARCH_ARM, &[])?,
+            detect: kernel(&shaders::SEARCH_DETECT, &[smooth, lanes])?,
+            judge: kernel(&shaders::SEARCH_JUDGE, &[lanes])?,
+            step: kernel(&shaders::SEARCH_STEP, &[lanes])?,
+            unfinished: kernel(&shaders::SEARCH_UNFINISHED, &[])?,
+            count: kernel(&shaders::SEARCH_COUNT, &[])?,
+            gather: kernel(&shaders::SEARCH_GATHER, &[])?,
             model,
         })
     }
@@ -126,16 +126,33 @@ impl SearchLane {
         let staging = Staging::new(context, HEAD_BYTES + records.size() + amounts.size() + staged as u64)?;
         let placed = detection.placed().ok_or(GpuError::Unsupported("f64"))?;
         let SearchModel { surface, mesh, compliance, .. } = &search.model;
-        let (list, positions) = (detection.list(), detection.positions());
-        let searching = [&uniform, surface, mesh, compliance, placed, positions, list, &words, &reals];
-        let arm = [&uniform, &double.chain, detection.motions(), list, &words, &reals];
-        let results = [&uniform, list, &words, &reals, &starts, &records, &amounts, &touches];
+        let buffers = [
+            ("parameters", &uniform),
+            ("surface", surface),
+            ("mesh", mesh),
+            ("compliance", compliance),
+            ("chain", &double.chain),
+            ("motions", detection.motions()),
+            ("placed", placed),
+            ("positions", detection.positions()),
+            ("list", detection.list()),
+            ("words", &words),
+            ("reals", &reals),
+            ("starts", &starts),
+            ("records", &records),
+            ("amounts", &amounts),
+            ("touches", &touches),
+        ];
+        let bind = |kernel: &Kernel| kernel.bind(context, &buffers);
         Ok(Self {
             room,
-            arm: search.arm.bind(context, &arm)?,
-            searching: search.step.bind(context, &searching)?,
-            unfinished: search.unfinished.bind(context, &[&uniform, &words])?,
-            results: search.count.bind(context, &results)?,
+            arm: bind(&search.arm)?,
+            detect: bind(&search.detect)?,
+            judge: bind(&search.judge)?,
+            step: bind(&search.step)?,
+            unfinished: bind(&search.unfinished)?,
+            count: bind(&search.count)?,
+            gather: bind(&search.gather)?,
             parameters: uniform,
             words,
             starts,
@@ -180,11 +197,11 @@ impl SearchLane {
     ) {
         let count = count as u32;
         let bytes = search.object_bytes();
-        let dispatch = |kernel, workgroups| Dispatch { kernel, bound: &self.searching, workgroups, bytes };
+        let dispatch = |kernel, bound| Dispatch { kernel, bound, workgroups: count, bytes };
         let round = [
-            dispatch(&search.detect, count),
-            dispatch(&search.judge, count),
-            dispatch(&search.step, count),
+            dispatch(&search.detect, &self.detect),
+            dispatch(&search.judge, &self.judge),
+            dispatch(&search.step, &self.step),
             Dispatch {
                 kernel: &search.unfinished,
                 bound: &self.unfinished,
@@ -199,9 +216,9 @@ impl SearchLane {
     fn record_results(&self, context: &Context, search: &Search, encoder: &mut wgpu::CommandEncoder, count: usize) {
         let rows = count as u32 * search.model.parameters.contacts;
         let bytes = self.result_bytes(search, count) + (size_of::<SearchTouch>() * self.staged) as u64;
-        let dispatch = |kernel, workgroups| Dispatch { kernel, bound: &self.results, workgroups, bytes };
-        let gather = dispatch(&search.gather, rows.div_ceil(PER_CONFIGURATION));
-        context.record(encoder, [dispatch(&search.count, 1), gather]);
+        let dispatch = |kernel, bound, workgroups| Dispatch { kernel, bound, workgroups, bytes };
+        let gather = dispatch(&search.gather, &self.gather, rows.div_ceil(PER_CONFIGURATION));
+        context.record(encoder, [dispatch(&search.count, &self.count, 1), gather]);
         let (records, amounts) = self.split_bytes(search, count);
         self.staging.copy_from(encoder, 0, (&self.words, 8 * self.room as u64), 4);
         self.staging.copy_from(encoder, 4, (&self.starts, 4 * count as u64), 4);

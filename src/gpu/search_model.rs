@@ -15,7 +15,7 @@ use crate::{
 use glam::DVec3;
 
 /// Most rows of a configuration: contacts, and proxy nodes that have touched. What exceeds them is left to the CPU.
-const CONTACTS: usize = 64;
+pub(super) const CONTACTS: usize = 64;
 
 /// Most object nodes that carry contact force in a configuration: three for each row, which neighbouring contacts share.
 const SUPPORT: usize = 3 * CONTACTS;

@@ -12,6 +12,7 @@ use crate::{
     },
     tolerances,
 };
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
 /// One entry point with everything it needs.
 #[derive(Debug)]
@@ -454,10 +455,19 @@ pub fn parse(shader: &Shader) -> Result<naga::Module, String> {
     naga::front::wgsl::parse_str(&source).map_err(|error| error.emit_to_string_with_path(&source, shader.name))
 }
 
+/// Validates a shader that was parsed.
+///
+/// # Errors
+/// naga's message with the offending line.
+pub(super) fn validate(shader: &Shader, module: &naga::Module) -> Result<ModuleInfo, String> {
+    let capabilities = if shader.is_double() { Capabilities::FLOAT64 } else { Capabilities::empty() };
+    let validated = Validator::new(ValidationFlags::all(), capabilities).validate(module);
+    validated.map_err(|error| format!("{}: {}", shader.name, error.emit_to_string(&shader.source())))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use naga::valid::{Capabilities, ValidationFlags, Validator};
 
     #[test]
     fn every_shader_is_valid_with_every_override_set_in_use() {
@@ -470,10 +480,7 @@ mod tests {
                 shader.name,
                 shader.entry
             );
-            let capabilities = if shader.is_double() { Capabilities::FLOAT64 } else { Capabilities::empty() };
-            let info = Validator::new(ValidationFlags::all(), capabilities)
-                .validate(&module)
-                .unwrap_or_else(|error| panic!("{}: {}", shader.name, error.emit_to_string(&shader.source())));
+            let info = validate(shader, &module).unwrap_or_else(|message| panic!("{message}"));
             assert!(!shader.overrides.is_empty(), "{}: at least the empty set", shader.name);
             for set in shader.overrides {
                 let constants = set.iter().map(|&(name, value)| (name.to_owned(), value)).collect();
