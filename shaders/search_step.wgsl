@@ -271,7 +271,7 @@ fn iterate(local: u32) {
     if local == 0u {
         set_word(LEFT, word(LEFT) - 1u);
         if is_convex {
-            go_to(multiply_for(PRECONDITION), ITERATE);
+            go_to(PRODUCT, ITERATE);
         } else {
             set_scalar(DESCENT, root(sum.y));
             go_to(after_negative_curvature(-sum.x / sum.y), ITERATE);
@@ -279,13 +279,12 @@ fn iterate(local: u32) {
     }
 }
 
-// C times what the linear solve leaves, or times the trial's forces.
+// C times what the linear solve leaves.
 fn take_product(local: u32) {
-    let next = word(NEXT);
-    multiply(select(LEFT_OVER, 1u - own, next == PLACE), LEFT_PRODUCT, local);
+    multiply(LEFT_OVER, LEFT_PRODUCT, local);
     sync();
     if local == 0u {
-        go_to(next, PRODUCT);
+        go_to(PRECONDITION, PRODUCT);
     }
 }
 
@@ -373,9 +372,11 @@ fn go_on(local: u32) {
         let own = scalar(STIFFENING) * vector_entry(STEP_FORCE, slot);
         put(LEFT_OVER, slot, vector_entry(OUT_OF_BALANCE, slot) - own - gather(slot));
     }
+    sync();
+    multiply(LEFT_OVER, LEFT_PRODUCT, local);
     if local == 0u {
         set_word(PASS, word(PASS) + 1u);
-        go_to(multiply_for(FACTORISE), GO_ON);
+        go_to(FACTORISE, GO_ON);
     }
 }
 
@@ -393,13 +394,14 @@ fn try_step(local: u32) {
     }
     if local == 0u {
         set_word(TRIAL_KIND, STEPPED);
-        go_to(multiply_for(PLACE), TRY);
+        go_to(PLACE, TRY);
     }
 }
 
 // The energy that the trial's forces store, and how far from rest that can move the surface.
 fn place(local: u32) {
     let trial = 1u - own;
+    multiply(trial, LEFT_PRODUCT, local);
     var work = vec3<f64>(0.0);
     for (var slot = local; slot < slots; slot += WORKGROUP) {
         work.x += dot(vector_entry(trial, slot), vector_entry(LEFT_PRODUCT, slot));
@@ -429,7 +431,7 @@ fn nudge(local: u32) {
     }
     if local == 0u {
         set_word(TRIAL_KIND, NUDGED);
-        go_to(multiply_for(PLACE), NUDGE);
+        go_to(PLACE, NUDGE);
     }
 }
 
@@ -443,7 +445,7 @@ fn respond(local: u32) {
     sync();
     if local == 0u {
         begin_solve(FOR_TANGENT, f64(1.0));
-        go_to(multiply_for(PRECONDITION), RESPOND);
+        go_to(PRODUCT, RESPOND);
     }
 }
 
@@ -552,12 +554,12 @@ fn main(
                 break;
             }
         }
-        if is_next(PLACE) { place(local); }
         if is_next(MODEL) { model(local); }
         if is_next(RESTORE) { restore(local); }
         if is_next(RESPONDED) { take_response(local); }
         if is_next(TRY) { try_step(local); }
         if is_next(NUDGE) { nudge(local); }
+        if is_next(PLACE) { place(local); }
         if is_next(ACCOUNT) { account(local); }
         sync();
         workgroupBarrier();

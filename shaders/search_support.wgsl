@@ -232,12 +232,6 @@ fn jacobian(node: u32, joint: u32) -> vec3<f64> {
     return select(cross(axis, proxy_position(node) - vector_at(at)), axis, scalar(at + 6u) != 0.0);
 }
 
-// Notes that `next` follows a product with C, which comes first; for one invocation.
-fn multiply_for(next: u32) -> u32 {
-    set_word(NEXT, next);
-    return PRODUCT;
-}
-
 // What follows an equilibrium; for one invocation.
 fn converged() -> u32 {
     set_word(STATUS, STATUS_CONTACT);

@@ -111,10 +111,9 @@ const HAS_TANGENT: u32 = 17u;
 // Touches, and whether the result may depend on nodes that the compliance does not cover.
 const TOUCHES: u32 = 18u;
 const IS_DOUBTFUL: u32 = 19u;
-// Whether the linear solve is at its beginning, and the phase that follows a product with C.
+// Whether the linear solve is at its beginning.
 const IS_FIRST: u32 = 20u;
-const NEXT: u32 = 21u;
-const HEADER: u32 = 22u;
+const HEADER: u32 = 21u;
 
 // Phases: what a search has to do next. It waits for rows where it is PLACED; up to TANGENT search_judge has it, and
 // beyond search_step.

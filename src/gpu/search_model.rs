@@ -86,7 +86,7 @@ impl SearchModel {
 
 /// Words of a workspace: see `shaders/search_types.wgsl`.
 fn words(p: &SearchParameters) -> u32 {
-    const HEADER: u32 = 22;
+    const HEADER: u32 = 21;
     const ROW_WORDS: u32 = 4;
     HEADER
         + 3 * p.proxy_nodes
