@@ -187,9 +187,7 @@ fn main() {
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();
     model.with_tangent = true;
     let [seen, unseen] = [11, 12].map(|seed| Judge::new(&scene, &model, seed, 1000).unwrap());
-    println!(
-        "\norder      base   levels  nodes  by level  bytes  solved  equilibria  seen  estimated  unseen  rounds  seconds"
-    );
+    println!("\norder      base   levels  nodes  by level  bytes  solved  equilibria  seen  unseen  rounds  seconds");
     for spacing in [4.0, 2.0, 1.4, 1.0, 0.7] {
         dense_grid(&scene, spacing, Interpolation::Potential, &unseen);
     }
@@ -204,13 +202,12 @@ fn main() {
         // In the file: key and mask of a block, numbers, gap and status of a node.
         let bytes = 16 * refined.store.blocks().len() + refined.nodes * (4 * width(refine.base.joints()) + 5);
         println!(
-            "{order:9?}  {spacing:5}  {levels}  {}  {:?}  {bytes}  {}  {}  {:.2} %  {:.2} %  {:.2} %  {}  {:.1}",
+            "{order:9?}  {spacing:5}  {levels}  {}  {:?}  {bytes}  {}  {}  {:.2} %  {:.2} %  {}  {:.1}",
             refined.nodes,
             refined.by_level,
             refined.solved,
             refined.equilibria,
             100.0 * refined.measured,
-            100.0 * refined.estimated,
             100.0 * error,
             refined.rounds,
             begin.elapsed().as_secs_f64()

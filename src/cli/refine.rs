@@ -63,8 +63,8 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
         100.0 * measured
     );
     let provenance = Provenance { notices: vec![notice], ..CpuBackend::provenance(scene) };
-    let (nodes, equilibria, by_level, rounds) =
-        (refined.nodes, refined.equilibria, refined.by_level.clone(), refined.rounds);
+    let (nodes, solved, by_level, rounds) = (refined.nodes, refined.solved, refined.by_level.clone(), refined.rounds);
+    let equilibria = refined.equilibria;
     let surface = Some(Surface::of(&object));
     let dataset = Dataset::refined(Arc::new(refined.store), base, surface, scene.text.clone(), provenance);
     dataset.save(wanted.output)?;
@@ -79,8 +79,8 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
     )?;
     writeln!(
         text,
-        "  nodes        {:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {equilibria} \
-         equilibria, {rounds} rounds",
+        "  nodes        {:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {solved} \
+         solved, {equilibria} equilibria, {rounds} rounds",
         uniform as f64 / nodes.max(1) as f64
     )?;
     writeln!(text, "  bytes        {} on the disk, {} in memory", megabytes(file), megabytes(bytes))?;
@@ -91,7 +91,7 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
         )?;
     }
     let json = serde_json::json!({
-        "file": wanted.output.display().to_string(), "nodes": nodes, "by_level": by_level, "equilibria": equilibria, "blocks": blocks,
+        "file": wanted.output.display().to_string(), "nodes": nodes, "by_level": by_level, "equilibria": equilibria, "solved": solved, "blocks": blocks,
         "bytes": file, "memory": bytes, "error": measured, "aim": aim, "uniform": uniform, "rounds": rounds, "seconds": seconds,
         "kept": kept,
     });

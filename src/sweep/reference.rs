@@ -116,17 +116,31 @@ impl Reference {
         Self { places: self.places.clone(), exact, ..*self }
     }
 
+    /// Mean of the squared distance of the torque that `answer` gives at each place from the exact one, and the standard
+    /// deviation of that mean over random places [N^2 m^2].
+    pub fn mean_square(&self, answer: impl FnMut(&JointVector) -> JointVector) -> (f64, f64) {
+        let squares = self.squares(answer);
+        let count = squares.len().max(1) as f64;
+        let mean = squares.iter().sum::<f64>() / count;
+        let variance = squares.iter().map(|square| (square - mean).powi(2)).sum::<f64>() / count;
+        (mean, (variance / count).sqrt())
+    }
+
     /// Root mean square and greatest distance of the torque that `answer` gives at each place from the exact one [N m].
-    pub fn errors(&self, mut answer: impl FnMut(&JointVector) -> JointVector) -> (f64, f64) {
-        let (mut sum, mut worst) = (0.0, 0.0_f64);
-        for (q, exact) in self.places.iter().zip(&self.exact) {
-            let pairs = answer(q);
-            let parts = pairs.iter().zip(exact.iter()).zip(self.levers.iter());
-            let square: f64 = parts.map(|((a, b), lever)| (lever * (a - b)).powi(2)).sum();
-            sum += square;
-            worst = worst.max(square);
-        }
-        ((sum / self.exact.len().max(1) as f64).sqrt(), worst.sqrt())
+    pub fn errors(&self, answer: impl FnMut(&JointVector) -> JointVector) -> (f64, f64) {
+        let squares = self.squares(answer);
+        let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+        (mean.sqrt(), squares.into_iter().fold(0.0, f64::max).sqrt())
+    }
+
+    /// Squared distances of the torque that `answer` gives at each place from the exact one [N^2 m^2].
+    fn squares(&self, mut answer: impl FnMut(&JointVector) -> JointVector) -> Vec<f64> {
+        let square = |(q, exact): (&JointVector, &JointVector)| {
+            let answered = answer(q);
+            let parts = answered.iter().zip(exact.iter()).zip(self.levers.iter());
+            parts.map(|((a, b), lever)| (lever * (a - b)).powi(2)).sum()
+        };
+        self.places.iter().zip(&self.exact).map(square).collect()
     }
 }
 

@@ -1,18 +1,20 @@
-//! A store filled level by level, where the interpolation errs.
+//! A store filled round by round, where the interpolation errs.
 //!
-//! *Estimate.* At a node of level l the torque that the levels below give errs by e = |tau_interpolated - tau_solved|:
-//! the two interpolations that meet there differ by the node's surplus. A cell of level l - 1 that is refined takes all
-//! nodes of level l in it; each of its halves, 2^d cells of level l, is expected to err by the rms of e over the nodes
-//! of level l at its corners, times the ratio by which e fell from the last level to this one. The cells of the base
-//! are probed at their middles, which are nodes of the first level, and expected to err by a share of the torque at
-//! their corners at least: contact that no node of the base and no middle meets is not seen.
+//! *Estimate.* At a solved node of level l the torque that the levels below gave errs by e = |tau_interpolated -
+//! tau_solved|: the two interpolations that meet there differ by the node's surplus. A cell of level l - 1 that is not
+//! refined is expected to err by the rms of e over the nodes of level l in it that are solved, those that it shares
+//! with refined neighbours, and of one expectation more: e at its own corners, before they were there, times the
+//! factor by which kinks fall from one level to the next. The cells of the base are probed at their middles, which are
+//! nodes of the first level. The middle may be free, or met by chance: their further expectation is the torque at
+//! their corners, times the rms of e over that of the torque, over all cells.
 //!
-//! *Marking.* Cells with the greatest expected error are refined until those that are not add up to at most half of
-//! what is left of the squared error: with that, each level leaves less to the next. (Doerfler 1996, A convergent
-//! adaptive algorithm for Poisson's equation, with the complement of the bulk.)
+//! *Scale.* Of the estimates only the ratios count. The error is measured at random configurations that no estimate
+//! has seen, and the estimates are scaled so that they add up to it. It keeps the aim when it does so by one standard
+//! deviation of such a measurement.
 //!
-//! *Verification.* The error is measured at random configurations that no estimate has seen. While it is above the aim
-//! the store is filled again, for a smaller error, from the nodes that are solved and some more.
+//! *Marking.* Cells of any level are refined that contribute most to the squared error, as few as are expected to leave
+//! no more than the aim. (Doerfler 1996, A convergent adaptive algorithm for Poisson's equation, whose bulk is a fixed
+//! share; here it follows from the aim.) The store is measured again, until it keeps the aim.
 
 use super::{
     node::{self, Scale, Solved},
@@ -28,27 +30,16 @@ use crate::{
 };
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// Ratio of the internal aims of two rounds [1]. Larger: more rounds. Smaller: more nodes than needed.
-const TIGHTER: f64 = 0.75;
+/// Standard deviations by which the measured squared error is to be below the aim's [1]. Larger: more nodes. Smaller:
+/// other configurations see a larger error more often.
+const CONFIDENCE: f64 = 1.0;
 
-/// Most rounds: the internal aim is then a twentieth of the first.
-const ROUNDS: usize = 12;
+/// Nodes that a round adds at least, over those that are there [1]. Larger: more nodes than needed. Smaller: more rounds.
+const GROWTH: f64 = 0.05;
 
-/// Squared error of a cell over that at its middle [1]: of the product of parabolas in three dimensions (8/15)^3 =
-/// 0.15, of a kink anywhere more. Measured on datasets/sphere.toml, potential: an aim of 5 % gives an estimate of 3.7 %
-/// and an error of 4.4 %, one of 1.2 % 1.1 % and 1.1 %. Smaller: the error is thought to be smaller than it is, and
-/// more rounds are needed.
-const SPREAD: f64 = 1.0;
-
-/// Ratio of the errors of two levels that is expected at least, and of the first two [1]. Larger: the next level is
-/// refined more widely. Smooth fields gain a factor of four to eight, kinks one of two; the sphere scene's first two
-/// levels one of three.
-const LEAST_FALL: f64 = 0.35;
-
-/// Error that is expected of a cell of the base whatever its middle says, over the rms torque at its corners [1]: the
-/// middle may be free, or met by chance. Larger: the first level is refined nearly everywhere in contact. Smaller:
-/// contact near few corners is missed.
-const UNSEEN: f64 = 0.3;
+/// Ratio of the squared errors of two levels [1]: kinks of the torque, which are left when smooth errors have fallen,
+/// err by h in a share h of the volume.
+const FALL: f64 = 0.125;
 
 /// Options of a store.
 pub struct Refine<'a> {
@@ -80,8 +71,6 @@ pub struct Refined {
     pub solved: usize,
     /// Rms error at the configurations by which the filling was stopped, over the rms torque [1].
     pub measured: f64,
-    /// Rms error that was expected from the estimate of the last round [1].
-    pub estimated: f64,
     /// Rounds.
     pub rounds: usize,
 }
@@ -123,12 +112,6 @@ impl Judge {
     pub fn relative_error(&self, answer: impl FnMut(&JointVector) -> JointVector) -> f64 {
         self.0.errors(answer).0 / self.0.torque
     }
-}
-
-/// A cell that may be refined, and its expected error [N m].
-struct Cell {
-    low: Place,
-    error: f64,
 }
 
 /// Solves nodes, each once.
@@ -186,6 +169,25 @@ impl Refine<'_> {
     /// [`RefineError`].
     pub fn fill(&self, judge: &Judge) -> Result<Refined, RefineError> {
         let reference = &judge.0;
+        let mut filling = self.begin()?;
+        let aim = (self.aim * reference.torque).powi(2);
+        let mut rounds = 0;
+        loop {
+            rounds += 1;
+            let store = filling.store(self.order)?;
+            let (mean, deviation) = reference.mean_square(|q| store.sample(q).torque());
+            let refinable = filling.leaves.iter().any(|leaf| leaf.level + 1 < self.levels);
+            // A store that errs by nothing has no deviation either.
+            let reserve = 1.0 + CONFIDENCE * deviation / mean.max(f64::MIN_POSITIVE);
+            if mean * reserve <= aim || !refinable || filling.book.solved.len() >= self.most {
+                return Ok(self.report(store, &filling, mean.sqrt() / reference.torque, rounds));
+            }
+            filling.refine(&store, aim / (mean * reserve));
+        }
+    }
+
+    /// The base alone.
+    fn begin(&self) -> Result<Filling<'_>, RefineError> {
         let space = Space::new(&self.base, self.levels)?;
         let pool = rayon::ThreadPoolBuilder::new().build()?;
         let mut levers = JointVector::zeros(space.joints());
@@ -194,102 +196,139 @@ impl Refine<'_> {
         });
         let mut book = Nodebook {
             scale: Scale::new(self.model, &space),
-            space,
+            space: space.clone(),
             levers,
             solvers: Solvers::new(self.model, pool.current_num_threads()),
             pool,
             solved: HashMap::new(),
         };
-        let mut aim = self.aim * reference.torque;
-        let mut rounds = 0;
-        loop {
-            rounds += 1;
-            let measure = |store: &Store| reference.errors(|q| store.sample(q).torque()).0 / reference.torque;
-            let (store, estimated) = self.round(&mut book, aim, &measure)?;
-            let measured = measure(&store);
-            let done = measured <= self.aim || rounds == ROUNDS || book.solved.len() >= self.most;
-            if done {
-                return Ok(self.report(store, &book, measured, estimated / reference.torque, rounds));
-            }
-            aim *= TIGHTER;
-        }
+        let base = lattice(&space, |last| last);
+        book.solve(0, base.iter().copied());
+        let mut nodes = vec![BTreeSet::new(); self.levels as usize];
+        nodes[0] = base.into_iter().collect();
+        let leaves = lattice(&space, |last| last - 1).into_iter().map(|low| Leaf { level: 0, low, square: 0.0 });
+        Ok(Filling { book, nodes, leaves: leaves.collect(), squares: HashMap::new() })
     }
 
-    fn report(&self, store: Store, book: &Nodebook<'_>, measured: f64, estimated: f64, rounds: usize) -> Refined {
-        let mut by_level = vec![0; self.levels as usize];
-        for (key, block) in store.blocks() {
-            if let Some((level, _)) = book.space.block(key) {
-                by_level[level as usize] += block.nodes().count();
-            }
-        }
+    fn report(&self, store: Store, filling: &Filling<'_>, measured: f64, rounds: usize) -> Refined {
+        let by_level: Vec<usize> = filling.nodes.iter().map(BTreeSet::len).collect();
+        let solved = &filling.book.solved;
         Refined {
             nodes: by_level.iter().sum(),
             by_level,
-            equilibria: book.solved.values().map(|solved| solved.equilibria as usize).sum(),
-            solved: book.solved.len(),
+            equilibria: solved.values().map(|solved| solved.equilibria as usize).sum(),
+            solved: solved.len(),
             store,
             measured,
-            estimated,
             rounds,
         }
     }
+}
 
-    /// Fills a store for an rms error of `aim` [N m], level by level until `measure` says that it is kept; also the
-    /// error that is expected of it.
-    fn round(
-        &self,
-        book: &mut Nodebook<'_>,
-        aim: f64,
-        measure: &impl Fn(&Store) -> f64,
-    ) -> Result<(Store, f64), RefineError> {
-        let space = book.space.clone();
-        let mut store = Store::new(space.clone(), self.order, 0);
-        let base = lattice(&space, |last| last);
-        book.solve(0, base.iter().copied());
-        publish(&mut store, book, 0, &base.into_iter().collect())?;
-        let cells: Vec<Place> = lattice(&space, |last| last - 1);
-        let middles: Vec<Place> = cells.iter().map(|low| odd(&space, low)).collect();
-        if self.levels > 1 {
-            book.solve(1, middles.iter().copied());
+/// A cell that is not refined.
+struct Leaf {
+    level: u32,
+    low: Place,
+    /// Expected contribution to the squared error, over the volume of a cell of the base [N^2 m^2].
+    square: f64,
+}
+
+/// A store that is being filled.
+struct Filling<'a> {
+    book: Nodebook<'a>,
+    /// Of each level.
+    nodes: Vec<BTreeSet<Place>>,
+    leaves: Vec<Leaf>,
+    /// Squared errors that the levels below had at solved nodes [N^2 m^2].
+    squares: HashMap<(u32, Place), f64>,
+}
+
+impl Filling<'_> {
+    /// The store of what is there.
+    fn store(&self, order: Order) -> Result<Store, PublishError> {
+        let mut store = Store::new(self.book.space.clone(), order, 0);
+        for (level, nodes) in (0..).zip(&self.nodes) {
+            publish(&mut store, &self.book, level, nodes)?;
         }
-        let mut leaves: Vec<Cell> = cells
-            .into_iter()
-            .zip(&middles)
-            .map(|(low, middle)| {
-                let error = book.error(&store, 1, middle).max(UNSEEN * book.torque(&low));
-                Cell { low, error }
-            })
-            .collect();
-        let count = leaves.len() as f64;
-        let (mut left, mut before) = (0.0, 0.0);
-        for level in 1..self.levels {
-            // Volume of a cell of the level below, over that of the grid.
-            let share = 0.5_f64.powi((space.joints() as u32 * (level - 1)) as i32) / count;
-            let budget = 0.5 * (aim * aim - left).max(0.0);
-            // Expectations of a level that is not there yet may be far too high.
-            if measure(&store) <= self.aim {
-                let rest = leaves.iter().map(|cell| cell.error.powi(2)).sum::<f64>();
-                return Ok((store, (left + SPREAD * share * rest).sqrt()));
-            }
-            let (marked, unmarked) = mark(leaves, budget / (SPREAD * share));
-            left += SPREAD * share * unmarked;
-            if marked.is_empty() || book.solved.len() >= self.most {
-                left += SPREAD * share * marked.iter().map(|cell| cell.error.powi(2)).sum::<f64>();
-                return Ok((store, left.sqrt()));
-            }
-            let nodes: BTreeSet<Place> = marked.iter().flat_map(|cell| inside(&space, &cell.low)).collect();
-            book.solve(level, nodes.iter().copied());
-            let errors: HashMap<Place, f64> =
-                nodes.iter().map(|node| (*node, book.error(&store, level, node))).collect();
-            publish(&mut store, book, level, &nodes)?;
-            let mean = (errors.values().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-            let fall = if before > 0.0 { (mean / before).clamp(LEAST_FALL, 1.0) } else { LEAST_FALL };
-            before = mean;
-            leaves = marked.iter().flat_map(|cell| halves(&space, &cell.low, &errors, fall)).collect();
+        Ok(store)
+    }
+
+    /// Solves those of `nodes` of `level` that are not, and compares `store` with them.
+    fn compare(&mut self, store: &Store, level: u32, nodes: &BTreeSet<Place>) {
+        self.book.solve(level, nodes.iter().copied());
+        for node in nodes {
+            let book = &self.book;
+            self.squares.entry((level, *node)).or_insert_with(|| book.error(store, level, node).powi(2));
         }
-        let share = 0.5_f64.powi((space.joints() as u32 * (self.levels - 1)) as i32) / count;
-        left += SPREAD * share * leaves.iter().map(|cell| cell.error.powi(2)).sum::<f64>();
-        Ok((store, left.sqrt()))
+    }
+
+    /// Sum of the squared errors at those of `nodes` of `level` that are solved, and their number.
+    fn known(&self, level: u32, nodes: impl Iterator<Item = Place>) -> (f64, f64) {
+        let known = nodes.filter_map(|node| self.squares.get(&(level, node)));
+        known.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0))
+    }
+
+    /// Expects an error of each leaf.
+    fn expect(&mut self, store: &Store) {
+        let space = self.book.space.clone();
+        let joints = space.joints();
+        let cells = lattice(&space, |last| last - 1);
+        let middles = cells.iter().map(|low| odd(&space, low)).collect();
+        self.compare(store, 1, &middles);
+        let torque: f64 = cells.iter().map(|low| self.book.torque(low).powi(2)).sum();
+        let share = self.known(1, middles.into_iter()).0 / torque.max(f64::MIN_POSITIVE);
+        let expected = |Leaf { level, low, .. }: &Leaf| {
+            let before = if *level == 0 {
+                share * self.book.torque(low).powi(2)
+            } else {
+                let (sum, count) = self.known(*level, (0..1 << joints).map(|set| corner(low, set)));
+                FALL * sum / count.max(1.0)
+            };
+            let (sum, count) = self.known(level + 1, inside(&space, low));
+            0.5_f64.powi((joints as u32 * level) as i32) * (before + sum) / (1.0 + count)
+        };
+        let squares: Vec<f64> = self.leaves.iter().map(expected).collect();
+        self.leaves.iter_mut().zip(squares).for_each(|(leaf, square)| leaf.square = square);
+    }
+
+    /// Takes the leaves to refine for a squared error of `goal` times the present one: those that err most, and no
+    /// fewer than are worth a round.
+    fn mark(&mut self, goal: f64) -> Vec<Leaf> {
+        let last = self.nodes.len() as u32 - 1;
+        self.leaves.sort_by(|a, b| {
+            let refinable = (a.level == last).cmp(&(b.level == last));
+            refinable.then(b.square.total_cmp(&a.square)).then((a.level, a.low).cmp(&(b.level, b.low)))
+        });
+        let refinable = self.leaves.partition_point(|leaf| leaf.level < last);
+        // In bulk a refined cell adds as many nodes as it has halves.
+        let halves = 2.0_f64.powi(self.book.space.joints() as i32);
+        let there: usize = self.nodes.iter().map(BTreeSet::len).sum();
+        let least = (GROWTH * there as f64 / halves).ceil() as usize;
+        let whole: f64 = self.leaves.iter().map(|leaf| leaf.square).sum();
+        let (mut left, mut count) = (whole, 0);
+        while count < refinable && (count < least || left > goal * whole) {
+            left -= (1.0 - FALL) * self.leaves[count].square;
+            count += 1;
+        }
+        self.leaves.drain(..count).collect()
+    }
+
+    /// Refines for a squared error of `goal` times that of `store`, which is the store of what is there.
+    fn refine(&mut self, store: &Store, goal: f64) {
+        let space = self.book.space.clone();
+        self.expect(store);
+        let marked = self.mark(goal);
+        for level in 0..self.nodes.len() as u32 - 1 {
+            let cells = || marked.iter().filter(|leaf| leaf.level == level);
+            let nodes: BTreeSet<Place> = cells().flat_map(|leaf| inside(&space, &leaf.low)).collect();
+            self.compare(store, level + 1, &nodes);
+            self.nodes[level as usize + 1].extend(nodes);
+            let lows = cells().flat_map(|leaf| {
+                let first = leaf.low.map(|i| 2 * i);
+                (0..1 << space.joints()).map(move |half| corner(&first, half))
+            });
+            self.leaves.extend(lows.map(|low| Leaf { level: level + 1, low, square: 0.0 }));
+        }
     }
 }
 
@@ -328,36 +367,6 @@ fn inside(space: &Space, low: &Place) -> impl Iterator<Item = Place> {
             .any(|a| digit(a) == 1)
             .then(|| std::array::from_fn(|a| if (a as u32) < joints { 2 * low[a] + digit(a as u32) } else { 0 }))
     })
-}
-
-/// The 2^d cells of the next level in a cell, each with the error that the nodes at its corners had before, times
-/// `fall`.
-fn halves(space: &Space, low: &Place, errors: &HashMap<Place, f64>, fall: f64) -> Vec<Cell> {
-    let joints = space.joints();
-    let first: Place = low.map(|i| 2 * i);
-    (0..1 << joints)
-        .map(|half| {
-            let low = corner(&first, half);
-            let known: Vec<f64> = (0..1 << joints).filter_map(|set| errors.get(&corner(&low, set)).copied()).collect();
-            let square = known.iter().map(|e| e * e).sum::<f64>() / known.len().max(1) as f64;
-            Cell { low, error: fall * square.sqrt() }
-        })
-        .collect()
-}
-
-/// The cells to refine, and the sum of the squared errors of the others, at most `budget`.
-fn mark(mut cells: Vec<Cell>, budget: f64) -> (Vec<Cell>, f64) {
-    cells.sort_by(|a, b| b.error.total_cmp(&a.error).then(a.low.cmp(&b.low)));
-    let mut rest = 0.0;
-    while let Some(last) = cells.last() {
-        let square = last.error.powi(2);
-        if rest + square > budget && square > 0.0 {
-            break;
-        }
-        rest += square;
-        cells.pop();
-    }
-    (cells, rest)
 }
 
 /// Publishes `nodes` of `level`, all solved, with whatever empty blocks they rest on.
