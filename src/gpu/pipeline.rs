@@ -19,7 +19,7 @@ use std::sync::Arc;
 pub struct BatchCapacity {
     /// Most configurations placed and tested for contact at a time.
     pub chunk: usize,
-    /// Most configurations solved by one dispatch.
+    /// Most configurations solved by one dispatch in f32; in f64 all of a section are.
     pub batch: usize,
     /// Most proxy nodes in contact in one configuration, at most 64, or 32 in f32; more are solved on the CPU.
     pub contacts: usize,
