@@ -43,6 +43,10 @@ unsafe impl GlobalAlloc for Remembering {
 #[cfg(unix)]
 mod answer {
     use super::{FAILED, Ordering};
+    use std::sync::atomic::AtomicBool;
+
+    /// Whether a thread has begun to answer: of several that find no memory at once only one speaks.
+    static ANSWERED: AtomicBool = AtomicBool::new(false);
 
     /// Text around the number of bytes.
     const SAID: [&str; 2] = [
@@ -58,6 +62,10 @@ mod answer {
             // SAFETY: no memory is involved; `abort` raises the signal again, which now ends the process.
             unsafe { libc::signal(signal, libc::SIG_DFL) };
             return;
+        }
+        while ANSWERED.swap(true, Ordering::Relaxed) {
+            // SAFETY: waits for a signal, and may do so in a signal handler; the other thread ends the process.
+            unsafe { libc::pause() };
         }
         say(2, ["haptize: ", "\n"], failed);
         if JSON {

@@ -310,4 +310,12 @@ fn other_commands_without_memory_end_with_an_error_of_one_json_object() {
         assert!(said.contains(expected) && error.contains("memory"), "{arguments:?}: {said} {error}");
         assert!(said.contains("ulimit -v"), "{arguments:?}: a remedy: {said}");
     }
+    // Several threads may find no memory at once: one speaks.
+    for kilobytes in (110_000..200_000).step_by(1_000) {
+        let arguments = ["play", "x.haptize", "--seconds", "0.1", "--json"];
+        let output = run_limited(folder, &arguments, &format!("ulimit -v {kilobytes}"));
+        let told = String::from_utf8_lossy(&output.stdout);
+        let json: Result<serde_json::Value, _> = serde_json::from_str(&told);
+        assert!(json.is_ok(), "{kilobytes} kB: {told}");
+    }
 }
