@@ -6,14 +6,14 @@
 // `is_beyond`.
 
 struct Closest {
-    distance: f64,
+    distance: real,
     facet: u32,
     point: ClosestPoint,
 }
 
 // The facet closest to x, if there is one no farther than `within`; facet `likely`, where there is one, is tried first.
 // No facet has left its place at rest by more than `moved`.
-fn closest_facet(x: vec3<f64>, within: f64, moved: f64, likely: u32) -> Closest {
+fn closest_facet(x: vec3<real>, within: real, moved: real, likely: u32) -> Closest {
     var best = Closest();
     best.distance = within;
     best.facet = ABSENT;
@@ -54,7 +54,7 @@ fn closest_facet(x: vec3<f64>, within: f64, moved: f64, likely: u32) -> Closest 
 }
 
 // Pseudonormal at a point of a facet, outward, not of length one.
-fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<f64>) -> vec3<f64> {
+fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<real>) -> vec3<real> {
     var first = 0u;
     var last = 1u;
     var node = 0u;
@@ -65,7 +65,7 @@ fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<f64>) -> vec3<f64> {
     } else if point.feature < FEATURE_FACE {
         last = 2u;
     }
-    var sum = vec3<f64>(0.0);
+    var sum = vec3<real>(0.0);
     for (var entry = first; entry < last; entry += 1u) {
         // One loop for all features: a facet formed at each of three places would triple the program.
         var face = facet;
@@ -84,7 +84,7 @@ fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<f64>) -> vec3<f64> {
         }
         form(face, x);
         let jet = jet_at(there);
-        sum += select(f64(1.0), angle_at(jet, k), point.feature < FEATURE_EDGE) * normal_of(jet);
+        sum += select(real(1.0), angle_at(jet, k), point.feature < FEATURE_EDGE) * normal_of(jet);
     }
     return sum;
 }

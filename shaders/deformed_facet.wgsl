@@ -14,7 +14,7 @@ fn carrier(facet: u32, j: u32) -> u32 {
 }
 
 // Position of the node in `place` less x. A node that the compliance does not cover does not move.
-fn node_from(place: u32, x: vec3<f64>) -> vec3<f64> {
+fn node_from(place: u32, x: vec3<real>) -> vec3<real> {
     let at_rest = surface_vector(parameters.at_rest + 3u * place) - x;
     if place >= parameters.covered {
         return at_rest;
@@ -28,14 +28,14 @@ fn at_mask(facet: u32, j: u32) -> u32 {
 }
 
 // Takes `facet` for the current one.
-fn form(facet: u32, x: vec3<f64>) {
+fn form(facet: u32, x: vec3<real>) {
     if !SMOOTH {
         net[0] = node_from(carrier(facet, 0u), x);
         net[10] = node_from(carrier(facet, 1u), x);
         net[14] = node_from(carrier(facet, 2u), x);
         return;
     }
-    net = array<vec3<f64>, 15>();
+    net = array<vec3<real>, 15>();
     for (var j = 0u; j < parameters.carriers; j += 1u) {
         let place = carrier(facet, j);
         if place == ABSENT {
@@ -62,13 +62,13 @@ fn form(facet: u32, x: vec3<f64>) {
 }
 
 // Whether it is known without forming the facet that it is farther than `distance` from x: by its flat triangle.
-fn is_beyond(facet: u32, x: vec3<f64>, distance: f64) -> bool {
+fn is_beyond(facet: u32, x: vec3<real>, distance: real) -> bool {
     if !SMOOTH {
         return false;
     }
     let a = node_from(carrier(facet, 0u), x);
     let b = node_from(carrier(facet, 1u), x);
     let c = node_from(carrier(facet, 2u), x);
-    let w = closest_point(vec3<f64>(0.0), a, b, c).weights;
+    let w = closest_point(vec3<real>(0.0), a, b, c).weights;
     return length(blend(w, a, b, c)) > distance + scalar(BULGE);
 }

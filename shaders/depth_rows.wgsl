@@ -2,35 +2,35 @@
 // problem (twin, with the formulas: src/contact/law/depth.rs).
 
 // The inverse of a symmetric matrix of two rows, its entries 00, 01, 11.
-fn inverse_of(m: vec3<f64>) -> vec3<f64> {
-    return vec3<f64>(m.z, -m.y, m.x) / max(m.x * m.z - m.y * m.y, LEAST_DIVISOR);
+fn inverse_of(m: vec3<real>) -> vec3<real> {
+    return vec3<real>(m.z, -m.y, m.x) / max(m.x * m.z - m.y * m.y, LEAST_DIVISOR);
 }
 
 // The product A B C of symmetric matrices of two rows where that is symmetric.
-fn symmetric_product(a: vec3<f64>, b: vec3<f64>, c: vec3<f64>) -> vec3<f64> {
-    let first = vec2<f64>(a.x * b.x + a.y * b.y, a.x * b.y + a.y * b.z);
-    let second = vec2<f64>(a.y * b.x + a.z * b.y, a.y * b.y + a.z * b.z);
-    return vec3<f64>(dot(first, c.xy), dot(first, c.yz), dot(second, c.yz));
+fn symmetric_product(a: vec3<real>, b: vec3<real>, c: vec3<real>) -> vec3<real> {
+    let first = vec2<real>(a.x * b.x + a.y * b.y, a.x * b.y + a.y * b.z);
+    let second = vec2<real>(a.y * b.x + a.z * b.y, a.y * b.y + a.z * b.z);
+    return vec3<real>(dot(first, c.xy), dot(first, c.yz), dot(second, c.yz));
 }
 
 // Writes what depends on the directions in which a point may move on its feature.
-fn write_curvature(at: u32, jet: Jet, feature: u32, normal: vec3<f64>, s: f64) {
-    var along = vec3<f64>(0.0);
-    var tangent_0 = vec3<f64>(0.0);
-    var tangent_1 = vec3<f64>(0.0);
-    var bending = vec3<f64>(0.0);
-    var turning = vec3<f64>(0.0);
+fn write_curvature(at: u32, jet: Jet, feature: u32, normal: vec3<real>, s: real) {
+    var along = vec3<real>(0.0);
+    var tangent_0 = vec3<real>(0.0);
+    var tangent_1 = vec3<real>(0.0);
+    var bending = vec3<real>(0.0);
+    var turning = vec3<real>(0.0);
     if feature == FEATURE_FACE {
         let d = TOWARDS_1;
         let e = TOWARDS_2;
         tangent_0 = tangent(jet, d);
         tangent_1 = tangent(jet, e);
-        let metric = vec3<f64>(dot(tangent_0, tangent_0), dot(tangent_0, tangent_1), dot(tangent_1, tangent_1));
+        let metric = vec3<real>(dot(tangent_0, tangent_0), dot(tangent_0, tangent_1), dot(tangent_1, tangent_1));
         let inverse = inverse_of(metric);
         turning = inverse;
         if SMOOTH {
             let bends =
-                vec3<f64>(dot(normal, bend(jet, d, d)), dot(normal, bend(jet, d, e)), dot(normal, bend(jet, e, e)));
+                vec3<real>(dot(normal, bend(jet, d, d)), dot(normal, bend(jet, d, e)), dot(normal, bend(jet, e, e)));
             let full = metric + s * bends;
             let area = metric.x * metric.z - metric.y * metric.y;
             if full.x > 0.0 && full.x * full.z - full.y * full.y > LEAST_CONVEXITY * area {
@@ -60,7 +60,7 @@ fn write_curvature(at: u32, jet: Jet, feature: u32, normal: vec3<f64>, s: f64) {
 
 // Bernstein polynomials of degree four at weights w, or their derivative along d: cubics at w, raised by `by`, which is
 // w or 4 d.
-fn raised(w: vec3<f64>, by: vec3<f64>) -> array<f64, 15> {
+fn raised(w: vec3<real>, by: vec3<real>) -> array<real, 15> {
     let c0 = w.x * w.x * w.x;
     let c1 = 3.0 * w.x * w.x * w.y;
     let c2 = 3.0 * w.x * w.x * w.z;
@@ -71,7 +71,7 @@ fn raised(w: vec3<f64>, by: vec3<f64>) -> array<f64, 15> {
     let c7 = 3.0 * w.y * w.y * w.z;
     let c8 = 3.0 * w.y * w.z * w.z;
     let c9 = w.z * w.z * w.z;
-    return array<f64, 15>(
+    return array<real, 15>(
         c0 * by.x,
         c0 * by.y + c1 * by.x,
         c0 * by.z + c2 * by.x,
@@ -92,27 +92,27 @@ fn raised(w: vec3<f64>, by: vec3<f64>) -> array<f64, 15> {
 
 // Writes three numbers for each node of a facet: what it weighs if its control points count as `counts`, or of a flat
 // one its corners as `corners`.
-fn spread(at: u32, facet: u32, counts: array<array<f64, 15>, 3>, corners: array<vec3<f64>, 3>) {
+fn spread(at: u32, facet: u32, counts: array<array<real, 15>, 3>, corners: array<vec3<real>, 3>) {
     for (var j = 0u; j < parameters.carriers; j += 1u) {
-        var weights = vec3<f64>(dot(corners[0], one_hot(j)), dot(corners[1], one_hot(j)), dot(corners[2], one_hot(j)));
+        var weights = vec3<real>(dot(corners[0], one_hot(j)), dot(corners[1], one_hot(j)), dot(corners[2], one_hot(j)));
         if SMOOTH {
             let mask = at_mask(facet, j);
-            weights = vec3<f64>(0.0);
-            weights += surface[mask + 0u] * vec3<f64>(counts[0][0], counts[1][0], counts[2][0]);
-            weights += surface[mask + 1u] * vec3<f64>(counts[0][1], counts[1][1], counts[2][1]);
-            weights += surface[mask + 2u] * vec3<f64>(counts[0][2], counts[1][2], counts[2][2]);
-            weights += surface[mask + 3u] * vec3<f64>(counts[0][3], counts[1][3], counts[2][3]);
-            weights += surface[mask + 4u] * vec3<f64>(counts[0][4], counts[1][4], counts[2][4]);
-            weights += surface[mask + 5u] * vec3<f64>(counts[0][5], counts[1][5], counts[2][5]);
-            weights += surface[mask + 6u] * vec3<f64>(counts[0][6], counts[1][6], counts[2][6]);
-            weights += surface[mask + 7u] * vec3<f64>(counts[0][7], counts[1][7], counts[2][7]);
-            weights += surface[mask + 8u] * vec3<f64>(counts[0][8], counts[1][8], counts[2][8]);
-            weights += surface[mask + 9u] * vec3<f64>(counts[0][9], counts[1][9], counts[2][9]);
-            weights += surface[mask + 10u] * vec3<f64>(counts[0][10], counts[1][10], counts[2][10]);
-            weights += surface[mask + 11u] * vec3<f64>(counts[0][11], counts[1][11], counts[2][11]);
-            weights += surface[mask + 12u] * vec3<f64>(counts[0][12], counts[1][12], counts[2][12]);
-            weights += surface[mask + 13u] * vec3<f64>(counts[0][13], counts[1][13], counts[2][13]);
-            weights += surface[mask + 14u] * vec3<f64>(counts[0][14], counts[1][14], counts[2][14]);
+            weights = vec3<real>(0.0);
+            weights += surface[mask + 0u] * vec3<real>(counts[0][0], counts[1][0], counts[2][0]);
+            weights += surface[mask + 1u] * vec3<real>(counts[0][1], counts[1][1], counts[2][1]);
+            weights += surface[mask + 2u] * vec3<real>(counts[0][2], counts[1][2], counts[2][2]);
+            weights += surface[mask + 3u] * vec3<real>(counts[0][3], counts[1][3], counts[2][3]);
+            weights += surface[mask + 4u] * vec3<real>(counts[0][4], counts[1][4], counts[2][4]);
+            weights += surface[mask + 5u] * vec3<real>(counts[0][5], counts[1][5], counts[2][5]);
+            weights += surface[mask + 6u] * vec3<real>(counts[0][6], counts[1][6], counts[2][6]);
+            weights += surface[mask + 7u] * vec3<real>(counts[0][7], counts[1][7], counts[2][7]);
+            weights += surface[mask + 8u] * vec3<real>(counts[0][8], counts[1][8], counts[2][8]);
+            weights += surface[mask + 9u] * vec3<real>(counts[0][9], counts[1][9], counts[2][9]);
+            weights += surface[mask + 10u] * vec3<real>(counts[0][10], counts[1][10], counts[2][10]);
+            weights += surface[mask + 11u] * vec3<real>(counts[0][11], counts[1][11], counts[2][11]);
+            weights += surface[mask + 12u] * vec3<real>(counts[0][12], counts[1][12], counts[2][12]);
+            weights += surface[mask + 13u] * vec3<real>(counts[0][13], counts[1][13], counts[2][13]);
+            weights += surface[mask + 14u] * vec3<real>(counts[0][14], counts[1][14], counts[2][14]);
         }
         let first = reals_base + at + j;
         reals[first] = weights.x;
@@ -123,17 +123,17 @@ fn spread(at: u32, facet: u32, counts: array<array<f64, 15>, 3>, corners: array<
 
 // Writes row `row` of the list `half`: proxy node `node` at x, with the closest point of the current facet, number
 // `facet`, and the outward direction there.
-fn write_row(half: u32, row: u32, node: u32, x: vec3<f64>, facet: u32, point: ClosestPoint, outward: vec3<f64>) {
+fn write_row(half: u32, row: u32, node: u32, x: vec3<real>, facet: u32, point: ClosestPoint, outward: vec3<real>) {
     let jet = jet_at(point.weights);
     var normal = outward;
     var s = dot(outward, jet.point);
-    var inverse_distance = f64(0.0);
+    var inverse_distance = real(0.0);
     if point.feature != FEATURE_FACE {
         let away = length(jet.point);
         s = select(-away, away, dot(jet.point, outward) >= 0.0);
-        inverse_distance = select(f64(-1.0), f64(1.0), s >= 0.0) / max(away, MINIMUM_CURVATURE_RADIUS);
+        inverse_distance = select(real(-1.0), real(1.0), s >= 0.0) / max(away, parameters.least_distance);
         normal = select(outward / sqrt(max(dot(outward, outward), LEAST_DIVISOR)), jet.point / s,
-            away > MINIMUM_CURVATURE_RADIUS);
+            away > parameters.least_distance);
     }
     let at = at_numbers(half, row);
     set_vector(at + NORMAL, normal);
@@ -155,8 +155,8 @@ fn write_row(half: u32, row: u32, node: u32, x: vec3<f64>, facet: u32, point: Cl
     set_word(words_at + 1u, facet);
     set_word(words_at + 2u, point.feature);
     set_word(words_at + 3u, nodes);
-    var d = vec3<f64>(0.0);
-    var e = vec3<f64>(0.0);
+    var d = vec3<real>(0.0);
+    var e = vec3<real>(0.0);
     if point.feature == FEATURE_FACE {
         d = TOWARDS_1;
         e = TOWARDS_2;
@@ -164,6 +164,6 @@ fn write_row(half: u32, row: u32, node: u32, x: vec3<f64>, facet: u32, point: Cl
         d = along_edge(point.feature - FEATURE_EDGE);
     }
     let w = point.weights;
-    spread(at + NODE_WEIGHTS, facet, array<array<f64, 15>, 3>(raised(w, w), raised(w, 4.0 * d), raised(w, 4.0 * e)),
-        array<vec3<f64>, 3>(w, d, e));
+    spread(at + NODE_WEIGHTS, facet, array<array<real, 15>, 3>(raised(w, w), raised(w, 4.0 * d), raised(w, 4.0 * e)),
+        array<vec3<real>, 3>(w, d, e));
 }

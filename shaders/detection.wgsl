@@ -41,7 +41,7 @@ fn main(
     // No point of the surface is closer than the closest one to the farthest point of a sphere around some.
     let at_clusters = parameters.surface_nodes + parameters.triangles + parameters.proxy_nodes;
     let at_groups = at_clusters + parameters.clusters;
-    for (var k = 0u; k < (parameters.clusters + GROUP - 1u) / GROUP; k += 1u) {
+    for (var k = 0u; k < parameters.groups; k += 1u) {
         let sphere = rest[at_groups + k];
         least = min(least, distance(x, sphere.xyz) + sphere.w);
     }

@@ -5,39 +5,39 @@
 // The stage declares SMOOTH, and `form(facet, x)`, which takes a facet for the current one, relative to x.
 
 // Control points of the current facet, in the twin's order; of a flat one only the corners, in places 0, 10 and 14.
-var<private> net: array<vec3<f64>, 15>;
+var<private> net: array<vec3<real>, 15>;
 
 // Directions of the weights in which a point moves over a face.
-const TOWARDS_1: vec3<f64> = vec3<f64>(-1.0, 1.0, 0.0);
-const TOWARDS_2: vec3<f64> = vec3<f64>(-1.0, 0.0, 1.0);
+const TOWARDS_1: vec3<real> = vec3<real>(-1.0, 1.0, 0.0);
+const TOWARDS_2: vec3<real> = vec3<real>(-1.0, 0.0, 1.0);
 
 // That in which it moves along edge k.
-fn along_edge(k: u32) -> vec3<f64> {
+fn along_edge(k: u32) -> vec3<real> {
     return one_hot((k + 1u) % 3u) - one_hot(k);
 }
 
 // A point with its derivatives by the weights: `slopes` by each, `bend_ij` by two of them.
 struct Jet {
-    point: vec3<f64>,
-    slopes: mat3x3<f64>,
-    bend_00: vec3<f64>,
-    bend_01: vec3<f64>,
-    bend_02: vec3<f64>,
-    bend_11: vec3<f64>,
-    bend_12: vec3<f64>,
-    bend_22: vec3<f64>,
+    point: vec3<real>,
+    slopes: mat3x3<real>,
+    bend_00: vec3<real>,
+    bend_01: vec3<real>,
+    bend_02: vec3<real>,
+    bend_11: vec3<real>,
+    bend_12: vec3<real>,
+    bend_22: vec3<real>,
 }
 
-fn blend(w: vec3<f64>, a: vec3<f64>, b: vec3<f64>, c: vec3<f64>) -> vec3<f64> {
+fn blend(w: vec3<real>, a: vec3<real>, b: vec3<real>, c: vec3<real>) -> vec3<real> {
     return w.x * a + w.y * b + w.z * c;
 }
 
 // Its point at weights w, by de Casteljau's algorithm. Without loops, so that compilers keep all control points in
 // registers.
-fn jet_at(w: vec3<f64>) -> Jet {
+fn jet_at(w: vec3<real>) -> Jet {
     if !SMOOTH {
         var flat = Jet();
-        flat.slopes = mat3x3<f64>(net[0], net[10], net[14]);
+        flat.slopes = mat3x3<real>(net[0], net[10], net[14]);
         flat.point = blend(w, net[0], net[10], net[14]);
         return flat;
     }
@@ -60,36 +60,36 @@ fn jet_at(w: vec3<f64>) -> Jet {
     let l0 = blend(w, q0, q1, q2);
     let l1 = blend(w, q1, q3, q4);
     let l2 = blend(w, q2, q4, q5);
-    return Jet(blend(w, l0, l1, l2), mat3x3<f64>(4.0 * l0, 4.0 * l1, 4.0 * l2),
+    return Jet(blend(w, l0, l1, l2), mat3x3<real>(4.0 * l0, 4.0 * l1, 4.0 * l2),
         12.0 * q0, 12.0 * q1, 12.0 * q2, 12.0 * q3, 12.0 * q4, 12.0 * q5);
 }
 
 // Derivative along d, and along d and e.
-fn tangent(jet: Jet, d: vec3<f64>) -> vec3<f64> {
+fn tangent(jet: Jet, d: vec3<real>) -> vec3<real> {
     return blend(d, jet.slopes[0], jet.slopes[1], jet.slopes[2]);
 }
 
-fn bend(jet: Jet, d: vec3<f64>, e: vec3<f64>) -> vec3<f64> {
+fn bend(jet: Jet, d: vec3<real>, e: vec3<real>) -> vec3<real> {
     return blend(e, blend(d, jet.bend_00, jet.bend_01, jet.bend_02), blend(d, jet.bend_01, jet.bend_11, jet.bend_12),
         blend(d, jet.bend_02, jet.bend_12, jet.bend_22));
 }
 
 // Its outward unit normal; zero where it has none.
-fn normal_of(jet: Jet) -> vec3<f64> {
+fn normal_of(jet: Jet) -> vec3<real> {
     return unit_or_zero(cross(tangent(jet, TOWARDS_1), tangent(jet, TOWARDS_2)));
 }
 
 // Angle at corner k between the two edges. It is only a weight: arctangent, good to 4096 ULP in f32, is more than it
 // needs.
-fn angle_at(jet: Jet, k: u32) -> f64 {
+fn angle_at(jet: Jet, k: u32) -> real {
     let left = unit_or_zero(tangent(jet, along_edge(k)));
     let right = -unit_or_zero(tangent(jet, along_edge((k + 2u) % 3u)));
-    return f64(atan2(f32(length(cross(left, right))), f32(dot(left, right))));
+    return real(atan2(f32(length(cross(left, right))), f32(dot(left, right))));
 }
 
 // The point of the current facet that is closest to the origin.
 fn closest_on_facet() -> ClosestPoint {
-    let flat = closest_point(vec3<f64>(0.0), net[0], net[10], net[14]);
+    let flat = closest_point(vec3<real>(0.0), net[0], net[10], net[14]);
     if !SMOOTH {
         return flat;
     }
@@ -116,23 +116,23 @@ fn closest_on_facet() -> ClosestPoint {
 
 // The weights at which the distance is least, on the facet continued beyond its edges. Far outside it stops, since
 // Newton's method would not come back.
-fn stationary(start: vec3<f64>) -> vec3<f64> {
+fn stationary(start: vec3<real>) -> vec3<real> {
     var w = start;
     for (var step_number = 0u; step_number < FACET_ITERATIONS; step_number += 1u) {
         let jet = jet_at(w);
         let a = tangent(jet, TOWARDS_1);
         let b = tangent(jet, TOWARDS_2);
-        let slope = vec2<f64>(dot(jet.point, a), dot(jet.point, b));
-        let metric = vec3<f64>(dot(a, a), dot(a, b), dot(b, b));
-        let full = metric + vec3<f64>(dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_1)),
+        let slope = vec2<real>(dot(jet.point, a), dot(jet.point, b));
+        let metric = vec3<real>(dot(a, a), dot(a, b), dot(b, b));
+        let full = metric + vec3<real>(dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_1)),
             dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_2)), dot(jet.point, bend(jet, TOWARDS_2, TOWARDS_2)));
         // Where the distance is not convex, the metric alone leads downhill.
         let h = select(metric, full, full.x > 0.0 && full.x * full.z > full.y * full.y);
         let determinant = max(h.x * h.z - h.y * h.y, LEAST_DIVISOR);
-        let step = vec2<f64>(h.y * slope.y - h.z * slope.x, h.y * slope.x - h.x * slope.y) / determinant;
+        let step = vec2<real>(h.y * slope.y - h.z * slope.x, h.y * slope.x - h.x * slope.y) / determinant;
         let u = w.y + step.x;
         let v = w.z + step.y;
-        w = vec3<f64>(1.0 - u - v, u, v);
+        w = vec3<real>(1.0 - u - v, u, v);
         if w.x < -1.0 || w.y < -1.0 || w.z < -1.0 || abs(step.x) + abs(step.y) < FACET_STEP {
             break;
         }
@@ -141,12 +141,12 @@ fn stationary(start: vec3<f64>) -> vec3<f64> {
 }
 
 // The closest point of edge k, searched from the point of the edge that is next to `start`.
-fn closest_on_edge(k: u32, start: vec3<f64>) -> ClosestPoint {
+fn closest_on_edge(k: u32, start: vec3<real>) -> ClosestPoint {
     let tail = one_hot(k);
     let head = one_hot((k + 1u) % 3u);
     let direction = head - tail;
     let sum = dot(start, head + tail);
-    var t = select(f64(0.5), dot(start, head) / max(sum, LEAST_DIVISOR), sum > 0.0);
+    var t = select(real(0.5), dot(start, head) / max(sum, LEAST_DIVISOR), sum > 0.0);
     for (var step_number = 0u; step_number < FACET_ITERATIONS; step_number += 1u) {
         let jet = jet_at((1.0 - t) * tail + t * head);
         let along = tangent(jet, direction);
@@ -154,7 +154,7 @@ fn closest_on_edge(k: u32, start: vec3<f64>) -> ClosestPoint {
         let full = metric + dot(jet.point, bend(jet, direction, direction));
         let before = t;
         t -= dot(jet.point, along) / max(select(metric, full, full > 0.0), LEAST_DIVISOR);
-        t = min(max(t, f64(0.0)), f64(1.0));
+        t = min(max(t, real(0.0)), real(1.0));
         if abs(t - before) < FACET_STEP {
             break;
         }

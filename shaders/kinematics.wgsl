@@ -1,19 +1,21 @@
-// Positions x_i of all proxy nodes for a batch of configurations: one invocation a (configuration, node).
-// No trigonometry: the host sends cosine and sine of every joint (or the displacement of a prismatic one).
+// Positions x_i of all proxy nodes for a batch of configurations: one invocation a (configuration, node). No
+// trigonometry: the host sends cosine and sine of every joint, or the displacement of a prismatic one.
 
 override WORKGROUP: u32 = 64u;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
-@group(0) @binding(1) var<storage, read> joints: array<Joint>;
-@group(0) @binding(2) var<storage, read> proxy_nodes: array<ProxyNode>;
+// Of each joint its origin, axis and kind (0 revolute, 1 prismatic); then of each proxy node its position in its link's
+// frame and that link.
+@group(0) @binding(1) var<storage, read> chain: array<real>;
 // Configuration by configuration, joint fastest: (cos q, sin q), or (q, 0) of a prismatic joint.
-@group(0) @binding(3) var<storage, read> motions: array<vec2<f32>>;
-// Configuration by configuration, node fastest; w is left for the gap.
+@group(0) @binding(2) var<storage, read> motions: array<vec2<real>>;
+// Configuration by configuration, node fastest: three coordinates each.
+@group(0) @binding(3) var<storage, read_write> placed: array<real>;
+// The same in f32; w is left for the gap.
 @group(0) @binding(4) var<storage, read_write> positions: array<vec4<f32>>;
 
-// Rodrigues: v turned about the unit vector `axis` by the angle with the given cosine and sine.
-fn turn(axis: vec3<f32>, motion: vec2<f32>, v: vec3<f32>) -> vec3<f32> {
-    return motion.x * v + motion.y * cross(axis, v) + ((1.0 - motion.x) * dot(axis, v)) * axis;
+fn vector_at(at: u32) -> vec3<real> {
+    return vec3<real>(chain[at], chain[at + 1u], chain[at + 2u]);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -27,19 +29,23 @@ fn main(
     if configuration >= parameters.configurations {
         return;
     }
-    let node = proxy_nodes[index % parameters.proxy_nodes];
+    let node = 7u * parameters.joints + 4u * (index % parameters.proxy_nodes);
     // From the tip inwards: each joint moves the point from its link's frame into its parent's. One vector is turned,
     // instead of a matrix being built from the root outwards.
-    var x = node.position;
-    for (var k = i32(node.link); k >= 0; k -= 1) {
-        let joint = joints[k];
+    var x = vector_at(node);
+    for (var k = i32(chain[node + 3u]); k >= 0; k -= 1) {
+        let joint = 7u * u32(k);
+        let axis = vector_at(joint + 3u);
         let motion = motions[configuration * parameters.joints + u32(k)];
-        if joint.kind == 0u {
-            x = turn(joint.axis, motion, x);
+        if chain[joint + 6u] == 0.0 {
+            x = turn(axis, motion, x);
         } else {
-            x += motion.x * joint.axis;
+            x += motion.x * axis;
         }
-        x += joint.origin;
+        x += vector_at(joint);
     }
-    positions[index] = vec4<f32>(x, 0.0);
+    placed[3u * index] = x.x;
+    placed[3u * index + 1u] = x.y;
+    placed[3u * index + 2u] = x.z;
+    positions[index] = vec4<f32>(vec3<f32>(x), 0.0);
 }

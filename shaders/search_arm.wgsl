@@ -4,18 +4,18 @@
 override WORKGROUP: u32 = 64u;
 
 @group(0) @binding(0) var<uniform> parameters: SearchParameters;
-// See double_kinematics.wgsl.
-@group(0) @binding(1) var<storage, read> chain: array<f64>;
-@group(0) @binding(2) var<storage, read> motions: array<vec2<f64>>;
+// See kinematics.wgsl.
+@group(0) @binding(1) var<storage, read> chain: array<real>;
+@group(0) @binding(2) var<storage, read> motions: array<vec2<real>>;
 @group(0) @binding(3) var<storage, read> list: array<u32>;
 @group(0) @binding(4) var<storage, read_write> words: array<u32>;
-@group(0) @binding(5) var<storage, read_write> reals: array<f64>;
+@group(0) @binding(5) var<storage, read_write> reals: array<real>;
 
-fn chain_vector(at: u32) -> vec3<f64> {
-    return vec3<f64>(chain[at], chain[at + 1u], chain[at + 2u]);
+fn chain_vector(at: u32) -> vec3<real> {
+    return vec3<real>(chain[at], chain[at + 1u], chain[at + 2u]);
 }
 
-fn write_vector(at: u32, value: vec3<f64>) {
+fn write_vector(at: u32, value: vec3<real>) {
     reals[at] = value.x;
     reals[at + 1u] = value.y;
     reals[at + 2u] = value.z;
@@ -41,10 +41,10 @@ fn main(
     reals[base + TRIAL_ELASTIC] = 0.0;
     reals[base + STIFFNESS] = parameters.first_kc;
     // Columns of the link's rotation, and its origin.
-    var x = vec3<f64>(1.0, 0.0, 0.0);
-    var y = vec3<f64>(0.0, 1.0, 0.0);
-    var z = vec3<f64>(0.0, 0.0, 1.0);
-    var origin = vec3<f64>(0.0);
+    var x = vec3<real>(1.0, 0.0, 0.0);
+    var y = vec3<real>(0.0, 1.0, 0.0);
+    var z = vec3<real>(0.0, 0.0, 1.0);
+    var origin = vec3<real>(0.0);
     for (var k = 0u; k < parameters.joints; k += 1u) {
         let o = chain_vector(7u * k);
         let a = chain_vector(7u * k + 3u);

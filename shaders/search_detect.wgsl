@@ -9,15 +9,34 @@ override WORKGROUP: u32 = 32u;
 // Whether there is a trial that waits for this.
 var<workgroup> waits: u32;
 
-// Lists the proxy nodes that can touch, in ascending order; returns how many there are.
-fn list_candidates(local: u32) -> u32 {
-    let reach = scalar(MOVED) + parameters.gap_band;
+var<workgroup> shares: array<real, WORKGROUP>;
+
+// Farther from the surface at rest than this no proxy node can touch where geometry is frozen: 1/2 |u|^2 <= E <= E(0)
+// in the energy norm, and |u_j|^2 <= trace(C_jj) |u|^2, all along the search.
+fn frozen_reach(local: u32) -> real {
+    var own = real(0.0);
+    for (var node = local; node < parameters.proxy_nodes; node += WORKGROUP) {
+        let depth = max(proxy_radius(node) - rest_distance(node) + parameters.gap_band, real(0.0));
+        own += proxy_share(node) * depth * depth;
+    }
+    shares[local] = own;
+    workgroupBarrier();
+    var sum = real(0.0);
+    for (var k = 0u; k < WORKGROUP; k += 1u) {
+        sum += shares[k];
+    }
+    workgroupBarrier();
+    return sqrt(parameters.kc * parameters.softest * sum);
+}
+
+// Lists the proxy nodes whose gap at rest is no wider than `reach`, in ascending order; returns how many there are.
+fn list_candidates(reach: real, local: u32) -> u32 {
     begin_list(0u, local);
     for (var first = 0u; first < parameters.proxy_nodes; first += WORKGROUP) {
         let node = first + local;
         var is_candidate = false;
         if node < parameters.proxy_nodes {
-            is_candidate = rest_distance(node) - proxy_radius(node) <= reach;
+            is_candidate = rest_distance(node) - proxy_radius(node) <= reach + parameters.gap_band;
         }
         let entry = place_in_list(is_candidate, local);
         if is_candidate {
@@ -40,6 +59,8 @@ fn list_groups(candidates: u32, local: u32) -> u32 {
             let sphere = parameters.at_spheres + 4u * group;
             let centre = surface_vector(sphere);
             let reach = surface[sphere + 3u] + widened;
+            // The paper ties nodes wherever they are.
+            matters = PAPER;
             for (var entry = 0u; entry < candidates && !matters; entry += 1u) {
                 let node = word(at_candidate(entry));
                 matters = distance(proxy_position(node), centre) <= abs(rest_distance(node)) + reach;
@@ -66,7 +87,7 @@ fn place_of(index: u32, groups: u32) -> u32 {
     return mesh[parameters.at_places + entry];
 }
 
-fn displace_node(place: u32, displacement: vec3<f64>) {
+fn displace_node(place: u32, displacement: vec3<real>) {
     if place != ABSENT {
         set_vector(at_displacement(place), displacement);
     }
@@ -87,14 +108,14 @@ fn displace(groups: u32, local: u32) {
 }
 
 // The facet closest to proxy node `node` at x, if it is near enough to matter.
-fn closest_to(node: u32, x: vec3<f64>) -> Closest {
+fn closest_to(node: u32, x: vec3<real>) -> Closest {
     let band = parameters.gap_band;
     let moved = scalar(MOVED);
     let rest = rest_distance(node);
     // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than
     // that.
     let within = abs(rest) + band + moved;
-    let is_followed = rest <= band || word(at_watched(node)) != 0u;
+    let is_followed = FROZEN || rest <= band || word(at_watched(node)) != 0u;
     let matters = select(max(proxy_radius(node), moved - rest + band), within, is_followed);
     // The last one is a start as good as any, but far from x it may not have been displaced.
     var likely = word(at_last(node)) - 1u;
@@ -105,16 +126,17 @@ fn closest_to(node: u32, x: vec3<f64>) -> Closest {
     return closest_facet(x, min(within, matters), moved, likely);
 }
 
-// Writes the rows of `candidates` proxy nodes.
-fn write_rows(candidates: u32, local: u32) {
+// Writes the rows of `candidates` proxy nodes: of those that touch or have touched or, where geometry is frozen, have a
+// gap no wider than `reach`.
+fn write_rows(candidates: u32, reach: real, local: u32) {
     let half = 1u - word(HALF);
     begin_list(0u, local);
     for (var first = 0u; first < candidates; first += WORKGROUP) {
         var is_row = false;
         var node = 0u;
-        var x = vec3<f64>(0.0);
+        var x = vec3<real>(0.0);
         var closest = Closest();
-        var outward = vec3<f64>(0.0);
+        var outward = vec3<real>(0.0);
         if first + local < candidates {
             node = word(at_candidate(first + local));
             x = proxy_position(node);
@@ -124,9 +146,9 @@ fn write_rows(candidates: u32, local: u32) {
                 outward = pseudonormal(closest.facet, closest.point, x);
                 form(closest.facet, x);
                 let is_inside = dot(jet_at(closest.point.weights).point, outward) >= 0.0;
-                let touches = proxy_radius(node) + select(-closest.distance, closest.distance, is_inside) > 0.0;
-                is_row = touches || word(at_watched(node)) != 0u;
-                if touches {
+                let depth = proxy_radius(node) + select(-closest.distance, closest.distance, is_inside);
+                is_row = depth > 0.0 || word(at_watched(node)) != 0u || (FROZEN && depth >= -reach);
+                if depth > 0.0 {
                     set_word(at_watched(node), 1u);
                 }
             }
@@ -156,8 +178,12 @@ fn main(
     }
     workgroupBarrier();
     if waits != 0u {
-        let candidates = list_candidates(local);
+        var reach = scalar(MOVED);
+        if FROZEN {
+            reach = frozen_reach(local);
+        }
+        let candidates = list_candidates(reach, local);
         displace(list_groups(candidates, local), local);
-        write_rows(candidates, local);
+        write_rows(candidates, reach, local);
     }
 }

@@ -6,19 +6,20 @@ fn judge(local: u32) {
     let trial = 1u - own;
     let kind = word(TRIAL_KIND);
     let kc = scalar(STIFFNESS);
-    var work = vec3<f64>(0.0);
+    var work = vec3<real>(0.0);
     for (var row = local; row < word(ROWS + trial); row += WORKGROUP) {
         let at = at_numbers(trial, row);
         let force = force_over_kc(at);
         work.x += force * scalar(at + DEPTH);
         // As the step predicted it; zero for a proxy node that had no row.
-        var multiplier = f64(0.0);
+        var multiplier = real(0.0);
         if kind == STEPPED {
-            multiplier = kc * max(scalar(at_predicted(word(at_row(trial, row)))), f64(0.0));
+            multiplier = kc * max(scalar(at_predicted(word(at_row(trial, row)))), real(0.0));
         } else if kind == NUDGED {
             multiplier = kc * force;
         }
-        set_scalar(at + MULTIPLIER, multiplier);
+        // Frozen geometry has no curvature.
+        set_scalar(at + MULTIPLIER, select(multiplier, real(0.0), FROZEN));
     }
     if kind != AT_REST {
         for (var row = local; row < row_count; row += WORKGROUP) {
@@ -32,7 +33,7 @@ fn judge(local: u32) {
 }
 
 // Takes the trial, or not; returns what is next.
-fn verdict(energy: f64, size: f64, kind: u32) -> u32 {
+fn verdict(energy: real, size: real, kind: u32) -> u32 {
     if word(OVERFLOW) != 0u {
         return overflow();
     }
@@ -53,7 +54,7 @@ fn verdict(energy: f64, size: f64, kind: u32) -> u32 {
     }
     let promised = scalar(PREDICTED) + rounding;
     // Contacts that come and go may leave a step that promises nothing.
-    let ratio = select(f64(0.0), (scalar(ENERGY) - energy + rounding) / promised, promised > 0.0);
+    let ratio = select(real(0.0), (scalar(ENERGY) - energy + rounding) / promised, promised > 0.0);
     if ratio >= POOR_SHARE {
         fade_damping(ratio > GOOD_SHARE);
         set_scalar(LENGTH, scalar(GREATEST));
@@ -71,11 +72,11 @@ fn verdict(energy: f64, size: f64, kind: u32) -> u32 {
 
 fn fade_damping(is_good: bool) {
     set_scalar(GROWTH, DAMPING_GROWTH);
-    let damping = scalar(DAMPING) * select(f64(1.0), DAMPING_DECAY, is_good);
-    set_scalar(DAMPING, select(damping, f64(0.0), damping < LEAST_DAMPING));
+    let damping = scalar(DAMPING) * select(real(1.0), DAMPING_DECAY, is_good);
+    set_scalar(DAMPING, select(damping, real(0.0), damping < LEAST_DAMPING));
 }
 
-fn take_trial(energy: f64) {
+fn take_trial(energy: real) {
     set_word(HALF, 1u - own);
     set_scalar(ENERGY, energy);
     set_scalar(ELASTIC, scalar(TRIAL_ELASTIC));
@@ -93,7 +94,7 @@ fn given_up() -> u32 {
 
 // Takes up the contact stiffness at the state. No iterate is farther from rest in the energy norm than 1/2 |u|^2 = E.
 fn begin_stage(local: u32) {
-    var work = vec3<f64>(0.0);
+    var work = vec3<real>(0.0);
     for (var row = local; row < row_count; row += WORKGROUP) {
         let at = numbers(row);
         work.x += force_over_kc(at) * scalar(at + DEPTH);
@@ -102,7 +103,7 @@ fn begin_stage(local: u32) {
     if local == 0u {
         let energy = scalar(ELASTIC) + 0.5 * scalar(STIFFNESS) * sum.x;
         set_scalar(ENERGY, energy);
-        set_scalar(DAMPING, f64(0.0));
+        set_scalar(DAMPING, real(0.0));
         set_scalar(GROWTH, DAMPING_GROWTH);
         set_scalar(GREATEST, sqrt(2.0 * energy));
         set_scalar(LENGTH, sqrt(2.0 * energy));
@@ -166,7 +167,7 @@ fn balance(local: u32) {
     slots = min(listed, parameters.support);
     for (var row = local; row < row_count; row += WORKGROUP) {
         let at = numbers(row);
-        set_reaction(row, Variation(-kc * force_over_kc(at) * vector_at(at + NORMAL), vec3<f64>(0.0), vec3<f64>(0.0)));
+        set_reaction(row, Variation(-kc * force_over_kc(at) * vector_at(at + NORMAL), vec3<real>(0.0), vec3<real>(0.0)));
     }
     sync();
     if local == 0u {
@@ -178,7 +179,7 @@ fn balance(local: u32) {
     sync();
     for (var slot = local; slot < slots; slot += WORKGROUP) {
         if slot >= before {
-            put(own, slot, vec3<f64>(0.0));
+            put(own, slot, vec3<real>(0.0));
         }
         let force = gather(slot);
         put(CONTACT_FORCES, slot, force);
@@ -187,7 +188,7 @@ fn balance(local: u32) {
     sync();
     multiply(OUT_OF_BALANCE, BALANCE_PRODUCT, local);
     multiply(CONTACT_FORCES, LEFT_PRODUCT, local);
-    var squares = vec3<f64>(0.0);
+    var squares = vec3<real>(0.0);
     for (var slot = local; slot < slots; slot += WORKGROUP) {
         squares.x += dot(vector_entry(OUT_OF_BALANCE, slot), vector_entry(BALANCE_PRODUCT, slot));
         squares.y += dot(vector_entry(CONTACT_FORCES, slot), vector_entry(LEFT_PRODUCT, slot));
@@ -221,7 +222,8 @@ fn decide() -> u32 {
     let may_go_on = word(ITERATIONS) < parameters.max_iterations;
     if kc == parameters.kc && residual <= parameters.tolerance {
         set_word(NUDGES, 0u);
-        return select(converged(), PROBE, may_go_on);
+        // A convex problem has no saddle.
+        return select(converged(), PROBE, may_go_on && !FROZEN);
     }
     if !may_go_on || !(length >= GIVE_UP_LENGTH * greatest) {
         return given_up();
@@ -234,10 +236,10 @@ fn decide() -> u32 {
 // --- The search for a saddle, and the tangent d tau/d q ---
 
 // A number in [-1, 1) that looks random, the same in every run (twin: src/random.rs).
-fn scattered(number: u32) -> f64 {
+fn scattered(number: u32) -> real {
     let state = number * 747796405u + 2891336453u;
     let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
-    return f64((word >> 22u) ^ word) / 2147483648.0 - 1.0;
+    return real((word >> 22u) ^ word) / 2147483648.0 - 1.0;
 }
 
 // Begins the search for negative curvature at a balanced state: the response to a random load.
@@ -245,13 +247,13 @@ fn probe(local: u32) {
     weigh_curvature(local);
     for (var slot = local; slot < slots; slot += WORKGROUP) {
         clear_step(slot);
-        let load = vec3<f64>(scattered(3u * slot), scattered(3u * slot + 1u), scattered(3u * slot + 2u));
+        let load = vec3<real>(scattered(3u * slot), scattered(3u * slot + 1u), scattered(3u * slot + 2u));
         put(LEFT_OVER, slot, load);
     }
     sync();
     multiply(LEFT_OVER, LEFT_PRODUCT, local);
     if local == 0u {
-        begin_solve(FOR_PROBE, f64(1.0));
+        begin_solve(FOR_PROBE, real(1.0));
         go_to(FACTORISE, PROBE);
     }
 }
@@ -264,9 +266,9 @@ fn load(local: u32) {
     for (var k = 0u; k < parameters.joints; k += 1u) {
         for (var row = local; row < row_count; row += WORKGROUP) {
             let at = numbers(row);
-            let v = Variation(-jacobian(word(row_words(row)), k), vec3<f64>(0.0), vec3<f64>(0.0));
+            let v = Variation(-jacobian(word(row_words(row)), k), vec3<real>(0.0), vec3<real>(0.0));
             let push = kc * scalar(at + SHARE) * dot(vector_at(at + NORMAL), v.point);
-            var reaction = Variation(vec3<f64>(0.0), vec3<f64>(0.0), vec3<f64>(0.0));
+            var reaction = Variation(vec3<real>(0.0), vec3<real>(0.0), vec3<real>(0.0));
             if is_active(row) {
                 reaction = stretched_and_bent(at, push, v);
             }
@@ -277,7 +279,7 @@ fn load(local: u32) {
             put(load_of(k), slot, gather(slot));
         }
         for (var l = 0u; l <= k; l += 1u) {
-            var sum = vec3<f64>(0.0);
+            var sum = vec3<real>(0.0);
             for (var row = local; row < row_count; row += WORKGROUP) {
                 if is_active(row) {
                     let node = word(row_words(row));
@@ -285,7 +287,7 @@ fn load(local: u32) {
                     let force = scalar(at + MULTIPLIER) * vector_at(at + NORMAL);
                     let turn = cross(vector_at(at_joint(l) + 3u), jacobian(node, k));
                     sum.x += dot(vector_at(at_reaction(row)), jacobian(node, l))
-                        + select(dot(force, turn), f64(0.0), scalar(at_joint(l) + 6u) != 0.0);
+                        + select(dot(force, turn), real(0.0), scalar(at_joint(l) + 6u) != 0.0);
                 }
             }
             sum = add_up(sum, local);
@@ -297,7 +299,7 @@ fn load(local: u32) {
     }
     if local == 0u {
         set_word(JOINT, 0u);
-        begin_solve(FOR_TANGENT, f64(1.0));
+        begin_solve(FOR_TANGENT, real(1.0));
         go_to(FACTORISE, TANGENT);
     }
 }

@@ -5,15 +5,18 @@ override GATHER_WORKGROUP: u32 = 64u;
 @group(0) @binding(0) var<uniform> parameters: SearchParameters;
 @group(0) @binding(1) var<storage, read> list: array<u32>;
 @group(0) @binding(2) var<storage, read_write> words: array<u32>;
-@group(0) @binding(3) var<storage, read_write> reals: array<f64>;
+@group(0) @binding(3) var<storage, read_write> reals: array<real>;
 // Where the touches of each configuration begin; behind the last, where they end.
 @group(0) @binding(4) var<storage, read_write> starts: array<u32>;
 // Four words a configuration: status, iterations, touches, and two bits: whether there is a tangent, and whether the
 // result may depend on nodes that the compliance does not cover.
 @group(0) @binding(5) var<storage, read_write> records: array<vec4<u32>>;
 // Residual, energy, torque and, where it is wanted, the tangent row by row.
-@group(0) @binding(6) var<storage, read_write> amounts: array<f64>;
-@group(0) @binding(7) var<storage, read_write> touches: array<SearchTouch>;
+@group(0) @binding(6) var<storage, read_write> amounts: array<real>;
+// Proxy node, facet and feature of each touch, or by the paper's iteration the object nodes that it is tied to.
+@group(0) @binding(7) var<storage, read_write> touches: array<vec4<u32>>;
+// Weights of the corners and the force on the proxy node, or the force on each of those nodes [N].
+@group(0) @binding(8) var<storage, read_write> presses: array<real>;
 
 // One workgroup over all configurations.
 @compute @workgroup_size(WORKGROUP)
@@ -70,18 +73,35 @@ fn gather(
     if row == 0u {
         write_record(place);
     }
+    if PAPER {
+        if row < word(TOUCHES) {
+            let tie = at_row(0u, row);
+            let touch = starts[place] + row;
+            touches[touch] = vec4<u32>(word(tie), word(tie + 1u), word(tie + 2u), word(tie + 3u));
+            for (var k = 0u; k < 9u; k += 1u) {
+                presses[9u * touch + k] = scalar(at_reaction(row) + k);
+            }
+        }
+        return;
+    }
     let half = word(HALF);
     if word(TOUCHES) == 0u || row >= word(ROWS + half) || scalar(at_numbers(half, row) + DEPTH) <= 0.0 {
         return;
     }
-    var before = 0u;
+    var touch = starts[place];
     for (var other = 0u; other < row; other += 1u) {
-        before += select(0u, 1u, scalar(at_numbers(half, other) + DEPTH) > 0.0);
+        touch += select(0u, 1u, scalar(at_numbers(half, other) + DEPTH) > 0.0);
     }
     let at = at_numbers(half, row);
     let at_words = at_row(half, row);
-    let corners = vector_at(at + CORNERS);
+    touches[touch] = vec4<u32>(word(at_words), word(at_words + 1u), word(at_words + 2u), 0u);
     let force = parameters.kc * scalar(at + SHARE) * scalar(at + DEPTH) * vector_at(at + NORMAL);
-    touches[starts[place] + before] = SearchTouch(word(at_words), word(at_words + 1u), word(at_words + 2u), 0u,
-        array<f64, 3>(corners.x, corners.y, corners.z), array<f64, 3>(force.x, force.y, force.z));
+    write_press(6u * touch, vector_at(at + CORNERS));
+    write_press(6u * touch + 3u, force);
+}
+
+fn write_press(at: u32, v: vec3<real>) {
+    presses[at] = v.x;
+    presses[at + 1u] = v.y;
+    presses[at + 2u] = v.z;
 }

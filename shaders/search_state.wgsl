@@ -2,31 +2,31 @@
 
 @group(0) @binding(0) var<uniform> parameters: SearchParameters;
 // Bounding spheres (closest_facet.wgsl); radius, and share of the stiffness, of each proxy node; the parts named above.
-@group(0) @binding(1) var<storage, read> surface: array<f64>;
+@group(0) @binding(1) var<storage, read> surface: array<real>;
 @group(0) @binding(2) var<storage, read> mesh: array<u32>;
 // C over the places that it covers, row-major: 3 x 3 numbers for each pair, or one [m/N].
-@group(0) @binding(3) var<storage, read> compliance: array<f64>;
+@group(0) @binding(3) var<storage, read> compliance: array<real>;
 // Proxy nodes of all configurations of the section, three coordinates each.
-@group(0) @binding(4) var<storage, read> placed: array<f64>;
+@group(0) @binding(4) var<storage, read> placed: array<real>;
 // The same in f32; w is the gap to the flat triangles at rest.
 @group(0) @binding(5) var<storage, read> positions: array<vec4<f32>>;
 // Number of configurations in contact plus one, then their numbers.
 @group(0) @binding(6) var<storage, read> list: array<u32>;
 // Places in the section of unfinished configurations, room for as many, their number, then the words of each workspace.
 @group(0) @binding(7) var<storage, read_write> words: array<u32>;
-@group(0) @binding(8) var<storage, read_write> reals: array<f64>;
+@group(0) @binding(8) var<storage, read_write> reals: array<real>;
 
-fn proxy_position(node: u32) -> vec3<f64> {
+fn proxy_position(node: u32) -> vec3<real> {
     let at = 3u * (member * parameters.proxy_nodes + node);
-    return vec3<f64>(placed[at], placed[at + 1u], placed[at + 2u]);
+    return vec3<real>(placed[at], placed[at + 1u], placed[at + 2u]);
 }
 
 // Radius of a proxy node, its share of the stiffness, and the link that it hangs on.
-fn proxy_radius(node: u32) -> f64 {
+fn proxy_radius(node: u32) -> real {
     return surface[at_proxy() + node];
 }
 
-fn proxy_share(node: u32) -> f64 {
+fn proxy_share(node: u32) -> real {
     return surface[at_proxy() + parameters.proxy_nodes + node];
 }
 
@@ -39,17 +39,17 @@ fn at_proxy() -> u32 {
 }
 
 // Signed distance of a proxy node to the flat triangles at rest, known to gap_band.
-fn rest_distance(node: u32) -> f64 {
-    return f64(positions[member * parameters.proxy_nodes + node].w) + proxy_radius(node);
+fn rest_distance(node: u32) -> real {
+    return real(positions[member * parameters.proxy_nodes + node].w) + proxy_radius(node);
 }
 
-fn surface_vector(at: u32) -> vec3<f64> {
-    return vec3<f64>(surface[at], surface[at + 1u], surface[at + 2u]);
+fn surface_vector(at: u32) -> vec3<real> {
+    return vec3<real>(surface[at], surface[at + 1u], surface[at + 2u]);
 }
 
 // Displacements of the nodes in four places by a vector of forces on the support: their rows of C times the vector.
-fn responses(vector: u32, places: vec4<u32>) -> array<vec3<f64>, 4> {
-    var u = array<vec3<f64>, 4>();
+fn responses(vector: u32, places: vec4<u32>) -> array<vec3<real>, 4> {
+    var u = array<vec3<real>, 4>();
     let slots = word(SLOTS);
     for (var slot = 0u; slot < slots; slot += 1u) {
         let other = word(at_place(slot));
@@ -64,14 +64,14 @@ fn responses(vector: u32, places: vec4<u32>) -> array<vec3<f64>, 4> {
 
 // Displacement of the node in `place` by a force on another one. C is symmetric: along a row of the other node,
 // neighbouring invocations read neighbouring entries.
-fn moved_by(other: u32, force: vec3<f64>, place: u32) -> vec3<f64> {
+fn moved_by(other: u32, force: vec3<real>, place: u32) -> vec3<real> {
     if ISOTROPIC {
         return compliance[other * parameters.covered + place] * force;
     }
     let first = 9u * other * parameters.covered + 3u * place;
     let second = first + 3u * parameters.covered;
     let third = second + 3u * parameters.covered;
-    return vec3<f64>(compliance[first], compliance[first + 1u], compliance[first + 2u]) * force.x
-        + vec3<f64>(compliance[second], compliance[second + 1u], compliance[second + 2u]) * force.y
-        + vec3<f64>(compliance[third], compliance[third + 1u], compliance[third + 2u]) * force.z;
+    return vec3<real>(compliance[first], compliance[first + 1u], compliance[first + 2u]) * force.x
+        + vec3<real>(compliance[second], compliance[second + 1u], compliance[second + 2u]) * force.y
+        + vec3<real>(compliance[third], compliance[third + 1u], compliance[third + 2u]) * force.z;
 }

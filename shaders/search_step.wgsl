@@ -47,7 +47,7 @@ fn factorise(local: u32) {
             let weights = numbers(row) + NODE_WEIGHTS;
             let normal = vector_at(numbers(row) + NORMAL);
             if ISOTROPIC {
-                var size = f64(0.0);
+                var size = real(0.0);
                 for (var j = 0u; j < parameters.carriers; j += 4u) {
                     size += scalar(weights + j) * along_row(places, j, place);
                     size += scalar(weights + j + 1u) * along_row(places, j + 1u, place);
@@ -56,7 +56,7 @@ fn factorise(local: u32) {
                 }
                 set_scalar(at_column(a, slot), size);
             } else {
-                var moved = vec3<f64>(0.0);
+                var moved = vec3<real>(0.0);
                 for (var j = 0u; j < parameters.carriers; j += 1u) {
                     moved += moved_by(word(places + j), scalar(weights + j) * normal, place);
                 }
@@ -70,7 +70,7 @@ fn factorise(local: u32) {
         let normal = vector_at(numbers(row) + NORMAL);
         let weights = numbers(row) + NODE_WEIGHTS;
         for (var a = 0u; a < taken; a += 1u) {
-            var deepened = f64(0.0);
+            var deepened = real(0.0);
             for (var j = 0u; j < parameters.carriers; j += 1u) {
                 if ISOTROPIC {
                     deepened += scalar(weights + j) * scalar(at_column(a, slot_of(row, j)));
@@ -96,7 +96,7 @@ fn factorise(local: u32) {
     }
 }
 
-fn along_row(places: u32, j: u32, place: u32) -> f64 {
+fn along_row(places: u32, j: u32, place: u32) -> real {
     return compliance[word(places + j) * parameters.covered + place];
 }
 
@@ -128,7 +128,7 @@ fn invert(order: u32, local: u32) {
     }
 }
 
-fn eliminate(row: u32, order: u32, column: u32, k: u32, share: f64) {
+fn eliminate(row: u32, order: u32, column: u32, k: u32, share: real) {
     let at = at_inverse(row, column);
     if row != k && row < order {
         set_scalar(at, scalar(at) - scalar(at_inverse(row, k)) * share);
@@ -142,7 +142,7 @@ fn precondition(local: u32) {
     let stiffening = scalar(STIFFENING);
     for (var row = local; row < row_count; row += WORKGROUP) {
         if !is_active(row) {
-            set_reaction(row, Variation(vec3<f64>(0.0), vec3<f64>(0.0), vec3<f64>(0.0)));
+            set_reaction(row, Variation(vec3<real>(0.0), vec3<real>(0.0), vec3<real>(0.0)));
         }
     }
     for (var a = local; a < taken; a += WORKGROUP) {
@@ -151,16 +151,16 @@ fn precondition(local: u32) {
     }
     sync();
     for (var a = local; a < taken; a += WORKGROUP) {
-        var push = f64(0.0);
+        var push = real(0.0);
         for (var b = 0u; b < taken; b += 1u) {
             push += scalar(at_inverse(b, a)) * scalar(at_deepening(b));
         }
         let row = word(at_taken(a));
         set_scalar(at_push(a), push);
-        set_reaction(row, Variation(push * vector_at(numbers(row) + NORMAL), vec3<f64>(0.0), vec3<f64>(0.0)));
+        set_reaction(row, Variation(push * vector_at(numbers(row) + NORMAL), vec3<real>(0.0), vec3<real>(0.0)));
     }
     sync();
-    var square = vec3<f64>(0.0);
+    var square = vec3<real>(0.0);
     for (var slot = local; slot < slots; slot += WORKGROUP) {
         let residual = vector_entry(LEFT_OVER, slot);
         var displacement = vector_entry(LEFT_PRODUCT, slot);
@@ -178,7 +178,7 @@ fn precondition(local: u32) {
     }
     let next = add_up(square, local).x;
     let is_first = word(IS_FIRST) != 0u;
-    let ratio = select(next / scalar(SQUARE), f64(0.0), is_first);
+    let ratio = select(next / scalar(SQUARE), real(0.0), is_first);
     for (var slot = local; slot < slots; slot += WORKGROUP) {
         var force = vector_entry(PRECONDITIONED_FORCE, slot);
         var displacement = vector_entry(PRECONDITIONED, slot);
@@ -201,7 +201,7 @@ fn precondition(local: u32) {
 }
 
 // Relative residual to which a linear solve is asked for.
-fn inner_tolerance() -> f64 {
+fn inner_tolerance() -> real {
     let purpose = word(PURPOSE);
     if purpose == FOR_STEP {
         return clamp(scalar(RESIDUAL), INNER_TOLERANCE_FLOOR, INNER_TOLERANCE);
@@ -222,7 +222,7 @@ fn after_iteration() -> u32 {
 }
 
 // What follows a direction of negative curvature; for one invocation.
-fn after_negative_curvature(lacking: f64) -> u32 {
+fn after_negative_curvature(lacking: real) -> u32 {
     let purpose = word(PURPOSE);
     if purpose == FOR_PROBE {
         return NUDGE;
@@ -235,7 +235,7 @@ fn after_negative_curvature(lacking: f64) -> u32 {
     set_word(ATTEMPTS, attempts);
     set_scalar(DAMPING, damping + max(lacking + CURVATURE_MARGIN, damping));
     // No step is as good as one of no length, which ends the search.
-    set_scalar(LENGTH, select(scalar(LENGTH), f64(0.0), attempts >= DAMPING_ATTEMPTS));
+    set_scalar(LENGTH, select(scalar(LENGTH), real(0.0), attempts >= DAMPING_ATTEMPTS));
     return select(STEP, DECIDE, attempts >= DAMPING_ATTEMPTS);
 }
 
@@ -247,11 +247,11 @@ fn iterate(local: u32) {
     for (var row = local; row < row_count; row += WORKGROUP) {
         let at = numbers(row);
         let v = variation(row, DIRECTION);
-        let push = select(f64(0.0), kc * scalar(at + SHARE) * dot(vector_at(at + NORMAL), v.point), is_active(row));
+        let push = select(real(0.0), kc * scalar(at + SHARE) * dot(vector_at(at + NORMAL), v.point), is_active(row));
         set_reaction(row, stretched_and_bent(at, push, v));
     }
     sync();
-    var work = vec3<f64>(0.0);
+    var work = vec3<real>(0.0);
     for (var slot = local; slot < slots; slot += WORKGROUP) {
         let force = vector_entry(DIRECTION_FORCE, slot);
         let product = stiffening * force + gather(slot);
@@ -261,7 +261,7 @@ fn iterate(local: u32) {
     }
     let sum = add_up(work, local);
     let is_convex = sum.x > 0.0;
-    let share = select(f64(0.0), before / sum.x, is_convex);
+    let share = select(real(0.0), before / sum.x, is_convex);
     for (var slot = local; slot < slots; slot += WORKGROUP) {
         put(STEP_FORCE, slot, vector_entry(STEP_FORCE, slot) + share * vector_entry(DIRECTION_FORCE, slot));
         put(STEP_DISPLACEMENT, slot, vector_entry(STEP_DISPLACEMENT, slot) + share * vector_entry(DIRECTION, slot));
@@ -291,7 +291,7 @@ fn take_product(local: u32) {
 // By how much the model is less at the step than at the state; notes the rows' forces there, and which then touch.
 fn model(local: u32) {
     let kc = scalar(STIFFNESS);
-    var sum = vec3<f64>(0.0);
+    var sum = vec3<real>(0.0);
     for (var slot = local; slot < slots; slot += WORKGROUP) {
         let displacement = vector_entry(STEP_DISPLACEMENT, slot);
         let force = vector_entry(STEP_FORCE, slot);
@@ -309,7 +309,7 @@ fn model(local: u32) {
             sum.x -= 0.5 * scalar(at + MULTIPLIER)
                 * (dot(bent.point, v.point) + dot(bent.tangent_0, v.tangent_0) + dot(bent.tangent_1, v.tangent_1));
         }
-        let force = scalar(at + SHARE) * max(depth + change, f64(0.0));
+        let force = scalar(at + SHARE) * max(depth + change, real(0.0));
         let before = force_over_kc(at);
         // The part that is of first order is in the residual.
         let same = (depth > 0.0) == (force > 0.0);
@@ -330,7 +330,7 @@ fn model(local: u32) {
 
 // What follows a pass of the step, by which the model decreases, other rows may touch, and the square of the step's
 // length; for one invocation.
-fn after_model(decrease: f64, has_changed: bool, square: f64) -> u32 {
+fn after_model(decrease: real, has_changed: bool, square: real) -> u32 {
     let number = word(PASS);
     if word(RESTORED) == 0u {
         if number > 0u && !(decrease > scalar(DECREASE)) {
@@ -383,7 +383,7 @@ fn go_on(local: u32) {
 // The forces to which the step leads, and what it predicts for the rows.
 fn try_step(local: u32) {
     for (var node = local; node < parameters.proxy_nodes; node += WORKGROUP) {
-        set_scalar(at_predicted(node), f64(0.0));
+        set_scalar(at_predicted(node), real(0.0));
     }
     for (var slot = local; slot < slots; slot += WORKGROUP) {
         put(1u - own, slot, vector_entry(own, slot) + vector_entry(STEP_FORCE, slot));
@@ -402,18 +402,43 @@ fn try_step(local: u32) {
 fn place(local: u32) {
     let trial = 1u - own;
     multiply(trial, LEFT_PRODUCT, local);
-    var work = vec3<f64>(0.0);
+    var work = vec3<real>(0.0);
     for (var slot = local; slot < slots; slot += WORKGROUP) {
         work.x += dot(vector_entry(trial, slot), vector_entry(LEFT_PRODUCT, slot));
     }
     let elastic = 0.5 * add_up(work, local).x;
     if local == 0u {
-        let norm = sqrt(2.0 * max(elastic, f64(0.0))) * (1.0 + LENGTH_ROUNDING);
+        let norm = sqrt(2.0 * max(elastic, real(0.0))) * (1.0 + LENGTH_ROUNDING);
         let bulging = parameters.bulge_mobility * norm;
         set_scalar(TRIAL_ELASTIC, elastic);
         set_scalar(MOVED, parameters.mobility * norm + bulging);
         set_scalar(BULGE, parameters.bulge + bulging);
-        go_to(PLACED, PLACE);
+        go_to(select(PLACED, JUDGE, FROZEN), PLACE);
+    }
+    if FROZEN {
+        sync();
+        deepen_rows(local);
+    }
+}
+
+// The trial's rows where their geometry is frozen: those of the state, deepened by the displacement LEFT_PRODUCT.
+fn deepen_rows(local: u32) {
+    let trial = 1u - own;
+    for (var row = local; row < row_count; row += WORKGROUP) {
+        let source = numbers(row);
+        let at = at_numbers(trial, row);
+        for (var k = 0u; k < NODE_WEIGHTS + 3u * parameters.carriers; k += 1u) {
+            set_scalar(at + k, scalar(source + k));
+        }
+        let node = word(row_words(row));
+        let deepening = dot(vector_at(source + NORMAL), moved_point(row, LEFT_PRODUCT));
+        set_scalar(at + DEPTH, proxy_radius(node) + scalar(source + DISTANCE) + deepening);
+        for (var k = 0u; k < ROW_WORDS + parameters.carriers; k += 1u) {
+            set_word(at_row(trial, row) + k, word(row_words(row) + k));
+        }
+    }
+    if local == 0u {
+        set_word(ROWS + trial, row_count);
     }
 }
 
@@ -444,7 +469,7 @@ fn respond(local: u32) {
     }
     sync();
     if local == 0u {
-        begin_solve(FOR_TANGENT, f64(1.0));
+        begin_solve(FOR_TANGENT, real(1.0));
         go_to(PRODUCT, RESPOND);
     }
 }
@@ -457,7 +482,7 @@ fn take_response(local: u32) {
     }
     sync();
     for (var l = 0u; l <= joint; l += 1u) {
-        var sum = vec3<f64>(0.0);
+        var sum = vec3<real>(0.0);
         for (var slot = local; slot < slots; slot += WORKGROUP) {
             // What the residual adds makes the error a product of those of both responses.
             sum.x += dot(vector_entry(load_of(l), slot), vector_entry(STEP_DISPLACEMENT, slot))
@@ -481,19 +506,19 @@ fn take_response(local: u32) {
 // Torque, number of touches, and whether the compliance covers all that the result depends on (src/contact/reach.rs).
 fn account(local: u32) {
     let kc = parameters.kc;
-    var sum = vec3<f64>(0.0);
+    var sum = vec3<real>(0.0);
     // How far the state has moved the surface.
-    let norm = sqrt(2.0 * max(scalar(ELASTIC), f64(0.0))) * (1.0 + LENGTH_ROUNDING);
+    let norm = sqrt(2.0 * max(scalar(ELASTIC), real(0.0))) * (1.0 + LENGTH_ROUNDING);
     let moved = (parameters.mobility + parameters.bulge_mobility) * norm;
     for (var row = local; row < row_count; row += WORKGROUP) {
         if scalar(numbers(row) + DEPTH) > 0.0 {
             sum.x += 1.0;
-            sum.y += select(f64(1.0), f64(0.0), is_covered(word(row_words(row)), moved));
+            sum.y += select(real(1.0), real(0.0), is_covered(word(row_words(row)), moved));
         }
     }
     sum = add_up(sum, local);
     for (var joint = 0u; joint < parameters.joints; joint += 1u) {
-        var torque = vec3<f64>(0.0);
+        var torque = vec3<real>(0.0);
         for (var row = local; row < row_count; row += WORKGROUP) {
             let at = numbers(row);
             torque.x += kc * force_over_kc(at)
@@ -512,7 +537,7 @@ fn account(local: u32) {
 }
 
 // Whether the compliance covers all facets that may lie as near to proxy node `node` as its closest one.
-fn is_covered(node: u32, moved: f64) -> bool {
+fn is_covered(node: u32, moved: real) -> bool {
     let x = proxy_position(node);
     let reach = abs(rest_distance(node)) + parameters.gap_band + 2.0 * moved;
     // A compliance that covers all nodes covers all facets.

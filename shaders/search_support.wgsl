@@ -13,7 +13,7 @@ const LOOP_BUDGET: u32 = 30000u;
 // What the search has to do now, and what it has done.
 var<workgroup> phase: u32;
 var<workgroup> spent: u32;
-var<workgroup> sums: array<vec3<f64>, WORKGROUP>;
+var<workgroup> sums: array<vec3<real>, WORKGROUP>;
 
 // Of the state: which half is its own, where its rows begin, how many there are, and slots in use.
 var<private> own: u32;
@@ -32,10 +32,10 @@ fn look_up() {
 }
 
 // Sum of `value` over all invocations, in every one.
-fn add_up(value: vec3<f64>, local: u32) -> vec3<f64> {
+fn add_up(value: vec3<real>, local: u32) -> vec3<real> {
     sums[local] = value;
     workgroupBarrier();
-    var sum = vec3<f64>(0.0);
+    var sum = vec3<real>(0.0);
     for (var k = 0u; k < WORKGROUP; k += 1u) {
         sum += sums[k];
     }
@@ -44,17 +44,17 @@ fn add_up(value: vec3<f64>, local: u32) -> vec3<f64> {
 }
 
 // Root of a square; rounding below zero counts as zero, what is not a number stays so.
-fn root(square: f64) -> f64 {
-    return select(sqrt(square), f64(0.0), square < 0.0);
+fn root(square: real) -> real {
+    return select(sqrt(square), real(0.0), square < 0.0);
 }
 
 // --- Support ---
 
-fn vector_entry(vector: u32, slot: u32) -> vec3<f64> {
+fn vector_entry(vector: u32, slot: u32) -> vec3<real> {
     return vector_at(at_entry_of(vector, slot));
 }
 
-fn put(vector: u32, slot: u32, value: vec3<f64>) {
+fn put(vector: u32, slot: u32, value: vec3<real>) {
     set_vector(at_entry_of(vector, slot), value);
 }
 
@@ -73,7 +73,7 @@ fn places_from(slot: u32) -> vec4<u32> {
         word(at_place(min(slot + 2u * WORKGROUP, last))), word(at_place(min(slot + 3u * WORKGROUP, last))));
 }
 
-fn put_four(vector: u32, slot: u32, values: array<vec3<f64>, 4>) {
+fn put_four(vector: u32, slot: u32, values: array<vec3<real>, 4>) {
     put(vector, slot, values[0]);
     if slot + WORKGROUP < slots {
         put(vector, slot + WORKGROUP, values[1]);
@@ -101,24 +101,24 @@ fn is_active(row: u32) -> bool {
 }
 
 // max(0, depth) times the node's share, of the row with these numbers.
-fn force_over_kc(at: u32) -> f64 {
-    return scalar(at + SHARE) * max(scalar(at + DEPTH), f64(0.0));
+fn force_over_kc(at: u32) -> real {
+    return scalar(at + SHARE) * max(scalar(at + DEPTH), real(0.0));
 }
 
 // How displacements of a row's nodes move its closest point, and turn the surface there; or a reaction to that.
 struct Variation {
-    point: vec3<f64>,
-    tangent_0: vec3<f64>,
-    tangent_1: vec3<f64>,
+    point: vec3<real>,
+    tangent_0: vec3<real>,
+    tangent_1: vec3<real>,
 }
 
 fn slot_of(row: u32, j: u32) -> u32 {
     return word(row_words(row) + ROW_WORDS + parameters.carriers + j);
 }
 
-fn moved_point(row: u32, vector: u32) -> vec3<f64> {
+fn moved_point(row: u32, vector: u32) -> vec3<real> {
     let weights = numbers(row) + NODE_WEIGHTS;
-    var sum = vec3<f64>(0.0);
+    var sum = vec3<real>(0.0);
     for (var j = 0u; j < parameters.carriers; j += 1u) {
         sum += scalar(weights + j) * vector_entry(vector, slot_of(row, j));
     }
@@ -127,7 +127,7 @@ fn moved_point(row: u32, vector: u32) -> vec3<f64> {
 
 fn variation(row: u32, vector: u32) -> Variation {
     let at = numbers(row);
-    var v = Variation(moved_point(row, vector), vec3<f64>(0.0), vec3<f64>(0.0));
+    var v = Variation(moved_point(row, vector), vec3<real>(0.0), vec3<real>(0.0));
     if scalar(at + MULTIPLIER) != 0.0 {
         let slopes = at + NODE_WEIGHTS + parameters.carriers;
         for (var j = 0u; j < parameters.carriers; j += 1u) {
@@ -140,8 +140,8 @@ fn variation(row: u32, vector: u32) -> Variation {
 }
 
 // Product of a symmetric matrix of two rows, its entries 00, 01, 11, and a vector.
-fn apply(m: vec3<f64>, v: vec2<f64>) -> vec2<f64> {
-    return vec2<f64>(dot(m.xy, v), dot(m.yz, v));
+fn apply(m: vec3<real>, v: vec2<real>) -> vec2<real> {
+    return vec2<real>(dot(m.xy, v), dot(m.yz, v));
 }
 
 // The reaction whose work along another variation is the second variation of the depth of both.
@@ -150,8 +150,8 @@ fn second_variation(at: u32, v: Variation) -> Variation {
     let t_0 = vector_at(at + TANGENT_0);
     let t_1 = vector_at(at + TANGENT_1);
     let along = vector_at(at + ALONG);
-    let sliding = vec2<f64>(dot(t_0, v.point), dot(t_1, v.point));
-    let tilting = vec2<f64>(dot(normal, v.tangent_0), dot(normal, v.tangent_1));
+    let sliding = vec2<real>(dot(t_0, v.point), dot(t_1, v.point));
+    let tilting = vec2<real>(dot(normal, v.tangent_0), dot(normal, v.tangent_1));
     let turned = apply(vector_at(at + TURNING), tilting);
     let carried = apply(vector_at(at + TURNING), sliding);
     let slide = apply(vector_at(at + BENDING), sliding) - turned;
@@ -162,9 +162,9 @@ fn second_variation(at: u32, v: Variation) -> Variation {
 }
 
 // The reaction of a row whose spring takes `push` more under the variation v.
-fn stretched_and_bent(at: u32, push: f64, v: Variation) -> Variation {
+fn stretched_and_bent(at: u32, push: real, v: Variation) -> Variation {
     let multiplier = scalar(at + MULTIPLIER);
-    var reaction = Variation(push * vector_at(at + NORMAL), vec3<f64>(0.0), vec3<f64>(0.0));
+    var reaction = Variation(push * vector_at(at + NORMAL), vec3<real>(0.0), vec3<real>(0.0));
     if multiplier != 0.0 {
         let bent = second_variation(at, v);
         reaction.point += multiplier * bent.point;
@@ -182,8 +182,8 @@ fn set_reaction(row: u32, reaction: Variation) {
 }
 
 // Sum of what the rows' reactions press on the node in `slot`.
-fn gather(slot: u32) -> vec3<f64> {
-    var sum = vec3<f64>(0.0);
+fn gather(slot: u32) -> vec3<real> {
+    var sum = vec3<real>(0.0);
     let carriers = parameters.carriers;
     var entry = word(at_head(slot));
     while entry != 0u {
@@ -208,7 +208,7 @@ fn weigh_curvature(local: u32) {
 }
 
 // Zero is the first displacement of a linear solve, for one invocation with what it is for.
-fn begin_solve(purpose: u32, stiffening: f64) {
+fn begin_solve(purpose: u32, stiffening: real) {
     set_scalar(STIFFENING, stiffening);
     set_word(PURPOSE, purpose);
     set_word(PASS, 0u);
@@ -218,14 +218,14 @@ fn begin_solve(purpose: u32, stiffening: f64) {
 }
 
 fn clear_step(slot: u32) {
-    put(STEP_FORCE, slot, vec3<f64>(0.0));
-    put(STEP_DISPLACEMENT, slot, vec3<f64>(0.0));
+    put(STEP_FORCE, slot, vec3<real>(0.0));
+    put(STEP_DISPLACEMENT, slot, vec3<real>(0.0));
 }
 
 // Derivative of the position of proxy node `node` by joint `joint`.
-fn jacobian(node: u32, joint: u32) -> vec3<f64> {
+fn jacobian(node: u32, joint: u32) -> vec3<real> {
     if joint > proxy_link(node) {
-        return vec3<f64>(0.0);
+        return vec3<real>(0.0);
     }
     let at = at_joint(joint);
     let axis = vector_at(at + 3u);

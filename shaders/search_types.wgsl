@@ -1,12 +1,10 @@
 // What the stages of the search for equilibria share (twin of the whole: src/contact/equilibrium/energy.rs). They work
-// in f64, on a number of configurations at once, each of which has a workspace. A round displaces the surface by the
-// trial's forces and finds its contacts (search_detect), judges it (search_judge), and goes on to the next trial
-// (search_step).
+// on a number of configurations at once, each of which has a workspace; in f64, or in f32 on devices without it. A
+// round displaces the surface by the trial's forces and finds its contacts (search_detect), judges it (search_judge),
+// and goes on to the next trial (search_step). By the paper's iteration it makes one pass of that (search_detect,
+// search_paper).
 //
 // Surface nodes are numbered by place: those that the compliance covers come first.
-
-// Numbers that shared functions compute in.
-alias real = f64;
 
 struct SearchParameters {
     // Configurations of this dispatch.
@@ -48,36 +46,35 @@ struct SearchParameters {
     // And the link of each proxy node.
     at_links: u32,
     // Gaps in f32 are known to this [m].
-    gap_band: f64,
-    // Contact stiffness of the first and of the last stage [N/m].
-    first_kc: f64,
-    kc: f64,
+    gap_band: real,
+    // Contact stiffness of the first and of the last stage; of the paper's iteration that of its springs [N/m].
+    first_kc: real,
+    kc: real,
     // Relative residual at which a configuration has converged.
-    tolerance: f64,
+    tolerance: real,
     // Roots of the greatest mobility of a node, and of what facets stand off their triangles by [sqrt(m/N)].
-    mobility: f64,
-    bulge_mobility: f64,
+    mobility: real,
+    bulge_mobility: real,
     // By how much facets stand off their triangles at rest [m].
-    bulge: f64,
+    bulge: real,
     // Least contact force in the energy norm that depths resolve to the tolerance, over kc [sqrt(J) m/N].
-    least_scale: f64,
+    least_scale: real,
+    // Below this distance to an edge or vertex the direction to it is rounding [m].
+    least_distance: real,
+    // Largest trace of a node's own block of C [m/N].
+    softest: real,
 }
 
 alias Parameters = SearchParameters;
 
-// A proxy node in contact: the closest facet, the feature of that, and the weights of the corners in its closest point;
-// force on the proxy node [N].
-struct SearchTouch {
-    proxy_node: u32,
-    facet: u32,
-    feature: u32,
-    padding: u32,
-    weights: array<f64, 3>,
-    force: array<f64, 3>,
-}
-
 // Whether the compliance has one number for a pair of nodes.
 override ISOTROPIC: bool = false;
+
+// Whether contact is linearised: its geometry is frozen at rest.
+override FROZEN: bool = false;
+
+// Whether equilibria are those of the paper's iteration.
+override PAPER: bool = false;
 
 // --- Words of a workspace ---
 
@@ -139,6 +136,9 @@ const RESPOND: u32 = 18u;
 const RESPONDED: u32 = 19u;
 const ACCOUNT: u32 = 20u;
 const DONE: u32 = 21u;
+// Of the paper's iteration, which is not DONE: ties, and their forces (search_paper). It iterates in between.
+const TIE: u32 = 22u;
+const PROJECT: u32 = 23u;
 
 // Kinds of trials.
 const AT_REST: u32 = 0u;
@@ -338,9 +338,4 @@ fn at_tangent(row: u32, column: u32) -> u32 {
 
 fn at_torque(joint: u32) -> u32 {
     return at_tangent(parameters.joints, 0u) + joint;
-}
-
-// Number of this workgroup when a dispatch is folded into two dimensions.
-fn unfold(group: vec3<u32>, groups: vec3<u32>) -> u32 {
-    return group.y * groups.x + group.x;
 }

@@ -30,20 +30,20 @@ fn set_word(at: u32, value: u32) {
     words[words_base + at] = value;
 }
 
-fn scalar(at: u32) -> f64 {
+fn scalar(at: u32) -> real {
     return reals[reals_base + at];
 }
 
-fn set_scalar(at: u32, value: f64) {
+fn set_scalar(at: u32, value: real) {
     reals[reals_base + at] = value;
 }
 
-fn vector_at(at: u32) -> vec3<f64> {
+fn vector_at(at: u32) -> vec3<real> {
     let first = reals_base + at;
-    return vec3<f64>(reals[first], reals[first + 1u], reals[first + 2u]);
+    return vec3<real>(reals[first], reals[first + 1u], reals[first + 2u]);
 }
 
-fn set_vector(at: u32, value: vec3<f64>) {
+fn set_vector(at: u32, value: vec3<real>) {
     let first = reals_base + at;
     reals[first] = value.x;
     reals[first + 1u] = value.y;

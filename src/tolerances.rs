@@ -42,16 +42,19 @@ pub const GPU_BOUND_SLACK: f64 = 1e-6;
 
 /// Widening of distances within which f32 kernels search, relative to these [1]: they follow from sums of up to some
 /// hundred products, each rounded by 6e-8.
-pub const GPU_SEARCH_SLACK: f32 = 1e-4;
+pub const GPU_SEARCH_SLACK: f64 = 1e-4;
+
+/// [`FACET_STEP`](crate::contact::geometry::facet::FACET_STEP) for f32 [1]: some roundings of a weight.
+pub const GPU_FACET_STEP: f64 = 4.0 * f32::EPSILON as f64;
 
 /// [`ENERGY_ROUNDING`] for f32, whose eps is 1.2e-7.
-pub const GPU_ENERGY_ROUNDING: f32 = 16.0 * f32::EPSILON;
+pub const GPU_ENERGY_ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
 /// [`GIVE_UP_LENGTH`] for f32: coordinates do not change visibly under a step this much smaller than the first.
-pub const GPU_GIVE_UP_RADIUS: f32 = 1e-6;
+pub const GPU_GIVE_UP_LENGTH: f64 = 1e-6;
 
 /// [`INNER_TOLERANCE_FLOOR`] for f32: eps times the about 1e3 by which rounding grows over some tens of iterations.
-pub const GPU_INNER_TOLERANCE_FLOOR: f32 = 1e-4;
+pub const GPU_INNER_TOLERANCE_FLOOR: f64 = 1e-4;
 
 /// Most iterations of one configuration in f32, whatever the scene allows: hardly any that needs more ends there, a
 /// group that goes on holds up its whole batch, and what is not converged is solved in f64 with all the scene's
@@ -74,7 +77,7 @@ pub const GPU_STIFFNESS: f64 = 1e3;
 pub const GPU_SETTLED_RESIDUAL: f64 = 1e-7;
 
 /// Relative residual of the paper's step 2 in f32 [1]: ten times better than the least tolerance of the iteration.
-pub const GPU_PAPER_INNER_TOLERANCE: f32 = 1e-6;
+pub const GPU_PAPER_INNER_TOLERANCE: f64 = 1e-6;
 
 // --- contact ---
 
@@ -102,19 +105,11 @@ pub const ENERGY_ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// section 6.1: any value in (0, 1/4); small, because the energy itself is cheap and only decrease matters).
 pub const ACCEPTED_SHARE: f64 = 1e-4;
 
-/// Below this share of the predicted decrease damping grows, in f32 the trust region shrinks [1] (Conn, Gould & Toint,
-/// section 17.1).
+/// Below this share of the predicted decrease damping grows [1] (Conn, Gould & Toint, section 17.1).
 pub const POOR_SHARE: f64 = 0.25;
 
-/// Above this share damping fades, and in f32 a step that reached the boundary widens the trust region [1] (same
-/// source).
+/// Above this share damping fades [1] (same source).
 pub const GOOD_SHARE: f64 = 0.75;
-
-/// Factors by which the trust region of f32 shrinks and widens [1] (same source).
-pub const SHRINK: f64 = 0.25;
-
-/// See [`SHRINK`].
-pub const WIDEN: f64 = 2.0;
 
 /// Largest relative residual at which the inner conjugate gradients stop [1]; nearer the solution they stop at the
 /// outer residual itself, which keeps Newton's convergence quadratic (Dembo, Eisenstat & Steihaug 1982).

@@ -171,9 +171,9 @@ impl Graphics {
 /// Part of a bake that an adapter does.
 fn tier(adapter: &AdapterSummary) -> &'static str {
     if adapter.double {
-        "solves in f64, from contact or not to torque; of `paper` and `linearised` forces in f32, which the CPU settles"
+        "solves in f64, from contact or not to torque"
     } else {
-        "has no f64 in shaders: the CPU decides contact near none, and settles all forces"
+        "has no f64 in shaders: solves in f32; the CPU decides contact near none, and settles forces"
     }
 }
 

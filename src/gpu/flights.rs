@@ -53,33 +53,27 @@ impl AdaptiveSize {
     }
 }
 
-/// First sizes of sections and batches: nothing is known of the device yet.
+/// First size of sections: nothing is known of the device yet.
 const FIRST_SECTION: usize = 1024;
-const FIRST_BATCH: usize = 64;
 
 /// A device, and how much it is given at a time.
 pub(super) struct PacedDevice<S> {
     pub stages: S,
     section: AdaptiveSize,
-    batch: AdaptiveSize,
     /// When it was last known to be done with something.
     done: Instant,
 }
 
 impl<S: Stages> PacedDevice<S> {
     pub fn new(stages: S) -> Self {
-        let room = stages.room();
-        let section = AdaptiveSize::new(FIRST_SECTION, room.section);
-        let batch = AdaptiveSize::new(FIRST_BATCH, room.batch);
-        Self { stages, section, batch, done: Instant::now() }
+        let section = AdaptiveSize::new(FIRST_SECTION, stages.room().section);
+        Self { stages, section, done: Instant::now() }
     }
 
     /// Begins again after a failure, with half the room.
     pub fn reopen(&mut self) -> Result<(), GpuError> {
         self.stages.reopen()?;
-        let room = self.stages.room();
-        self.section.halve(room.section);
-        self.batch.halve(room.batch);
+        self.section.halve(self.stages.room().section);
         Ok(())
     }
 
@@ -247,8 +241,8 @@ pub(super) fn fly<S: Stages>(
             fleet.search(flight, queue)?;
             continue;
         };
-        let Flight { device, lane, section, ticket, since, .. } = flight;
-        let found = fleet.found(device, lane, detected.touching.len(), ticket, since).map_err(|e| (device, e))?;
+        let Flight { device, lane, section, ticket, .. } = flight;
+        let found = fleet.found(device, lane, detected.touching.len(), ticket).map_err(|e| (device, e))?;
         fleet.idle.push_back((device, lane));
         fleet.depart(queue);
         fleet.keep_busy(queue)?;
@@ -287,10 +281,9 @@ impl<S: Stages> Fleet<'_, S> {
         };
         let time = paced.worked(since);
         paced.section.adapt(count, time);
-        let batch = paced.batch.now;
         let ticket = match detected.touching.len() {
             0 => None,
-            count => Some(HostTime::of(&mut self.time.submitting, || paced.stages.solve(lane, count, batch))),
+            count => Some(HostTime::of(&mut self.time.submitting, || paced.stages.solve(lane, count))),
         };
         let (detected, since) = (Some(detected), Instant::now());
         self.flights.push_back(Flight { device, lane, section, ticket, since, detected });
@@ -303,13 +296,11 @@ impl<S: Stages> Fleet<'_, S> {
         lane: usize,
         count: usize,
         ticket: Option<S::Ticket>,
-        since: Instant,
     ) -> Result<Found, GpuError> {
-        let Some(ticket) = ticket else { return Ok(Found::nothing()) };
+        let Some(ticket) = ticket else { return Ok(Found::default()) };
         let paced = &mut self.devices[device];
         let found = HostTime::of(&mut self.time.reading, || paced.stages.found(lane, count, &ticket))?;
-        let time = paced.worked(since);
-        paced.batch.adapt(count, time);
+        paced.done = Instant::now();
         Ok(found)
     }
 
@@ -332,8 +323,9 @@ impl<S: Stages> Fleet<'_, S> {
 mod tests {
     use super::*;
     use crate::gpu::{
+        precision::Precision,
         solver::free,
-        stages::{GapPrecision, StageRoom},
+        stages::{StageRoom, Trust},
     };
 
     /// A device that finds the first coordinate of each configuration, in contact where it is odd. It is lost once,
@@ -347,7 +339,7 @@ mod tests {
 
     impl Odd {
         fn new(lanes: usize, section: usize, until_lost: usize) -> PacedDevice<Self> {
-            let room = StageRoom { lanes, section, batch: 1 };
+            let room = StageRoom { lanes, section };
             PacedDevice::new(Self { lanes: vec![Vec::new(); lanes], room, until_lost, opened: 1 })
         }
     }
@@ -359,8 +351,8 @@ mod tests {
             self.room
         }
 
-        fn precision(&self) -> GapPrecision {
-            GapPrecision { band: 0.0, exact: true }
+        fn trust(&self) -> Trust {
+            Trust { band: 0.0, precision: Precision::Double }
         }
 
         fn detect(&mut self, lane: usize, section: &[JointVector]) -> usize {
@@ -376,17 +368,17 @@ mod tests {
             Ok(Detected { gaps, touching })
         }
 
-        fn solve(&mut self, lane: usize, _: usize, _: usize) -> usize {
+        fn solve(&mut self, lane: usize, _: usize) -> usize {
             self.lanes[lane].len()
         }
 
         fn found(&mut self, _: usize, _: usize, _: &usize) -> Result<Found, GpuError> {
             match self.until_lost.checked_sub(1) {
                 None if self.opened == 1 => Err(GpuError::Lost("on purpose".into())),
-                None => Ok(Found::nothing()),
+                None => Ok(Found::default()),
                 Some(left) => {
                     self.until_lost = left;
-                    Ok(Found::nothing())
+                    Ok(Found::default())
                 }
             }
         }
@@ -480,7 +472,7 @@ mod tests {
         assert_eq!(size.now, 32, "no less than a quarter");
         size.adapt(10, DISPATCH_TARGET / 100);
         assert_eq!(size.now, 32, "cut short");
-        // Three batches one behind the other, each as long as it should be.
+        // As much as three dispatches should take.
         size.adapt(96, DISPATCH_TARGET * 3);
         assert_eq!(size.now, 32);
     }

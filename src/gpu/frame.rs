@@ -186,8 +186,11 @@ impl FrameUpdate {
                 stages.extend(common.dense_stages(gpu, [&inverse, &right], &overrides)?);
             }
             FrameMethod::Iterations(iterations) => {
-                let odd =
-                    StorageBuffer::uniform(gpu, "frame parameters", &FrameParameters { odd: 1, ..common.parameters })?;
+                let odd = StorageBuffer::uniform(
+                    gpu,
+                    "frame parameters",
+                    &[FrameParameters { odd: 1, ..common.parameters }],
+                )?;
                 let vectors = WORK_VECTORS * VECTOR * u64::from(common.parameters.nodes);
                 let work = StorageBuffer::new(gpu, "conjugate gradients", vectors)?;
                 let sums = StorageBuffer::new(gpu, "sums", 3 * 4 * u64::from(common.parameters.groups))?;
@@ -346,7 +349,7 @@ impl Common {
         let parameters = FrameParameters { nodes: nodes as u32, period: period as f32, odd: 0, groups };
         Ok(Self {
             parameters,
-            even: StorageBuffer::uniform(gpu, "frame parameters", &parameters)?,
+            even: StorageBuffer::uniform(gpu, "frame parameters", &[parameters])?,
             structure: StorageBuffer::from_slice(gpu, "stiffness structure", &structure)?,
             blocks: StorageBuffer::from_slice(gpu, "stiffness blocks", &blocks)?,
             inertia: (!effects.quasi_static)

@@ -82,7 +82,7 @@ impl Kernel {
         };
         // The lock is held meanwhile, so that of two threads that want one kernel the second gets the first's.
         let mut compiled = context.kernels.lock().unwrap_or_else(PoisonError::into_inner);
-        let key = format!("{name} {overrides:?}");
+        let key = format!("{name} {:?} {overrides:?}", shader.precision);
         if let Some(kernel) = compiled.get(&key) {
             return Ok(kernel.clone());
         }
@@ -214,13 +214,13 @@ impl StorageBuffer {
         Self::with_usage(context, what, bytes, wgpu::BufferUsages::STORAGE)
     }
 
-    /// A uniform buffer that holds `value`.
+    /// A uniform buffer that holds `values`.
     ///
     /// # Errors
     /// When memory is exhausted.
-    pub fn uniform<T: Pod>(context: &Context, what: &'static str, value: &T) -> Result<Self, GpuError> {
-        let buffer = Self::with_usage(context, what, size_of::<T>() as u64, wgpu::BufferUsages::UNIFORM)?;
-        buffer.write(context, std::slice::from_ref(value));
+    pub fn uniform<T: Pod>(context: &Context, what: &'static str, values: &[T]) -> Result<Self, GpuError> {
+        let buffer = Self::with_usage(context, what, size_of_val(values) as u64, wgpu::BufferUsages::UNIFORM)?;
+        buffer.write(context, values);
         Ok(buffer)
     }
 

@@ -1,15 +1,18 @@
-//! Leaf functions of the kernels, each on its own, against their CPU twins in f64 on the same (f32) inputs.
+//! Leaf functions of the kernels, each on its own, against their CPU twins in f64 on the same inputs.
 
 use super::{
     adapter::AdapterChoice,
     context::{Context, GpuError},
-    forces::ForceSearch,
     kernel::{Dispatch, Kernel, StorageBuffer},
-    layout::{Joint, Parameters, ProxyNode},
-    model::DeviceModel,
+    layout::{Parameters, SearchParameters},
+    model::{DeviceModel, joints_and_nodes},
     pipeline::BatchCapacity,
+    precision::Precision,
+    search_model::{SearchModel, reals, words},
     shaders::{self, Shader},
     solver::GpuSolver,
+    stages::Found,
+    unpack::unpack,
 };
 use crate::{
     contact::Backend,
@@ -27,7 +30,7 @@ use crate::{
     random::sequence,
     scene::{JointKind, Material, Scene, SpringKind, SpringSpec},
 };
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Zeroable;
 use glam::DVec3;
 use std::sync::{Arc, OnceLock};
 
@@ -39,70 +42,141 @@ fn context() -> Arc<Context> {
 }
 
 /// A triangle relative to a proxy node, and displacements of its corners.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
+#[derive(Clone, Copy)]
 struct Question {
-    corners: [[f32; 4]; 3],
-    moves: [[f32; 4]; 3],
+    corners: [DVec3; 3],
+    moves: [DVec3; 3],
 }
 
-/// Result of the kernel.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
+/// What the kernel says of it: the closest point, and the row of the contact.
 struct Answer {
-    weights: [f32; 3],
-    feature: u32,
-    normal: [f32; 3],
-    depth: f32,
-    variation: [[f32; 4]; 3],
+    weights: [f64; 3],
+    feature: usize,
+    normal: DVec3,
+    depth: f64,
+    /// Force on each corner by the second variation of the depth.
+    variation: [DVec3; 3],
 }
 
+/// Numbers of an answer.
+const ANSWER: usize = 17;
+
+/// A row for each invocation, in a workspace of its own.
 const LEAF: &str = "
-struct Question { corners: array<vec4<f32>, 3>, moves: array<vec4<f32>, 3> }
-struct Answer { weights: vec3<f32>, feature: u32, normal: vec3<f32>, depth: f32, variation: array<vec4<f32>, 3> }
-@group(0) @binding(0) var<uniform> parameters: Parameters;
-@group(0) @binding(1) var<storage, read> questions: array<Question>;
-@group(0) @binding(2) var<storage, read_write> answers: array<Answer>;
-// Functions of the surface that this kernel does not call.
-@group(0) @binding(3) var<storage, read> mesh: array<u32>;
-fn node_from(node: u32, x: vec3<f32>) -> vec3<f32> { return x; }
-@compute @workgroup_size(64)
+@group(0) @binding(9) var<storage, read> questions: array<real>;
+@group(0) @binding(10) var<storage, read_write> answers: array<real>;
+fn question(place: u32) -> vec3<real> {
+    return vec3<real>(questions[3u * place], questions[3u * place + 1u], questions[3u * place + 2u]);
+}
+fn answer(at: u32, v: vec3<real>) {
+    answers[at] = v.x;
+    answers[at + 1u] = v.y;
+    answers[at + 2u] = v.z;
+}
+@compute @workgroup_size(WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= parameters.configurations {
         return;
     }
-    let question = questions[id.x];
-    let a = question.corners[0].xyz;
-    let b = question.corners[1].xyz;
-    let c = question.corners[2].xyz;
-    let closest = closest_point(vec3<f32>(0.0), a, b, c);
-    let n = cross(b - a, c - a);
-    let contact = measure(0.0, a, b, c, closest, n / sqrt(max(dot(n, n), LEAST_DIVISOR)));
-    let v = mat3x3<f32>(question.moves[0].xyz, question.moves[1].xyz, question.moves[2].xyz);
-    let bend = second_variation(contact, v);
-    answers[id.x] = Answer(closest.weights, closest.feature, contact.normal, contact.depth,
-        array<vec4<f32>, 3>(vec4<f32>(bend[0], 0.0), vec4<f32>(bend[1], 0.0), vec4<f32>(bend[2], 0.0)));
+    take_place(id.x);
+    net[0] = question(6u * id.x);
+    net[10] = question(6u * id.x + 1u);
+    net[14] = question(6u * id.x + 2u);
+    let closest = closest_on_facet();
+    write_row(0u, 0u, 0u, vec3<real>(0.0), 0u, closest, normal_of(jet_at(closest.weights)));
+    let at = at_numbers(0u, 0u);
+    let weights = at + NODE_WEIGHTS;
+    let carriers = parameters.carriers;
+    var v = Variation();
+    for (var j = 0u; j < 3u; j += 1u) {
+        let moved = question(6u * id.x + 3u + j);
+        v.point += scalar(weights + j) * moved;
+        v.tangent_0 += scalar(weights + carriers + j) * moved;
+        v.tangent_1 += scalar(weights + 2u * carriers + j) * moved;
+    }
+    let bend = second_variation(at, v);
+    let first = 17u * id.x;
+    answer(first, closest.weights);
+    answers[first + 3u] = real(closest.feature);
+    answer(first + 4u, vector_at(at + NORMAL));
+    answers[first + 7u] = scalar(at + DEPTH);
+    for (var j = 0u; j < 3u; j += 1u) {
+        answer(first + 8u + 3u * j, scalar(weights + j) * bend.point + scalar(weights + carriers + j) * bend.tangent_0
+            + scalar(weights + 2u * carriers + j) * bend.tangent_1);
+    }
 }
 ";
 
-static LEAF_SHADER: Shader = Shader {
+static LEAF_SHADER: [Shader; 2] = shaders::in_both(Shader {
     name: "leaf",
     entry: "main",
-    parts: &[shaders::TYPES, shaders::CLOSEST_POINT, shaders::MESH, shaders::SURFACE, shaders::DEPTH, LEAF],
+    parts: &[
+        shaders::SEARCH_TYPES,
+        shaders::WORKSPACE,
+        shaders::SEARCH_STATE,
+        shaders::LISTING,
+        shaders::CLOSEST_POINT,
+        shaders::MESH,
+        shaders::FACET,
+        shaders::DEFORMED_FACET,
+        shaders::DEPTH_ROWS,
+        shaders::SEARCH_SUPPORT,
+        LEAF,
+    ],
     overrides: &[&[]],
-};
+    precision: Precision::Single,
+});
 
-fn ask(questions: &[Question]) -> Vec<Answer> {
+/// Of an adapter with f64 both.
+fn precisions() -> &'static [Precision] {
+    if context().adapter().double { &[Precision::Single, Precision::Double] } else { &[Precision::Single] }
+}
+
+fn ask(precision: Precision, questions: &[Question]) -> Vec<Answer> {
     let context = context();
-    let parameters = Parameters { configurations: questions.len() as u32, least_distance: 1e-9, ..Zeroable::zeroed() };
-    let parameters = StorageBuffer::uniform(&context, "parameters", &parameters).unwrap();
-    let input = StorageBuffer::from_slice(&context, "questions", questions).unwrap();
-    let output = StorageBuffer::new(&context, "answers", (size_of::<Answer>() * questions.len()) as u64).unwrap();
+    let count = questions.len();
+    let mut parameters = SearchParameters {
+        configurations: count as u32,
+        room: count as u32,
+        proxy_nodes: 1,
+        contacts: 1,
+        support: 1,
+        carriers: 4,
+        least_distance: 1e-9,
+        ..Zeroable::zeroed()
+    };
+    (parameters.words, parameters.reals) = (words(&parameters), reals(&parameters, false));
+    let numbers: Vec<f64> =
+        questions.iter().flat_map(|q| [q.corners, q.moves].concat()).flat_map(|v| v.to_array()).collect();
+    let of = |what, numbers: &[f64]| StorageBuffer::from_slice(&context, what, &precision.encode(numbers)).unwrap();
+    let room = |what, bytes: usize| StorageBuffer::new(&context, what, bytes as u64).unwrap();
+    let bytes = precision.size() * ANSWER * count;
+    let output = room("answers", bytes);
     output.poison(&context, output.size());
-    let kernel = Kernel::new(&context, &LEAF_SHADER, &[]).unwrap();
-    let buffers = [("parameters", &parameters), ("questions", &input), ("answers", &output)];
-    run(&context, &kernel, &buffers, (questions.len() as u32).div_ceil(64));
-    output.read(&context, questions.len()).unwrap()
+    let kernel = Kernel::new(&context, precision.of(&LEAF_SHADER), &[]).unwrap();
+    let uniform = StorageBuffer::uniform(&context, "parameters", &parameters.encode(precision)).unwrap();
+    let buffers = [
+        ("parameters", &uniform),
+        // Radius and share of the proxy node.
+        ("surface", &of("surface", &[0.0, 1.0])),
+        ("mesh", &StorageBuffer::from_slice(&context, "mesh", &[0, 1, 2, u32::MAX]).unwrap()),
+        ("list", &room("list", 4 * (count + 1))),
+        ("words", &room("words", 4 * (2 * count + 1 + count * parameters.words as usize))),
+        ("reals", &room("reals", precision.size() * count * parameters.reals as usize)),
+        ("questions", &of("questions", &numbers)),
+        ("answers", &output),
+    ];
+    run(&context, &kernel, &buffers, (count as u32).div_ceil(32));
+    let answers = precision.decode(&output.read::<u8>(&context, bytes).unwrap());
+    let vector = |at: &[f64]| DVec3::from_slice(at);
+    let answer = |at: &[f64]| Answer {
+        weights: [at[0], at[1], at[2]],
+        feature: at[3] as usize,
+        normal: vector(&at[4..]),
+        depth: at[7],
+        variation: [vector(&at[8..]), vector(&at[11..]), vector(&at[14..])],
+    };
+    answers.chunks_exact(ANSWER).map(answer).collect()
 }
 
 fn run(context: &Context, kernel: &Kernel, buffers: &[(&str, &StorageBuffer)], workgroups: u32) {
@@ -113,22 +187,28 @@ fn run(context: &Context, kernel: &Kernel, buffers: &[(&str, &StorageBuffer)], w
     context.wait(&submission).unwrap();
 }
 
-fn vector(v: &[f32]) -> DVec3 {
-    DVec3::new(v[0].into(), v[1].into(), v[2].into())
-}
-
-/// Triangles of centimetres around a proxy node at the origin.
+/// Triangles of centimetres around a proxy node at the origin, of numbers that f32 has.
 fn random_questions(count: usize) -> Vec<Question> {
     let mut next = sequence(7);
-    let mut point = |size: f64| [(next() * size) as f32, (next() * size) as f32, (next() * size) as f32, 0.0];
+    let mut point = |size: f64| DVec3::from_array([(); 3].map(|()| f64::from((next() * size) as f32)));
     (0..count)
         .map(|_| Question { corners: [(); 3].map(|()| point(0.02)), moves: [(); 3].map(|()| point(1.0)) })
         .collect()
 }
 
-/// Distances to plump triangles agree to 16 roundings of 6e-8 of their size: what closest_point adds up. The weights
-/// are quotients of areas, whose rounding grows with the square of the triangle's aspect.
-const DISTANCE_ROUNDING: f64 = 1e-6 * 0.02;
+/// Rounding of a distance to plump triangles: sixteen roundings of their size, which is what closest_point adds up [m].
+/// The weights are quotients of areas, whose rounding grows with the square of the triangle's aspect.
+fn distance_rounding(precision: Precision) -> f64 {
+    16.0 * 0.02 * unit_rounding(precision)
+}
+
+/// Rounding of a number, relative to it [1].
+fn unit_rounding(precision: Precision) -> f64 {
+    match precision {
+        Precision::Single => f64::from(f32::EPSILON) / 2.0,
+        Precision::Double => f64::EPSILON / 2.0,
+    }
+}
 
 #[test]
 fn closest_points_are_as_close_as_the_twins() {
@@ -138,143 +218,137 @@ fn closest_points_are_as_close_as_the_twins() {
         let corners = &mut questions[4 * k].corners;
         match k % 6 {
             0 => corners[1] = corners[0],
-            1 => corners[2] = corners[0].map(|x| x * (1.0 + 1e-6)),
+            1 => corners[2] = (corners[0] * (1.0 + 1e-6)).as_vec3().as_dvec3(),
             2 => (corners[1], corners[2]) = (corners[0], corners[0]),
-            3 => corners[0] = [0.0; 4],
-            4 => corners[1] = corners[0].map(|x| -x),
-            _ => corners[2] = std::array::from_fn(|a| -corners[0][a] - corners[1][a]),
+            3 => corners[0] = DVec3::ZERO,
+            4 => corners[1] = -corners[0],
+            _ => corners[2] = -corners[0] - corners[1],
         }
     }
-    let mut seen = [0; 3];
-    for (question, answer) in questions.iter().zip(ask(&questions)) {
-        let corners = question.corners.map(|c| vector(&c));
-        let reference = closest_point(DVec3::ZERO, corners);
-        let best = point_at(corners, reference.weights).length();
-        let weights = answer.weights.map(f64::from);
-        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-6 && weights.iter().all(|w| *w >= -1e-6), "{weights:?}");
-        let found = point_at(corners, weights).length();
-        let [a, b, c] = corners;
-        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        let aspect = longest * longest / area_vector(corners).length().max(1e-30);
-        let farthest = corners.iter().map(|corner| corner.length()).fold(0.0, f64::max);
-        assert!(
-            (found - best).abs() <= DISTANCE_ROUNDING * (1.0 + aspect * aspect),
-            "{corners:?}: {found:e}, {best:e}"
-        );
-        assert!(found <= farthest + DISTANCE_ROUNDING, "{corners:?}: {found:e}");
-        seen[if answer.feature < 3 { 0 } else { usize::from(answer.feature == 6) + 1 }] += 1;
+    for &precision in precisions() {
+        let mut seen = [0; 3];
+        for (question, answer) in questions.iter().zip(ask(precision, &questions)) {
+            let corners = question.corners;
+            let reference = closest_point(DVec3::ZERO, corners);
+            let best = point_at(corners, reference.weights).length();
+            let weights = answer.weights;
+            assert!(
+                (weights.iter().sum::<f64>() - 1.0).abs() < 1e-6 && weights.iter().all(|w| *w >= -1e-6),
+                "{weights:?}"
+            );
+            let found = point_at(corners, weights).length();
+            let [a, b, c] = corners;
+            let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+            let aspect = longest * longest / area_vector(corners).length().max(1e-30);
+            let farthest = corners.iter().map(|corner| corner.length()).fold(0.0, f64::max);
+            let rounding = distance_rounding(precision);
+            assert!((found - best).abs() <= rounding * (1.0 + aspect * aspect), "{corners:?}: {found:e}, {best:e}");
+            assert!(found <= farthest + rounding, "{corners:?}: {found:e}");
+            seen[if answer.feature < 3 { 0 } else { usize::from(answer.feature == 6) + 1 }] += 1;
+        }
+        assert!(seen.iter().all(|&count| count > 100), "corners, edges, faces: {seen:?}");
     }
-    assert!(seen.iter().all(|&count| count > 100), "corners, edges, faces: {seen:?}");
 }
 
 #[test]
 fn depth_and_its_derivatives_are_the_twins() {
     let questions = random_questions(2000);
-    let mut compared = 0;
-    for (question, answer) in questions.iter().zip(ask(&questions)) {
-        let corners = question.corners.map(|c| vector(&c));
-        let point = closest_point(DVec3::ZERO, corners);
-        let number = match point.feature {
-            Feature::Vertex(k) => k,
-            Feature::Edge(k) => 3 + k,
-            Feature::Face => 6,
-        };
-        let doubled = area_vector(corners);
-        let distance = point_at(corners, point.weights).length();
-        // Where a feature's border is near, rounding chooses the side; slivers and near hits have steep derivatives.
-        if number as u32 != answer.feature || doubled.length() < 1e-5 || distance < 1e-3 {
-            continue;
+    for &precision in precisions() {
+        let mut compared = 0;
+        for (question, answer) in questions.iter().zip(ask(precision, &questions)) {
+            let corners = question.corners;
+            let point = closest_point(DVec3::ZERO, corners);
+            let number = match point.feature {
+                Feature::Vertex(k) => k,
+                Feature::Edge(k) => 3 + k,
+                Feature::Face => 6,
+            };
+            let doubled = area_vector(corners);
+            let distance = point_at(corners, point.weights).length();
+            // Where a feature's border is near, rounding chooses the side; slivers and near hits have steep derivatives.
+            if number != answer.feature || doubled.length() < 1e-5 || distance < 1e-3 {
+                continue;
+            }
+            compared += 1;
+            let measured @ (normal, depth, _) =
+                measure(DVec3::ZERO, 0.0, &Facet::flat(corners), &point, unit_or_zero(doubled));
+            assert!((depth - answer.depth).abs() < 4.0 * distance_rounding(precision));
+            // Directions: rounding over the shortest length that is divided by, 16 of 0.02 m over 1 mm, with its square.
+            let steep = 1600.0 * unit_rounding(precision);
+            assert!(normal.distance(answer.normal) < steep, "{normal} {}", answer.normal);
+            let carriers = Carriers::new((&[0, 1, 2], None), &point);
+            let contact = Contact { multiplier: 1.0, ..Contact::new(0, carriers, measured) };
+            let reaction = contact.second_variation(&contact.variation(|j| question.moves[j]));
+            let reference = [0, 1, 2].map(|j| contact.at_node(&reaction, j));
+            let size = reference.iter().map(|v| v.length()).fold(0.0, f64::max);
+            for (expected, found) in reference.iter().zip(answer.variation) {
+                // Weights of a sliver are known to rounding over its height: 2e-8 m in f32 over 1e-5 m^2 / 0.05 m, with
+                // some margin.
+                let error = expected.distance(found);
+                assert!(error <= 20.0 * steep * size, "{number}: {expected} {found}");
+            }
         }
-        compared += 1;
-        let face = unit_or_zero(doubled);
-        let measured @ (normal, depth, _) = measure(DVec3::ZERO, 0.0, &Facet::flat(corners), &point, face);
-        assert!((depth - f64::from(answer.depth)).abs() < 4.0 * DISTANCE_ROUNDING);
-        // Directions: rounding over the shortest length that is divided by.
-        assert!(normal.distance(vector(&answer.normal)) < 1e-4, "{normal} {:?}", answer.normal);
-        let carriers = Carriers::new((&[0, 1, 2], None), &point);
-        let contact = Contact { multiplier: 1.0, ..Contact::new(0, carriers, measured) };
-        let moves = question.moves.map(|v| vector(&v));
-        let reaction = contact.second_variation(&contact.variation(|j| moves[j]));
-        let reference = [0, 1, 2].map(|j| contact.at_node(&reaction, j));
-        let size = reference.iter().map(|v| v.length()).fold(0.0, f64::max);
-        for (expected, found) in reference.iter().zip(&answer.variation) {
-            let error = expected.distance(vector(found));
-            // Weights of a sliver are known to rounding over its height: 2e-8 m over 1e-5 m^2 / 0.05 m, with some
-            // margin.
-            assert!(error <= 2e-3 * size, "{number}: {expected} {found:?}");
-        }
+        assert!(compared > 1200, "{compared}");
     }
-    assert!(compared > 1200, "{compared}");
 }
 
 #[test]
-fn proxy_nodes_are_placed_to_f32() {
-    let chain_of = |name: &str| {
-        let scene = Scene::load(format!("{}/datasets/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
-        (Chain::new(&scene.proxy), scene.grid.axes)
-    };
+fn proxy_nodes_are_placed_to_rounding() {
     for name in ["sphere.toml", "mesh.toml"] {
-        let (chain, axes) = chain_of(name);
+        let scene = Scene::load(format!("{}/datasets/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+        let object = Object::build(&scene.object).unwrap();
+        let chain = Chain::new(&scene.proxy);
+        let model = Model::new(&object, &chain, scene.contact);
         let mut next = sequence(3);
-        let poses: Vec<Vec<f64>> = (0..300)
-            .map(|_| {
-                let within =
-                    |axis: &crate::scene::AxisSpec| axis.start + axis.step * axis.count as f64 * (0.5 + 0.5 * next());
-                axes.iter().map(within).collect()
-            })
-            .collect();
-        let motions: Vec<[f32; 2]> = poses
-            .iter()
-            .flat_map(|q| q.iter().zip(&chain.joints))
-            .map(|(q, joint)| match joint.kind {
-                JointKind::Revolute => [q.cos() as f32, q.sin() as f32],
-                JointKind::Prismatic => [*q as f32, 0.0],
-            })
-            .collect();
-        let joints: Vec<Joint> = chain
-            .joints
-            .iter()
-            .map(|joint| Joint {
-                origin: joint.origin.as_vec3().to_array(),
-                kind: u32::from(joint.kind == JointKind::Prismatic),
-                axis: joint.axis.as_vec3().to_array(),
-                padding: 0,
-            })
-            .collect();
-        let nodes: Vec<ProxyNode> = chain
-            .nodes
-            .iter()
-            .map(|node| ProxyNode { position: node.position.as_vec3().to_array(), link: node.link as u32 })
-            .collect();
-        let context = context();
-        let parameters = Parameters {
-            configurations: poses.len() as u32,
-            joints: joints.len() as u32,
-            proxy_nodes: nodes.len() as u32,
-            ..Zeroable::zeroed()
-        };
-        let count = poses.len() * nodes.len();
-        let output = StorageBuffer::new(&context, "positions", 16 * count as u64).unwrap();
-        output.poison(&context, output.size());
-        let kernel = Kernel::new(&context, &shaders::KINEMATICS, &[]).unwrap();
-        let buffers = [
-            ("parameters", &StorageBuffer::uniform(&context, "parameters", &parameters).unwrap()),
-            ("joints", &StorageBuffer::from_slice(&context, "joints", &joints).unwrap()),
-            ("proxy_nodes", &StorageBuffer::from_slice(&context, "nodes", &nodes).unwrap()),
-            ("motions", &StorageBuffer::from_slice(&context, "motions", &motions).unwrap()),
-            ("positions", &output),
-        ];
-        run(&context, &kernel, &buffers, (count as u32).div_ceil(64));
-        let positions: Vec<[f32; 4]> = output.read(&context, count).unwrap();
-        let mut pose = chain.new_pose();
-        for (q, positions) in poses.iter().zip(positions.chunks(chain.nodes.len())) {
-            chain.pose(q, &mut pose);
-            for (expected, found) in pose.nodes.iter().zip(positions) {
-                // Levers of 0.3 m, some twenty roundings of 6e-8 of them in a root-sum-of-squares.
-                assert!(expected.distance(vector(found)) < 2e-7, "{name}: {expected} {found:?}");
+        let mut within =
+            |axis: &crate::scene::AxisSpec| axis.start + axis.step * axis.count as f64 * (0.5 + 0.5 * next());
+        let poses: Vec<Vec<f64>> = (0..300).map(|_| scene.grid.axes.iter().map(&mut within).collect()).collect();
+        for &precision in precisions() {
+            let mut pose = chain.new_pose();
+            let placed = place(precision, &model, &poses);
+            for (q, placed) in poses.iter().zip(placed.chunks_exact(3 * chain.nodes.len())) {
+                chain.pose(q, &mut pose);
+                for (expected, found) in pose.nodes.iter().zip(placed.as_chunks::<3>().0) {
+                    let found = DVec3::from_array(*found) + model.surface.centre;
+                    // Levers of 0.3 m, some twenty roundings of them in a root-sum-of-squares.
+                    let rounding = 10.0 * 0.3 * unit_rounding(precision);
+                    assert!(expected.distance(found) < rounding, "{name}: {expected} {found}");
+                }
             }
         }
     }
+}
+
+/// Proxy nodes relative to the object's centre, three coordinates each [m].
+fn place(precision: Precision, model: &Model<'_>, poses: &[Vec<f64>]) -> Vec<f64> {
+    let chain = model.chain;
+    let motion = |(q, joint): (&f64, &crate::proxy::Joint)| match joint.kind {
+        JointKind::Revolute => [q.cos(), q.sin()],
+        JointKind::Prismatic => [*q, 0.0],
+    };
+    let motions: Vec<f64> = poses.iter().flat_map(|q| q.iter().zip(&chain.joints).flat_map(motion)).collect();
+    let context = context();
+    let parameters = Parameters {
+        configurations: poses.len() as u32,
+        joints: chain.joints.len() as u32,
+        proxy_nodes: chain.nodes.len() as u32,
+        ..Zeroable::zeroed()
+    };
+    let of = |what, numbers: &[f64]| StorageBuffer::from_slice(&context, what, &precision.encode(numbers)).unwrap();
+    let count = poses.len() * chain.nodes.len();
+    let bytes = 3 * precision.size() * count;
+    let output = StorageBuffer::new(&context, "placed", bytes as u64).unwrap();
+    output.poison(&context, output.size());
+    let kernel = Kernel::new(&context, precision.of(&shaders::KINEMATICS), &[]).unwrap();
+    let buffers = [
+        ("parameters", &StorageBuffer::uniform(&context, "parameters", &[parameters]).unwrap()),
+        ("chain", &of("chain", &joints_and_nodes(model))),
+        ("motions", &of("motions", &motions)),
+        ("placed", &output),
+        ("positions", &StorageBuffer::new(&context, "positions", 16 * count as u64).unwrap()),
+    ];
+    run(&context, &kernel, &buffers, (count as u32).div_ceil(64));
+    precision.decode(&output.read::<u8>(&context, bytes).unwrap())
 }
 
 #[test]
@@ -286,7 +360,7 @@ fn a_lost_device_is_opened_anew() {
     // A device of its own: the other tests want theirs.
     let own = Arc::new(Context::open(AdapterChoice::Any).unwrap());
     let mut solver =
-        GpuSolver::with_room(Arc::clone(&own), &model, BatchCapacity { batch: 64, ..BatchCapacity::default() })
+        GpuSolver::with_room(Arc::clone(&own), &model, BatchCapacity { chunk: 64, ..BatchCapacity::default() })
             .unwrap();
     let middle = |axis: &crate::scene::AxisSpec| axis.start + axis.step * (axis.count / 2) as f64;
     let q = crate::JointVector::from_slice(&scene.grid.axes.iter().map(middle).collect::<Vec<_>>());
@@ -305,18 +379,21 @@ fn one_number_for_a_pair_of_nodes_holds_the_compliance_of_isotropic_objects() {
         let object = Object::build(&scene.object).unwrap();
         let chain = Chain::new(&scene.proxy);
         let model = Model::new(&object, &chain, scene.contact);
-        let device = DeviceModel::new(&context(), &model).unwrap();
-        let search = ForceSearch::new(&context(), &model, &device, BatchCapacity::default()).unwrap();
-        assert_eq!(search.compliance.size(), 4 * numbers * (object.surface_nodes as u64).pow(2), "{kind:?}");
+        for &precision in precisions() {
+            let device = DeviceModel::new(&context(), &model, precision).unwrap();
+            let search = SearchModel::new(&context(), &model, &device, 1).unwrap();
+            let entries = numbers * (object.surface_nodes as u64).pow(2);
+            assert_eq!(search.compliance.size(), precision.size() as u64 * entries, "{kind:?}");
+        }
     }
 }
 
 #[test]
 fn a_refused_shader_is_an_error_and_the_device_lives_on() {
-    let broken = Shader { name: "broken", entry: "nowhere", parts: &[shaders::TYPES], overrides: &[&[]] };
+    let broken = Shader { name: "broken", entry: "nowhere", parts: &[shaders::TYPES], ..shaders::DETECTION };
     let refused = Kernel::new(&context(), &broken, &[]);
     assert!(matches!(refused, Err(GpuError::Refused(_))));
-    let kernel = Kernel::new(&context(), &shaders::COMPACTION, &[]).unwrap();
+    let kernel = Kernel::new(&context(), &shaders::COMPACTION[0], &[]).unwrap();
     let some = StorageBuffer::new(&context(), "some", 4096).unwrap();
     let Err(GpuError::Refused(missing)) = kernel.bind(&context(), &[("parameters", &some), ("gaps", &some)]) else {
         panic!("a binding is missing");
@@ -333,16 +410,21 @@ fn what_no_kernel_wrote_is_found_out() {
     let object = Object::build(&scene.object).unwrap();
     let chain = Chain::new(&scene.proxy);
     let model = Model::new(&object, &chain, scene.contact);
-    let outcome: super::layout::SolverResult = Zeroable::zeroed();
-    let touch: super::layout::Touch = Zeroable::zeroed();
     let q = crate::JointVector::zeros(3);
     let mut solver = Solver::new(&model);
-    let mut unpack = |outcome, touch| super::unpack::unpack(&model, &mut solver, &q, &outcome, &[touch]);
-    assert!(unpack(outcome, touch).is_none());
-    let written = super::layout::SolverResult { status: Status::Contact as u32, touches: 1, ..Zeroable::zeroed() };
-    assert!(unpack(written, touch).is_some());
-    let beyond = super::layout::SolverResult { touches: 2, ..written };
-    assert!(unpack(beyond, touch).is_none(), "more touches than there is room for");
+    let mut unpack = |record, touches: usize| {
+        let found = Found {
+            records: vec![record],
+            amounts: vec![0.0; 2 + q.len()],
+            touches: vec![[0; 4]; touches],
+            presses: vec![0.5; 6 * touches],
+        };
+        unpack(&model, &mut solver, (&q, -0.01), &found, (0, 0), Precision::Double)
+    };
+    assert!(unpack([0; 4], 1).is_none());
+    let written = [Status::Contact as u32, 1, 1, 0];
+    assert!(unpack(written, 1).is_some());
+    assert!(unpack(written, 0).is_none(), "more touches than there are");
 }
 
 #[test]

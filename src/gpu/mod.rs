@@ -8,8 +8,8 @@
 //! | `shaders` | shaders embedded, assembled from parts, with their override sets |
 //! | `model` | object, proxy and contact law as buffers |
 //! | `detection` | the stages that place the proxy and test it for contact at rest |
-//! | `forces` | the search for forces in f32, for devices without f64 and other algorithms |
-//! | `search` | the search for equilibria in f64: kernels, buffers, rounds |
+//! | `precision` | f64, or f32 where a device has no f64 |
+//! | `search` | the search for equilibria: kernels, buffers, rounds |
 //! | `search_model` | object, proxy and contact law for the search |
 //! | `pipeline` | the stages of a batch and their buffers |
 //! | `stages` | what a batch goes through, whoever does it; a device that returns stored results |
@@ -21,9 +21,9 @@
 //! | `timing` | how long each kernel takes, where that is asked for |
 //!
 //! A shader in `shaders/` and its CPU twin share names and order of statements. Where the device has f64, contact or not
-//! is decided in it, and the energy form is solved in it from the rest state to the result, in the steps of the CPU.
-//! Elsewhere, and by the other algorithms, the device searches forces in f32, with coordinates relative to the object's
-//! centre, and the host settles them in f64.
+//! is decided in it, and equilibria are found in it from the rest state to the result, in the steps of the CPU.
+//! Elsewhere the same shaders compute in f32, with coordinates relative to the object's centre, and the host settles
+//! what they find in f64.
 
 mod adapter;
 mod context;
@@ -31,7 +31,6 @@ mod detection;
 #[cfg(test)]
 mod facet_tests;
 mod flights;
-mod forces;
 mod frame;
 mod kernel;
 pub mod layout;
@@ -39,6 +38,7 @@ pub mod layout;
 mod leaf_tests;
 mod model;
 mod pipeline;
+pub mod precision;
 mod search;
 mod search_model;
 pub mod shaders;

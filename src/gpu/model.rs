@@ -6,45 +6,49 @@
 use super::{
     context::{Context, GpuError},
     kernel::StorageBuffer,
-    layout::{Joint, Parameters, ProxyNode},
+    layout::Parameters,
+    precision::Precision,
     shaders::{CLUSTER, GROUP},
 };
 use crate::{
-    contact, proxy,
+    contact::{self, geometry::bounding_volumes::CULLING_SLACK},
+    proxy,
     scene::{Algorithm, JointKind},
     tolerances,
 };
 use glam::DVec3;
 
-/// Invocations of a workgroup of the equilibrium stages, one of which keeps one contact: the least that GPUs run in
-/// step.
-pub(super) const LANES: u32 = 32;
-
-/// The device's copy of a contact model.
+/// The device's copy of arm and surface at rest.
 pub struct DeviceModel {
+    pub(super) precision: Precision,
     /// Without the configurations, which each dispatch sets.
     pub(super) parameters: Parameters,
-    pub(super) joints: StorageBuffer,
-    pub(super) proxy_nodes: StorageBuffer,
+    pub(super) chain: StorageBuffer,
+    /// What f32 knows of the flat triangles: see `shaders/detection.wgsl`.
     pub(super) rest: StorageBuffer,
     pub(super) mesh: StorageBuffer,
     pub(super) clusters: StorageBuffer,
+    /// The contact surface: see `shaders/gap.wgsl`.
+    pub(super) surface: StorageBuffer,
+    /// Whether its facets are bent.
+    pub(super) is_smooth: bool,
     /// Gaps in f32, to the flat triangles, are those to the contact surface but for this [m].
     pub(super) gap_band: f64,
+    /// Gaps to the contact surface no farther than this from zero are left open [m].
+    pub(super) open_band: f64,
 }
 
-/// Contact stiffness of the energy form in f32 [N/m]. The kernels give it to every proxy node; each node's own, which
-/// differs where a link has a stiffness per length, enters when the result is settled in f64.
+/// Contact stiffness of the energy form in f32 [N/m]; what is stiffer is stiffened when the result is settled in f64.
 pub(super) fn stiffness(model: &contact::Model<'_>) -> f64 {
     model.kc.min(tolerances::GPU_STIFFNESS / model.max_nodal_compliance)
 }
 
 impl DeviceModel {
-    /// Uploads a model.
+    /// Uploads a model, for stages that compute in `precision`.
     ///
     /// # Errors
     /// When a buffer exceeds the device's limits or memory.
-    pub fn new(context: &Context, model: &contact::Model<'_>) -> Result<Self, GpuError> {
+    pub fn new(context: &Context, model: &contact::Model<'_>, precision: Precision) -> Result<Self, GpuError> {
         let contact::Model { object, chain, compliance, contact, .. } = model;
         if contact.updates > 0 {
             return Err(GpuError::Unsupported("updates"));
@@ -52,55 +56,54 @@ impl DeviceModel {
         if !compliance.is_whole() && contact.algorithm == Algorithm::Paper {
             return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });
         }
-        let extent = model.surface.positions.iter().map(|n| n.length()).fold(0.0, f64::max);
-        // The kernels know the flat triangles; a smooth surface stands off these.
-        let gap_band = model.surface.bulge
-            + tolerances::GPU_GAP_BAND_PER_EXTENT * extent
+        let extent = extent(model);
+        let rounding = tolerances::GPU_GAP_BAND_PER_EXTENT * extent
             + tolerances::GPU_GAP_BAND_PER_JOINT * chain.joints.len() as f64 * reach(chain, model.surface.centre);
-        let corners = |t: &[u32; 3]| t.map(|j| model.surface.positions[j as usize]);
-        let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
-        let longest_edge = object.triangles.iter().map(|t| edge(corners(t))).fold(0.0, f64::max);
-        let clusters: Vec<u32> = model.surface.bounds.order().collect();
+        // A smooth surface stands off the flat triangles.
+        let gap_band = model.surface.bulge + rounding;
+        let order: Vec<u32> = model.surface.bounds.order().collect();
+        let clusters = order.len().div_ceil(CLUSTER) as u32;
+        let numbers = |what, numbers: &[f64]| StorageBuffer::from_slice(context, what, &precision.encode(numbers));
         Ok(Self {
+            precision,
             parameters: Parameters {
+                configurations: 0,
                 joints: chain.joints.len() as u32,
                 proxy_nodes: chain.nodes.len() as u32,
                 surface_nodes: object.surface_nodes as u32,
-                covered: compliance.nodes.len() as u32,
                 triangles: object.triangles.len() as u32,
-                max_iterations: contact.max_iterations.min(tolerances::GPU_MAX_ITERATIONS),
-                stiffness: contact.stiffness as f32,
-                kc: stiffness(model) as f32,
-                tolerance: contact.tolerance.max(tolerances::GPU_LEAST_TOLERANCE) as f32,
-                softest: model.max_nodal_compliance as f32,
-                least_distance: (tolerances::GPU_LEAST_DISTANCE_PER_EXTENT * extent) as f32,
-                depth_rounding: (tolerances::GPU_DEPTH_ROUNDING_PER_EDGE * longest_edge) as f32,
-                clusters: clusters.len().div_ceil(CLUSTER) as u32,
-                mobility: model.mobility as f32,
-                ..bytemuck::Zeroable::zeroed()
+                clusters,
+                groups: clusters.div_ceil(GROUP as u32),
+                gap_band: (gap_band as f32).next_up(),
             },
-            joints: StorageBuffer::from_slice(context, "joints", &joints(chain, model.surface.centre))?,
-            proxy_nodes: StorageBuffer::from_slice(context, "proxy nodes", &proxy_nodes(chain))?,
-            rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, &clusters, extent))?,
-            mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(model, &clusters))?,
-            clusters: StorageBuffer::from_slice(context, "clusters", &clusters)?,
+            chain: numbers("chain", &joints_and_nodes(model))?,
+            rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, &order, extent))?,
+            mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(model))?,
+            clusters: StorageBuffer::from_slice(context, "clusters", &order)?,
+            surface: numbers("contact surface", &surface(model, precision))?,
+            is_smooth: model.surface.smooth.is_some(),
             gap_band,
+            open_band: if precision == Precision::Double { 0.0 } else { rounding },
         })
     }
 
-    /// Entries of the workspace of one configuration, four f32 each (see `shaders/deformed.wgsl`).
-    pub(super) fn workspace(&self) -> u64 {
-        u64::from(self.parameters.covered) + 2 * u64::from(self.parameters.clusters)
+    /// Size of what the proxy is tested against for contact at rest: of the flat triangles, and of the contact surface
+    /// [B].
+    pub(super) fn surface_bytes(&self) -> [u64; 2] {
+        [self.rest.size() + self.mesh.size() + self.clusters.size(), self.surface.size()]
     }
+}
 
-    /// Size of what places the proxy [B].
-    pub(super) fn arm_bytes(&self) -> u64 {
-        self.joints.size() + self.proxy_nodes.size()
-    }
+/// Greatest distance of a surface node to the object's centre [m].
+pub(super) fn extent(model: &contact::Model<'_>) -> f64 {
+    model.surface.positions.iter().map(|n| n.length()).fold(0.0, f64::max)
+}
 
-    /// Size of what the proxy is tested against for contact at rest [B].
-    pub(super) fn surface_bytes(&self) -> u64 {
-        self.rest.size() + self.mesh.size() + self.clusters.size()
+/// What bounding spheres are widened by, for stages that compute in `precision` [m].
+pub(super) fn culling_slack(model: &contact::Model<'_>, precision: Precision) -> f64 {
+    match precision {
+        Precision::Single => tolerances::GPU_BOUND_SLACK * extent(model),
+        Precision::Double => CULLING_SLACK * model.surface.extent,
     }
 }
 
@@ -126,26 +129,6 @@ fn reach(chain: &proxy::Chain, centre: DVec3) -> f64 {
     chain.nodes.iter().map(tip).fold(0.0, f64::max)
 }
 
-/// The first joint's origin carries the shift to the centre; all others are relative to their parents anyway.
-fn joints(chain: &proxy::Chain, centre: DVec3) -> Vec<Joint> {
-    let convert = |(k, joint): (usize, &proxy::Joint)| Joint {
-        origin: (if k == 0 { joint.origin - centre } else { joint.origin }).as_vec3().to_array(),
-        kind: match joint.kind {
-            JointKind::Revolute => 0,
-            JointKind::Prismatic => 1,
-        },
-        axis: joint.axis.as_vec3().to_array(),
-        padding: 0,
-    };
-    chain.joints.iter().enumerate().map(convert).collect()
-}
-
-fn proxy_nodes(chain: &proxy::Chain) -> Vec<ProxyNode> {
-    let convert =
-        |node: &proxy::Node| ProxyNode { position: node.position.as_vec3().to_array(), link: node.link as u32 };
-    chain.nodes.iter().map(convert).collect()
-}
-
 /// Surface nodes, bounding spheres of the triangles, radii of the proxy nodes, bounding spheres of the clusters of
 /// triangles and of the groups of clusters, one behind the other.
 fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 4]> {
@@ -168,30 +151,64 @@ fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 
     nodes.chain(spheres).chain(radii).chain(together).collect()
 }
 
-/// Corners, neighbours, lists around nodes and places, then the clusters' triangles and nodes, one behind the other:
-/// see `shaders/surface.wgsl` and `shaders/deformed.wgsl`.
-fn mesh(model: &contact::Model<'_>, clusters: &[u32]) -> Vec<u32> {
-    let object = model.object;
-    let topology = &object.topology;
-    let mut mesh = Vec::new();
-    mesh.extend(object.triangles.iter().flatten());
+/// Corners, neighbours, and lists around nodes: see `shaders/mesh.wgsl`.
+pub(super) fn mesh(model: &contact::Model<'_>) -> Vec<u32> {
+    let (object, topology) = (model.object, &model.object.topology);
+    let mut mesh: Vec<u32> = object.triangles.iter().flatten().copied().collect();
     mesh.extend(topology.across.iter().flatten());
     mesh.extend(&topology.around_offsets);
     mesh.extend(&topology.around);
-    if !model.compliance.is_whole() {
-        let place = |node| model.compliance.place(node).map_or(u32::MAX, |place| place as u32);
-        mesh.extend((0..object.surface_nodes as u32).map(place));
-    }
-    mesh.extend(clusters);
-    let (mut starts, mut nodes) = (vec![0], Vec::new());
-    for cluster in clusters.chunks(CLUSTER) {
-        let mut own: Vec<u32> = cluster.iter().flat_map(|&t| object.triangles[t as usize]).collect();
-        own.sort_unstable();
-        own.dedup();
-        nodes.extend(own);
-        starts.push(nodes.len() as u32);
-    }
-    mesh.extend(starts);
-    mesh.extend(nodes);
     mesh
+}
+
+/// Origin, axis and kind of each joint, the first origin relative to the object's centre; position and link of each
+/// proxy node.
+pub(super) fn joints_and_nodes(model: &contact::Model<'_>) -> Vec<f64> {
+    let mut numbers = Vec::new();
+    for (k, joint) in model.chain.joints.iter().enumerate() {
+        let origin = if k == 0 { joint.origin - model.surface.centre } else { joint.origin };
+        numbers.extend(origin.to_array());
+        numbers.extend(joint.axis.to_array());
+        numbers.push(f64::from(u8::from(joint.kind == JointKind::Prismatic)));
+    }
+    for node in &model.chain.nodes {
+        numbers.extend(node.position.to_array());
+        numbers.push(node.link as f64);
+    }
+    numbers
+}
+
+/// The control points of facet `t` at rest, of a flat one its corners [m].
+pub(super) fn controls(model: &contact::Model<'_>, t: u32) -> Vec<DVec3> {
+    let facet = model.surface.facet_at_rest(t);
+    facet.net.map_or_else(|| facet.corners.to_vec(), |net| net.to_vec())
+}
+
+/// Spheres around the facets, `together` of them in their order, widened by `slack` [m]: centre and radius.
+fn spheres(model: &contact::Model<'_>, together: usize, slack: f64) -> Vec<[f64; 4]> {
+    let sphere = |facets: &[u32]| {
+        // No point of a facet lies outside its control points.
+        let points: Vec<DVec3> = facets.iter().flat_map(|&t| controls(model, t)).collect();
+        let centre = points.iter().sum::<DVec3>() / points.len() as f64;
+        let radius = points.iter().map(|point| point.distance(centre)).fold(0.0, f64::max);
+        [centre.x, centre.y, centre.z, radius + slack]
+    };
+    let order: Vec<u32> = model.surface.bounds.order().collect();
+    order.chunks(together).map(sphere).collect()
+}
+
+/// The spheres of the clusters of facets, of the groups of clusters, and of the facets in the order of the clusters:
+/// see `shaders/bounding_spheres.wgsl`.
+pub(super) fn bounding_spheres(model: &contact::Model<'_>, precision: Precision) -> Vec<f64> {
+    let slack = culling_slack(model, precision);
+    [CLUSTER, GROUP * CLUSTER, 1].into_iter().flat_map(|together| spheres(model, together, slack)).flatten().collect()
+}
+
+/// Bounding spheres, radii of proxy nodes and control points: see `shaders/gap.wgsl`.
+fn surface(model: &contact::Model<'_>, precision: Precision) -> Vec<f64> {
+    let mut numbers = bounding_spheres(model, precision);
+    numbers.extend(model.chain.nodes.iter().map(|node| node.radius));
+    let facets = 0..model.object.triangles.len() as u32;
+    numbers.extend(facets.flat_map(|t| controls(model, t)).flat_map(|point| point.to_array()));
+    numbers
 }

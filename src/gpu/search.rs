@@ -1,19 +1,20 @@
-//! The search for equilibria in f64 on the device: its kernels, its buffers, and the rounds that it takes.
+//! The search for equilibria on the device: its kernels, its buffers, and the rounds that it takes.
 //!
 //! Each configuration in contact has a workspace. In a round its trial displaces the surface, contacts are found, and
-//! the trial is judged and the next one made; what is done leaves the list of the unfinished. A submission makes some
-//! rounds; the host asks for more while some are unfinished.
+//! the trial is judged and the next one made, or a pass of the paper's iteration; what is done leaves the list of the
+//! unfinished. A submission makes some rounds; the host asks for more while some are unfinished.
 
 use super::{
     context::{Context, GpuError},
-    detection::{Detection, DoubleModel},
-    forces::TOUCHES_MARGIN,
+    detection::Detection,
     kernel::{Dispatch, Kernel, Staging, StorageBuffer},
-    layout::{SearchParameters, SearchTouch},
+    layout::SearchParameters,
+    model::DeviceModel,
     search_model::SearchModel,
     shaders::{self, Shader},
-    stages::{Found, Solved},
+    stages::Found,
 };
+use crate::scene::Algorithm;
 
 /// Invocations of a workgroup that searches: as many as GPUs run in step, and as a software rasteriser does.
 const HARDWARE_LANES: u32 = 32;
@@ -34,14 +35,19 @@ const HEAD_BYTES: u64 = 16;
 const FIRST_TOUCHES: f64 = 8.0;
 const STAGED_TOUCHES: usize = 16;
 
+/// What the mean number of touches of one section is raised by to hold those of the next: neighbouring sections differ
+/// little.
+const TOUCHES_MARGIN: f64 = 1.25;
+
+/// Bytes of a record, and of the words of a touch [B].
+const WORDS_BYTES: usize = size_of::<[u32; 4]>();
+
 /// The kernels of the search.
 pub(super) struct Search {
     pub model: SearchModel,
     arm: Kernel,
-    detect: Kernel,
-    judge: Kernel,
-    step: Kernel,
-    unfinished: Kernel,
+    /// The kernels of a round, in order; the last one lists the unfinished.
+    round: Vec<Kernel>,
     count: Kernel,
     gather: Kernel,
 }
@@ -55,12 +61,10 @@ pub(super) struct SearchLane {
     records: StorageBuffer,
     amounts: StorageBuffer,
     touches: StorageBuffer,
+    presses: StorageBuffer,
     staging: Staging,
     arm: wgpu::BindGroup,
-    detect: wgpu::BindGroup,
-    judge: wgpu::BindGroup,
-    step: wgpu::BindGroup,
-    unfinished: wgpu::BindGroup,
+    round: Vec<wgpu::BindGroup>,
     count: wgpu::BindGroup,
     gather: wgpu::BindGroup,
     /// Touches that one configuration is expected to have.
@@ -74,17 +78,29 @@ impl Search {
     pub fn new(context: &Context, model: SearchModel) -> Result<Self, GpuError> {
         let lanes = if context.adapter().hardware { HARDWARE_LANES } else { SOFTWARE_LANES };
         let lanes = ("WORKGROUP", f64::from(lanes));
-        let isotropic = ("ISOTROPIC", f64::from(u8::from(model.is_isotropic)));
-        let smooth = ("SMOOTH", f64::from(u8::from(model.is_smooth)));
-        let kernel = |shader: &Shader, overrides: &[(&str, f64)]| {
-            Kernel::new(context, shader, &[&[isotropic], overrides].concat())
+        let flag = |name, is_set| (name, f64::from(u8::from(is_set)));
+        let smooth = flag("SMOOTH", model.is_smooth);
+        let law = [
+            flag("ISOTROPIC", model.is_isotropic),
+            flag("FROZEN", model.algorithm == Algorithm::Linearised),
+            flag("PAPER", model.algorithm == Algorithm::Paper),
+        ];
+        let kernel = |shaders: &[Shader; 2], overrides: &[(&str, f64)]| {
+            Kernel::new(context, model.precision.of(shaders), &[&law, overrides].concat())
+        };
+        let detect = kernel(&shaders::SEARCH_DETECT, &[smooth, lanes])?;
+        let unfinished = kernel(&shaders::SEARCH_UNFINISHED, &[])?;
+        let round = match model.algorithm {
+            // Ties are found among all nodes: more invocations share these.
+            Algorithm::Paper => vec![detect, kernel(&shaders::SEARCH_PAPER, &[smooth])?, unfinished],
+            Algorithm::Energy | Algorithm::Linearised => {
+                let judge = kernel(&shaders::SEARCH_JUDGE, &[lanes])?;
+                vec![detect, judge, kernel(&shaders::SEARCH_STEP, &[lanes])?, unfinished]
+            }
         };
         Ok(Self {
             arm: kernel(&shaders::SEARCH_ARM, &[])?,
-            detect: kernel(&shaders::SEARCH_DETECT, &[smooth, lanes])?,
-            judge: kernel(&shaders::SEARCH_JUDGE, &[lanes])?,
-            step: kernel(&shaders::SEARCH_STEP, &[lanes])?,
-            unfinished: kernel(&shaders::SEARCH_UNFINISHED, &[])?,
+            round,
             count: kernel(&shaders::SEARCH_COUNT, &[])?,
             gather: kernel(&shaders::SEARCH_GATHER, &[])?,
             model,
@@ -102,6 +118,19 @@ impl Search {
         let SearchParameters { joints, with_tangent, .. } = self.model.parameters;
         (2 + joints + with_tangent * joints * joints) as usize
     }
+
+    /// Numbers of a touch: see `shaders/search_results.wgsl`.
+    fn presses_each(&self) -> usize {
+        if self.model.algorithm == Algorithm::Paper { 9 } else { 6 }
+    }
+
+    /// Bytes of the records, the amounts, and the words and numbers of `touches` touches, of `count` configurations [B].
+    fn result_bytes(&self, count: usize, touches: usize) -> [u64; 4] {
+        let number = self.model.precision.size();
+        let amounts = number * self.amounts_each() * count;
+        let presses = number * self.presses_each() * touches;
+        [WORDS_BYTES * count, amounts, WORDS_BYTES * touches, presses].map(|bytes| bytes as u64)
+    }
 }
 
 impl SearchLane {
@@ -109,31 +138,33 @@ impl SearchLane {
     pub fn new(
         context: &Context,
         search: &Search,
-        double: &DoubleModel,
+        device: &DeviceModel,
         detection: &Detection,
         room: usize,
     ) -> Result<Self, GpuError> {
+        let SearchModel { surface, mesh, compliance, precision, .. } = &search.model;
         let parameters = SearchParameters { room: room as u32, ..search.model.parameters };
-        let buffer = |what, bytes: usize| StorageBuffer::new(context, what, bytes as u64);
-        let uniform = StorageBuffer::uniform(context, "parameters of the search", &parameters)?;
-        let words = buffer("words of the search", 4 * (2 * room + 1 + room * parameters.words as usize))?;
-        let reals = buffer("reals of the search", room * search.model.workspace())?;
-        let starts = buffer("starts of touches", 4 * (room + 1))?;
-        let records = buffer("records", size_of::<[u32; 4]>() * room)?;
-        let amounts = buffer("amounts", size_of::<f64>() * search.amounts_each() * room)?;
-        let touches = buffer("touches", size_of::<SearchTouch>() * parameters.contacts as usize * room)?;
-        let staged = size_of::<SearchTouch>() * STAGED_TOUCHES * room;
-        let staging = Staging::new(context, HEAD_BYTES + records.size() + amounts.size() + staged as u64)?;
-        let placed = detection.placed().ok_or(GpuError::Unsupported("f64"))?;
-        let SearchModel { surface, mesh, compliance, .. } = &search.model;
+        let buffer = |what, bytes: u64| StorageBuffer::new(context, what, bytes);
+        let uniform = StorageBuffer::uniform(context, "parameters of the search", &parameters.encode(*precision))?;
+        let words = buffer("words of the search", 4 * (2 * room + 1 + room * parameters.words as usize) as u64)?;
+        let reals = buffer("reals of the search", (room * search.model.workspace()) as u64)?;
+        let starts = buffer("starts of touches", 4 * (room as u64 + 1))?;
+        let [record_bytes, amount_bytes, touch_bytes, press_bytes] =
+            search.result_bytes(room, parameters.contacts as usize * room);
+        let records = buffer("records", record_bytes)?;
+        let amounts = buffer("amounts", amount_bytes)?;
+        let touches = buffer("touches", touch_bytes)?;
+        let presses = buffer("presses", press_bytes)?;
+        let staged: u64 = search.result_bytes(room, STAGED_TOUCHES * room).iter().sum();
+        let staging = Staging::new(context, HEAD_BYTES + staged)?;
         let buffers = [
             ("parameters", &uniform),
             ("surface", surface),
             ("mesh", mesh),
             ("compliance", compliance),
-            ("chain", &double.chain),
+            ("chain", &device.chain),
             ("motions", detection.motions()),
-            ("placed", placed),
+            ("placed", detection.placed()),
             ("positions", detection.positions()),
             ("list", detection.list()),
             ("words", &words),
@@ -142,15 +173,13 @@ impl SearchLane {
             ("records", &records),
             ("amounts", &amounts),
             ("touches", &touches),
+            ("presses", &presses),
         ];
         let bind = |kernel: &Kernel| kernel.bind(context, &buffers);
         Ok(Self {
             room,
             arm: bind(&search.arm)?,
-            detect: bind(&search.detect)?,
-            judge: bind(&search.judge)?,
-            step: bind(&search.step)?,
-            unfinished: bind(&search.unfinished)?,
+            round: search.round.iter().map(bind).collect::<Result<_, _>>()?,
             count: bind(&search.count)?,
             gather: bind(&search.gather)?,
             parameters: uniform,
@@ -159,6 +188,7 @@ impl SearchLane {
             records,
             amounts,
             touches,
+            presses,
             staging,
             touches_each: FIRST_TOUCHES,
             staged: 0,
@@ -169,7 +199,7 @@ impl SearchLane {
     pub fn solve(&mut self, context: &Context, search: &Search, count: usize) -> wgpu::SubmissionIndex {
         let configurations = count as u32;
         let parameters = SearchParameters { configurations, room: self.room as u32, ..search.model.parameters };
-        self.parameters.write(context, &[parameters]);
+        self.parameters.write(context, &parameters.encode(search.model.precision));
         self.staged = (self.touches_each * TOUCHES_MARGIN * count as f64).ceil() as usize;
         self.staged = self.staged.min(count * STAGED_TOUCHES.min(parameters.contacts as usize));
         let mut encoder = context.device.create_command_encoder(&Default::default());
@@ -196,47 +226,29 @@ impl SearchLane {
         rounds: usize,
     ) {
         let count = count as u32;
-        let bytes = search.object_bytes();
-        let dispatch = |kernel, bound| Dispatch { kernel, bound, workgroups: count, bytes };
-        let round = [
-            dispatch(&search.detect, &self.detect),
-            dispatch(&search.judge, &self.judge),
-            dispatch(&search.step, &self.step),
-            Dispatch {
-                kernel: &search.unfinished,
-                bound: &self.unfinished,
-                workgroups: 1,
-                bytes: 16 * u64::from(count),
-            },
-        ];
+        let last = search.round.len() - 1;
+        let round = search.round.iter().zip(&self.round).enumerate().map(|(k, (kernel, bound))| {
+            let (workgroups, bytes) =
+                if k < last { (count, search.object_bytes()) } else { (1, 16 * u64::from(count)) };
+            Dispatch { kernel, bound, workgroups, bytes }
+        });
         context.record(encoder, std::iter::repeat_n(round, rounds).flatten());
     }
 
     /// Records that what was found of `count` configurations comes to the host.
     fn record_results(&self, context: &Context, search: &Search, encoder: &mut wgpu::CommandEncoder, count: usize) {
         let rows = count as u32 * search.model.parameters.contacts;
-        let bytes = self.result_bytes(search, count) + (size_of::<SearchTouch>() * self.staged) as u64;
-        let dispatch = |kernel, bound, workgroups| Dispatch { kernel, bound, workgroups, bytes };
+        let each = search.result_bytes(count, self.staged);
+        let dispatch = |kernel, bound, workgroups| Dispatch { kernel, bound, workgroups, bytes: each.iter().sum() };
         let gather = dispatch(&search.gather, &self.gather, rows.div_ceil(PER_CONFIGURATION));
         context.record(encoder, [dispatch(&search.count, &self.count, 1), gather]);
-        let (records, amounts) = self.split_bytes(search, count);
         self.staging.copy_from(encoder, 0, (&self.words, 8 * self.room as u64), 4);
         self.staging.copy_from(encoder, 4, (&self.starts, 4 * count as u64), 4);
-        self.staging.copy(encoder, HEAD_BYTES, &self.records, records);
-        self.staging.copy(encoder, HEAD_BYTES + records, &self.amounts, amounts);
-        let touches = (size_of::<SearchTouch>() * self.staged) as u64;
-        self.staging.copy(encoder, HEAD_BYTES + records + amounts, &self.touches, touches);
-    }
-
-    /// Bytes of the records and of the amounts of `count` configurations [B].
-    fn split_bytes(&self, search: &Search, count: usize) -> (u64, u64) {
-        let amounts = size_of::<f64>() * search.amounts_each() * count;
-        ((size_of::<[u32; 4]>() * count) as u64, amounts as u64)
-    }
-
-    fn result_bytes(&self, search: &Search, count: usize) -> u64 {
-        let (records, amounts) = self.split_bytes(search, count);
-        HEAD_BYTES + records + amounts
+        let mut place = HEAD_BYTES;
+        for (buffer, bytes) in [&self.records, &self.amounts, &self.touches, &self.presses].into_iter().zip(each) {
+            self.staging.copy(encoder, place, buffer, bytes);
+            place += bytes;
+        }
     }
 
     /// Waits for a submission of [`SearchLane::solve`], and makes more rounds until all `count` are done.
@@ -250,8 +262,7 @@ impl SearchLane {
         let mut again = None;
         let mut made = FIRST_ROUNDS;
         loop {
-            let (unfinished, total, mut solved) =
-                self.read(context, search, count, again.as_ref().unwrap_or(ticket))?;
+            let (unfinished, total, mut found) = self.read(context, search, count, again.as_ref().unwrap_or(ticket))?;
             if unfinished > 0 {
                 let mut encoder = context.device.create_command_encoder(&Default::default());
                 self.record_rounds(context, search, &mut encoder, unfinished, made / 2);
@@ -261,10 +272,13 @@ impl SearchLane {
                 continue;
             }
             if total > self.staged {
-                solved.touches = self.touches.read(context, total)?;
+                let precision = search.model.precision;
+                found.touches = self.touches.read(context, total)?;
+                let bytes = self.presses.read(context, precision.size() * search.presses_each() * total)?;
+                found.presses = precision.decode(&bytes);
             }
             self.touches_each = total as f64 / count.max(1) as f64;
-            return Ok(Found::Solved(solved));
+            return Ok(found);
         }
     }
 
@@ -275,22 +289,26 @@ impl SearchLane {
         search: &Search,
         count: usize,
         ticket: &wgpu::SubmissionIndex,
-    ) -> Result<(usize, usize, Solved), GpuError> {
-        let (records, amounts) = self.split_bytes(search, count);
-        let bytes = self.result_bytes(search, count) + (size_of::<SearchTouch>() * self.staged) as u64;
+    ) -> Result<(usize, usize, Found), GpuError> {
+        let each = search.result_bytes(count, self.staged).map(|bytes| bytes as usize);
+        let bytes = HEAD_BYTES + each.iter().sum::<usize>() as u64;
         self.staging.take(context, ticket, bytes, |bytes| {
-            let (head, bytes) = bytes.split_at(HEAD_BYTES as usize);
-            let (records, bytes) = bytes.split_at(records as usize);
-            let (amounts, touches) = bytes.split_at(amounts as usize);
+            let (head, mut rest) = bytes.split_at(HEAD_BYTES as usize);
             let head: Vec<u32> = bytemuck::pod_collect_to_vec(head);
             let (unfinished, total) = (head[0] as usize, head[1] as usize);
-            let there = size_of::<SearchTouch>() * total.min(self.staged);
-            let solved = Solved {
+            let [records, amounts, touches, presses] = each.map(|bytes| {
+                let (own, behind) = rest.split_at(bytes);
+                rest = behind;
+                own
+            });
+            let [.., touch_bytes, press_bytes] = search.result_bytes(count, total.min(self.staged));
+            let found = Found {
                 records: bytemuck::pod_collect_to_vec(records),
-                amounts: bytemuck::pod_collect_to_vec(amounts),
-                touches: bytemuck::pod_collect_to_vec(&touches[..there]),
+                amounts: search.model.precision.decode(amounts),
+                touches: bytemuck::pod_collect_to_vec(&touches[..touch_bytes as usize]),
+                presses: search.model.precision.decode(&presses[..press_bytes as usize]),
             };
-            (unfinished, total, solved)
+            (unfinished, total, found)
         })
     }
 }

@@ -1,16 +1,17 @@
-//! Object, proxy and contact law in f64 on the device, as the search for equilibria wants them, and the size of its
-//! workspaces.
+//! Object, proxy and contact law on the device, as the search for equilibria wants them, and the size of its workspaces.
 
 use super::{
     context::{Context, GpuError},
-    detection::{bounding_spheres, controls},
     kernel::StorageBuffer,
     layout::SearchParameters,
+    model::{DeviceModel, bounding_spheres, controls, culling_slack, extent, mesh, stiffness},
+    precision::Precision,
     shaders::{CLUSTER, GROUP, NODES_TOGETHER},
 };
 use crate::{
-    contact::{self, geometry::bounding_volumes::CULLING_SLACK},
-    tolerances::{CONTINUATION_START, DEPTH_ROUNDING},
+    contact::{self, law::depth::MINIMUM_CURVATURE_RADIUS},
+    scene::Algorithm,
+    tolerances::{self, CONTINUATION_START, DEPTH_ROUNDING},
 };
 use glam::DVec3;
 
@@ -25,6 +26,8 @@ const ABSENT: u32 = u32::MAX;
 
 /// The device's copy of a contact model for the search.
 pub(super) struct SearchModel {
+    pub precision: Precision,
+    pub algorithm: Algorithm,
     /// Without the configurations, and the room for them.
     pub parameters: SearchParameters,
     pub surface: StorageBuffer,
@@ -36,56 +39,116 @@ pub(super) struct SearchModel {
 }
 
 impl SearchModel {
-    /// Uploads a model whose gaps in f32 are known to `gap_band` [m], for at most `contacts` rows a configuration.
+    /// Uploads a model of which `device` has the arm and the surface at rest, for at most `contacts` rows a
+    /// configuration.
     pub fn new(
         context: &Context,
         model: &contact::Model<'_>,
-        gap_band: f64,
+        device: &DeviceModel,
         contacts: usize,
     ) -> Result<Self, GpuError> {
         let nodes = model.chain.nodes.len();
+        let precision = device.precision;
         let is_isotropic = model.compliance.rows_per_node == 1;
-        let parts = Parts::new(model);
+        let parts = Parts::new(model, precision);
         let contacts = CONTACTS.min(contacts).min(nodes);
         let support = SUPPORT.min(model.compliance.nodes.len());
+        let limits = Limits::new(model, precision);
         let mut parameters = SearchParameters {
             joints: model.chain.joints.len() as u32,
             proxy_nodes: nodes as u32,
             contacts: contacts as u32,
             support: support as u32,
-            max_iterations: model.contact.max_iterations,
-            with_tangent: u32::from(model.with_tangent),
-            gap_band,
-            first_kc: model.kc.min(CONTINUATION_START / model.max_nodal_compliance),
-            kc: model.kc,
-            tolerance: model.contact.tolerance,
+            max_iterations: limits.iterations,
+            with_tangent: u32::from(limits.with_tangent),
+            gap_band: device.gap_band,
+            first_kc: limits.first_kc,
+            kc: limits.kc,
+            tolerance: limits.tolerance,
             mobility: model.mobility.sqrt(),
             bulge_mobility: model.bulge_mobility.sqrt(),
             bulge: model.surface.bulge,
-            least_scale: DEPTH_ROUNDING * model.surface.extent / model.contact.tolerance
-                * model.max_nodal_compliance.sqrt(),
+            least_scale: limits.depth_rounding / limits.tolerance * model.max_nodal_compliance.sqrt(),
+            least_distance: limits.least_distance,
+            softest: model.max_nodal_compliance,
             ..parts.parameters
         };
         parameters.words = words(&parameters);
         parameters.reals = reals(&parameters, is_isotropic);
+        let numbers = |what, numbers: &[f64]| StorageBuffer::from_slice(context, what, &precision.encode(numbers));
         Ok(Self {
+            precision,
+            algorithm: model.contact.algorithm,
             parameters,
-            surface: StorageBuffer::from_slice(context, "surface for the search", &parts.surface)?,
+            surface: numbers("surface for the search", &parts.surface)?,
             mesh: StorageBuffer::from_slice(context, "mesh for the search", &parts.mesh)?,
-            compliance: StorageBuffer::from_slice(context, "compliance in f64", &model.compliance.entries)?,
+            // Rounded one by one: each keeps 24 bits in f32, whatever the condition number of K.
+            compliance: numbers("compliance", &model.compliance.entries)?,
             is_isotropic,
-            is_smooth: model.surface.smooth.is_some(),
+            is_smooth: device.is_smooth,
         })
     }
 
     /// Bytes of the reals of one workspace, which are most of it [B].
     pub fn workspace(&self) -> usize {
-        size_of::<f64>() * self.parameters.reals as usize
+        self.precision.size() * self.parameters.reals as usize
     }
 }
 
+/// What is asked of the search, and what rounding leaves it.
+struct Limits {
+    first_kc: f64,
+    kc: f64,
+    tolerance: f64,
+    iterations: u32,
+    with_tangent: bool,
+    depth_rounding: f64,
+    least_distance: f64,
+}
+
+impl Limits {
+    fn new(model: &contact::Model<'_>, precision: Precision) -> Self {
+        let contact = &model.contact;
+        let kc = match (contact.algorithm, precision) {
+            (Algorithm::Paper, _) => contact.stiffness,
+            (_, Precision::Double) => model.kc,
+            (_, Precision::Single) => stiffness(model),
+        };
+        let first_kc = match contact.algorithm {
+            Algorithm::Energy => kc.min(CONTINUATION_START / model.max_nodal_compliance),
+            Algorithm::Linearised | Algorithm::Paper => kc,
+        };
+        match precision {
+            Precision::Double => Self {
+                first_kc,
+                kc,
+                tolerance: contact.tolerance,
+                iterations: contact.max_iterations,
+                with_tangent: model.with_tangent && contact.algorithm == Algorithm::Energy,
+                depth_rounding: DEPTH_ROUNDING * model.surface.extent,
+                least_distance: MINIMUM_CURVATURE_RADIUS,
+            },
+            Precision::Single => Self {
+                first_kc,
+                kc,
+                tolerance: contact.tolerance.max(tolerances::GPU_LEAST_TOLERANCE),
+                iterations: contact.max_iterations.min(tolerances::GPU_MAX_ITERATIONS),
+                with_tangent: false,
+                depth_rounding: tolerances::GPU_DEPTH_ROUNDING_PER_EDGE * longest_edge(model),
+                least_distance: tolerances::GPU_LEAST_DISTANCE_PER_EXTENT * extent(model),
+            },
+        }
+    }
+}
+
+fn longest_edge(model: &contact::Model<'_>) -> f64 {
+    let corners = |t: &[u32; 3]| t.map(|j| model.surface.positions[j as usize]);
+    let edge = |[a, b, c]: [DVec3; 3]| a.distance(b).max(b.distance(c)).max(c.distance(a));
+    model.object.triangles.iter().map(|t| edge(corners(t))).fold(0.0, f64::max)
+}
+
 /// Words of a workspace: see `shaders/search_types.wgsl`.
-fn words(p: &SearchParameters) -> u32 {
+pub(super) fn words(p: &SearchParameters) -> u32 {
     const HEADER: u32 = 21;
     const ROW_WORDS: u32 = 4;
     HEADER
@@ -99,7 +162,7 @@ fn words(p: &SearchParameters) -> u32 {
 }
 
 /// Reals of a workspace: see there.
-fn reals(p: &SearchParameters, is_isotropic: bool) -> u32 {
+pub(super) fn reals(p: &SearchParameters, is_isotropic: bool) -> u32 {
     const SCALARS: u32 = 20;
     const ROW_REALS: u32 = 26;
     const VECTORS: u32 = 16;
@@ -124,7 +187,7 @@ struct Parts {
 }
 
 impl Parts {
-    fn new(model: &contact::Model<'_>) -> Self {
+    fn new(model: &contact::Model<'_>, precision: Precision) -> Self {
         let (object, surface) = (model.object, &model.surface);
         let triangles = object.triangles.len() as u32;
         let facets = 0..triangles;
@@ -142,7 +205,7 @@ impl Parts {
             carriers: carriers as u32,
             ..bytemuck::Zeroable::zeroed()
         };
-        let mut numbers = bounding_spheres(model);
+        let mut numbers = bounding_spheres(model, precision);
         numbers.extend(model.chain.nodes.iter().map(|node| node.radius));
         numbers.extend(&model.shares);
         parameters.at_rest = numbers.len() as u32;
@@ -154,11 +217,8 @@ impl Parts {
             numbers.extend(smooth.shapes().iter().flat_map(|shape| (0..carriers).flat_map(|j| shape.mask_of(j))));
         }
         parameters.at_spheres = numbers.len() as u32;
-        numbers.extend(numbering.spheres(model).into_iter().flatten());
-        let mut mesh: Vec<u32> = object.triangles.iter().flatten().copied().collect();
-        mesh.extend(object.topology.across.iter().flatten());
-        mesh.extend(&object.topology.around_offsets);
-        mesh.extend(&object.topology.around);
+        numbers.extend(numbering.spheres(model, culling_slack(model, precision)).into_iter().flatten());
+        let mut mesh = mesh(model);
         parameters.at_order = mesh.len() as u32;
         mesh.extend(&order);
         parameters.at_carriers = mesh.len() as u32;
@@ -208,9 +268,9 @@ impl Numbering {
         Self { places, nodes, near }
     }
 
-    /// Spheres around all facets at rest that hang on a node of a group of covered ones: centre and radius.
-    fn spheres(&self, model: &contact::Model<'_>) -> Vec<[f64; 4]> {
-        let slack = CULLING_SLACK * model.surface.extent;
+    /// Spheres around all facets at rest that hang on a node of a group of covered ones, widened by `slack` [m]: centre
+    /// and radius.
+    fn spheres(&self, model: &contact::Model<'_>, slack: f64) -> Vec<[f64; 4]> {
         let mut hanging = vec![Vec::new(); self.nodes.len()];
         for t in 0..model.object.triangles.len() as u32 {
             for &node in model.surface.carriers(t).0 {

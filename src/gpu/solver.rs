@@ -1,20 +1,21 @@
 //! Equilibria of many configurations on GPUs: the backend of a sweep.
 //!
 //! Configurations are cut into sections (`flights`), which are placed and tested for contact; the host then knows how
-//! many touch, and submits these in batches, one workgroup a configuration. While the devices solve sections, all cores
-//! settle the ones before in f64. Sizes of sections and batches follow from measured time: a dispatch should last tens
-//! of milliseconds. Results depend neither on them nor on how many devices there are.
+//! many touch, and submits these, one workgroup a configuration. While the devices solve sections, all cores make
+//! equilibria of the ones before, which in f32 are settled in f64. Sizes of sections follow from measured time: a
+//! dispatch should last tens of milliseconds. Results depend neither on them nor on how many devices there are.
 //!
-//! What f32 or the kernel's room cannot decide is left to the CPU's f64 solver: forces that do not settle, more
-//! contacts than the lists hold, and where shaders have no f64 contact within rounding of none. Nothing is cut off.
+//! What f32 or the kernel's room cannot decide is left to the CPU's solver: forces that do not settle, more contacts
+//! than the lists hold, and where shaders have no f64 contact within rounding of none. Nothing is cut off.
 
 use super::{
     adapter::AdapterSummary,
     context::{Context, GpuError},
     flights::{HostTime, Landed, PacedDevice, Queue, fly},
     pipeline::{BatchCapacity, Pipeline},
-    stages::{Detected, Found, GapPrecision, Recorded, Stages},
-    unpack::{solved, unpack},
+    precision::Precision,
+    stages::{Detected, Found, Recorded, Stages, Trust},
+    unpack::unpack,
 };
 use crate::{
     JointVector,
@@ -113,7 +114,7 @@ impl<'a, S: Stages> GpuSolver<'a, S> {
     /// Whether contact or not is decided on the devices, in f64.
     #[must_use]
     pub fn is_exact(&self) -> bool {
-        self.devices.iter().all(|device| device.stages.precision().exact)
+        self.devices.iter().all(|device| device.stages.trust().precision == Precision::Double)
     }
 
     /// Where the time of the host went since the solver was made.
@@ -127,7 +128,7 @@ impl HostPart<'_> {
     /// Adds the equilibria of a section that a device has solved.
     fn conclude(
         &mut self,
-        precision: GapPrecision,
+        trust: Trust,
         landed: Landed<'_>,
         time: &mut HostTime,
         equilibria: &mut Vec<Equilibrium>,
@@ -137,8 +138,8 @@ impl HostPart<'_> {
         let mut results: Vec<Equilibrium> =
             gaps.iter().zip(configurations).map(|(&gap, q)| free(gap, q.len())).collect();
         let assembled = Instant::now();
-        self.decide_free(precision, configurations, &touching, &mut results);
-        let settled = self.settle(precision, configurations, &touching, &found, &results)?;
+        self.decide_free(trust, configurations, &touching, &mut results);
+        let settled = self.settle(trust, configurations, &touching, &found, &results)?;
         let done = Instant::now();
         for (&member, result) in touching.iter().zip(settled) {
             results[member as usize] = result;
@@ -150,42 +151,33 @@ impl HostPart<'_> {
         Ok(())
     }
 
-    /// Solves on the CPU what touches nothing but lies within what its gap is known to of contact, and where gaps are
-    /// those to flat triangles measures those to a smooth surface.
-    fn decide_free(
-        &mut self,
-        precision: GapPrecision,
-        section: &[JointVector],
-        touching: &[u32],
-        results: &mut [Equilibrium],
-    ) {
-        let measured = precision.exact || self.model.surface.smooth.is_none();
-        if measured && results.iter().all(|result| result.gap.abs() > precision.band) {
+    /// Solves on the CPU what touches nothing but lies within what its gap is known to of contact.
+    fn decide_free(&mut self, trust: Trust, section: &[JointVector], touching: &[u32], results: &mut [Equilibrium]) {
+        if results.iter().all(|result| result.gap.abs() > trust.band) {
             return;
         }
         let mut free = vec![true; section.len()];
         touching.iter().for_each(|&member| free[member as usize] = false);
-        let (undecided, others): (Vec<usize>, Vec<usize>) =
-            (0..section.len()).filter(|&k| free[k]).partition(|&k| self.is_undecided(precision, &results[k]));
-        self.left_to_cpu += undecided.len();
-        let open = if measured { undecided } else { [undecided, others].concat() };
+        let open: Vec<usize> =
+            (0..section.len()).filter(|&k| free[k] && self.is_undecided(trust, &results[k])).collect();
+        self.left_to_cpu += open.len();
         let decided = self.cpu.map(&open, |solver, &k| solver.solve(&section[k]));
         for (k, result) in open.into_iter().zip(decided) {
             results[k] = result;
         }
     }
 
-    /// The equilibria of those in contact, settled from what the kernels `found`.
+    /// The equilibria of those in contact, from what the kernels `found`.
     fn settle(
         &mut self,
-        precision: GapPrecision,
+        trust: Trust,
         section: &[JointVector],
         touching: &[u32],
         found: &Found,
         at_rest: &[Equilibrium],
     ) -> Result<Vec<Equilibrium>, GpuError> {
-        let counts = found.counts();
-        let starts: Vec<usize> = counts
+        let starts: Vec<usize> = found
+            .counts()
             .iter()
             .scan(0_usize, |end, &count| {
                 let start = *end;
@@ -198,22 +190,8 @@ impl HostPart<'_> {
         let settled = self.cpu.map(&places, |solver, &place| {
             let member = touching[place] as usize;
             let (q, start) = (&section[member], *starts.get(place)?);
-            let (result, is_undecided) = match found {
-                Found::Solved(found) => {
-                    let result = solved(model, solver, (q, at_rest[member].gap), found, (place, start))?;
-                    let is_undecided = result.status == Status::Overflow;
-                    (result, is_undecided)
-                }
-                Found::Forces(found) => {
-                    let (outcome, list) = (found.results.get(place)?, found.touches.get(start..)?);
-                    let mut result = unpack(model, solver, q, outcome, list)?;
-                    if model.contact.algorithm == Algorithm::Paper {
-                        result.gap = at_rest[member].gap;
-                    }
-                    let is_undecided = self.is_undecided(precision, &result);
-                    (result, is_undecided)
-                }
-            };
+            let result = unpack(model, solver, (q, at_rest[member].gap), found, (place, start), trust.precision)?;
+            let is_undecided = self.is_undecided(trust, &result);
             Some(if is_undecided { (solver.solve(q), 1) } else { (result, 0) })
         });
         let unwritten = settled.iter().filter(|result| result.is_none()).count();
@@ -227,12 +205,13 @@ impl HostPart<'_> {
 
     /// Whether f32 or the kernel's room left open what the equilibrium is. The paper's iteration often does not
     /// converge in any precision, and is then left at that.
-    fn is_undecided(&self, precision: GapPrecision, result: &Equilibrium) -> bool {
+    fn is_undecided(&self, trust: Trust, result: &Equilibrium) -> bool {
+        let is_settled = trust.precision == Precision::Double || self.model.contact.algorithm == Algorithm::Paper;
         result.gap.is_nan()
-            || result.gap.abs() <= precision.band
+            || result.gap.abs() <= trust.band && trust.precision == Precision::Single
             || match result.status {
-                Status::Contact => result.residual.is_nan() || result.residual > GPU_RESOLVED_RESIDUAL,
-                Status::Unconverged => self.model.contact.algorithm != Algorithm::Paper,
+                Status::Contact => !is_settled && (result.residual.is_nan() || result.residual > GPU_RESOLVED_RESIDUAL),
+                Status::Unconverged => !is_settled,
                 Status::Overflow => true,
                 Status::Free | Status::Outside => false,
             }
@@ -289,7 +268,7 @@ impl<S: Stages> Backend for GpuSolver<'_, S> {
         loop {
             let Self { devices, host, time } = self;
             let conclude = |stages: &S, landed: Landed<'_>, time: &mut HostTime, equilibria: &mut Vec<Equilibrium>| {
-                host.conclude(stages.precision(), landed, time, equilibria)
+                host.conclude(stages.trust(), landed, time, equilibria)
             };
             match fly(devices, &mut queue, time, conclude) {
                 Ok(()) => return Ok(()),

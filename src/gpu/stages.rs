@@ -1,9 +1,6 @@
 //! What a batch goes through, whoever does it: a device, or what stands for one and returns stored results at once.
 
-use super::{
-    context::GpuError,
-    layout::{SearchTouch, SolverResult, Touch},
-};
+use super::{context::GpuError, precision::Precision};
 use crate::JointVector;
 use std::ops::Range;
 
@@ -16,93 +13,54 @@ pub struct Detected {
     pub touching: Vec<u32>,
 }
 
-/// What the kernels found of the configurations in contact.
-#[derive(Clone, Debug)]
-pub enum Found {
-    /// Forces in f32, which are to be settled.
-    Forces(Forces),
-    /// Equilibria in f64.
-    Solved(Solved),
-}
-
-/// Forces in f32.
+/// What the kernels found of the configurations in contact: see `shaders/search_results.wgsl`.
 #[derive(Clone, Debug, Default)]
-pub struct Forces {
-    /// One for each configuration.
-    pub results: Vec<SolverResult>,
-    /// Of one after the other.
-    pub touches: Vec<Touch>,
-}
-
-/// Equilibria in f64: see `shaders/search_results.wgsl`.
-#[derive(Clone, Debug, Default)]
-pub struct Solved {
+pub struct Found {
     /// One for each configuration.
     pub records: Vec<[u32; 4]>,
     /// As many for each.
     pub amounts: Vec<f64>,
-    /// Of one after the other.
-    pub touches: Vec<SearchTouch>,
+    /// Of one configuration after the other.
+    pub touches: Vec<[u32; 4]>,
+    /// As many for each touch.
+    pub presses: Vec<f64>,
 }
 
 impl Found {
-    /// Nothing of no configuration.
-    #[must_use]
-    pub fn nothing() -> Self {
-        Self::Solved(Solved::default())
-    }
-
     /// Number of touches of each configuration.
     #[must_use]
     pub fn counts(&self) -> Vec<usize> {
-        match self {
-            Self::Forces(forces) => forces.results.iter().map(|result| result.touches as usize).collect(),
-            Self::Solved(solved) => solved.records.iter().map(|[_, _, touches, _]| *touches as usize).collect(),
-        }
+        self.records.iter().map(|[_, _, touches, _]| *touches as usize).collect()
     }
 
     /// What was found of `configurations`, whose touches are in `touches`.
     fn part(&self, configurations: Range<usize>, touches: Range<usize>) -> Self {
-        match self {
-            Self::Forces(forces) => Self::Forces(Forces {
-                results: forces.results[configurations].to_vec(),
-                touches: forces.touches[touches].to_vec(),
-            }),
-            Self::Solved(solved) => {
-                let each = solved.amounts.len() / solved.records.len().max(1);
-                Self::Solved(Solved {
-                    amounts: solved.amounts[each * configurations.start..each * configurations.end].to_vec(),
-                    records: solved.records[configurations].to_vec(),
-                    touches: solved.touches[touches].to_vec(),
-                })
-            }
+        let amounts = self.amounts.len() / self.records.len().max(1);
+        let presses = self.presses.len() / self.touches.len().max(1);
+        Self {
+            amounts: self.amounts[amounts * configurations.start..amounts * configurations.end].to_vec(),
+            presses: self.presses[presses * touches.start..presses * touches.end].to_vec(),
+            records: self.records[configurations].to_vec(),
+            touches: self.touches[touches].to_vec(),
         }
     }
 
-    /// Adds what was found of other configurations, in the same precision.
+    /// Adds what was found of other configurations.
     fn extend(&mut self, other: Self) {
-        match (self, other) {
-            (Self::Forces(own), Self::Forces(other)) => {
-                own.results.extend(other.results);
-                own.touches.extend(other.touches);
-            }
-            (Self::Solved(own), Self::Solved(other)) => {
-                own.records.extend(other.records);
-                own.amounts.extend(other.amounts);
-                own.touches.extend(other.touches);
-            }
-            (own, other) => *own = other,
-        }
+        self.records.extend(other.records);
+        self.amounts.extend(other.amounts);
+        self.touches.extend(other.touches);
+        self.presses.extend(other.presses);
     }
 }
 
-/// How far gaps can be trusted.
+/// How far results can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GapPrecision {
+pub struct Trust {
     /// Gaps no farther than this from zero are left open [m].
     pub band: f64,
-    /// Whether gaps are those of the contact surface in f64.
-    pub exact: bool,
+    /// What was computed in; equilibria in f32 are settled in f64 on the host.
+    pub precision: Precision,
 }
 
 /// Bounds on what a device takes at a time.
@@ -112,8 +70,6 @@ pub struct StageRoom {
     pub lanes: usize,
     /// Most configurations of a section.
     pub section: usize,
-    /// Most configurations in contact of one dispatch.
-    pub batch: usize,
 }
 
 /// The stages of a device. A section of configurations has a lane: it is placed and tested for contact, and then those
@@ -125,8 +81,8 @@ pub trait Stages {
     /// What it takes at a time.
     fn room(&self) -> StageRoom;
 
-    /// How far its gaps can be trusted.
-    fn precision(&self) -> GapPrecision;
+    /// How far its results can be trusted.
+    fn trust(&self) -> Trust;
 
     /// Submits where the proxy is at each configuration of a section, and whether it touches.
     fn detect(&mut self, lane: usize, section: &[JointVector]) -> Self::Ticket;
@@ -137,9 +93,8 @@ pub trait Stages {
     /// When the device fails.
     fn detected(&mut self, lane: usize, count: usize, ticket: &Self::Ticket) -> Result<Detected, GpuError>;
 
-    /// Submits the solution of the first `count` configurations in contact of what the lane has detected, `batch` to a
-    /// dispatch.
-    fn solve(&mut self, lane: usize, count: usize, batch: usize) -> Self::Ticket;
+    /// Submits the solution of the first `count` configurations in contact of what the lane has detected.
+    fn solve(&mut self, lane: usize, count: usize) -> Self::Ticket;
 
     /// Waits for a submission of [`Stages::solve`].
     ///
@@ -161,7 +116,7 @@ pub trait Stages {
 #[derive(Clone, Debug)]
 pub struct Recorded {
     room: StageRoom,
-    precision: GapPrecision,
+    trust: Trust,
     gaps: Vec<f64>,
     is_touching: Vec<bool>,
     found: Found,
@@ -172,9 +127,9 @@ pub struct Recorded {
 impl Recorded {
     /// What `stages` find of `configurations`.
     pub(super) fn of<S: Stages>(stages: &mut S, configurations: &[JointVector]) -> Result<Self, GpuError> {
-        let (room, precision) = (stages.room(), stages.precision());
-        let (gaps, is_touching, found) = (Vec::new(), Vec::new(), Found::nothing());
-        let mut recorded = Self { room, precision, gaps, is_touching, found, returned: [0; 3] };
+        let (room, trust) = (stages.room(), stages.trust());
+        let (gaps, is_touching, found) = (Vec::new(), Vec::new(), Found::default());
+        let mut recorded = Self { room, trust, gaps, is_touching, found, returned: [0; 3] };
         for section in configurations.chunks(room.section) {
             let ticket = stages.detect(0, section);
             let Detected { gaps, touching } = stages.detected(0, section.len(), &ticket)?;
@@ -183,7 +138,7 @@ impl Recorded {
             recorded.is_touching.resize(recorded.gaps.len(), false);
             touching.iter().for_each(|&member| recorded.is_touching[before + member as usize] = true);
             if !touching.is_empty() {
-                let ticket = stages.solve(0, touching.len(), room.batch);
+                let ticket = stages.solve(0, touching.len());
                 recorded.found.extend(stages.found(0, touching.len(), &ticket)?);
             }
         }
@@ -205,8 +160,8 @@ impl Stages for Recorded {
         self.room
     }
 
-    fn precision(&self) -> GapPrecision {
-        self.precision
+    fn trust(&self) -> Trust {
+        self.trust
     }
 
     fn detect(&mut self, _: usize, _: &[JointVector]) {}
@@ -218,7 +173,7 @@ impl Stages for Recorded {
         Ok(Detected { gaps: self.gaps[places].to_vec(), touching })
     }
 
-    fn solve(&mut self, _: usize, _: usize, _: usize) {}
+    fn solve(&mut self, _: usize, _: usize) {}
 
     fn found(&mut self, _: usize, count: usize, (): &()) -> Result<Found, GpuError> {
         let counts = self.found.counts();

@@ -181,12 +181,24 @@ mod tests {
         let names: Vec<&str> = timed.1.iter().map(|kernel| kernel.name.as_str()).collect();
         assert_eq!(
             names,
-            ["kinematics", "detection", "classification", "compaction", "energy", "results count", "results gather"]
+            [
+                "kinematics",
+                "detection",
+                "gap",
+                "compaction",
+                "search_arm",
+                "search_detect",
+                "search_judge",
+                "search_step",
+                "search_unfinished",
+                "search_results count",
+                "search_results gather",
+            ]
         );
         // One workgroup a configuration, and for each of its nodes the place is written, then read and written.
-        let [kinematics, detection, _, _, energy, ..] = &timed.1[..] else { panic!("{names:?}") };
+        let [kinematics, detection, _, _, _, search, ..] = &timed.1[..] else { panic!("{names:?}") };
         let touching = timed.0.iter().filter(|(status, ..)| *status != crate::contact::Status::Free).count() as u64;
-        assert!(energy.workgroups >= touching && touching > 50, "{} for {touching}", energy.workgroups);
+        assert!(search.workgroups >= touching && touching > 50, "{} for {touching}", search.workgroups);
         let places = (16 * chain.nodes.len() * configurations.len()) as u64;
         assert!(kinematics.bytes > places && kinematics.bytes < 2 * places);
         assert!(detection.bytes > 2 * places);

@@ -18,7 +18,7 @@
 //! iterations are needed whatever the object's size and the springs' stiffness. Negative curvature asks for more
 //! damping.
 
-// Indexed loops as in shaders/trust_region.wgsl.
+// Indexed loops as in shaders/search_step.wgsl.
 #![allow(clippy::needless_range_loop)]
 
 use super::woodbury::Woodbury;

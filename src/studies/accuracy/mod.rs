@@ -49,7 +49,7 @@ pub enum Study {
     Updates,
     /// How contact is solved; cost is a configuration.
     Algorithm,
-    /// f64 on the CPU against f32 on the GPU; cost is a configuration.
+    /// f64 and f32 on the GPU against the CPU; cost is a configuration.
     Arithmetic,
     /// Mean edge of the object's mesh; cost is a configuration.
     Mesh,

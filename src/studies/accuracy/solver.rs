@@ -4,9 +4,10 @@ use super::{Accuracy, AccuracyError, Cost, Row, Study, timed};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},
+    gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver},
     scene::{Algorithm, ContactSpec, Scene},
     sweep::{
-        Backend, BackendChoice, ChosenBackend, OTHER_ADAPTER,
+        Backend, OTHER_ADAPTER,
         reference::{Reference, equilibria},
         remedied,
     },
@@ -82,28 +83,29 @@ pub(super) fn settings(
     Ok(())
 }
 
-/// f32 on a GPU, where there is one, against f64.
+/// f64 and f32 on GPUs, where there are some, against the CPU.
 pub(super) fn arithmetic(model: &Model<'_>, reference: &Reference, study: &mut Accuracy) -> Result<(), AccuracyError> {
     let places = &reference.places[..reference.places.len().min(GPU_CONFIGURATIONS)];
     let (baseline, found) = timed(study.rounds, || equilibria(model, model.contact, places))?;
     let part = reference.first(places.len());
     let cost = baseline.over(baseline.least);
     study.rows.push(row(Study::Arithmetic, "cpu", "cpu, f64".to_owned(), 64.0, cost, &part, &found));
-    let mut gpu = match ChosenBackend::open(BackendChoice::Gpu, model) {
-        Ok(gpu) => gpu,
-        Err(error) => {
-            study.notes.push(format!("f32 on a GPU is not measured: {}", remedied(&error.to_string(), OTHER_ADAPTER)));
-            return Ok(());
-        }
-    };
-    match timed(study.rounds, || gpu.solve(places)) {
-        Ok((cost, found)) => {
-            let setting = format!("{}, f32", gpu.adapter());
-            let cost = cost.over(baseline.least);
-            study.rows.push(row(Study::Arithmetic, "gpu", setting, 32.0, cost, &part, &found));
-        }
-        Err(error) => {
-            study.notes.push(format!("f32 on a GPU is not measured: {}", remedied(&error.to_string(), OTHER_ADAPTER)))
+    for (double, name, bits) in [(true, "f64", 64.0), (false, "f32", 32.0)] {
+        let measure = || -> Result<Option<Row>, GpuError> {
+            let room = BatchCapacity { double, ..BatchCapacity::default() };
+            let mut gpu = GpuSolver::on(Context::open_all(&AdapterChoice::Any)?, model, room)?;
+            if double && !gpu.is_exact() {
+                return Ok(None);
+            }
+            let (cost, found) = timed(study.rounds, || gpu.solve(places))?;
+            let setting = gpu.adapters().map(|adapter| format!("{adapter}, {name}")).collect::<Vec<_>>().join("; ");
+            Ok(Some(row(Study::Arithmetic, "gpu", setting, bits, cost.over(baseline.least), &part, &found)))
+        };
+        match measure() {
+            Ok(row) => study.rows.extend(row),
+            Err(error) => study
+                .notes
+                .push(format!("{name} on a GPU is not measured: {}", remedied(&error.to_string(), OTHER_ADAPTER))),
         }
     }
     Ok(())

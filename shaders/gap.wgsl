@@ -1,4 +1,4 @@
-// Smallest signed distance of a configuration's proxy nodes to the surface at rest, less their radii, in f64 (twin:
+// Smallest signed distance of a configuration's proxy nodes to the surface at rest, less their radii (twin:
 // src/contact/geometry/rest.rs): one invocation a configuration. Below zero there is contact.
 //
 // Of the gaps that f32 found, to flat triangles, those that may be the smallest are measured again. Facets are searched
@@ -9,36 +9,36 @@ override WORKGROUP: u32 = 32u;
 // Whether facets are of degree four.
 override SMOOTH: bool = false;
 
-@group(0) @binding(0) var<uniform> parameters: DoubleParameters;
+@group(0) @binding(0) var<uniform> parameters: Parameters;
 // One behind the other: the bounding spheres (centre, radius) of the clusters of facets, of the groups of clusters, and
 // of the facets in the order of the clusters; the radius of each proxy node; the control points of the facets.
-@group(0) @binding(1) var<storage, read> surface: array<f64>;
+@group(0) @binding(1) var<storage, read> surface: array<real>;
 @group(0) @binding(2) var<storage, read> mesh: array<u32>;
 // All facets, CLUSTER of them side by side in each cluster.
-@group(0) @binding(3) var<storage, read> order: array<u32>;
+@group(0) @binding(3) var<storage, read> clusters: array<u32>;
 // Proxy nodes in f32; w is the gap of each.
 @group(0) @binding(4) var<storage, read> positions: array<vec4<f32>>;
-// The same in f64, three coordinates each.
-@group(0) @binding(5) var<storage, read> placed: array<f64>;
-@group(0) @binding(6) var<storage, read_write> gaps: array<f64>;
+// The same in the numbers of this stage, three coordinates each.
+@group(0) @binding(5) var<storage, read> placed: array<real>;
+@group(0) @binding(6) var<storage, read_write> gaps: array<real>;
 
 // Where the radii of the proxy nodes begin.
 fn radii() -> u32 {
     return 4u * (parameters.clusters + parameters.groups + parameters.triangles);
 }
 
-fn control(facet: u32, k: u32, x: vec3<f64>) -> vec3<f64> {
+fn control(facet: u32, k: u32, x: vec3<real>) -> vec3<real> {
     let at = radii() + parameters.proxy_nodes + 3u * (facet * select(3u, 15u, SMOOTH) + k);
-    return vec3<f64>(surface[at], surface[at + 1u], surface[at + 2u]) - x;
+    return vec3<real>(surface[at], surface[at + 1u], surface[at + 2u]) - x;
 }
 
 // The facet in place `entry` of the clusters.
 fn facet_in_order(entry: u32) -> u32 {
-    return order[entry];
+    return clusters[entry];
 }
 
 // Takes `facet` for the current one.
-fn form(facet: u32, x: vec3<f64>) {
+fn form(facet: u32, x: vec3<real>) {
     net[0] = control(facet, 0u, x);
     if !SMOOTH {
         net[10] = control(facet, 1u, x);
@@ -62,7 +62,7 @@ fn form(facet: u32, x: vec3<f64>) {
 }
 
 // Whether it is known without forming the facet that it is farther than `distance` from x.
-fn is_beyond(facet: u32, x: vec3<f64>, distance: f64) -> bool {
+fn is_beyond(facet: u32, x: vec3<real>, distance: real) -> bool {
     return false;
 }
 
@@ -79,19 +79,19 @@ fn main(
     let first = configuration * parameters.proxy_nodes;
     var least = FAR_AWAY;
     for (var node = 0u; node < parameters.proxy_nodes; node += 1u) {
-        least = min(least, f64(positions[first + node].w));
+        least = min(least, real(positions[first + node].w));
     }
-    least += 2.0 * parameters.gap_band;
+    least += 2.0 * real(parameters.gap_band);
     var gap = FAR_AWAY;
     for (var node = 0u; node < parameters.proxy_nodes; node += 1u) {
-        let known = f64(positions[first + node].w);
+        let known = real(positions[first + node].w);
         if known > least {
             continue;
         }
         let at = 3u * (first + node);
-        let x = vec3<f64>(placed[at], placed[at + 1u], placed[at + 2u]);
+        let x = vec3<real>(placed[at], placed[at + 1u], placed[at + 2u]);
         let radius = surface[radii() + node];
-        let closest = closest_facet(x, abs(known + radius) + 2.0 * parameters.gap_band, f64(0.0), ABSENT);
+        let closest = closest_facet(x, abs(known + radius) + 2.0 * real(parameters.gap_band), real(0.0), ABSENT);
         if closest.facet == ABSENT {
             continue;
         }
