@@ -155,8 +155,8 @@ fn describe(text: &mut String, inspection: &Inspection, chain: &Chain) -> fmt::R
     for (number, node) in proxy_nodes.iter().enumerate() {
         let Some(contact) = &node.contact else { continue };
         writeln!(text, "  {number:<3} {:<10} {}", node.link, numbers(&node.position.to_array()))?;
-        let carriers = contact.nodes.iter().zip(&contact.weights).map(|(node, weight)| format!("{node} ({weight:.3})"));
-        let carriers = carriers.collect::<Vec<_>>().join(" ");
+        let shown = contact.nodes.iter().zip(&contact.weights).filter(|(_, weight)| weight.abs() >= LEAST_WEIGHT);
+        let carriers = shown.map(|(node, weight)| format!("{node} ({weight:.3})")).collect::<Vec<_>>().join(" ");
         writeln!(text, "      force {} on {carriers}", numbers(&contact.force.to_array()))?;
         let columns: Vec<_> = node.jacobian.iter().map(|column| numbers(&column.to_array())).collect();
         writeln!(text, "      J     {}", columns.join("  "))?;
@@ -177,7 +177,12 @@ fn efforts(values: &[f64], chain: &Chain) -> String {
     values.iter().zip(&chain.joints).map(one).collect::<Vec<_>>().join(", ")
 }
 
+/// Least weight that is printed: smaller ones would read zero [1].
+const LEAST_WEIGHT: f64 = 5e-4;
+
 fn numbers(values: &[f64]) -> String {
-    let values: Vec<_> = values.iter().map(|value| format!("{value:.5}")).collect();
+    // Zero has no sign.
+    let rounded = |value: &f64| (value * 1e5).round() / 1e5 + 0.0;
+    let values: Vec<_> = values.iter().map(|value| format!("{:.5}", rounded(value))).collect();
     format!("[{}]", values.join(", "))
 }

@@ -16,8 +16,8 @@ use crate::{JointVector, contact, scene::JointKind};
 /// Invocations of a workgroup of the stages with one invocation a node or configuration; the shaders' default.
 const WORKGROUP: u32 = 64;
 
-/// Most invocations of a workgroup of the gaps to the contact surface: as many as GPUs run in step, since more would only wait for the
-/// slowest.
+/// Most invocations of a workgroup of the gaps to the contact surface: as many as GPUs run in step, since more would
+/// only wait for the slowest.
 const IN_STEP: u32 = 32;
 
 /// A kernel and what it is bound to.

@@ -1,4 +1,5 @@
-//! Facets of the contact surface on the device, in either precision, function by function, against their twins on the CPU.
+//! Facets of the contact surface on the device, in either precision, function by function, against their twins on the
+//! CPU.
 
 use super::{
     adapter::AdapterChoice,

@@ -265,7 +265,8 @@ fn depth_and_its_derivatives_are_the_twins() {
             };
             let doubled = area_vector(corners);
             let distance = point_at(corners, point.weights).length();
-            // Where a feature's border is near, rounding chooses the side; slivers and near hits have steep derivatives.
+            // Where a feature's border is near, rounding chooses the side; slivers and near hits have steep
+            // derivatives.
             if number != answer.feature || doubled.length() < 1e-5 || distance < 1e-3 {
                 continue;
             }
@@ -273,7 +274,8 @@ fn depth_and_its_derivatives_are_the_twins() {
             let measured @ (normal, depth, _) =
                 measure(DVec3::ZERO, 0.0, &Facet::flat(corners), &point, unit_or_zero(doubled));
             assert!((depth - answer.depth).abs() < 4.0 * distance_rounding(precision));
-            // Directions: rounding over the shortest length that is divided by, 16 of 0.02 m over 1 mm, with its square.
+            // Directions: rounding over the shortest length that is divided by, 16 of 0.02 m over 1 mm, with its
+            // square.
             let steep = 1600.0 * unit_rounding(precision);
             assert!(normal.distance(answer.normal) < steep, "{normal} {}", answer.normal);
             let carriers = Carriers::new((&[0, 1, 2], None), &point);

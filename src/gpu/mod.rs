@@ -20,8 +20,8 @@
 //! | `kernel` | one compute pipeline with its bindings and dispatches; buffers, poison, read-back |
 //! | `timing` | how long each kernel takes, where that is asked for |
 //!
-//! A shader in `shaders/` and its CPU twin share names and order of statements. Where the device has f64, contact or not
-//! is decided in it, and equilibria are found in it from the rest state to the result, in the steps of the CPU.
+//! A shader in `shaders/` and its CPU twin share names and order of statements. Where the device has f64, contact or
+//! not is decided in it, and equilibria are found in it from the rest state to the result, in the steps of the CPU.
 //! Elsewhere the same shaders compute in f32, with coordinates relative to the object's centre, and the host settles
 //! what they find in f64.
 

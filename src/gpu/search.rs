@@ -124,7 +124,8 @@ impl Search {
         if self.model.algorithm == Algorithm::Paper { 9 } else { 6 }
     }
 
-    /// Bytes of the records, the amounts, and the words and numbers of `touches` touches, of `count` configurations [B].
+    /// Bytes of the records, the amounts, and the words and numbers of `touches` touches, of `count` configurations
+    /// [B].
     fn result_bytes(&self, count: usize, touches: usize) -> [u64; 4] {
         let number = self.model.precision.size();
         let amounts = number * self.amounts_each() * count;

@@ -1,4 +1,5 @@
-//! Object, proxy and contact law on the device, as the search for equilibria wants them, and the size of its workspaces.
+//! Object, proxy and contact law on the device, as the search for equilibria wants them, and the size of its
+//! workspaces.
 
 use super::{
     context::{Context, GpuError},
@@ -18,7 +19,8 @@ use glam::DVec3;
 /// Most rows of a configuration: contacts, and proxy nodes that have touched. What exceeds them is left to the CPU.
 pub(super) const CONTACTS: usize = 64;
 
-/// Most object nodes that carry contact force in a configuration: three for each row, which neighbouring contacts share.
+/// Most object nodes that carry contact force in a configuration: three for each row, which neighbouring contacts
+/// share.
 const SUPPORT: usize = 3 * CONTACTS;
 
 /// No place, behind the last node of a facet.

@@ -1,7 +1,8 @@
 //! The shaders of `shaders/`, embedded, and how a stage is put together from parts.
 //!
 //! WGSL has no include: a stage is the generated constants, with the type of its numbers, then shared structs and
-//! functions, then the stage's own file. Constants that both sides need have one source, here in Rust; sizes and switches are override constants.
+//! functions, then the stage's own file. Constants that both sides need have one source, here in Rust; sizes and
+//! switches are override constants.
 
 use super::precision::Precision;
 use crate::{

@@ -21,9 +21,10 @@ use crate::{
 };
 use glam::DVec3;
 
-/// The equilibrium at `q`, where the gap at rest is `gap`, that the kernels `found` in `precision` for the configuration
-/// in this place, whose touches begin there; `None` when they wrote nothing: records are zero before, which is the
-/// status of free configurations. What they gave up for want of room, or what is not finite, has overflown.
+/// The equilibrium at `q`, where the gap at rest is `gap`, that the kernels `found` in `precision` for the
+/// configuration in this place, whose touches begin there; `None` when they wrote nothing: records are zero before,
+/// which is the status of free configurations. What they gave up for want of room, or what is not finite, has
+/// overflown.
 pub(super) fn unpack(
     model: &contact::Model<'_>,
     solver: &mut contact::Solver<'_>,

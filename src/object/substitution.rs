@@ -11,8 +11,8 @@
 //! added up in their order, so that the result is the same for any number of threads (Liu, The role of elimination
 //! trees in sparse factorization, 1990).
 //!
-//! Sharing out is what it is for. On one thread it takes as long as faer's own solve, 24.5 ms and 24.8 with the factor of
-//! 100,000 nodes; on two it takes 14.4 ms, where a frame may last 16.7 (`cargo bench --bench frame`).
+//! Sharing out is what it is for. On one thread it takes as long as faer's own solve, 24.5 ms and 24.8 with the factor
+//! of 100,000 nodes; on two it takes 14.4 ms, where a frame may last 16.7 (`cargo bench --bench frame`).
 
 use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
 use rayon::prelude::*;

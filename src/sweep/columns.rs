@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! u64 first point, u64 points p, u64 contacts c of the object's nodes, u64 touches t of the proxy's
-//! f64 torque[p][d], f64 energy[p], u64 end[p] of each point's contacts among those of the block, u64 the same of touches or none,
-//! f32 tangent[p][d (d + 1) / 2] or none, f32 gap[p], f32 residual[p], u32 iterations[p], u32 node[c], f32 force[c][3],
-//! u32 node[t], f32 force[t][3], u8 status[p]
+//! f64 torque[p][d], f64 energy[p], u64 end[p] of each point's contacts among those of the block, u64 the same of
+//! touches or none, f32 tangent[p][d (d + 1) / 2] or none, f32 gap[p], f32 residual[p], u32 iterations[p], u32 node[c],
+//! f32 force[c][3], u32 node[t], f32 force[t][3], u8 status[p]
 //! ```
 
 use crate::JointMatrix;

@@ -116,8 +116,8 @@ impl Reference {
         Self { places: self.places.clone(), exact, ..*self }
     }
 
-    /// Mean of the squared distance of the torque that `answer` gives at each place from the exact one, and the standard
-    /// deviation of that mean over random places [N^2 m^2].
+    /// Mean of the squared distance of the torque that `answer` gives at each place from the exact one, and the
+    /// standard deviation of that mean over random places [N^2 m^2].
     pub fn mean_square(&self, answer: impl FnMut(&JointVector) -> JointVector) -> (f64, f64) {
         let squares = self.squares(answer);
         let count = squares.len().max(1) as f64;

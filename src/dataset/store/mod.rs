@@ -183,8 +183,8 @@ impl Store {
         self.blocks.get(self.space.key(level, block))
     }
 
-    /// All blocks that are there now, each with those on which it rests, whatever others publish meanwhile. Ascending by
-    /// key: those of the base first.
+    /// All blocks that are there now, each with those on which it rests, whatever others publish meanwhile. Ascending
+    /// by key: those of the base first.
     #[must_use]
     pub fn blocks(&self) -> Vec<(u64, &Block)> {
         let horizon = self.horizon();

@@ -34,7 +34,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 /// other configurations see a larger error more often.
 const CONFIDENCE: f64 = 1.0;
 
-/// Nodes that a round adds at least, over those that are there [1]. Larger: more nodes than needed. Smaller: more rounds.
+/// Nodes that a round adds at least, over those that are there [1]. Larger: more nodes than needed. Smaller: more
+/// rounds.
 const GROWTH: f64 = 0.05;
 
 /// Ratio of the squared errors of two levels [1]: kinks of the torque, which are left when smooth errors have fallen,

@@ -149,8 +149,8 @@ pub unsafe extern "C" fn hdGetDoublev(what: c_uint, values: *mut f64) {
     if !state.in_frame {
         state.errors.push(0x0402);
     }
-    // A millisecond of a hand of 3e-3 kg m^2 that holds the joints by 20 N m/rad; or of as heavy an arm before a wall of
-    // 1 N m/rad at 0.3 rad.
+    // A millisecond of a hand of 3e-3 kg m^2 that holds the joints by 20 N m/rad; or of as heavy an arm before a wall
+    // of 1 N m/rad at 0.3 rad.
     for a in 0..3 {
         let rest = [0.1, 0.2, 0.3][a];
         let wall = if a == 1 { (state.angles[a] - 0.3).max(0.0) } else { 0.0 };
