@@ -46,7 +46,8 @@ class Arm:
     def __init__(self, text):
         self.joints = tomllib.loads(text)["proxy"]["joint"]
         # Beside its name stand the links that a joint moves.
-        links = [line.split("# moves ")[1].split(", ") for line in text.splitlines() if line.startswith("name = ") and "# moves " in line]
+        named = [line for line in text.splitlines() if line.startswith("name = ") and "# moves " in line]
+        links = [line.split("# moves ")[1].split(", ") for line in named]
         for joint, moved in zip(self.joints, links, strict=True):
             joint["axis"] = np.array(joint["axis"]) / np.linalg.norm(joint["axis"])
             joint["links"] = moved

@@ -460,6 +460,22 @@ impl Store {
         gathered
     }
 
+    /// The numbers that `level` adds at the corners of its cell with first corner `low`, corner by corner, zeros where
+    /// there is no node; `None` where there is no block.
+    #[must_use]
+    pub fn added(&self, level: u32, low: &Place) -> Option<Vec<Vec<f64>>> {
+        let mut found = false;
+        let corners = (0..1_usize << self.space.joints()).map(|side| {
+            let node = beyond(low, side);
+            let block = self.get(level, &self.space.block_of(&node));
+            found |= block.is_some();
+            let surplus = block.and_then(|block| block.surplus_at(self.space.place_of(&node), self.kinds()));
+            surplus.map_or(vec![0.0; self.kinds()], |surplus| surplus.iter().map(|&number| number.into()).collect())
+        });
+        let corners = corners.collect();
+        found.then_some(corners)
+    }
+
     /// Memory of all blocks [bytes].
     #[must_use]
     pub fn bytes(&self) -> usize {
