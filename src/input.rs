@@ -21,7 +21,7 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
         file.by_ref().take(POINTER.len() as u64).read_to_end(&mut head)?;
         file.rewind()?;
         let what = "this is a pointer of Git LFS, not the file itself: run `git lfs pull` in its repository";
-        return if head == POINTER { Err(io::Error::new(io::ErrorKind::InvalidData, what)) } else { Ok(file) };
+        return if head == POINTER { Err(io::Error::new(io::ErrorKind::InvalidInput, what)) } else { Ok(file) };
     }
     let what = if found.is_dir() {
         "this is a folder: give a file in it"

@@ -16,9 +16,10 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Most numbers of cells, 4^d each, from which the stiffness is bounded [1]: some seconds of a processor. That is a
-/// million cells of the base for three joints, and 16 thousand for six.
-const MOST_NUMBERS: usize = 1 << 26;
+/// Most numbers of cells, 4^d each, from which the stiffness is bounded [1]: those of 131 thousand cells for three
+/// joints, of two thousand for six. More: the bound holds for more of a large store. Fewer: a session begins sooner,
+/// which waits for some tenths of a second.
+const MOST_NUMBERS: usize = 1 << 23;
 
 /// The field at `q`, of the first `horizon` blocks, and the levels whose cell around `q` is whole.
 pub(super) fn sample(lattice: &Lattice, store: &Store, q: &[f64], horizon: u64) -> (Sample, u32) {
@@ -43,11 +44,12 @@ pub(super) fn sample(lattice: &Lattice, store: &Store, q: &[f64], horizon: u64) 
     (sample, root.whole)
 }
 
-/// Upper bound of the Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), over the cells around nodes in
-/// contact; over [`MOST_NUMBERS`] evenly chosen ones of the base where there are more.
+/// Upper bound of the Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), over the cells of a store of
+/// [`MOST_NUMBERS`] at most; of a larger one over evenly chosen cells of the base.
 pub(super) fn relative_stiffness(store: &Store, slopes: &JointVector) -> f64 {
     let (space, joints) = (store.space(), slopes.len());
     let blocks = store.blocks();
+    let count: usize = blocks.iter().map(|(_, block)| block.nodes().count()).sum();
     let base = blocks.iter().filter_map(|(key, block)| Some((space.block(*key)?, block.nodes().present)));
     let nodes = base.filter(|((level, _), _)| *level == 0).flat_map(|((_, place), present)| {
         space.nodes(0, &place).filter(move |(at, _)| present >> at & 1 == 1).map(|(_, node)| node)
@@ -63,9 +65,10 @@ pub(super) fn relative_stiffness(store: &Store, slopes: &JointVector) -> f64 {
         };
         (0..1_usize << joints).filter_map(cell)
     };
-    let around: Vec<Place> = nodes.collect();
-    let every = (around.len() << joints).div_ceil(MOST_NUMBERS >> (2 * joints)).max(1);
-    let mut cells: Vec<Place> = around.into_iter().flat_map(below).step_by(every).collect();
+    // There are about as many cells as nodes, and 2^d of the base at each node of the base.
+    let share = count.div_ceil(MOST_NUMBERS >> (2 * joints));
+    let every = if share > 1 { share << joints } else { 1 };
+    let mut cells: Vec<Place> = nodes.flat_map(below).step_by(every).collect();
     cells.sort_unstable();
     cells.dedup();
     let norm =
@@ -100,16 +103,16 @@ fn steepest(store: &Store, slopes: &JointVector, cell: (u32, Place), whole: &[Be
     if finer < space.levels() {
         added = (0..1_usize << joints).map(|side| store.added(finer, &child(side))).collect();
     }
-    if added.iter().all(Option::is_none) {
-        return norm(store, slopes, level, whole);
-    }
-    let half = |(side, added): (usize, Option<Vec<Vec<f64>>>)| {
+    // Levels below bound what no finer one changes, and with that the parts where one does.
+    let coarse = added.is_empty() || added.iter().any(Option::is_none);
+    let below = if coarse { norm(store, slopes, level, whole) } else { 0.0 };
+    let refined = added.into_iter().enumerate().filter_map(|(side, added)| Some((side, added?)));
+    let steepest_of = |(side, added): (usize, Vec<Vec<f64>>)| {
         let mut part: Vec<Bernstein> = whole.iter().map(|whole| whole.half(side)).collect();
-        let Some(added) = added else { return norm(store, slopes, finer, &part) };
         part.iter_mut().zip(parts(store, added)).for_each(|(sum, more)| sum.add(&more));
         steepest(store, slopes, (finer, child(side)), &part)
     };
-    added.into_iter().enumerate().map(half).fold(0.0, f64::max)
+    refined.map(steepest_of).fold(below, f64::max)
 }
 
 /// Square of a bound of the norm over one cell of `level`: `d tau_a/d q_b = -(w_b s_a + w ds_a/dq_b)` with the slopes

@@ -464,16 +464,15 @@ impl Store {
     /// there is no node; `None` where there is no block.
     #[must_use]
     pub fn added(&self, level: u32, low: &Place) -> Option<Vec<Vec<f64>>> {
-        let mut found = false;
-        let corners = (0..1_usize << self.space.joints()).map(|side| {
-            let node = beyond(low, side);
-            let block = self.get(level, &self.space.block_of(&node));
-            found |= block.is_some();
-            let surplus = block.and_then(|block| block.surplus_at(self.space.place_of(&node), self.kinds()));
-            surplus.map_or(vec![0.0; self.kinds()], |surplus| surplus.iter().map(|&number| number.into()).collect())
-        });
-        let corners = corners.collect();
-        found.then_some(corners)
+        let nodes = || (0..1_usize << self.space.joints()).map(|side| beyond(low, side));
+        let block = |node: &Place| self.get(level, &self.space.block_of(node));
+        nodes().any(|node| block(&node).is_some()).then(|| {
+            let numbers = |node: Place| {
+                let surplus = block(&node)?.surplus_at(self.space.place_of(&node), self.kinds())?;
+                Some(surplus.iter().map(|&number| number.into()).collect())
+            };
+            nodes().map(|node| numbers(node).unwrap_or_else(|| vec![0.0; self.kinds()])).collect()
+        })
     }
 
     /// Memory of all blocks [bytes].
