@@ -1,6 +1,13 @@
 //! Files that are read.
 
-use std::{fs::File, io, path::Path};
+use std::{
+    fs::File,
+    io::{self, Read, Seek},
+    path::Path,
+};
+
+/// How the text begins that Git LFS leaves in the place of a file that it has not fetched.
+const POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
 
 /// Opens the file at `path`. A folder holds no bytes, a pipe would be waited for, and a device may have no end.
 ///
@@ -9,7 +16,12 @@ use std::{fs::File, io, path::Path};
 pub(crate) fn open(path: &Path) -> io::Result<File> {
     let found = std::fs::metadata(path)?;
     if found.is_file() {
-        return File::open(path);
+        let mut file = File::open(path)?;
+        let mut head = Vec::new();
+        file.by_ref().take(POINTER.len() as u64).read_to_end(&mut head)?;
+        file.rewind()?;
+        let what = "this is a pointer of Git LFS, not the file itself: run `git lfs pull` in its repository";
+        return if head == POINTER { Err(io::Error::new(io::ErrorKind::InvalidInput, what)) } else { Ok(file) };
     }
     let what = if found.is_dir() {
         "this is a folder: give a file in it"

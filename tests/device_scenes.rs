@@ -109,6 +109,7 @@ fn feels(name: &str, most: f64) {
     let (dataset, report) = bake.in_memory().unwrap();
     assert_eq!((report.unconverged, report.overflowed), (0, 0), "{name}: {report:?}");
     let setup = Setup::new(&dataset).unwrap();
+    assert!(setup.exceeded.is_empty(), "{name}: {:?}", setup.exceeded);
     for motion in [&setup.scene.motion.press, &setup.scene.motion.scrape] {
         let motion = Motion::through(motion, setup.chain.joints.len()).unwrap();
         // Without frames of the object, which the torque does not depend on.

@@ -183,7 +183,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => return usage(&error),
     };
     memory::tell_shortage(line.json);
-    let begun = interrupt::listen(line.json, has(&matches, "resume")).and_then(|()| start_threads());
+    // What refines a grid keeps nothing before its end.
+    let refines = matches.subcommand().is_some_and(|(_, given)| given.try_contains_id("refine").unwrap_or(false));
+    let resumes = has(&matches, "resume") && !refines;
+    let begun = interrupt::listen(line.json, resumes).and_then(|()| start_threads());
     let report = begun.and_then(|()| line.command.as_ref().map_or_else(demo::run, Command::run));
     match report.and_then(|report| print(&report, line.json).map(|()| report.whole)) {
         Ok(true) => 0,

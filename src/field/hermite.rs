@@ -10,18 +10,11 @@
 //! value, one gradient entry an axis joins the contraction where its axis is the one contracted: about 4^d sums of four
 //! products in all. Nothing allocates, nothing branches.
 
-use super::stencil::{Lattice, Stencil};
-use crate::{JointVector, MAX_JOINTS, proxy::JointMatrix};
-
-/// Bounds over one cell.
-pub(super) struct CellBounds {
-    /// The function is nowhere greater.
-    pub greatest: f64,
-    /// The size of the derivative along each axis is nowhere greater.
-    pub first: JointVector,
-    /// Nor that of the second derivatives along each pair of axes.
-    pub second: JointMatrix,
-}
+use super::{
+    bernstein::{Bernstein, Bounds, place},
+    stencil::{Lattice, Stencil},
+};
+use crate::JointVector;
 
 /// An interpolated function.
 pub(super) struct Hermite {
@@ -89,59 +82,29 @@ impl Hermite {
     }
 
     /// Bounds on the function and its derivatives over the cell whose first corner is `point`, `None` where no cell
-    /// begins there. `work` is resized and overwritten.
-    ///
-    /// In Bernstein form a polynomial lies between its least and greatest coefficient, and the coefficients of its
-    /// derivatives are differences of its own (Farin 2002, Curves and Surfaces for CAGD, sections 5.3 and 6.3).
-    pub fn bounds(&self, lattice: &Lattice, point: usize, work: &mut Vec<f64>) -> Option<CellBounds> {
+    /// begins there.
+    pub fn bounds(&self, lattice: &Lattice, point: usize) -> Option<Bounds> {
         let joints = self.joints;
         // An axis of one point has no extent: the cell is flat there.
         let mut corners = vec![point];
-        for (count, _, stride) in lattice.lines() {
+        let mut per_step = self.per_step;
+        for ((count, _, stride), per_step) in lattice.lines().zip(per_step.iter_mut()) {
             if count > 1 && Lattice::position(point, count, stride) + 1 == count {
                 return None;
+            }
+            if count == 1 {
+                *per_step = 0.0;
             }
             let far: Vec<usize> = corners.iter().map(|corner| corner + if count > 1 { stride } else { 0 }).collect();
             corners.extend(far);
         }
-        work.clear();
-        work.resize(1 << (2 * joints), 0.0);
+        let mut numbers = vec![0.0; 1 << (2 * joints)];
         for (side, corner) in corners.iter().enumerate() {
             for set in 0..1 << joints {
-                let digit = |a: usize| (2 * (side >> a & 1) + (set >> a & 1)) << (2 * a);
-                work[(0..joints).map(digit).sum::<usize>()] = self.derivatives[(corner << joints) + set];
+                numbers[place(joints, side, set)] = self.derivatives[(corner << joints) + set];
             }
         }
-        for axis in 0..joints {
-            let stride = 1 << (2 * axis);
-            for block in work.chunks_exact_mut(4 * stride) {
-                for k in 0..stride {
-                    let [f, g, far, h] = [0, 1, 2, 3].map(|digit| block[k + digit * stride]);
-                    [f, f + g / 3.0, far - h / 3.0, far]
-                        .into_iter()
-                        .enumerate()
-                        .for_each(|(digit, coefficient)| block[k + digit * stride] = coefficient);
-                }
-            }
-        }
-        let flat = |axis: usize| lattice.lines().nth(axis).is_none_or(|(count, ..)| count == 1);
-        let mut bounds = CellBounds {
-            greatest: work.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            first: JointVector::zeros(joints),
-            second: [[0.0; MAX_JOINTS]; MAX_JOINTS],
-        };
-        for a in (0..joints).filter(|&a| !flat(a)) {
-            let along = differences(work, a);
-            let rate = 3.0 * self.per_step[a];
-            bounds.first[a] = rate * along.iter().fold(0.0, |most, x| f64::max(most, x.abs()));
-            let twice = |b: usize| differences(&along, b).iter().fold(0.0, |most, x| f64::max(most, x.abs()));
-            bounds.second[a][a] = 2.0 * self.per_step[a] * rate * twice(a);
-            for b in (0..a).filter(|&b| !flat(b)) {
-                let both = rate * 3.0 * self.per_step[b] * twice(b);
-                (bounds.second[a][b], bounds.second[b][a]) = (both, both);
-            }
-        }
-        Some(bounds)
+        Some(Bernstein::hermite(joints, numbers).bounds(&per_step))
     }
 
     /// The function and its gradient in the cell of `stencil`. `N = 4^(D-1)`.
@@ -177,19 +140,6 @@ impl Hermite {
         }
         (value[0], gradient)
     }
-}
-
-/// Differences of neighbouring coefficients along `axis`, in an array of the same shape; those of the last along any
-/// axis, which has no neighbour, are not a number and count for nothing.
-fn differences(coefficients: &[f64], axis: usize) -> Vec<f64> {
-    let stride = 1 << (2 * axis);
-    let mut result = vec![f64::NAN; coefficients.len()];
-    for (to, from) in result.chunks_exact_mut(4 * stride).zip(coefficients.chunks_exact(4 * stride)) {
-        for ((to, near), far) in to.iter_mut().zip(from).zip(&from[stride..]) {
-            *to = far - near;
-        }
-    }
-    result
 }
 
 /// Weights of f_0, g_0 h, f_1, g_1 h at fraction `x` of a cell, and their derivatives by x.

@@ -125,16 +125,17 @@ impl Potential {
     /// Upper bound of the Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), over all cells:
     /// `d^2 U / dq_a dq_b = w_a w_b + w w_ab` where w is positive, each factor by its bound over the cell.
     pub fn relative_stiffness(&self, lattice: &Lattice, slopes: &JointVector) -> f64 {
-        let norm = |work: &mut Vec<f64>, point: usize| {
-            let Some(w) = self.root.bounds(lattice, point, work).filter(|w| w.greatest > 0.0) else { return 0.0 };
-            let mut sum = 0.0;
-            for a in 0..slopes.len() {
-                for b in 0..slopes.len() {
-                    sum += (w.first[a] * w.first[b] + w.greatest * w.second[a][b]).powi(2) / (slopes[a] * slopes[b]);
-                }
-            }
-            sum
+        let norm = |point: usize| {
+            let Some(w) = self.root.bounds(lattice, point).filter(|w| w.greatest > 0.0) else { return 0.0 };
+            let entry = |a: usize, b: usize| w.first[a] * w.first[b] + w.greatest * w.second[a][b];
+            square(slopes, entry)
         };
-        (0..lattice.points()).into_par_iter().map_init(Vec::new, norm).reduce(|| 0.0, f64::max).sqrt()
+        (0..lattice.points()).into_par_iter().map(norm).reduce(|| 0.0, f64::max).sqrt()
     }
+}
+
+/// Square of the Frobenius norm of `S^-1/2 E S^-1/2`, E of the entries `entry(a, b)`, S = diag(slopes).
+pub(super) fn square(slopes: &JointVector, entry: impl Fn(usize, usize) -> f64) -> f64 {
+    let pairs = (0..slopes.len()).flat_map(|a| (0..slopes.len()).map(move |b| (a, b)));
+    pairs.map(|(a, b)| entry(a, b).powi(2) / (slopes[a] * slopes[b])).sum()
 }

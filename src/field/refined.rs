@@ -4,11 +4,22 @@
 //! are. There is no boundary layer: the torque begins at w = 0 without a jump. A store does not say what it does not
 //! keep: how many nodes of the object touch.
 
-use super::{Flags, Sample, stencil::Lattice};
-use crate::{JointVector, store::Store, tolerances::GRADIENT_STEP};
+use super::{
+    Flags, Sample,
+    bernstein::{Bernstein, Bounds, place},
+    potential::square,
+    stencil::Lattice,
+};
+use crate::{
+    JointVector, MAX_JOINTS,
+    store::{Order, Place, Store, record::sets},
+};
+use rayon::prelude::*;
 
-/// Most nodes at which the stiffness is taken [1]. More: nearer to the greatest there is. Fewer: quicker.
-const MOST_NODES: usize = 4096;
+/// Most numbers of cells, 4^d each, from which the stiffness is bounded [1]: those of 131 thousand cells for three
+/// joints, of two thousand for six. More: the bound holds for more of a large store. Fewer: a session begins sooner,
+/// which waits for some tenths of a second.
+const MOST_NUMBERS: usize = 1 << 23;
 
 /// The field at `q`, of the first `horizon` blocks, and the levels whose cell around `q` is whole.
 pub(super) fn sample(lattice: &Lattice, store: &Store, q: &[f64], horizon: u64) -> (Sample, u32) {
@@ -33,35 +44,91 @@ pub(super) fn sample(lattice: &Lattice, store: &Store, q: &[f64], horizon: u64) 
     (sample, root.whole)
 }
 
-/// Greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), over nodes in contact, evenly chosen where
-/// there are many. By differences of the torque over small steps: between nodes it may be greater.
+/// Upper bound of the Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), over the cells of a store of
+/// [`MOST_NUMBERS`] at most; of a larger one over evenly chosen cells of the base.
 pub(super) fn relative_stiffness(store: &Store, slopes: &JointVector) -> f64 {
-    let space = store.space();
-    let finest = space.levels() - 1;
+    let (space, joints) = (store.space(), slopes.len());
     let blocks = store.blocks();
-    let nodes = blocks.iter().filter_map(|(key, block)| Some((space.block(*key)?, block.nodes())));
-    let places = nodes.flat_map(|((level, place), nodes)| {
-        let present = nodes.present;
-        let there = space.nodes(level, &place).filter(move |(at, _)| present >> at & 1 == 1);
-        there.map(move |(_, node)| space.configuration(level, &node))
+    let count: usize = blocks.iter().map(|(_, block)| block.nodes().count()).sum();
+    let base = blocks.iter().filter_map(|(key, block)| Some((space.block(*key)?, block.nodes().present)));
+    let nodes = base.filter(|((level, _), _)| *level == 0).flat_map(|((_, place), present)| {
+        space.nodes(0, &place).filter(move |(at, _)| present >> at & 1 == 1).map(|(_, node)| node)
     });
-    let touching: Vec<JointVector> = places.filter(|q| store.sample(q).value > 0.0).collect();
-    let every = touching.len().div_ceil(MOST_NODES).max(1);
-    let norm = |q: &JointVector| {
-        let mut sum = 0.0;
-        for b in 0..q.len() {
-            let step = GRADIENT_STEP * space.step(finest, b);
-            let torque = |side: f64| {
-                let mut at = *q;
-                at[b] += side * step;
-                store.sample(&at).torque()
-            };
-            let (before, after) = (torque(-1.0), torque(1.0));
-            for a in 0..q.len() {
-                sum += ((after[a] - before[a]) / (2.0 * step)).powi(2) / (slopes[a] * slopes[b]);
+    let last = space.last(0);
+    let below = |node: Place| {
+        let cell = move |side: usize| {
+            let mut low = node;
+            for (a, low) in low.iter_mut().enumerate().take(joints) {
+                *low = low.checked_sub((side >> a & 1) as u32)?;
             }
-        }
-        sum
+            (0..joints).all(|a| low[a] < last[a]).then_some(low)
+        };
+        (0..1_usize << joints).filter_map(cell)
     };
-    touching.iter().step_by(every).map(norm).fold(0.0, f64::max).sqrt()
+    // There are about as many cells as nodes, and 2^d of the base at each node of the base.
+    let share = count.div_ceil(MOST_NUMBERS >> (2 * joints));
+    let every = if share > 1 { share << joints } else { 1 };
+    let mut cells: Vec<Place> = nodes.flat_map(below).step_by(every).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    let norm =
+        |low: Place| store.added(0, &low).map_or(0.0, |added| steepest(store, slopes, (0, low), &parts(store, added)));
+    cells.into_par_iter().map(norm).reduce(|| 0.0, f64::max).sqrt()
+}
+
+/// What interpolates in a cell: w, and for linear stores each slope by itself.
+fn parts(store: &Store, added: Vec<Vec<f64>>) -> Vec<Bernstein> {
+    let joints = store.space().joints();
+    if store.order() == Order::Linear {
+        let of = |kind: usize| added.iter().map(|corner| corner[kind]).collect();
+        return (0..=joints).map(|kind| Bernstein::multilinear(joints, of(kind))).collect();
+    }
+    let mut numbers = vec![0.0; 1 << (2 * joints)];
+    for (side, corner) in added.iter().enumerate() {
+        for (set, number) in sets(joints).zip(corner) {
+            numbers[place(joints, side, set)] = *number;
+        }
+    }
+    vec![Bernstein::hermite(joints, numbers)]
+}
+
+/// Square of the greatest norm over the `cell`, a level and its first corner, in which the levels up to this one sum up
+/// to `whole`: where a finer level adds something, with it.
+fn steepest(store: &Store, slopes: &JointVector, cell: (u32, Place), whole: &[Bernstein]) -> f64 {
+    let (space, joints) = (store.space(), slopes.len());
+    let (level, low) = cell;
+    let finer = level + 1;
+    let child = |side: usize| std::array::from_fn::<_, MAX_JOINTS, _>(|a| 2 * low[a] + (side >> a & 1) as u32);
+    let mut added = Vec::new();
+    if finer < space.levels() {
+        added = (0..1_usize << joints).map(|side| store.added(finer, &child(side))).collect();
+    }
+    // Levels below bound what no finer one changes, and with that the parts where one does.
+    let coarse = added.is_empty() || added.iter().any(Option::is_none);
+    let below = if coarse { norm(store, slopes, level, whole) } else { 0.0 };
+    let refined = added.into_iter().enumerate().filter_map(|(side, added)| Some((side, added?)));
+    let steepest_of = |(side, added): (usize, Vec<Vec<f64>>)| {
+        let mut part: Vec<Bernstein> = whole.iter().map(|whole| whole.half(side)).collect();
+        part.iter_mut().zip(parts(store, added)).for_each(|(sum, more)| sum.add(&more));
+        steepest(store, slopes, (finer, child(side)), &part)
+    };
+    refined.map(steepest_of).fold(below, f64::max)
+}
+
+/// Square of a bound of the norm over one cell of `level`: `d tau_a/d q_b = -(w_b s_a + w ds_a/dq_b)` with the slopes
+/// s, those of w or a linear store's own, which it keeps by steps of the base.
+fn norm(store: &Store, slopes: &JointVector, level: u32, parts: &[Bernstein]) -> f64 {
+    let space = store.space();
+    let mut per_step = JointVector::zeros(slopes.len());
+    per_step.iter_mut().enumerate().for_each(|(a, per_step)| *per_step = 1.0 / space.step(level, a));
+    let Some((root, own)) = parts.split_first() else { return 0.0 };
+    let w = root.bounds(&per_step);
+    if w.greatest <= 0.0 {
+        return 0.0;
+    }
+    if own.is_empty() {
+        return square(slopes, |a, b| w.first[a] * w.first[b] + w.greatest * w.second[a][b]);
+    }
+    let own: Vec<Bounds> = own.iter().map(|slope| slope.bounds(&per_step)).collect();
+    square(slopes, |a, b| (own[a].size * w.first[b] + w.greatest * own[a].first[b]) / space.step(0, a))
 }

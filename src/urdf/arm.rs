@@ -323,6 +323,9 @@ impl Builder<'_> {
             if link.is_visual && !link.shapes.is_empty() {
                 self.note(&link.span, format!("link {:?} has no <collision>: its <visual> shapes are used", link.name));
             }
+            for span in &link.empty {
+                self.note(span, format!("link {:?} has a shape of no size: it is left out", link.name));
+            }
             if link.inertial.is_none() && !link.shapes.is_empty() && group.inertial().mass > 0.0 {
                 self.note(&link.span, format!("link {:?} has no <inertial>: it counts as massless", link.name));
             }

@@ -20,6 +20,8 @@ pub struct Link {
     pub shapes: Vec<Placed>,
     /// Whether `shapes` are visual ones.
     pub is_visual: bool,
+    /// Places in the file of shapes of no size, which are left out [B].
+    pub empty: Vec<Range<usize>>,
 }
 
 /// Mass and inertia of a link.
@@ -69,18 +71,23 @@ pub enum Geometry {
 
 /// Reads a `<link>`.
 pub(super) fn read(source: &Source<'_>, node: Node<'_, '_>) -> Result<Link, UrdfError> {
-    let shapes = |kind: &str| -> Result<Vec<Placed>, UrdfError> {
-        let elements = node.children().filter(|child| child.is_element() && child.tag_name().name() == kind);
-        elements.map(|element| shape(source, element)).collect()
-    };
-    let collision = shapes("collision")?;
+    let of_kind = |kind: &str| node.children().filter(|child| child.tag_name().name() == kind).collect::<Vec<_>>();
+    let collision = of_kind("collision");
     let is_visual = collision.is_empty();
+    let (mut shapes, mut empty) = (Vec::new(), Vec::new());
+    for element in if is_visual { of_kind("visual") } else { collision } {
+        match shape(source, element)? {
+            Some(shape) => shapes.push(shape),
+            None => empty.push(element.range()),
+        }
+    }
     Ok(Link {
         name: source.required(node, "name")?.to_owned(),
         span: node.range(),
         inertial: child(node, "inertial").map(|element| inertial(source, element)).transpose()?,
-        shapes: if is_visual { shapes("visual")? } else { collision },
+        shapes,
         is_visual,
+        empty,
     })
 }
 
@@ -117,10 +124,22 @@ fn inertial(source: &Source<'_>, node: Node<'_, '_>) -> Result<Inertial, UrdfErr
     Ok(Inertial { mass: value, centre: place.translation, inertia })
 }
 
-fn shape(source: &Source<'_>, node: Node<'_, '_>) -> Result<Placed, UrdfError> {
+/// Reads a shape; `None` where it has no size.
+fn shape(source: &Source<'_>, node: Node<'_, '_>) -> Result<Option<Placed>, UrdfError> {
     let missing = |what: &str| source.error(node.range(), format!("<{}> needs {what}", node.tag_name().name()));
     let geometry = child(node, "geometry").ok_or_else(|| missing("<geometry>"))?;
     let form = geometry.children().find(Node::is_element).ok_or_else(|| missing("a shape in its <geometry>"))?;
+    let sizes: &[&str] = match form.tag_name().name() {
+        "box" => &["size"],
+        "cylinder" => &["radius", "length"],
+        "sphere" => &["radius"],
+        _ => &[],
+    };
+    let is_zero =
+        |name: &&str| form.attribute(*name).is_some_and(|text| text.split_whitespace().all(|x| x.parse() == Ok(0.0)));
+    if !sizes.is_empty() && sizes.iter().all(is_zero) {
+        return Ok(None);
+    }
     let geometry = match form.tag_name().name() {
         "box" => {
             source.required(form, "size")?;
@@ -146,5 +165,5 @@ fn shape(source: &Source<'_>, node: Node<'_, '_>) -> Result<Placed, UrdfError> {
             return Err(source.error(form.range(), message));
         }
     };
-    Ok(Placed { place: origin(source, node)?, geometry, span: form.range() })
+    Ok(Some(Placed { place: origin(source, node)?, geometry, span: form.range() }))
 }

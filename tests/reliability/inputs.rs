@@ -9,6 +9,9 @@ use std::{
     time::{Duration, Instant},
 };
 
+/// What Git LFS leaves in the place of a file that it has not fetched.
+const POINTER: &str = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 749611\n";
+
 /// Runs the program, which must end by itself, with exit code 1, and say `expected` of `name`.
 fn refused(folder: &Path, arguments: &[&str], name: &str, expected: &str) {
     let mut child = command(folder, arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
@@ -63,9 +66,15 @@ fn what_is_no_file_is_refused_at_once_by_every_reader() {
     std::fs::write(home.join("columns.toml"), columns).unwrap();
     std::fs::write(home.join("log.csv"), "a,b\n0,0\n0.1,0.1\n0.2,0.2\n0.3,0.3\n").unwrap();
     std::fs::create_dir(home.join("folder")).unwrap();
+    std::fs::write(home.join("pointer"), POINTER).unwrap();
     assert!(Command::new("mkfifo").arg(home.join("pipe")).status().unwrap().success());
     for reader in READERS {
-        let kinds = [("pipe", "this is a pipe"), ("/dev/zero", "a device"), ("folder", "this is a folder")];
+        let kinds = [
+            ("pipe", "this is a pipe"),
+            ("/dev/zero", "a device"),
+            ("folder", "this is a folder"),
+            ("pointer", "git lfs pull"),
+        ];
         for (name, expected) in kinds {
             // Of a folder merge takes the shards in it.
             if !(reader[0] == "merge" && name == "folder") {
@@ -85,12 +94,19 @@ fn a_mesh_that_is_no_file_is_refused_at_once() {
     let home = folder.path();
     let springs = "springs = { kind = \"isotropic\", stiffness = 300.0 }";
     for extension in ["obj", "ply", "stl", "msh"] {
-        for (kind, expected) in [("pipe", "this is a pipe"), ("device", "a device"), ("folder", "this is a folder")] {
+        let kinds = [
+            ("pipe", "this is a pipe"),
+            ("device", "a device"),
+            ("folder", "this is a folder"),
+            ("pointer", "git lfs pull"),
+        ];
+        for (kind, expected) in kinds {
             let name = format!("{kind}.{extension}");
             let path = home.join(&name);
             match kind {
                 "pipe" => assert!(Command::new("mkfifo").arg(&path).status().unwrap().success()),
                 "device" => std::os::unix::fs::symlink("/dev/zero", &path).unwrap(),
+                "pointer" => std::fs::write(&path, POINTER).unwrap(),
                 _ => std::fs::create_dir(&path).unwrap(),
             }
             let key = if extension == "msh" { "tetrahedra" } else { "mesh" };

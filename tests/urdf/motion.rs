@@ -6,7 +6,7 @@ use haptize::{
     JointVector,
     proxy::{Chain, Pose},
     scene::{JointKind, Scene},
-    urdf::{Geometry, Note, sample, write_scene},
+    urdf::{Arm, Geometry, Note, sample, write_scene},
 };
 use std::f64::consts::FRAC_PI_2;
 
@@ -189,6 +189,21 @@ fn what_the_file_lacks_is_noted() {
     }
     assert_eq!(arm.base, ["world", "base"]);
     assert_eq!(JointVector::from_slice(&arm.joints[1].limits), JointVector::from_slice(&[-0.05, 0.1]));
+}
+
+#[test]
+fn shapes_of_no_size_are_noted_and_left_out() {
+    let text = std::fs::read_to_string(file("arm.urdf")).unwrap();
+    let whole = arm(&text, "probe", &[]).unwrap().1;
+    for empty in ["<box size=\"0 0 0\"/>", "<cylinder radius=\"0\" length=\"0.0\"/>", "<sphere radius=\"0\"/>"] {
+        let link = "<link name=\"probe\">";
+        let with = text.replace(link, &format!("{link}<collision><geometry>{empty}</geometry></collision>"));
+        let (_, arm) = arm(&with, "probe", &[]).unwrap();
+        let found: Vec<&Note> = arm.notes.iter().filter(|note| note.message.contains("no size")).collect();
+        assert!(found.len() == 1 && found[0].message.contains("\"probe\""), "{:?}", arm.notes);
+        let shapes = |arm: &Arm| arm.joints.iter().map(|joint| joint.shapes.len()).sum::<usize>();
+        assert_eq!(shapes(&arm), shapes(&whole));
+    }
 }
 
 /// One side of a parallelogram follows the other: in a chain through that side it is a joint like any other.

@@ -460,6 +460,21 @@ impl Store {
         gathered
     }
 
+    /// The numbers that `level` adds at the corners of its cell with first corner `low`, corner by corner, zeros where
+    /// there is no node; `None` where there is no block.
+    #[must_use]
+    pub fn added(&self, level: u32, low: &Place) -> Option<Vec<Vec<f64>>> {
+        let nodes = || (0..1_usize << self.space.joints()).map(|side| beyond(low, side));
+        let block = |node: &Place| self.get(level, &self.space.block_of(node));
+        nodes().any(|node| block(&node).is_some()).then(|| {
+            let numbers = |node: Place| {
+                let surplus = block(&node)?.surplus_at(self.space.place_of(&node), self.kinds())?;
+                Some(surplus.iter().map(|&number| number.into()).collect())
+            };
+            nodes().map(|node| numbers(node).unwrap_or_else(|| vec![0.0; self.kinds()])).collect()
+        })
+    }
+
     /// Memory of all blocks [bytes].
     #[must_use]
     pub fn bytes(&self) -> usize {

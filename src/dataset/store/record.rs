@@ -28,7 +28,7 @@ pub const fn mixed(a: usize, b: usize) -> usize {
 }
 
 /// The axes along which each number is derived, as a set of bits, in their order.
-pub(super) fn sets(joints: usize) -> impl Iterator<Item = usize> {
+pub fn sets(joints: usize) -> impl Iterator<Item = usize> {
     let of_axis = |a: usize| std::iter::once(1 << a).chain((0..a).map(move |b| 1 << a | 1 << b));
     std::iter::once(0).chain((0..joints).flat_map(of_axis))
 }
