@@ -195,6 +195,22 @@ fn preparing_makes_all_levels_whole_around_a_place() {
 }
 
 #[test]
+fn a_cell_is_whole_wherever_it_lies_within_the_cells_below() {
+    let world = World::new();
+    let model = world.model();
+    let motion = world.motion(5, 24);
+    // At places in all corners of the cells below blocks rest on others that are no corners of those cells.
+    for k in 0..20 {
+        let store = world.store();
+        let ahead = Ahead::new(&model, Arc::clone(&store));
+        let at = Whereabouts::at_rest(&motion.at(0.25 * f64::from(k)).0);
+        let mut solver = ahead.solver();
+        while ahead.advance(&mut solver, &at, false) {}
+        assert_eq!(store.sample(&at.position).whole, LEVELS, "{at:?}");
+    }
+}
+
+#[test]
 fn a_solution_at_the_proxy_is_followed_by_its_tangent_to_second_order() {
     let world = World::new();
     let model = world.model();
