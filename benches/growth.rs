@@ -24,18 +24,13 @@ use haptize::{
     scene::{ProxyNodeSpec, Scene},
     store::{Order, Space, Store, record::width},
     sweep::{
-        ahead::Ahead,
+        ahead::{Ahead, Whereabouts},
         build_object, grid_of,
         refine::{Judge, Refine},
         sample,
     },
 };
-use std::{
-    hint::black_box,
-    path::Path,
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{hint::black_box, path::Path, sync::Arc, time::Instant};
 
 /// Rms errors for which a store is filled, over the rms torque [1].
 const AIMS: [f64; 9] = [0.3, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001];
@@ -45,9 +40,6 @@ const LEVELS: [u32; 6] = [16, 12, 8, 6, 5, 4];
 
 /// Places along a way at which it is solved: one a millisecond.
 const PLACES: usize = 5000;
-
-/// Time after which a place is left as it is [s].
-const LONGEST: Duration = Duration::from_secs(60);
 
 /// Configurations in contact by which an error is measured: as many as `haptize bake --refine` takes.
 const JUDGED: usize = 400;
@@ -164,7 +156,10 @@ fn fill(refine: &Refine<'_>, judges: &[Judge; 2]) -> Cost {
 fn explore(model: &Model<'_>, base: &Grid, levels: u32, places: &[JointVector], exact: &[JointVector]) -> Cost {
     let store = Arc::new(Store::new(Space::new(base, levels).unwrap(), Order::Potential, 2_000_000));
     let (begin, ahead) = (processor_time(), Ahead::new(model, Arc::clone(&store)));
-    places.iter().for_each(|q| ahead.prepare(q, 1, LONGEST));
+    let mut solver = ahead.solver();
+    for q in places {
+        while ahead.advance(&mut solver, &Whereabouts::at_rest(q), false) {}
+    }
     let spent = (processor_time() - begin, ahead.solved().nodes);
     let (mut error, mut size) = (0.0, 0.0);
     for (q, exact) in places.iter().zip(exact) {

@@ -213,7 +213,7 @@ fn draw(folder: &str, rows: &[(&str, Vec<Spent>)]) {
         };
         rows.iter().enumerate().map(curve).collect()
     };
-    let mut sheet = Diagram::new("Error against what is solved and stored", "rms over the rms torque, three joints", 1);
+    let mut sheet = Diagram::new("Error against what is solved and stored", "three joints", 1);
     let nodes = curves(|spent| spent.0);
     sheet.panel(0, "Nodes solved [1]", "Rms error over rms torque [1]", &nodes, &[]);
     sheet.panel(

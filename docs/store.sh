@@ -7,4 +7,4 @@ cd "$(dirname "$0")/.."
 for bench in store growth on_demand; do
     cargo bench --locked --bench "$bench"
 done
-cp out/store/store-{error,growth,on-demand}.png docs/figures/
+cp out/store/store-{error,growth,way,on-demand}.png docs/figures/
