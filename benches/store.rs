@@ -2,8 +2,8 @@
 //!
 //!     cargo bench --bench store -- [SCENE [AIM [FOLDER]]]
 //!
-//! `SCENE`: by default datasets/sphere.toml; `AIM`: rms error over the rms torque, by default 0.01; `FOLDER`, by default
-//! out/store, gets the figure of errors against nodes and bytes.
+//! `SCENE`: by default datasets/sphere.toml; `AIM`: rms error over the rms torque, by default 0.01; `FOLDER`, by
+//! default out/store, gets the figure of errors against nodes and bytes.
 
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 

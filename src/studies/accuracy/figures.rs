@@ -55,7 +55,8 @@ pub(super) fn loops(accuracy: &Accuracy) -> Canvas {
     let mut sheet = Diagram::new(
         "Work of the contact torque around closed loops, which a passive object never gives",
         &format!(
-            "squares in the plane of two joints; zero is drawn at the rounding of the object's greatest energy, {:.3} J",
+            "squares in the plane of two joints; zero is drawn at the rounding of the object's greatest energy, \
+             {:.3} J",
             accuracy.greatest_energy
         ),
         1,
