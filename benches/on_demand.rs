@@ -1,8 +1,9 @@
 //! Contact solved while it is felt: what the loop misses, how much the torque errs and how it changes.
 //!
-//!     cargo bench --bench on_demand -- [SCENE [LEVELS [SECONDS]]]
+//!     cargo bench --bench on_demand -- [SCENE [LEVELS [SECONDS [SPEED]]]]
 //!
-//! `SCENE`: by default datasets/organ.toml. Time is simulated: for each millisecond of the loop the thread that solves
+//! `SCENE`: by default datasets/organ.toml; `SPEED`: greatest speed of the tip between two places [m/s], by default
+//! several, which are drawn in out/store. Time is simulated: for each millisecond of the loop the thread that solves
 //! gets a millisecond of processor time, as one that has a core to itself. So other work on the machine changes the
 //! figures little.
 
@@ -20,6 +21,12 @@ use haptize::{
         setup::Setup,
         trace::Tick,
     },
+    report::{
+        colour,
+        diagram::{Diagram, Series},
+        plot::{Entry, Mark},
+        write_both,
+    },
     scene::{Scene, Waypoint},
     store::{Order, Space, Store},
     sweep::{
@@ -29,8 +36,8 @@ use haptize::{
 };
 use std::{path::Path, sync::Arc, time::Duration};
 
-/// Greatest speed of the tip between two places [m/s].
-const SPEED: f64 = 0.2;
+/// Greatest speeds of the tip between two places [m/s]. At 0.4 m/s the loop stops such a walk with a fault.
+const SPEEDS: [f64; 5] = [0.05, 0.1, 0.15, 0.2, 0.3];
 
 /// Greatest speed of a minimum-jerk motion over its mean [1].
 const MINIMUM_JERK: f64 = 1.875;
@@ -49,7 +56,7 @@ fn tip(chain: &Chain, q: &[f64]) -> glam::DVec3 {
 }
 
 /// A walk through contact, at the speed of the tip: from one random place to another, as deep as `depths` say.
-fn walk(scene: &Scene, chain: &Chain, solver: &mut Solver<'_>, seconds: f64) -> Motion {
+fn walk(scene: &Scene, chain: &Chain, solver: &mut Solver<'_>, seconds: f64, speed: f64) -> Motion {
     let grid = grid_of(scene);
     let mut seed = 24_u64;
     let mut random = || {
@@ -76,7 +83,7 @@ fn walk(scene: &Scene, chain: &Chain, solver: &mut Solver<'_>, seconds: f64) -> 
             })
             .collect();
         let way: f64 = places.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-        let time = waypoints.last().unwrap().time + MINIMUM_JERK * way / SPEED;
+        let time = waypoints.last().unwrap().time + MINIMUM_JERK * way / speed;
         waypoints.push(Waypoint { time, q });
         before = q;
     }
@@ -92,7 +99,7 @@ struct World<'a> {
 
 impl World<'_> {
     /// Plays a session and tells of it.
-    fn session(&self, device: &mut dyn Device, direct: bool, seconds: f64) {
+    fn session(&self, device: &mut dyn Device, direct: bool, seconds: f64) -> Seen {
         let grid = grid_of(self.scene);
         let store = Arc::new(Store::new(Space::new(&grid, self.levels).unwrap(), Order::Potential, 2_000_000));
         let ahead = Ahead::new(self.model, Arc::clone(&store));
@@ -135,7 +142,7 @@ impl World<'_> {
                 spent += processor_time() - began;
             }
         }
-        self.report(&ticks, &store);
+        let seen = self.report(&ticks, &store);
         println!("{:?}\n{:?}, {} blocks", answers.read(), ahead.solved(), store.horizon());
         costs.sort_by(f64::total_cmp);
         if !costs.is_empty() {
@@ -145,10 +152,11 @@ impl World<'_> {
                 1e6 * costs[costs.len() * 99 / 100]
             );
         }
+        seen
     }
 
     /// Errors along the way.
-    fn report(&self, ticks: &[Tick], store: &Store) {
+    fn report(&self, ticks: &[Tick], store: &Store) -> Seen {
         let mut solver = Solver::new(self.model);
         let (mut felt, mut full, mut size, mut contacts, mut steepest, mut exact) =
             (0.0, 0.0, 0.0, 0, 0.0_f64, 0.0_f64);
@@ -197,7 +205,51 @@ impl World<'_> {
         );
         let created =
             ticks.iter().map(|t| t.accounts.created() - t.accounts.taken_from_field()).fold(f64::MIN, f64::max);
-        println!("created less taken: at most {created:.2e} J");
+        let residual =
+            ticks.iter().map(|t| t.accounts.residual().abs() / t.accounts.turnover.max(1e-6)).fold(0.0, f64::max);
+        let port = ticks.iter().filter_map(|t| t.accounts.device_port()).fold(f64::MAX, f64::min);
+        let odd = ticks.iter().filter(|t| !t.contact_torque.is_finite() || t.fault.is_some()).count();
+        println!(
+            "created less taken: at most {created:.2e} J; residual of the accounts at most {residual:.1e} of their \
+             turnover; the device's port at least {port:.2e} J; {odd} ticks not finite or at fault"
+        );
+        Seen { felt: (felt / size).sqrt(), steepest, exact }
+    }
+}
+
+/// What a session showed.
+struct Seen {
+    /// Rms error over the rms torque, as felt [1].
+    felt: f64,
+    /// Greatest changes of the torque in a tick: as felt, and of direct solves [N m].
+    steepest: f64,
+    exact: f64,
+}
+
+/// Draws the sessions with the store and those with `direct` against the speed.
+fn draw(seen: &[[Seen; 2]]) {
+    let curve = |name: &str, colour, dashed, up: &dyn Fn(&[Seen; 2]) -> f64| Series {
+        name: name.to_owned(),
+        points: SPEEDS.iter().zip(seen).map(|(speed, seen)| (*speed, up(seen))).collect(),
+        dashed,
+        colour,
+    };
+    let mut sheet =
+        Diagram::new("Six joints felt while they are solved", "one thread solves ahead; the store has two levels", 1);
+    let speed = "Greatest speed of the tip between two places [m/s]";
+    let errors =
+        [curve("store", 0, false, &|[store, _]| store.felt), curve("direct", 1, false, &|[_, direct]| direct.felt)];
+    sheet.panel(0, speed, "Rms error over rms torque [1]", &errors, &[]);
+    let changes = [
+        curve("", 0, false, &|[store, _]| store.steepest),
+        curve("", 1, false, &|[_, direct]| direct.steepest),
+        curve("", 2, true, &|[_, direct]| direct.exact),
+    ];
+    sheet.panel(1, speed, "Greatest change of the torque in a tick [N m]", &changes, &[]);
+    let dashes = Entry { name: "direct solves".into(), colour: colour::series(2), mark: Mark::Dashes };
+    sheet.legend(&errors, vec![dashes]);
+    for file in write_both(Path::new("out/store"), "store-on-demand", &sheet.canvas()).unwrap() {
+        println!("{}", file.display());
     }
 }
 
@@ -211,9 +263,15 @@ fn main() {
     let mut model = Model::new(&object, &chain, scene.contact);
     model.with_tangent = true;
     let world = World { scene: &scene, chain: &chain, model: &model, levels };
-    for direct in [false, true] {
-        println!("\n{}", if direct { "direct" } else { "store" });
-        let motion = walk(&scene, &chain, &mut Solver::new(&model), seconds);
-        world.session(&mut Recorded::new(motion), direct, seconds);
+    let play = |speed: f64| {
+        [false, true].map(|direct| {
+            println!("\n{}, {speed} m/s", if direct { "direct" } else { "store" });
+            let motion = walk(&scene, &chain, &mut Solver::new(&model), seconds, speed);
+            world.session(&mut Recorded::new(motion), direct, seconds)
+        })
+    };
+    match arguments.get(3) {
+        Some(speed) => drop(play(speed.parse().unwrap())),
+        None => draw(&SPEEDS.map(play)),
     }
 }

@@ -1,11 +1,14 @@
-//! The sparse store beside uniform grids: time of a look-up, and points and bytes for an error.
+//! The sparse store beside uniform grids: time of a look-up and of a tick, and points and bytes for an error.
 //!
-//!     cargo bench --bench store -- [SCENE [AIM]]
+//!     cargo bench --bench store -- [SCENE [AIM [FOLDER]]]
 //!
-//! `SCENE`: by default datasets/sphere.toml; `AIM`: rms error over the rms torque, by default 0.01.
+//! `SCENE`: by default datasets/sphere.toml; `AIM`: rms error over the rms torque, by default 0.01; `FOLDER`, by
+//! default out/store, gets the figure of errors against nodes and bytes.
 
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 
+#[path = "../tests/desktop/mod.rs"]
+mod desktop;
 #[path = "../tests/synthetic/mod.rs"]
 mod synthetic;
 
@@ -13,9 +16,14 @@ use haptize as engine;
 use haptize::{
     JointVector, MAX_JOINTS,
     contact::{Model, Status},
-    dataset::{Axis, Grid},
+    dataset::{Axis, Dataset, Grid, Provenance},
     field::TorqueField,
     proxy::Chain,
+    render::haptic::{Haptics, Inputs},
+    report::{
+        diagram::{Diagram, Series},
+        write_both,
+    },
     scene::{Interpolation, JointKind, Scene},
     store::{
         Nodes, Order, Place, Space, Store,
@@ -27,7 +35,12 @@ use haptize::{
         sample,
     },
 };
-use std::{hint::black_box, path::Path, sync::atomic::AtomicBool, time::Instant};
+use std::{
+    hint::black_box,
+    path::Path,
+    sync::{Arc, atomic::AtomicBool},
+    time::Instant,
+};
 
 /// Blocks of look-ups that are timed.
 const BLOCKS: u32 = 2000;
@@ -68,9 +81,9 @@ fn places(space: &Space, level: u32) -> Vec<Place> {
 }
 
 /// A store of a half space with all blocks of all levels.
-fn dense(joints: usize, count: usize, levels: u32, order: Order) -> Store {
-    let grid = synthetic::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]);
-    let space = Space::new(&grid, levels).unwrap();
+fn dense(grid: &Grid, levels: u32, order: Order) -> Store {
+    let joints = grid.joints();
+    let space = Space::new(grid, levels).unwrap();
     let blocks: Vec<Vec<Place>> = (0..levels).map(|level| places(&space, level)).collect();
     let store = Store::new(space.clone(), order, blocks.iter().map(Vec::len).sum());
     let normal = 1.0 / (joints as f64).sqrt();
@@ -91,7 +104,7 @@ fn dense(joints: usize, count: usize, levels: u32, order: Order) -> Store {
 }
 
 fn look_ups() {
-    println!("joints  order      nodes/axis  levels  look-up [ns]  dense grid of as many points [ns]");
+    println!("joints  order      nodes/axis  levels  look-up [ns]  whole tick [ns]  dense grid of as many points [ns]");
     for (joints, count, levels) in
         [(3, 29, 1), (3, 8, 3), (3, 4, 4), (4, 5, 2), (5, 4, 2), (6, 7, 1), (6, 4, 2), (6, 2, 3)]
     {
@@ -106,20 +119,29 @@ fn look_ups() {
         for (order, interpolation) in
             [(Order::Linear, Interpolation::Linear), (Order::Potential, Interpolation::Potential)]
         {
-            let store = dense(joints, count, levels, order);
+            let base = synthetic::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]);
+            let store = Arc::new(dense(&base, levels, order));
             let stored = nanoseconds(|k| {
                 black_box(store.sample(&place(k)));
             });
+            let slope = JointVector::from_slice(&vec![10.0; joints]);
+            let refined = Dataset::refined(Arc::clone(&store), base, None, String::new(), Provenance::default());
+            let field = TorqueField::interpolated(&refined, interpolation, 0.5, &slope).unwrap();
+            let haptics = Haptics::new(field, desktop::proxy(joints), &desktop::haptics(joints)).unwrap();
+            let mut state = haptics.start(&place(0.0)).unwrap();
+            let tick = nanoseconds(|k| {
+                let inputs = Inputs { position: place(k), age: 0.0, elapsed: 1e-3, interval: 1e-3 };
+                black_box(haptics.tick(&mut state, &inputs));
+            });
             let points = ((count - 1) << (levels - 1)) + 1;
             let grid = synthetic::grid(&vec![(-0.6, 1.2 / (points - 1) as f64, points); joints]);
-            let slope = JointVector::from_slice(&vec![10.0; joints]);
             let field =
                 TorqueField::interpolated(&synthetic::half_space(grid, 5.0), interpolation, 0.5, &slope).unwrap();
             let grid = nanoseconds(|k| {
                 black_box(field.sample(&place(k)));
             });
-            let (stored, grid) = (stored - placing, grid - placing);
-            println!("{joints:6}  {order:9?}  {points:10}  {levels:6}  {stored:12.0}  {grid:12.0}");
+            let [stored, tick, grid] = [stored, tick, grid].map(|time| time - placing);
+            println!("{joints:6}  {order:9?}  {points:10}  {levels:6}  {stored:12.0}  {tick:15.0}  {grid:12.0}");
         }
     }
 }
@@ -141,8 +163,11 @@ fn grid(scene: &Scene, spacing: f64) -> Grid {
     Grid { axes: axes.collect() }
 }
 
+/// Nodes solved, bytes and error.
+type Spent = (f64, f64, f64);
+
 /// Bakes `scene` over a grid of spacing `spacing` times its own, and prints what its interpolation errs by.
-fn dense_grid(scene: &Scene, spacing: f64, interpolation: Interpolation, unseen: &Judge) {
+fn dense_grid(scene: &Scene, spacing: f64, interpolation: Interpolation, unseen: &Judge) -> Spent {
     let begin = Instant::now();
     let mut scene = scene.clone();
     let base = grid(&scene, spacing);
@@ -174,6 +199,34 @@ fn dense_grid(scene: &Scene, spacing: f64, interpolation: Interpolation, unseen:
         100.0 * error,
         begin.elapsed().as_secs_f64()
     );
+    (report.points as f64, bytes as f64, error)
+}
+
+/// Draws error against nodes and bytes.
+fn draw(folder: &str, rows: &[(&str, Vec<Spent>)]) {
+    let curves = |across: fn(&Spent) -> f64| -> Vec<Series> {
+        let curve = |(colour, (name, spent)): (usize, &(&str, Vec<Spent>))| Series {
+            name: (*name).to_owned(),
+            points: spent.iter().map(|spent| (across(spent), spent.2)).collect(),
+            dashed: false,
+            colour,
+        };
+        rows.iter().enumerate().map(curve).collect()
+    };
+    let mut sheet = Diagram::new("Error against what is solved and stored", "three joints", 1);
+    let nodes = curves(|spent| spent.0);
+    sheet.panel(0, "Nodes solved [1]", "Rms error over rms torque [1]", &nodes, &[]);
+    sheet.panel(
+        1,
+        "Size of what the loop reads [bytes]",
+        "Rms error over rms torque [1]",
+        &curves(|spent| spent.1),
+        &[],
+    );
+    sheet.legend(&nodes, Vec::new());
+    for file in write_both(Path::new(folder), "store-error", &sheet.canvas()).unwrap() {
+        println!("{}", file.display());
+    }
 }
 
 fn main() {
@@ -188,12 +241,13 @@ fn main() {
     model.with_tangent = true;
     let [seen, unseen] = [11, 12].map(|seed| Judge::new(&scene, &model, seed, 1000).unwrap());
     println!("\norder      base   levels  nodes  by level  bytes  solved  equilibria  seen  unseen  rounds  seconds");
-    for spacing in [4.0, 2.0, 1.4, 1.0, 0.7] {
-        dense_grid(&scene, spacing, Interpolation::Potential, &unseen);
-    }
-    for spacing in [1.0, 0.5, 0.4] {
-        dense_grid(&scene, spacing, Interpolation::Linear, &unseen);
-    }
+    let dense = |interpolation, spacings: &[f64]| -> Vec<Spent> {
+        spacings.iter().map(|spacing| dense_grid(&scene, *spacing, interpolation, &unseen)).collect()
+    };
+    let mut rows = vec![
+        ("dense linear", dense(Interpolation::Linear, &[4.0, 2.0, 1.0, 0.5, 0.4])),
+        ("dense potential", dense(Interpolation::Potential, &[4.0, 2.0, 1.4, 1.0, 0.7])),
+    ];
     let fill = |order, spacing: f64, levels, aim| {
         let begin = Instant::now();
         let refine = Refine { model: &model, base: grid(&scene, spacing), levels, order, aim, most: 50_000 };
@@ -212,14 +266,17 @@ fn main() {
             refined.rounds,
             begin.elapsed().as_secs_f64()
         );
+        (refined.nodes as f64, bytes as f64, error)
     };
-    for order in [Order::Potential, Order::Linear] {
-        for spacing in [4.0, 2.0, 1.0, 0.7, 0.5] {
-            // One level, no aim: the uniform grid.
-            fill(order, spacing, 1, f64::INFINITY);
-        }
-        for (spacing, levels) in [(8.0, 4), (4.0, 3)] {
-            fill(order, spacing, levels, aim);
-        }
+    let names = [
+        (Order::Linear, ["linear, one level", "linear, refined"]),
+        (Order::Potential, ["potential, one level", "potential, refined"]),
+    ];
+    for (order, [even, refined]) in names {
+        // One level, no aim: the uniform grid.
+        rows.push((even, [4.0, 2.0, 1.0, 0.7, 0.5].map(|spacing| fill(order, spacing, 1, f64::INFINITY)).to_vec()));
+        let aims = [8.0, 4.0, 2.0, 1.0, 0.5].map(|times| times * aim);
+        rows.push((refined, aims.map(|aim| fill(order, 4.0, 5, aim)).to_vec()));
     }
+    draw(arguments.get(2).map_or("out/store", String::as_str), &rows);
 }

@@ -7,6 +7,6 @@ cd "$(dirname "$0")/.."
 if [ $# -gt 0 ]; then haptize=$(realpath "$1"); else cargo build --release; haptize=$PWD/target/release/haptize; fi
 out=out/accuracy
 "$haptize" accuracy datasets/sphere.toml --points 460000 -o "$out"
-cp "$out"/accuracy-{spacing,solver,refinement}.png docs/figures/
+cp "$out"/accuracy-{spacing,loops,solver,refinement}.png docs/figures/
 "$haptize" accuracy datasets/sphere.toml --points 10000 --effects -o "$out/effects"
 cp "$out/effects/effects.png" docs/figures/

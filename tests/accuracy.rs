@@ -90,6 +90,17 @@ fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
     assert_eq!(table.lines().count(), found.rows.len() + 1);
 }
 
+/// Where there is one equilibrium a solution every tick errs as the solver does, the tangents of older ones ever more.
+#[test]
+fn direct_errs_by_the_age_of_its_tangents() {
+    let scene = Scene::load(Path::new("tests/scenes/small.toml")).unwrap();
+    let extent = Extent { configurations: 200, points: 100, rounds: 1 };
+    let found = accuracy::measure(&scene, extent, &mut |_| ()).unwrap();
+    let followed: Vec<f64> = found.of(Study::Lookup).filter(|row| row.series == "direct").map(|row| row.rms).collect();
+    assert!(followed.len() == 4 && followed.is_sorted_by(|a, b| a < b), "{followed:?}");
+    assert!(followed[0] < 1e-3 * followed[3], "{followed:?}");
+}
+
 /// Each effect alone and within the whole scene: what is counted is exact, what is timed is relative to the same run.
 fn effects_are_priced_side_by_side(scene: &Scene) -> accuracy::effects::Effects {
     let priced = accuracy::effects::price(scene, 2, &mut |_| ()).unwrap();

@@ -5,10 +5,10 @@ use crate::{
     contact::Model,
     dataset::{Dataset, Provenance, Surface},
     proxy::Chain,
-    scene::{Interpolation, Scene},
+    scene::Scene,
     store::Order,
     sweep::{
-        Aim, CpuBackend, build_object, check_algorithm, grid_of,
+        Aim, CpuBackend, build_object, check_algorithm, grid_of, order_of,
         refine::{Judge, Refine},
         sample,
     },
@@ -38,7 +38,7 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
-    let order = if scene.haptics.interpolation == Interpolation::Linear { Order::Linear } else { Order::Potential };
+    let order = order_of(scene);
     model.with_tangent = order == Order::Potential;
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
     let unseen = Judge::new(scene, &model, 2, JUDGED)?;

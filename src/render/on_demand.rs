@@ -12,7 +12,7 @@ use crate::{
     sweep::{
         CpuBackend, NoEnergy, SceneObjectError,
         ahead::{Ahead, Solution, Solved, Whereabouts, follow},
-        build_object, check_algorithm, grid_of, sample,
+        build_object, check_algorithm, grid_of, order_of, sample,
     },
 };
 use std::{
@@ -124,11 +124,12 @@ impl OnDemand {
         let chain = Chain::new(&scene.proxy);
         let grid = grid_of(&scene);
         let provenance = CpuBackend::provenance(&scene);
-        let mut store = Store::new(Space::new(&grid, levels)?, Order::Potential, 0);
+        let mut store = Store::new(Space::new(&grid, levels)?, order_of(&scene), 0);
         if file.exists() {
             let earlier = Dataset::load(file)?;
             let same_scene = earlier.scene == scene.text;
-            let found = earlier.refinement.filter(|found| same_scene && found.space() == store.space());
+            let is_alike = |found: &Store| found.space() == store.space() && found.order() == store.order();
+            let found = earlier.refinement.filter(|found| same_scene && is_alike(found));
             store = found.and_then(Arc::into_inner).ok_or_else(|| OnDemandError::Another(file.into()))?;
         }
         let known = store.horizon();
@@ -182,7 +183,7 @@ impl OnDemand {
                     return Done::default();
                 }
             };
-            model.with_tangent = true;
+            model.with_tangent = this.store.order() == Order::Potential;
             let ahead = Ahead::new(&model, Arc::clone(&this.store));
             ahead.prepare(&start, this.threads, LONGEST_START.saturating_sub(began.elapsed()));
             ends.serve(&model, &ahead, &raised, &report);

@@ -7,6 +7,7 @@
 pub mod canvas;
 pub mod chart;
 pub mod colour;
+pub mod diagram;
 mod font;
 pub mod force;
 pub mod gridized;

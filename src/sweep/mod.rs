@@ -45,7 +45,7 @@ pub use grid_sweep::{Progress, Run, Sweep, grid_of};
 pub use inspection::{Contact, Inspection, ObjectNode, ProxyNode};
 pub use lowest::Lowered;
 pub use merge::{Merge, MergeError, Merged};
-pub use node::{NoEnergy, check_algorithm};
+pub use node::{NoEnergy, check_algorithm, order_of};
 pub use pilot::{Aim, Choice, Cost, Pilot, PilotError, Prospect, Trial};
 pub use plan::{Plan, ShardCost};
 pub use reach::{DepthShare, JointReach, Reach, ReachError};

@@ -19,9 +19,9 @@
 use crate::{
     JointVector,
     contact::{Model, Solver, Status},
-    scene::{Algorithm, Scene},
+    scene::{Algorithm, Interpolation, Scene},
     store::{
-        Space,
+        Order, Space,
         record::{mixed, slope, width},
         root_of,
     },
@@ -53,6 +53,12 @@ pub struct NoEnergy;
 /// [`NoEnergy`] unless its algorithm is [`Algorithm::Energy`].
 pub fn check_algorithm(scene: &Scene) -> Result<(), NoEnergy> {
     if scene.contact.algorithm == Algorithm::Energy { Ok(()) } else { Err(NoEnergy) }
+}
+
+/// Returns how a store is to interpolate that is filled for `scene`: as the scene asks for, where a store can.
+#[must_use]
+pub fn order_of(scene: &Scene) -> Order {
+    if scene.haptics.interpolation == Interpolation::Linear { Order::Linear } else { Order::Potential }
 }
 
 /// A solved node.

@@ -11,6 +11,7 @@ use haptize::{
     proxy::Chain,
     render::{
         live::{Answers, Live},
+        on_demand::OnDemand,
         session::Driver,
         setup::Setup,
     },
@@ -194,6 +195,22 @@ fn preparing_makes_all_levels_whole_around_a_place() {
 }
 
 #[test]
+fn a_cell_is_whole_wherever_it_lies_within_the_cells_below() {
+    let world = World::new();
+    let model = world.model();
+    let motion = world.motion(5, 24);
+    // At places in all corners of the cells below blocks rest on others that are no corners of those cells.
+    for k in 0..20 {
+        let store = world.store();
+        let ahead = Ahead::new(&model, Arc::clone(&store));
+        let at = Whereabouts::at_rest(&motion.at(0.25 * f64::from(k)).0);
+        let mut solver = ahead.solver();
+        while ahead.advance(&mut solver, &at, false) {}
+        assert_eq!(store.sample(&at.position).whole, LEVELS, "{at:?}");
+    }
+}
+
+#[test]
 fn a_solution_at_the_proxy_is_followed_by_its_tangent_to_second_order() {
     let world = World::new();
     let model = world.model();
@@ -218,4 +235,29 @@ fn a_solution_at_the_proxy_is_followed_by_its_tangent_to_second_order() {
         assert_eq!(solution.at(&q).0.norm(), 0.0);
     }
     assert!(errors[0] < 0.05 && errors[1] < 0.6 * errors[0] + 1e-6, "{errors:?}");
+}
+
+#[test]
+fn a_scene_is_explored_for_its_own_interpolation() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = include_str!("../scenes/small.toml");
+    for (name, order) in [
+        ("linear", Order::Linear),
+        ("gap-field", Order::Potential),
+        ("potential", Order::Potential),
+        ("direct", Order::Potential),
+    ] {
+        let path = folder.path().join(name).with_extension("toml");
+        std::fs::write(&path, format!("{text}\n[haptics]\ninterpolation = \"{name}\"\n")).unwrap();
+        let kept = folder.path().join(name).with_extension("haptize");
+        let on_demand = Arc::new(OnDemand::open(&path, &kept, 2, Some(1)).unwrap());
+        let start = grid_of(on_demand.scene()).configuration(0);
+        let (_, exploration) = on_demand.begin(&start).unwrap();
+        assert!(exploration.end().unwrap().solved.nodes > 0, "{name}");
+        let dataset = on_demand.dataset();
+        assert_eq!(dataset.refinement.as_ref().unwrap().order(), order, "{name}");
+        // What was kept goes on with the same scene.
+        dataset.save(&kept).unwrap();
+        assert!(OnDemand::open(&path, &kept, 2, Some(1)).is_ok(), "{name}");
+    }
 }

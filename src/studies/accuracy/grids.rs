@@ -1,6 +1,6 @@
 //! Grids of other spacings over the scene's region, looked up by each interpolation: error, bake time, size, loops.
 
-use super::{Accuracy, AccuracyError, Cost, Loops, Row, Study, timed};
+use super::{Accuracy, AccuracyError, Loops, Row, Study, timed};
 use crate::{
     JointVector,
     dataset::Dataset,
@@ -18,7 +18,7 @@ use std::hint::black_box;
 const COARSER: [f64; 9] = [4.0, 2.828, 2.0, 1.414, 1.0, std::f64::consts::FRAC_1_SQRT_2, 0.5, 0.354, 0.25];
 
 /// Look-ups that are timed at once.
-const LOOK_UPS: usize = 20_000;
+pub(super) const LOOK_UPS: usize = 20_000;
 
 /// Sides of loops, in grid steps.
 const SIDES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
@@ -79,7 +79,6 @@ pub(super) fn spacing(
 
 /// Time of a look-up, relative to that of `linear`.
 pub(super) fn look_up(scene: &Scene, own: &Dataset, study: &mut Accuracy) -> Result<(), AccuracyError> {
-    let mut baseline = 0.0;
     let errors = |series: &str, study: &Accuracy| {
         let own = study.rows.iter().find(|row| row.series == series && row.points == own.grid.points());
         own.map_or((0.0, 0.0), |row| (row.rms, row.worst))
@@ -93,19 +92,19 @@ pub(super) fn look_up(scene: &Scene, own: &Dataset, study: &mut Accuracy) -> Res
             }
             Ok::<(), AccuracyError>(())
         })?;
-        if baseline == 0.0 {
-            baseline = cost.least;
+        if study.look_up == 0.0 {
+            study.look_up = cost.least / LOOK_UPS as f64;
         }
         let (rms, worst) = errors(interpolation.name(), study);
         study.rows.push(Row {
             study: Study::Lookup,
-            series: "look-up".to_owned(),
+            series: interpolation.name().to_owned(),
             setting: interpolation.name().to_owned(),
             value: f64::from(u8::from(interpolation == Interpolation::Potential)) * 2.0 + 1.0,
             points: own.grid.points(),
             solved: 0,
             bytes: 0,
-            cost: Cost::over(cost, baseline),
+            cost: cost.over(LOOK_UPS as f64 * study.look_up),
             unit: "N m",
             rms,
             worst,

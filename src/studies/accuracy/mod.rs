@@ -9,6 +9,7 @@
 //! the same in each and a busy machine only adds to it; median and greatest show by how much.
 
 mod choice;
+mod direct;
 mod dynamics;
 pub mod effects;
 mod figures;
@@ -59,7 +60,7 @@ pub enum Study {
     Skin,
     /// Contact compliance; cost is a configuration.
     Stiffness,
-    /// Interpolation; cost is a look-up.
+    /// Interpolation; cost is a look-up, or with `direct` the share of a solve that falls to a tick, and the tangent.
     Lookup,
     /// Frame step of the graphics; cost is the same simulated time.
     Frame,
@@ -146,6 +147,10 @@ pub struct Accuracy {
     pub unit: &'static str,
     /// Greatest energy of the scene's own dataset [J].
     pub greatest_energy: f64,
+    /// Time of a look-up by `linear`, to which those of the others are relative [s].
+    pub look_up: f64,
+    /// Time of an equilibrium in contact along a way, solved warm with its tangent [s].
+    pub solution: f64,
     /// Study by study.
     pub rows: Vec<Row>,
     /// Work around loops in the scene's own dataset.
@@ -230,6 +235,8 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
         points: spacing::points(scene),
         unit: unit(scene),
         greatest_energy: 0.0,
+        look_up: 0.0,
+        solution: 0.0,
         rows: Vec::new(),
         loops: Vec::new(),
         notes: Vec::new(),
@@ -238,8 +245,9 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
     progress("grid spacing and interpolation");
     let own = grids::spacing(scene, &reference, extent.points, &mut study)?;
     study.greatest_energy = own.summary().max_energy.unwrap_or(0.0);
-    progress("look-up and loops");
+    progress("look-up, direct and loops");
     grids::look_up(scene, &own, &mut study)?;
+    direct::followed(scene, &model, &reference, &mut study)?;
     grids::loops(scene, &own, &reference, &mut study)?;
     progress("contact solver");
     solver::settings(scene, &model, &reference, &mut study)?;

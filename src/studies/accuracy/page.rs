@@ -1,7 +1,7 @@
 //! The files of a study: figures, one table of all rows as CSV, and one page that holds them all.
 
 use super::{
-    Accuracy, Study,
+    Accuracy, Row, Study,
     choice::{TARGETS, limits, offers},
     effects::{self, Effects},
     figures,
@@ -55,7 +55,8 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
             figures::loops(accuracy),
             "Left: linear torque, component by component, is no gradient: it gives or takes energy around a loop. The \
              potential's work is zero to rounding. Where curves coincide, the first shows around the second. Right: \
-             what a look-up of each costs at the scene's own spacing.",
+             what a look-up of each costs at the scene's own spacing, and `direct`, with an equilibrium solved every \
+             tick (right end) to every eight ticks, whose time is that of the other core; the hand moves at 0.2 m/s.",
         ),
         (
             "accuracy-solver",
@@ -191,6 +192,20 @@ pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
             None => writeln!(text, "; changes do not fall")?,
         }
     }
+    let errs = |row: &Row| match 100.0 * row.rms / row.size {
+        error if error < 0.01 => format!("{} below 0.01 %", row.setting),
+        error => format!("{} {error:.2} %", row.setting),
+    };
+    let [looked, followed] = [false, true].map(|direct| {
+        let rows = accuracy.of(Study::Lookup).filter(|row| (row.series == Interpolation::Direct.name()) == direct);
+        rows.map(errs).collect::<Vec<_>>().join(", ")
+    });
+    writeln!(text, "  look-up      `linear` {:.0} ns; errors: {looked}", 1e9 * accuracy.look_up)?;
+    writeln!(
+        text,
+        "  direct       {:.0} us a solution in contact; errors, solved {followed}",
+        1e6 * accuracy.solution
+    )?;
     let limits = limits(accuracy);
     let limits: Vec<String> = limits.iter().map(|limit| format!("{} {:.2} %", limit.of, 100.0 * limit.error)).collect();
     if !limits.is_empty() {

@@ -176,12 +176,9 @@ impl<'a> Ahead<'a> {
         let mut claimed = self.claims();
         let mut of_cell = |level: u32, low: &Place| {
             for block in self.store.corners(level, low) {
-                let rests = || self.store.foundation(level, &block).all(|(l, p)| self.store.get(l, &p).is_some());
-                if self.store.get(level, &block).is_none() && rests() && claimed.insert(space.key(level, &block)) {
-                    blocks.push((level, block));
-                    if blocks.len() == BATCH {
-                        return false;
-                    }
+                self.want(level, &block, &mut claimed, &mut blocks);
+                if blocks.len() >= BATCH {
+                    return false;
                 }
             }
             true
@@ -203,6 +200,23 @@ impl<'a> Ahead<'a> {
             }
         }
         blocks
+    }
+
+    /// Claims a block that is not there; where that on which it rests is not all there, first that.
+    fn want(&self, level: u32, block: &Place, claimed: &mut HashSet<u64>, blocks: &mut Vec<(u32, Place)>) {
+        if self.store.get(level, block).is_some() {
+            return;
+        }
+        let mut rests = true;
+        for (below, place) in self.store.foundation(level, block) {
+            if self.store.get(below, &place).is_none() {
+                rests = false;
+                self.want(below, &place, claimed, blocks);
+            }
+        }
+        if rests && claimed.insert(self.store.space().key(level, block)) {
+            blocks.push((level, *block));
+        }
     }
 
     /// Places along the way, so close that no cell of `level` is left out along an axis.

@@ -1,0 +1,10 @@
+#!/usr/bin/env bash
+# Redraws the figures of docs/store.md, and prints its tables. Takes some minutes.
+#
+# bash docs/store.sh
+set -euo pipefail
+cd "$(dirname "$0")/.."
+for bench in store growth on_demand; do
+    cargo bench --locked --bench "$bench"
+done
+cp out/store/store-{error,growth,way,on-demand}.png docs/figures/
