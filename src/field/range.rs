@@ -31,6 +31,13 @@ use crate::{
 };
 use glam::DVec3;
 
+/// Least c that counts outside the grid [m; steps for measured datasets]: a thousand times its rounding, and in a second
+/// of steps towards the object a nanometre.
+const CREEP: f64 = 1e-12;
+
+/// By how much rounding may carry x over the grid's border, over the spacing [1].
+const RIM: f64 = 1e-9;
+
 /// Least and greatest coordinate of each joint [rad or m].
 pub type Stops = [[f64; 2]; MAX_JOINTS];
 
@@ -138,7 +145,10 @@ impl HaptizedRange {
     pub fn stops(&self, x: &JointVector, velocity: &JointVector, interval: f64, limits: &Stops) -> Stops {
         let mut reach = JointVector::zeros(x.len());
         if let Some(beyond) = &self.beyond {
-            let share = 0.5 * beyond.clearance(self, x).max(0.0) / x.len() as f64;
+            // Halved from step to step c is rounded to nothing in the end. Then the way to the grid, axis by axis, may
+            // lead through the object: the proxy creeps until c grows again.
+            let least = if self.contains(x) { 0.0 } else { CREEP };
+            let share = 0.5 * beyond.clearance(self, x).max(least) / x.len() as f64;
             if share > 0.0 {
                 reach.iter_mut().zip(beyond.levers.iter()).for_each(|(reach, lever)| *reach = share / lever);
             }
@@ -165,9 +175,12 @@ impl HaptizedRange {
         nearest
     }
 
-    /// Whether `x` is in the grid.
+    /// Whether `x` is in the grid, but for rounding.
     fn contains(&self, x: &JointVector) -> bool {
-        x.iter().zip(self.ends).all(|(x, [least, greatest])| (least..=greatest).contains(x))
+        let within = |((x, [least, greatest]), (_, step, _)): ((&f64, [f64; 2]), (usize, f64, usize))| {
+            (least - RIM * step..=greatest + RIM * step).contains(x)
+        };
+        x.iter().zip(self.ends).zip(self.lattice.lines()).all(within)
     }
 }
 
