@@ -44,7 +44,7 @@ pub const GPU_BOUND_SLACK: f64 = 1e-6;
 /// hundred products, each rounded by 6e-8.
 pub const GPU_SEARCH_SLACK: f64 = 1e-4;
 
-/// [`FACET_STEP`](crate::contact::geometry::facet::FACET_STEP) for f32 [1]: some roundings of a weight.
+/// The least step of the search for the closest point of a bent facet, for f32 [1]: some roundings of a weight.
 pub const GPU_FACET_STEP: f64 = 4.0 * f32::EPSILON as f64;
 
 /// [`ENERGY_ROUNDING`] for f32, whose eps is 1.2e-7.

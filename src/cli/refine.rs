@@ -6,7 +6,7 @@ use crate::{
     dataset::{Dataset, Provenance, Surface},
     proxy::Chain,
     scene::Scene,
-    store::Order,
+    store::{Order, Store},
     sweep::{
         Aim, CpuBackend, build_object, check_algorithm, grid_of, order_of,
         refine::{Judge, Refine},
@@ -40,7 +40,9 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
     let order = order_of(scene);
     model.with_tangent = order == Order::Potential;
+    let solving = Instant::now();
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
+    let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;
     let unseen = Judge::new(scene, &model, 2, JUDGED)?;
     let aim = match wanted.aim {
         Aim::Relative(share) => share,
@@ -53,6 +55,14 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
         "haptize: for an rms error of {percent:.2} %: {} points of the scene's grid, and of up to {uniform} where it \
          errs",
         base.points()
+    ));
+    let most = uniform.min(wanted.most);
+    let [memory, disk] = Store::most_bytes(base.axes.len(), most);
+    tell(format_args!(
+        "haptize: that is at most {most} nodes, which would take about {:.0} s to solve, {} of memory and {} of disk",
+        (each * most as f64).ceil(),
+        megabytes(memory),
+        megabytes(disk)
     ));
     let refine = Refine { model: &model, base: base.clone(), levels: wanted.levels, order, aim, most: wanted.most };
     let refined = refine.fill(&seen)?;
@@ -92,7 +102,7 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
     }
     let json = serde_json::json!({
         "file": wanted.output.display().to_string(), "nodes": nodes, "by_level": by_level, "equilibria": equilibria, "solved": solved, "blocks": blocks,
-        "bytes": file, "memory": bytes, "error": measured, "aim": aim, "uniform": uniform, "rounds": rounds, "seconds": seconds,
+        "bytes": file, "memory": bytes, "most_memory": memory, "error": measured, "aim": aim, "uniform": uniform, "rounds": rounds, "seconds": seconds,
         "kept": kept,
     });
     Ok(Report { text, json, whole: kept })

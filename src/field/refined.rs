@@ -16,10 +16,10 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Most numbers of cells, 4^d each, from which the stiffness is bounded [1]: those of 131 thousand cells for three
-/// joints, of two thousand for six. More: the bound holds for more of a large store. Fewer: a session begins sooner,
-/// which waits for some tenths of a second.
-const MOST_NUMBERS: usize = 1 << 23;
+/// Most numbers of cells, 4^d each, from which the stiffness is bounded [1]: those of eight thousand cells for three
+/// joints, of 128 for six. More: the bound holds for more of a large store. Fewer: a session begins sooner, which waits
+/// for a tenth of a second.
+const MOST_NUMBERS: usize = 1 << 19;
 
 /// The field at `q`, of the first `horizon` blocks, and the levels whose cell around `q` is whole.
 pub(super) fn sample(lattice: &Lattice, store: &Store, q: &[f64], horizon: u64) -> (Sample, u32) {

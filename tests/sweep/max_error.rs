@@ -189,6 +189,7 @@ fn a_refined_bake_keeps_its_error_and_refines_nothing_that_keeps_it_already() {
     let (code, json) = refined("0.08%", "4");
     let (error, nodes) = (json["error"].as_f64().unwrap(), json["nodes"].as_u64().unwrap());
     assert!(code == Some(0) && json["kept"] == true && error <= 0.0008 && nodes > 63, "{json:#}");
+    assert!(json["memory"].as_u64().unwrap() <= json["most_memory"].as_u64().unwrap(), "{json:#}");
     let between = error_between(&folder.output());
     assert!((0.5..2.0).contains(&(between / error)), "{between} beside {error}");
     let told = haptize(folder.0.path(), &["info", "a.haptize"]);

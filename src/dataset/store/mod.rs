@@ -475,6 +475,16 @@ impl Store {
         })
     }
 
+    /// Memory and file that `nodes` nodes over `joints` joints take at most, each in a block of its own [bytes].
+    #[must_use]
+    pub fn most_bytes(joints: usize, nodes: usize) -> [usize; 2] {
+        let record = size_of::<f32>() * width(joints);
+        // Numbers of the node and of the interpolation, its gap and status; in the file key and places of the block.
+        let memory = size_of::<Block>() + 2 * size_of::<usize>() + 2 * record + size_of::<f32>() + 1;
+        let file = 2 * size_of::<u64>() + record + size_of::<f32>() + 1;
+        [memory, file].map(|each| nodes.saturating_mul(each))
+    }
+
     /// Memory of all blocks [bytes].
     #[must_use]
     pub fn bytes(&self) -> usize {

@@ -103,6 +103,13 @@ impl Judge {
         Reference::in_contact(scene, model, seed, contacts).map(Self)
     }
 
+    /// Number of configurations that were solved, free ones among them.
+    #[must_use]
+    pub fn solved(&self) -> usize {
+        // Each is solved twice: see [`Reference::solve`].
+        2 * (self.0.places.len() + self.0.left_out)
+    }
+
     /// Rms of the torque [N m].
     #[must_use]
     pub fn torque(&self) -> f64 {
