@@ -77,13 +77,13 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
     Ok(Report { text, json, whole })
 }
 
-/// What there is to draw and to compute on.
+/// Lists what there is to draw and to compute on.
 struct Graphics {
     /// Best first.
     adapters: Vec<AdapterSummary>,
     /// Whether each solves when `haptize bake` takes GPUs.
     solves: Vec<bool>,
-    /// What the environment names, and this machine does not have.
+    /// Adapters that the environment names, and this machine does not have.
     missing: Vec<String>,
 }
 
@@ -103,7 +103,7 @@ impl Graphics {
         Self { adapters, solves, missing }
     }
 
-    /// What `haptize bake` takes by itself.
+    /// The backend that `haptize bake` takes by itself.
     fn automatic(&self) -> &'static str {
         match () {
             () if !self.missing.is_empty() => "none",

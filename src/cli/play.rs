@@ -166,7 +166,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     Ok(Report { text, json, whole: outcome.is_whole() })
 }
 
-/// What became of a session, summed up.
+/// Sums up what became of a session.
 struct Outcome<'a> {
     played: &'a Played,
     summary: Summary,
@@ -388,7 +388,7 @@ fn load(path: &Path) -> Result<Dataset, Failure> {
     })
 }
 
-/// What is there already of the files that a session writes.
+/// Returns which of the files that a session writes are there already.
 struct Outputs {
     filled: Folder,
     recorded: Option<Earlier>,

@@ -76,7 +76,7 @@ pub(super) fn relative_stiffness(store: &Store, slopes: &JointVector) -> f64 {
     cells.into_par_iter().map(norm).reduce(|| 0.0, f64::max).sqrt()
 }
 
-/// What interpolates in a cell: w, and for linear stores each slope by itself.
+/// Returns what interpolates in a cell: w, and for linear stores each slope by itself.
 fn parts(store: &Store, added: Vec<Vec<f64>>) -> Vec<Bernstein> {
     let joints = store.space().joints();
     if store.order() == Order::Linear {

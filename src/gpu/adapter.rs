@@ -150,7 +150,7 @@ pub fn adapters() -> Vec<AdapterSummary> {
     candidates(&instance()).into_iter().map(|(_, adapter)| adapter).filter(|it| it.is_among(&names)).collect()
 }
 
-/// What [`ADAPTER_VARIABLE`] asks for, and whether this machine has an adapter that is called so.
+/// Returns what [`ADAPTER_VARIABLE`] asks for, and whether this machine has an adapter that is called so.
 #[must_use]
 pub fn named_adapters() -> Vec<(String, bool)> {
     let names = asked_for();

@@ -44,7 +44,7 @@ impl BoundKernel {
     }
 }
 
-/// What the stages share.
+/// Buffers that the stages share.
 struct Buffers {
     parameters: StorageBuffer,
     motions: StorageBuffer,

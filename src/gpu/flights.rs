@@ -196,7 +196,7 @@ struct Flight<T> {
     device: usize,
     lane: usize,
     section: Section,
-    /// What it waits for: nothing, where nothing touches.
+    /// The submission that it waits for: nothing, where nothing touches.
     ticket: Option<T>,
     since: Instant,
     /// Where its proxy is, once that is known.
@@ -418,7 +418,7 @@ mod tests {
 
     const SIZES: [usize; 9] = [5, 0, 0, 0, 0, 0, 17, 1, 8];
 
-    /// What comes back of chunks of [`SIZES`], and how many were under way at most.
+    /// Returns what comes back of chunks of [`SIZES`], and how many were under way at most.
     fn flown(devices: &mut [PacedDevice<Odd>]) -> (Vec<Vec<f64>>, usize, usize) {
         let (sizes, taken) = (SIZES.into(), Vec::new());
         let mut work = Numbers { sizes, given: 0, under_way: 0, most_under_way: 0, taken };

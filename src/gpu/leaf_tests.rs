@@ -48,7 +48,7 @@ struct Question {
     moves: [DVec3; 3],
 }
 
-/// What the kernel says of it: the closest point, and the row of the contact.
+/// The kernel's answer: the closest point, and the row of the contact.
 struct Answer {
     weights: [f64; 3],
     feature: usize,
@@ -127,7 +127,7 @@ static LEAF_SHADER: [Shader; 2] = shaders::in_both(Shader {
     precision: Precision::Single,
 });
 
-/// Of an adapter with f64 both.
+/// Returns the precisions of the adapter: both where it has f64.
 fn precisions() -> &'static [Precision] {
     if context().adapter().double { &[Precision::Single, Precision::Double] } else { &[Precision::Single] }
 }

@@ -24,7 +24,7 @@ pub struct DeviceModel {
     /// Without the configurations, which each dispatch sets.
     pub(super) parameters: Parameters,
     pub(super) chain: StorageBuffer,
-    /// What f32 knows of the flat triangles: see `shaders/detection.wgsl`.
+    /// The flat triangles in f32: see `shaders/detection.wgsl`.
     pub(super) rest: StorageBuffer,
     pub(super) mesh: StorageBuffer,
     pub(super) clusters: StorageBuffer,
@@ -99,7 +99,7 @@ pub(super) fn extent(model: &contact::Model<'_>) -> f64 {
     model.surface.positions.iter().map(|n| n.length()).fold(0.0, f64::max)
 }
 
-/// What bounding spheres are widened by, for stages that compute in `precision` [m].
+/// Returns the margin of bounding spheres, for stages that compute in `precision` [m].
 pub(super) fn culling_slack(model: &contact::Model<'_>, precision: Precision) -> f64 {
     match precision {
         Precision::Single => tolerances::GPU_BOUND_SLACK * extent(model),

@@ -75,7 +75,7 @@ pub struct Pipeline<'a> {
     model: &'a contact::Model<'a>,
     room: BatchCapacity,
     search: Search,
-    /// Of each section in flight.
+    /// One pair for each section in flight.
     lanes: Vec<(Detection, SearchLane)>,
 }
 

@@ -35,8 +35,8 @@ const HEAD_BYTES: u64 = 16;
 const FIRST_TOUCHES: f64 = 8.0;
 const STAGED_TOUCHES: usize = 16;
 
-/// What the mean number of touches of one section is raised by to hold those of the next: neighbouring sections differ
-/// little.
+/// Factor from the mean number of touches of one section to the room for those of the next: neighbouring sections
+/// differ little.
 const TOUCHES_MARGIN: f64 = 1.25;
 
 /// Bytes of a record, and of the words of a touch [B].
@@ -52,7 +52,7 @@ pub(super) struct Search {
     gather: Kernel,
 }
 
-/// What one section in flight has of its own.
+/// Buffers and bindings of one section in flight.
 pub(super) struct SearchLane {
     room: usize,
     parameters: StorageBuffer,

@@ -97,7 +97,7 @@ impl SearchModel {
     }
 }
 
-/// What is asked of the search, and what rounding leaves it.
+/// Stiffness, tolerances and limits of a search.
 struct Limits {
     first_kc: f64,
     kc: f64,

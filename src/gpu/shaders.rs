@@ -26,7 +26,7 @@ pub struct Shader {
     pub(super) parts: &'static [&'static str],
     /// Every set of override constants that the engine uses.
     pub overrides: &'static [&'static [(&'static str, f64)]],
-    /// What its numbers are.
+    /// The type of its numbers.
     pub precision: Precision,
 }
 

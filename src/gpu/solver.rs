@@ -35,7 +35,7 @@ pub struct GpuSolver<'a, S: Stages = Pipeline<'a>> {
     time: HostTime,
 }
 
-/// What is done with what the devices found.
+/// The host's part: equilibria of what the devices found.
 struct HostPart<'a> {
     model: &'a contact::Model<'a>,
     cpu: Solvers<'a>,
@@ -81,7 +81,7 @@ impl<'a> GpuSolver<'a> {
         self.devices.iter().map(|device| device.stages.context().adapter())
     }
 
-    /// What its first device finds of `configurations`, to be replayed.
+    /// Records what its first device finds of `configurations`, to be replayed.
     ///
     /// # Errors
     /// When the device fails.

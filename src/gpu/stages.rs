@@ -13,14 +13,14 @@ pub struct Detected {
     pub touching: Vec<u32>,
 }
 
-/// What the kernels found of the configurations in contact: see `shaders/search_results.wgsl`.
+/// Results of the kernels for the configurations in contact: see `shaders/search_results.wgsl`.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     /// One for each configuration.
     pub records: Vec<[u32; 4]>,
     /// As many for each.
     pub amounts: Vec<f64>,
-    /// Of one configuration after the other.
+    /// Words of the touches, one configuration after the other.
     pub touches: Vec<[u32; 4]>,
     /// As many for each touch.
     pub presses: Vec<f64>,
@@ -33,7 +33,7 @@ impl Found {
         self.records.iter().map(|[_, _, touches, _]| *touches as usize).collect()
     }
 
-    /// What was found of `configurations`, whose touches are in `touches`.
+    /// Returns what was found of `configurations`, whose touches are in `touches`.
     fn part(&self, configurations: Range<usize>, touches: Range<usize>) -> Self {
         let amounts = self.amounts.len() / self.records.len().max(1);
         let presses = self.presses.len() / self.touches.len().max(1);
@@ -59,7 +59,7 @@ impl Found {
 pub struct Trust {
     /// Gaps no farther than this from zero are left open [m].
     pub band: f64,
-    /// What was computed in; equilibria in f32 are settled in f64 on the host.
+    /// Precision of the stages; equilibria in f32 are settled in f64 on the host.
     pub precision: Precision,
 }
 
@@ -78,7 +78,7 @@ pub trait Stages {
     /// A submission.
     type Ticket;
 
-    /// What it takes at a time.
+    /// Returns the bounds on what it takes at a time.
     fn room(&self) -> StageRoom;
 
     /// How far its results can be trusted.
@@ -109,7 +109,7 @@ pub trait Stages {
     fn reopen(&mut self) -> Result<(), GpuError>;
 }
 
-/// What a device found of a list of configurations, to be returned at once: a device that takes no time, beside which
+/// Results of a device for a list of configurations, returned at once: a device that takes no time, beside which
 /// what the host does can be measured.
 ///
 /// It knows no configurations: it is to be asked for those of the list, in the same order, as often as one likes.
@@ -125,7 +125,7 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// What `stages` find of `configurations`.
+    /// Records what `stages` find of `configurations`.
     pub(super) fn of<S: Stages>(stages: &mut S, configurations: &[JointVector]) -> Result<Self, GpuError> {
         let (room, trust) = (stages.room(), stages.trust());
         let (gaps, is_touching, found) = (Vec::new(), Vec::new(), Found::default());
