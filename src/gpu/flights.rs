@@ -62,16 +62,23 @@ pub(super) struct PacedDevice<S> {
     section: AdaptiveSize,
     /// When it was last known to be done with something.
     done: Instant,
+    /// Whether it has failed, and found nothing since.
+    has_failed: bool,
 }
 
 impl<S: Stages> PacedDevice<S> {
     pub fn new(stages: S) -> Self {
         let section = AdaptiveSize::new(FIRST_SECTION, stages.room().section);
-        Self { stages, section, done: Instant::now() }
+        Self { stages, section, done: Instant::now(), has_failed: false }
     }
 
-    /// Begins again after a failure, with half the room.
-    pub fn reopen(&mut self) -> Result<(), GpuError> {
+    /// Begins again after a failure, with half the room; not twice without a result in between.
+    fn recover(&mut self, failure: GpuError) -> Result<(), GpuError> {
+        let may_pass = matches!(failure, GpuError::Lost(_) | GpuError::TimedOut(_) | GpuError::OutOfMemory(_));
+        if !may_pass || self.has_failed {
+            return Err(failure);
+        }
+        self.has_failed = true;
         self.stages.reopen()?;
         self.section.halve(self.stages.room().section);
         Ok(())
@@ -128,23 +135,16 @@ pub(super) struct Queue<'w> {
     chunks: VecDeque<Asked>,
     /// Chunks that were handed back.
     handed: usize,
-    /// Configurations whose equilibria are there.
-    landed: usize,
     is_over: bool,
 }
 
 impl<'w> Queue<'w> {
     pub fn new(work: &'w mut dyn Work) -> Self {
-        Self { work, chunks: VecDeque::new(), handed: 0, landed: 0, is_over: false }
-    }
-
-    /// Configurations whose equilibria are there.
-    pub fn landed(&self) -> usize {
-        self.landed
+        Self { work, chunks: VecDeque::new(), handed: 0, is_over: false }
     }
 
     /// Everything that has no equilibrium yet is to depart again.
-    pub fn rewind(&mut self) {
+    fn rewind(&mut self) {
         self.chunks.iter_mut().for_each(|chunk| chunk.departed = chunk.equilibria.len());
     }
 
@@ -178,7 +178,6 @@ impl<'w> Queue<'w> {
     /// Where the equilibria of `section`, the earliest that has none, are to be added.
     fn equilibria(&mut self, section: &Section) -> (&[JointVector], &mut Vec<Equilibrium>) {
         let chunk = &mut self.chunks[section.chunk - self.handed];
-        self.landed += section.places.len();
         (&chunk.configurations[section.places.clone()], &mut chunk.equilibria)
     }
 
@@ -219,15 +218,39 @@ struct Fleet<'f, S: Stages> {
 }
 
 /// A failure, and the number of the device that failed.
-pub(super) type Failed = (usize, GpuError);
+type Failed = (usize, GpuError);
 
 /// Takes all of `queue` through `devices`. `conclude` adds the equilibria of a section that one of them has solved to a
-/// list.
+/// list. A device that is lost, hangs or runs out of memory is opened again; where that does not help the others go on
+/// without it.
+///
+/// # Errors
+/// When the last device fails.
 pub(super) fn fly<S: Stages>(
-    devices: &mut [PacedDevice<S>],
+    devices: &mut Vec<PacedDevice<S>>,
     queue: &mut Queue<'_>,
     time: &mut HostTime,
     mut conclude: impl FnMut(&S, Landed<'_>, &mut HostTime, &mut Vec<Equilibrium>) -> Result<(), GpuError>,
+) -> Result<(), GpuError> {
+    while let Err((device, failure)) = fly_together(devices, queue, time, &mut conclude) {
+        queue.rewind();
+        let Err(error) = devices[device].recover(failure) else { continue };
+        if devices.len() == 1 {
+            return Err(error);
+        }
+        devices.remove(device);
+        let (place, left) = (device + 1, devices.len());
+        queue.work.note(format!("solved without graphics device {place} of {}, which failed: {error}", left + 1));
+    }
+    Ok(())
+}
+
+/// The same until one of them fails.
+fn fly_together<S: Stages>(
+    devices: &mut [PacedDevice<S>],
+    queue: &mut Queue<'_>,
+    time: &mut HostTime,
+    conclude: &mut impl FnMut(&S, Landed<'_>, &mut HostTime, &mut Vec<Equilibrium>) -> Result<(), GpuError>,
 ) -> Result<(), Failed> {
     // One lane of every device, then the next.
     let lanes = devices.iter().map(|device| device.stages.room().lanes).max().unwrap_or(0);
@@ -300,7 +323,7 @@ impl<S: Stages> Fleet<'_, S> {
         let Some(ticket) = ticket else { return Ok(Found::default()) };
         let paced = &mut self.devices[device];
         let found = HostTime::of(&mut self.time.reading, || paced.stages.found(lane, count, &ticket))?;
-        paced.done = Instant::now();
+        (paced.done, paced.has_failed) = (Instant::now(), false);
         Ok(found)
     }
 
@@ -328,19 +351,24 @@ mod tests {
         stages::{StageRoom, Trust},
     };
 
-    /// A device that finds the first coordinate of each configuration, in contact where it is odd. It is lost once,
-    /// when it is asked for what it found so often.
+    /// A device that finds the first coordinate of each configuration, in contact where it is odd. It is lost when it
+    /// is asked for what it found so often: once, or for good.
     struct Odd {
         lanes: Vec<Vec<f64>>,
         room: StageRoom,
         until_lost: usize,
+        is_mended: bool,
         opened: usize,
     }
 
     impl Odd {
-        fn new(lanes: usize, section: usize, until_lost: usize) -> PacedDevice<Self> {
+        fn new(lanes: usize, section: usize, until_lost: usize, is_mended: bool) -> PacedDevice<Self> {
             let room = StageRoom { lanes, section };
-            PacedDevice::new(Self { lanes: vec![Vec::new(); lanes], room, until_lost, opened: 1 })
+            PacedDevice::new(Self { lanes: vec![Vec::new(); lanes], room, until_lost, is_mended, opened: 1 })
+        }
+
+        fn sound(lanes: usize, section: usize) -> PacedDevice<Self> {
+            Self::new(lanes, section, usize::MAX, true)
         }
     }
 
@@ -374,7 +402,7 @@ mod tests {
 
         fn found(&mut self, _: usize, _: usize, _: &usize) -> Result<Found, GpuError> {
             match self.until_lost.checked_sub(1) {
-                None if self.opened == 1 => Err(GpuError::Lost("on purpose".into())),
+                None if self.opened == 1 || !self.is_mended => Err(GpuError::Lost("on purpose".into())),
                 None => Ok(Found::default()),
                 Some(left) => {
                     self.until_lost = left;
@@ -396,6 +424,7 @@ mod tests {
         under_way: usize,
         most_under_way: usize,
         taken: Vec<Vec<f64>>,
+        notices: Vec<String>,
     }
 
     impl Work for Numbers {
@@ -413,54 +442,67 @@ mod tests {
             self.taken.push(equilibria.iter().map(|equilibrium| equilibrium.gap).collect());
         }
 
-        fn note(&mut self, _: String) {}
+        fn note(&mut self, notice: String) {
+            self.notices.push(notice);
+        }
     }
 
     const SIZES: [usize; 9] = [5, 0, 0, 0, 0, 0, 17, 1, 8];
 
-    /// Returns what comes back of chunks of [`SIZES`], and how many were under way at most.
-    fn flown(devices: &mut [PacedDevice<Odd>]) -> (Vec<Vec<f64>>, usize, usize) {
-        let (sizes, taken) = (SIZES.into(), Vec::new());
-        let mut work = Numbers { sizes, given: 0, under_way: 0, most_under_way: 0, taken };
-        let mut failures = 0;
-        let mut queue = Queue::new(&mut work);
-        let mut time = HostTime::default();
+    /// What comes back of chunks of [`SIZES`], whether or not the last device fails.
+    fn flown(devices: &mut Vec<PacedDevice<Odd>>) -> (Numbers, Result<(), GpuError>) {
+        let (sizes, taken, notices) = (SIZES.into(), Vec::new(), Vec::new());
+        let mut work = Numbers { sizes, given: 0, under_way: 0, most_under_way: 0, taken, notices };
         let conclude = |_: &Odd, landed: Landed<'_>, _: &mut HostTime, equilibria: &mut Vec<Equilibrium>| {
             let gaps = landed.detected.gaps;
             assert!(gaps.iter().zip(landed.configurations).all(|(gap, q)| *gap == q[0]));
             equilibria.extend(gaps.into_iter().map(|gap| free(gap, 1)));
             Ok(())
         };
-        while let Err((device, _)) = fly(devices, &mut queue, &mut time, conclude) {
-            failures += 1;
-            queue.rewind();
-            devices[device].reopen().unwrap();
-        }
-        (work.taken, work.most_under_way, failures)
+        let result = fly(devices, &mut Queue::new(&mut work), &mut HostTime::default(), conclude);
+        (work, result)
+    }
+
+    fn expected() -> Vec<Vec<f64>> {
+        let mut numbers = (0..).map(f64::from);
+        SIZES.iter().map(|&size| numbers.by_ref().take(size).collect()).collect()
     }
 
     #[test]
     fn chunks_come_back_whole_and_in_order_however_many_are_under_way() {
-        let mut numbers = (0..).map(f64::from);
-        let expected: Vec<Vec<f64>> = SIZES.iter().map(|&size| numbers.by_ref().take(size).collect()).collect();
-        let never = usize::MAX;
         for (lanes, section) in [(1, 1), (1, 100), (2, 3), (3, 4), (8, 2)] {
-            let (one, under_way, failures) = flown(&mut [Odd::new(lanes, section, never)]);
-            assert_eq!((one, failures), (expected.clone(), 0), "{lanes} lanes of {section}");
-            assert!(under_way <= CHUNKS_IN_FLIGHT, "{under_way}");
-            let mut both = [Odd::new(lanes, section, never), Odd::new(1, 2, never)];
-            assert_eq!(flown(&mut both).0, expected, "two devices");
+            let (one, result) = flown(&mut vec![Odd::sound(lanes, section)]);
+            assert!(result.is_ok());
+            assert_eq!(one.taken, expected(), "{lanes} lanes of {section}");
+            assert!(one.most_under_way <= CHUNKS_IN_FLIGHT, "{}", one.most_under_way);
+            let (both, _) = flown(&mut vec![Odd::sound(lanes, section), Odd::sound(1, 2)]);
+            assert_eq!(both.taken, expected(), "two devices");
         }
     }
 
     #[test]
     fn what_was_under_way_on_a_device_that_is_lost_departs_again() {
-        let mut numbers = (0..).map(f64::from);
-        let expected: Vec<Vec<f64>> = SIZES.iter().map(|&size| numbers.by_ref().take(size).collect()).collect();
         for lost_after in [0, 1, 4] {
-            let (taken, _, failures) = flown(&mut [Odd::new(3, 4, lost_after), Odd::new(2, 4, usize::MAX)]);
-            assert_eq!((taken, failures), (expected.clone(), 1), "lost after {lost_after}");
+            let mut devices = vec![Odd::new(3, 4, lost_after, true), Odd::sound(2, 4)];
+            let (work, result) = flown(&mut devices);
+            assert!(result.is_ok() && work.notices.is_empty());
+            assert_eq!(work.taken, expected(), "lost after {lost_after}");
+            assert_eq!(devices[0].stages.opened, 2);
         }
+    }
+
+    #[test]
+    fn the_others_go_on_without_a_device_that_is_lost_for_good() {
+        for lost_after in [0, 1] {
+            let mut devices = vec![Odd::sound(2, 4), Odd::new(3, 4, lost_after, false)];
+            let (work, result) = flown(&mut devices);
+            assert!(result.is_ok() && devices.len() == 1);
+            assert_eq!(work.taken, expected(), "lost after {lost_after}");
+            let [notice] = &work.notices[..] else { panic!("{:?}", work.notices) };
+            assert!(notice.contains("device 2 of 2") && notice.contains("on purpose"), "{notice}");
+        }
+        let (work, result) = flown(&mut vec![Odd::new(1, 4, 0, false)]);
+        assert!(matches!(result, Err(GpuError::Lost(_))) && work.notices.is_empty());
     }
 
     #[test]

@@ -33,6 +33,7 @@ pub struct GpuSolver<'a, S: Stages = Pipeline<'a>> {
     devices: Vec<PacedDevice<S>>,
     host: HostPart<'a>,
     time: HostTime,
+    notices: Vec<String>,
 }
 
 /// The host's part: equilibria of what the devices found.
@@ -108,6 +109,7 @@ impl<'a, S: Stages> GpuSolver<'a, S> {
             devices: devices.into_iter().map(PacedDevice::new).collect(),
             host: HostPart { model, cpu, left_to_cpu: 0 },
             time: HostTime::default(),
+            notices: Vec::new(),
         }
     }
 
@@ -237,6 +239,7 @@ pub(super) fn free(gap: f64, joints: usize) -> Equilibrium {
 struct OneChunk {
     configurations: Option<Vec<JointVector>>,
     equilibria: Vec<Equilibrium>,
+    notices: Vec<String>,
 }
 
 impl Work for OneChunk {
@@ -248,40 +251,32 @@ impl Work for OneChunk {
         self.equilibria = equilibria;
     }
 
-    fn note(&mut self, _: String) {}
+    fn note(&mut self, notice: String) {
+        self.notices.push(notice);
+    }
 }
 
 impl<S: Stages> Backend for GpuSolver<'_, S> {
     type Error = GpuError;
 
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, GpuError> {
-        let mut work = OneChunk { configurations: Some(configurations.to_vec()), equilibria: Vec::new() };
+        let configurations = Some(configurations.to_vec());
+        let mut work = OneChunk { configurations, equilibria: Vec::new(), notices: Vec::new() };
         self.stream(&mut work)?;
+        self.notices.append(&mut work.notices);
         Ok(work.equilibria)
     }
 
-    /// Solves chunk by chunk. A device that is lost, hangs or runs out of memory is opened again, with half the room;
-    /// if no result has come since the last time, this is an error.
     fn stream(&mut self, work: &mut dyn Work) -> Result<(), GpuError> {
-        let mut queue = Queue::new(work);
-        let mut landed_at_failure = None;
-        loop {
-            let Self { devices, host, time } = self;
-            let conclude = |stages: &S, landed: Landed<'_>, time: &mut HostTime, equilibria: &mut Vec<Equilibrium>| {
-                host.conclude(stages.trust(), landed, time, equilibria)
-            };
-            match fly(devices, &mut queue, time, conclude) {
-                Ok(()) => return Ok(()),
-                Err((device, GpuError::Lost(_) | GpuError::TimedOut(_) | GpuError::OutOfMemory(_)))
-                    if landed_at_failure != Some(queue.landed()) =>
-                {
-                    landed_at_failure = Some(queue.landed());
-                    queue.rewind();
-                    self.devices[device].reopen()?;
-                }
-                Err((_, error)) => return Err(error),
-            }
-        }
+        let Self { devices, host, time, .. } = self;
+        let conclude = |stages: &S, landed: Landed<'_>, time: &mut HostTime, equilibria: &mut Vec<Equilibrium>| {
+            host.conclude(stages.trust(), landed, time, equilibria)
+        };
+        fly(devices, &mut Queue::new(work), time, conclude)
+    }
+
+    fn notices(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notices)
     }
 
     fn left_to_cpu(&self) -> usize {

@@ -1,9 +1,9 @@
 //! A backend on a device that may fail for good, and the CPU in its place from then on.
 //!
 //! A GPU is lost by a driver's reset, by sleep, by being pulled out, or by other programs that take its memory. Its
-//! solver first tries again by itself with smaller batches; what it cannot mend ends here. The batches under way
-//! and all that follow are then solved by the CPU, so that a sweep of hours goes on, and [`Backend::notices`] reports
-//! it.
+//! solver first tries again by itself with smaller batches, and then goes on with its other devices; what it cannot mend
+//! ends here. The batches under way and all that follow are then solved by the CPU, so that a sweep of hours goes on,
+//! and [`Backend::notices`] reports it.
 
 use super::{Backend, CpuBackend};
 use crate::{
@@ -128,7 +128,8 @@ impl<B: Backend> Backend for WithFallback<'_, B> {
     }
 
     fn notices(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.notices)
+        let of_device = self.device.as_mut().map_or_else(Vec::new, Backend::notices);
+        [std::mem::take(&mut self.notices), of_device].concat()
     }
 
     fn left_to_cpu(&self) -> usize {
