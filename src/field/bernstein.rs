@@ -77,39 +77,36 @@ impl Bernstein {
         cell
     }
 
+    /// The function is nowhere greater.
+    pub fn greatest(&self) -> f64 {
+        self.coefficients.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// Bounds over the cell, of which there are `per_step` [1/rad or 1/m] in a unit of each joint; zero along an axis
     /// without extent.
     pub fn bounds(&self, per_step: &JointVector) -> Bounds {
         let (joints, n) = (self.joints, self.degree as f64);
-        let size = |of: &Self| of.coefficients.iter().fold(0.0, |most, x| f64::max(most, x.abs()));
+        let stride = |axis: usize| (self.degree + 1).pow(axis as u32);
         let mut bounds = Bounds {
-            greatest: self.coefficients.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            size: size(self),
+            greatest: self.greatest(),
+            size: size(&self.coefficients),
             first: JointVector::zeros(joints),
             second: [[0.0; MAX_JOINTS]; MAX_JOINTS],
         };
+        let (mut along, mut twice) = (Vec::new(), Vec::new());
         for a in 0..joints {
-            let along = self.differences(a);
+            differences(&self.coefficients, self.degree + 1, stride(a), &mut along);
             let rate = n * per_step[a];
             bounds.first[a] = rate * size(&along);
-            bounds.second[a][a] = (n - 1.0) * per_step[a] * rate * size(&along.differences(a));
+            differences(&along, self.degree, stride(a), &mut twice);
+            bounds.second[a][a] = (n - 1.0) * per_step[a] * rate * size(&twice);
             for b in 0..a {
-                let both = rate * n * per_step[b] * size(&along.differences(b));
+                differences(&along, self.degree + 1, stride(b), &mut twice);
+                let both = rate * n * per_step[b] * size(&twice);
                 (bounds.second[a][b], bounds.second[b][a]) = (both, both);
             }
         }
         bounds
-    }
-
-    /// Differences of neighbouring coefficients along `axis`, in the same places; those of the last, which has no
-    /// neighbour, are not a number and count for nothing.
-    fn differences(&self, axis: usize) -> Self {
-        let mut result = self.clone();
-        result.along(axis, |line| {
-            (1..line.len()).for_each(|k| line[k - 1] = line[k] - line[k - 1]);
-            line[line.len() - 1] = f64::NAN;
-        });
-        result
     }
 
     /// Changes the coefficients of each line along `axis`.
@@ -125,6 +122,25 @@ impl Bernstein {
             }
         }
     }
+}
+
+/// Differences of neighbours along an axis with `count` of them, `stride` apart: one fewer.
+fn differences(of: &[f64], count: usize, stride: usize, into: &mut Vec<f64>) {
+    into.clear();
+    for line in of.chunks_exact(count * stride) {
+        into.extend(line.iter().zip(&line[stride..]).map(|(low, high)| high - low));
+    }
+}
+
+/// The greatest size of `numbers`: in lanes, which processors compare at once.
+fn size(numbers: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    for chunk in numbers.chunks(lanes.len()) {
+        for (most, x) in lanes.iter_mut().zip(chunk) {
+            *most = if x.abs() > *most { x.abs() } else { *most };
+        }
+    }
+    lanes.into_iter().fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -12,14 +12,9 @@ use super::{
 };
 use crate::{
     JointVector, MAX_JOINTS,
-    store::{Order, Place, Store, record::sets},
+    store::{Order, Place, Store, beyond, record::sets},
 };
 use rayon::prelude::*;
-
-/// Most numbers of cells, 4^d each, from which the stiffness is bounded [1]: those of eight thousand cells for three
-/// joints, of 128 for six. More: the bound holds for more of a large store. Fewer: a session begins sooner, which waits
-/// for a tenth of a second.
-const MOST_NUMBERS: usize = 1 << 19;
 
 /// The field at `q`, of the first `horizon` blocks, and the levels whose cell around `q` is whole.
 pub(super) fn sample(lattice: &Lattice, store: &Store, q: &[f64], horizon: u64) -> (Sample, u32) {
@@ -44,36 +39,27 @@ pub(super) fn sample(lattice: &Lattice, store: &Store, q: &[f64], horizon: u64) 
     (sample, root.whole)
 }
 
-/// Upper bound of the Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), over the cells of a store of
-/// [`MOST_NUMBERS`] at most; of a larger one over evenly chosen cells of the base.
+/// Upper bound of the Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), over all cells.
 pub(super) fn relative_stiffness(store: &Store, slopes: &JointVector) -> f64 {
     let (space, joints) = (store.space(), slopes.len());
-    let blocks = store.blocks();
-    let count: usize = blocks.iter().map(|(_, block)| block.nodes().count()).sum();
-    let base = blocks.iter().filter_map(|(key, block)| Some((space.block(*key)?, block.nodes().present)));
-    let nodes = base.filter(|((level, _), _)| *level == 0).flat_map(|((_, place), present)| {
-        space.nodes(0, &place).filter(move |(at, _)| present >> at & 1 == 1).map(|(_, node)| node)
-    });
     let last = space.last(0);
-    let below = |node: Place| {
-        let cell = move |side: usize| {
-            let mut low = node;
-            for (a, low) in low.iter_mut().enumerate().take(joints) {
-                *low = low.checked_sub((side >> a & 1) as u32)?;
-            }
-            (0..joints).all(|a| low[a] < last[a]).then_some(low)
-        };
-        (0..1_usize << joints).filter_map(cell)
+    let is_there = |node: &Place| store.get(0, &space.block_of(node)).is_some();
+    // Each cell once: by the first of its corners that has a block.
+    let cell = |node: &Place, side: usize| {
+        let mut low = *node;
+        for (a, low) in low.iter_mut().enumerate().take(joints) {
+            *low = low.checked_sub((side >> a & 1) as u32).filter(|low| *low < last[a])?;
+        }
+        (0..side).all(|before| !is_there(&beyond(&low, before))).then_some(low)
     };
-    // There are about as many cells as nodes, and 2^d of the base at each node of the base.
-    let share = count.div_ceil(MOST_NUMBERS >> (2 * joints));
-    let every = if share > 1 { share << joints } else { 1 };
-    let mut cells: Vec<Place> = nodes.flat_map(below).step_by(every).collect();
-    cells.sort_unstable();
-    cells.dedup();
-    let norm =
-        |low: Place| store.added(0, &low).map_or(0.0, |added| steepest(store, slopes, (0, low), &parts(store, added)));
-    cells.into_par_iter().map(norm).reduce(|| 0.0, f64::max).sqrt()
+    let steepest_at = |(_, node): (usize, Place)| {
+        let cells = (0..1_usize << joints).filter_map(|side| cell(&node, side));
+        let added = cells.filter_map(|low| Some((low, store.added(0, &low)?)));
+        added.map(|(low, added)| steepest(store, slopes, (0, low), &parts(store, added))).fold(0.0, f64::max)
+    };
+    let blocks = store.blocks();
+    let base = blocks.par_iter().filter_map(|(key, _)| space.block(*key)).filter(|(level, _)| *level == 0);
+    base.map(|(_, block)| space.nodes(0, &block).map(steepest_at).fold(0.0, f64::max)).reduce(|| 0.0, f64::max).sqrt()
 }
 
 /// Returns what interpolates in a cell: w, and for linear stores each slope by itself.
@@ -121,11 +107,8 @@ fn norm(store: &Store, slopes: &JointVector, level: u32, parts: &[Bernstein]) ->
     let space = store.space();
     let mut per_step = JointVector::zeros(slopes.len());
     per_step.iter_mut().enumerate().for_each(|(a, per_step)| *per_step = 1.0 / space.step(level, a));
-    let Some((root, own)) = parts.split_first() else { return 0.0 };
+    let Some((root, own)) = parts.split_first().filter(|(root, _)| root.greatest() > 0.0) else { return 0.0 };
     let w = root.bounds(&per_step);
-    if w.greatest <= 0.0 {
-        return 0.0;
-    }
     if own.is_empty() {
         return square(slopes, |a, b| w.first[a] * w.first[b] + w.greatest * w.second[a][b]);
     }

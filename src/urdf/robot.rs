@@ -138,6 +138,15 @@ impl Robot {
             }
             joints.push(joint);
         }
+        let mut roots = links.iter().enumerate().filter(|(number, _)| !movers.contains_key(number));
+        if let (Some((_, first)), Some((_, second))) = (roots.next(), roots.next()) {
+            let message = format!(
+                "links {:?} and {:?} are both the child of no joint: a URDF is a tree with one root; join them with a \
+                 fixed joint, or remove one",
+                first.name, second.name
+            );
+            return Err(source.error(second.span.clone(), message));
+        }
         let name = root.attribute("name").unwrap_or("robot").to_owned();
         Ok(Self { path: path.as_ref().to_owned(), name, links, joints, text })
     }

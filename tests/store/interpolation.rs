@@ -1,13 +1,13 @@
 //! Continuity at every border of blocks and levels, exactness at nodes and on polynomials, the gradient.
 
-use crate::fixture::{Random, blocks, noise, space, step, store};
+use crate::fixture::{Random, blocks, nodes, noise, space, step, store};
 use haptize::{
     JointVector, MAX_JOINTS,
     dataset::{Axis, Dataset, Grid, Provenance},
     field::TorqueField,
     scene::Interpolation,
     store::{
-        Order, Root, Store,
+        Order, Root, Space, Store,
         record::{mixed, slope, width},
     },
 };
@@ -262,5 +262,64 @@ fn the_torque_is_nowhere_steeper_than_the_bound_on_which_gains_rest() {
                 assert!(joints > 3 || bound < looser * steepest, "{joints}, {order:?}: {steepest}, {bound}");
             }
         }
+    }
+}
+
+/// A store of one level whose nodes are all there, `count` along each axis.
+fn whole(joints: usize, count: usize, mut record: impl FnMut(&[f64]) -> Vec<f64>) -> (Store, Grid) {
+    let axis = |a: usize| Axis { name: format!("joint {a}"), unit: "rad".into(), start: 0.0, step: 0.1, count };
+    let grid = Grid { axes: (0..joints).map(axis).collect() };
+    let space = Space::new(&grid, 1).unwrap();
+    let places = blocks(&space, 0);
+    let store = Store::new(space, Order::Potential, places.len());
+    for place in places {
+        store.publish(0, &place, nodes(store.space(), 0, &place, |_| true, &mut record)).unwrap();
+    }
+    (store, grid)
+}
+
+#[test]
+fn one_steep_cell_among_thousands_is_bounded() {
+    // A constant, with a bend at one node: whichever cells a choice would leave out, it leaves out one of these.
+    for (joints, count, places) in [(3, 24, 200), (6, 4, 8)] {
+        let mut random = Random(3);
+        for _ in 0..places {
+            let bent: Vec<f64> =
+                (0..joints).map(|_| (0.5 * (random.next() + 1.0) * count as f64).floor() * 0.1).collect();
+            let (store, grid) = whole(joints, count, |q| {
+                let mut record = vec![0.0; width(joints)];
+                let is_bent = q.iter().zip(&bent).all(|(q, bent)| (q - bent).abs() < 0.05);
+                record[0] = if is_bent { 2.0 } else { 1.0 };
+                record
+            });
+            let data = Dataset::refined(Arc::new(store), grid, None, "name = \"bent\"".into(), Provenance::default());
+            let ones = JointVector::from_slice(&vec![1.0; joints]);
+            let field = TorqueField::interpolated(&data, Interpolation::Potential, 0.5, &ones).unwrap();
+            let bound = field.relative_stiffness(&ones);
+            let store = data.refinement.as_ref().unwrap();
+            // A little inside, in each cell around the node.
+            let steepest = (0..1_usize << joints).map(|side| {
+                let beside = |(a, bent): (usize, &f64)| bent + if side >> a & 1 == 1 { 1e-3 } else { -1e-3 };
+                steepness(store, &bent.iter().enumerate().map(beside).collect::<Vec<_>>())
+            });
+            let steepest = steepest.fold(0.0, f64::max);
+            assert!(steepest > 100.0 && steepest <= bound, "{joints} joints, {bent:?}: {steepest} beyond {bound}");
+        }
+    }
+}
+
+#[test]
+fn where_nothing_bends_the_bound_is_below_what_a_bend_has() {
+    // What the comparison above would see of a bound that left out the cells around the bend.
+    for (joints, count) in [(3, 24), (6, 4)] {
+        let (store, grid) = whole(joints, count, |_| {
+            let mut record = vec![0.0; width(joints)];
+            record[0] = 1.0;
+            record
+        });
+        let data = Dataset::refined(Arc::new(store), grid, None, "name = \"flat\"".into(), Provenance::default());
+        let ones = JointVector::from_slice(&vec![1.0; joints]);
+        let field = TorqueField::interpolated(&data, Interpolation::Potential, 0.5, &ones).unwrap();
+        assert!(field.relative_stiffness(&ones) < 100.0);
     }
 }

@@ -49,6 +49,7 @@ const CASES: &[(&str, &str, usize, &[&str])] = &[
     ("<child link=\"hand\"/>", "<child link=\"arm\"/>", 8, &["child of the joint on line 5"]),
     ("<link name=\"hand\"/>", "<link name=\"arm\"/>", 4, &["two links", "\"arm\""]),
     ("name=\"grip\"", "name=\"turn\"", 8, &["two joints", "\"turn\""]),
+    ("<link name=\"hand\"/>", "<link name=\"hand\"/><link name=\"tray\"/>", 4, &["\"base\" and \"tray\"", "one root"]),
     ("<link name=\"hand\"/>", "<link/>", 4, &["attribute name"]),
     ("<box size=\"0.1 0.02 0.02\"/>", "<box size=\"0.1 0 0.02\"/>", 3, &["positive"]),
     ("<box size=\"0.1 0.02 0.02\"/>", "<sphere radius=\"-1\"/>", 3, &["positive"]),

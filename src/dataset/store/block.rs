@@ -90,6 +90,6 @@ impl Block {
 }
 
 /// The block above, along the axes in `set`, of the one with `place`.
-pub(super) fn beyond(place: &Place, set: usize) -> Place {
+pub(crate) fn beyond(place: &Place, set: usize) -> Place {
     std::array::from_fn::<_, MAX_JOINTS, _>(|a| place[a] + (set >> a & 1) as u32)
 }

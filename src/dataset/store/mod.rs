@@ -35,7 +35,7 @@ pub use block::{Block, Nodes};
 pub use space::{Place, Space, SpaceError};
 
 use crate::{JointVector, MAX_JOINTS};
-use block::beyond;
+pub(crate) use block::beyond;
 use directory::{Directory, Refusal};
 use record::{MAX_WIDTH, mixed, sets, slope, width};
 use std::sync::{
