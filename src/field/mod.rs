@@ -187,9 +187,7 @@ impl TorqueField {
 
     /// Upper bound of the stiffness of the interpolated torque inside the grid, before any boundary layer, relative to
     /// `slopes`, one per joint [N m/rad]: no Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), is
-    /// greater; of a refined dataset with more cells than can be looked at none in evenly chosen ones
-    /// (`field/refined.rs`). One or less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for
-    /// `slopes` = Ks.
+    /// greater. One or less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
     #[must_use]
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
         match &self.source {
