@@ -10,6 +10,9 @@
 
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 
+mod clock;
+
+use clock::nanoseconds;
 use haptize::{
     JointVector,
     contact::{Model, Solver},
@@ -30,7 +33,7 @@ use haptize::{
         sample,
     },
 };
-use std::{hint::black_box, path::Path, sync::Arc, time::Instant};
+use std::{hint::black_box, path::Path, sync::Arc};
 
 /// Rms errors for which a store is filled, over the rms torque [1].
 const AIMS: [f64; 9] = [0.3, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001];
@@ -96,19 +99,6 @@ fn finer(base: &Grid, times: usize) -> Grid {
     grid
 }
 
-/// Median over blocks of the mean time of `work` [ns].
-fn nanoseconds(mut work: impl FnMut(f64)) -> f64 {
-    let mut blocks: Vec<f64> = (0..BLOCKS)
-        .map(|block| {
-            let start = Instant::now();
-            (0..LOOK_UPS).for_each(|k| work(f64::from(LOOK_UPS * block + k)));
-            start.elapsed().as_nanos() as f64 / f64::from(LOOK_UPS)
-        })
-        .collect();
-    blocks.sort_by(f64::total_cmp);
-    blocks[blocks.len() / 2]
-}
-
 /// What `store` costs, which `spent` seconds of processor time filled with `solved` nodes; its error, and a way that is
 /// looked up.
 fn cost(store: &Store, base: &Grid, (spent, solved): (f64, u64), error: f64, way: impl Fn(f64) -> JointVector) -> Cost {
@@ -117,10 +107,10 @@ fn cost(store: &Store, base: &Grid, (spent, solved): (f64, u64), error: f64, way
     let levels =
         blocks.iter().filter(|(_, block)| block.nodes().present != 0).map(|(key, _)| store.space().block(*key));
     let finest = levels.flatten().map(|(level, _)| level).max().unwrap_or(0);
-    let placing = nanoseconds(|k| {
+    let placing = nanoseconds(BLOCKS, LOOK_UPS, |k| {
         black_box(way(k));
     });
-    let look_up = nanoseconds(|k| {
+    let look_up = nanoseconds(BLOCKS, LOOK_UPS, |k| {
         black_box(store.sample(&way(k)));
     });
     Cost {

@@ -7,11 +7,13 @@
 
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 
+mod clock;
 #[path = "../tests/desktop/mod.rs"]
 mod desktop;
 #[path = "../tests/synthetic/mod.rs"]
 mod synthetic;
 
+use clock::nanoseconds;
 use haptize as engine;
 use haptize::{
     JointVector, MAX_JOINTS,
@@ -47,19 +49,6 @@ const BLOCKS: u32 = 2000;
 
 /// Look-ups in a block.
 const LOOK_UPS: u32 = 50;
-
-/// Median over blocks of the mean time of `work` [ns].
-fn nanoseconds(mut work: impl FnMut(f64)) -> f64 {
-    let mut blocks: Vec<f64> = (0..BLOCKS)
-        .map(|block| {
-            let start = Instant::now();
-            (0..LOOK_UPS).for_each(|k| work(f64::from(LOOK_UPS * block + k)));
-            start.elapsed().as_nanos() as f64 / f64::from(LOOK_UPS)
-        })
-        .collect();
-    blocks.sort_by(f64::total_cmp);
-    blocks[blocks.len() / 2]
-}
 
 /// All places of blocks of `level`.
 fn places(space: &Space, level: u32) -> Vec<Place> {
@@ -113,7 +102,7 @@ fn look_ups() {
             q.iter_mut().enumerate().for_each(|(a, q)| *q = 0.1 + 0.4 * (1e-3 * k + a as f64).sin());
             q
         };
-        let placing = nanoseconds(|k| {
+        let placing = nanoseconds(BLOCKS, LOOK_UPS, |k| {
             black_box(place(k));
         });
         for (order, interpolation) in
@@ -121,7 +110,7 @@ fn look_ups() {
         {
             let base = synthetic::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]);
             let store = Arc::new(dense(&base, levels, order));
-            let stored = nanoseconds(|k| {
+            let stored = nanoseconds(BLOCKS, LOOK_UPS, |k| {
                 black_box(store.sample(&place(k)));
             });
             let slope = JointVector::from_slice(&vec![10.0; joints]);
@@ -129,7 +118,7 @@ fn look_ups() {
             let field = TorqueField::interpolated(&refined, interpolation, 0.5, &slope).unwrap();
             let haptics = Haptics::new(field, desktop::proxy(joints), &desktop::haptics(joints)).unwrap();
             let mut state = haptics.start(&place(0.0)).unwrap();
-            let tick = nanoseconds(|k| {
+            let tick = nanoseconds(BLOCKS, LOOK_UPS, |k| {
                 let inputs = Inputs { position: place(k), age: 0.0, elapsed: 1e-3, interval: 1e-3 };
                 black_box(haptics.tick(&mut state, &inputs));
             });
@@ -137,7 +126,7 @@ fn look_ups() {
             let grid = synthetic::grid(&vec![(-0.6, 1.2 / (points - 1) as f64, points); joints]);
             let field =
                 TorqueField::interpolated(&synthetic::half_space(grid, 5.0), interpolation, 0.5, &slope).unwrap();
-            let grid = nanoseconds(|k| {
+            let grid = nanoseconds(BLOCKS, LOOK_UPS, |k| {
                 black_box(field.sample(&place(k)));
             });
             let [stored, tick, grid] = [stored, tick, grid].map(|time| time - placing);

@@ -5,11 +5,13 @@
 
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 
+mod clock;
 #[path = "../tests/desktop/mod.rs"]
 mod desktop;
 #[path = "../tests/synthetic/mod.rs"]
 mod synthetic;
 
+use clock::nanoseconds;
 use haptize as engine;
 use haptize::{
     JointVector, MAX_JOINTS,
@@ -17,22 +19,9 @@ use haptize::{
     render::haptic::{Haptics, Inputs},
     scene::Interpolation,
 };
-use std::{hint::black_box, time::Instant};
+use std::hint::black_box;
 
 const TICKS: u32 = 100_000;
-
-/// Median over blocks of a thousand of the mean time of `work` [ns].
-fn nanoseconds(mut work: impl FnMut(f64)) -> f64 {
-    let mut blocks: Vec<f64> = (0..TICKS / 1000)
-        .map(|block| {
-            let start = Instant::now();
-            (0..1000).for_each(|k| work(f64::from(1000 * block + k)));
-            start.elapsed().as_nanos() as f64 / 1000.0
-        })
-        .collect();
-    blocks.sort_by(f64::total_cmp);
-    blocks[blocks.len() / 2]
-}
 
 fn main() {
     println!(
@@ -52,15 +41,15 @@ fn main() {
             q.iter_mut().enumerate().for_each(|(a, q)| *q = 0.1 + 0.4 * (1e-3 * k + a as f64).sin());
             q
         };
-        let placing = nanoseconds(|k| {
+        let placing = nanoseconds(TICKS / 1000, 1000, |k| {
             black_box(place(k));
         });
-        let look_up = nanoseconds(|k| {
+        let look_up = nanoseconds(TICKS / 1000, 1000, |k| {
             black_box(field.sample(&place(k)));
         });
         let haptics = Haptics::new(field, desktop::proxy(joints), &spec).unwrap();
         let mut state = haptics.start(&place(0.0)).unwrap();
-        let tick = nanoseconds(|k| {
+        let tick = nanoseconds(TICKS / 1000, 1000, |k| {
             let inputs = Inputs { position: place(k), age: 0.0, elapsed: 1e-3, interval: 1e-3 };
             black_box(haptics.tick(&mut state, &inputs));
         });

@@ -30,6 +30,16 @@ pub struct Shader {
     pub precision: Precision,
 }
 
+/// A stage in f32.
+const fn stage(
+    name: &'static str,
+    entry: &'static str,
+    parts: &'static [&'static str],
+    overrides: &'static [&'static [(&'static str, f64)]],
+) -> Shader {
+    Shader { name, entry, parts, overrides, precision: Precision::Single }
+}
+
 /// A stage of the same text in either precision.
 pub(super) const fn in_both(shader: Shader) -> [Shader; 2] {
     [Shader { precision: Precision::Single, ..shader }, Shader { precision: Precision::Double, ..shader }]
@@ -59,48 +69,27 @@ const FRAME: &str = include_str!("../../shaders/frame.wgsl");
 const FRAME_ITERATIVE: &str = include_str!("../../shaders/frame_iterative.wgsl");
 
 /// Node positions for a batch of configurations.
-pub static KINEMATICS: [Shader; 2] = in_both(Shader {
-    name: "kinematics",
-    entry: "main",
-    parts: &[TYPES, ROTATION, include_str!("../../shaders/kinematics.wgsl")],
-    overrides: &[&[]],
-    precision: Precision::Single,
-});
+pub static KINEMATICS: [Shader; 2] =
+    in_both(stage("kinematics", "main", &[TYPES, ROTATION, include_str!("../../shaders/kinematics.wgsl")], &[&[]]));
 
 /// Gap of every proxy node to the flat triangles at rest.
-pub static DETECTION: Shader = Shader {
-    name: "detection",
-    entry: "main",
-    parts: &[TYPES, CLOSEST_POINT, MESH, SURFACE, include_str!("../../shaders/detection.wgsl")],
-    overrides: &[&[]],
-    precision: Precision::Single,
-};
+pub static DETECTION: Shader = stage(
+    "detection",
+    "main",
+    &[TYPES, CLOSEST_POINT, MESH, SURFACE, include_str!("../../shaders/detection.wgsl")],
+    &[&[]],
+);
 
 /// Smallest gap of every configuration.
-pub static GAP: [Shader; 2] = in_both(Shader {
-    name: "gap",
-    entry: "main",
-    parts: &[
-        TYPES,
-        CLOSEST_POINT,
-        MESH,
-        FACET,
-        BOUNDING_SPHERES,
-        CLOSEST_FACET,
-        include_str!("../../shaders/gap.wgsl"),
-    ],
-    overrides: &[&[], SMOOTH],
-    precision: Precision::Single,
-});
+pub static GAP: [Shader; 2] = in_both(stage(
+    "gap",
+    "main",
+    &[TYPES, CLOSEST_POINT, MESH, FACET, BOUNDING_SPHERES, CLOSEST_FACET, include_str!("../../shaders/gap.wgsl")],
+    &[&[], SMOOTH],
+));
 
 /// List of the configurations in contact.
-pub static COMPACTION: [Shader; 2] = in_both(Shader {
-    name: "compaction",
-    entry: "main",
-    parts: &[TYPES, PREFIX_SUM, COMPACT],
-    overrides: &[&[]],
-    precision: Precision::Single,
-});
+pub static COMPACTION: [Shader; 2] = in_both(stage("compaction", "main", &[TYPES, PREFIX_SUM, COMPACT], &[&[]]));
 
 /// Triangles that share a bounding sphere in searches for the closest one.
 pub(super) const CLUSTER: usize = 8;
@@ -122,19 +111,18 @@ const FROZEN: &[(&str, f64)] = &[("FROZEN", 1.0)];
 const PAPER: &[(&str, f64)] = &[("PAPER", 1.0)];
 
 /// Search: workspaces and joint axes.
-pub static SEARCH_ARM: [Shader; 2] = in_both(Shader {
-    name: "search_arm",
-    entry: "main",
-    parts: &[SEARCH_TYPES, ROTATION, include_str!("../../shaders/search_arm.wgsl")],
-    overrides: &[&[]],
-    precision: Precision::Single,
-});
+pub static SEARCH_ARM: [Shader; 2] = in_both(stage(
+    "search_arm",
+    "main",
+    &[SEARCH_TYPES, ROTATION, include_str!("../../shaders/search_arm.wgsl")],
+    &[&[]],
+));
 
 /// Search: the trial's displacement, and its contacts and near misses.
-pub static SEARCH_DETECT: [Shader; 2] = in_both(Shader {
-    name: "search_detect",
-    entry: "main",
-    parts: &[
+pub static SEARCH_DETECT: [Shader; 2] = in_both(stage(
+    "search_detect",
+    "main",
+    &[
         SEARCH_TYPES,
         WORKSPACE,
         SEARCH_STATE,
@@ -148,31 +136,22 @@ pub static SEARCH_DETECT: [Shader; 2] = in_both(Shader {
         DEPTH_ROWS,
         include_str!("../../shaders/search_detect.wgsl"),
     ],
-    overrides: &[&[], SMOOTH, ISOTROPIC, FROZEN, PAPER],
-    precision: Precision::Single,
-});
+    &[&[], SMOOTH, ISOTROPIC, FROZEN, PAPER],
+));
 
 /// Search: the trial judged.
-pub static SEARCH_JUDGE: [Shader; 2] = in_both(Shader {
-    name: "search_judge",
-    entry: "main",
-    parts: &[
-        SEARCH_TYPES,
-        WORKSPACE,
-        SEARCH_STATE,
-        LISTING,
-        SEARCH_SUPPORT,
-        include_str!("../../shaders/search_judge.wgsl"),
-    ],
-    overrides: &[&[], ISOTROPIC, FROZEN],
-    precision: Precision::Single,
-});
+pub static SEARCH_JUDGE: [Shader; 2] = in_both(stage(
+    "search_judge",
+    "main",
+    &[SEARCH_TYPES, WORKSPACE, SEARCH_STATE, LISTING, SEARCH_SUPPORT, include_str!("../../shaders/search_judge.wgsl")],
+    &[&[], ISOTROPIC, FROZEN],
+));
 
 /// Search: from one trial to the next.
-pub static SEARCH_STEP: [Shader; 2] = in_both(Shader {
-    name: "search_step",
-    entry: "main",
-    parts: &[
+pub static SEARCH_STEP: [Shader; 2] = in_both(stage(
+    "search_step",
+    "main",
+    &[
         SEARCH_TYPES,
         WORKSPACE,
         SEARCH_STATE,
@@ -181,15 +160,14 @@ pub static SEARCH_STEP: [Shader; 2] = in_both(Shader {
         SEARCH_SUPPORT,
         include_str!("../../shaders/search_step.wgsl"),
     ],
-    overrides: &[&[], ISOTROPIC, FROZEN],
-    precision: Precision::Single,
-});
+    &[&[], ISOTROPIC, FROZEN],
+));
 
 /// Search: a pass of the paper's iteration.
-pub static SEARCH_PAPER: [Shader; 2] = in_both(Shader {
-    name: "search_paper",
-    entry: "main",
-    parts: &[
+pub static SEARCH_PAPER: [Shader; 2] = in_both(stage(
+    "search_paper",
+    "main",
+    &[
         SEARCH_TYPES,
         WORKSPACE,
         SEARCH_STATE,
@@ -201,36 +179,24 @@ pub static SEARCH_PAPER: [Shader; 2] = in_both(Shader {
         SEARCH_SUPPORT,
         include_str!("../../shaders/search_paper.wgsl"),
     ],
-    overrides: &[PAPER, &[("PAPER", 1.0), ("ISOTROPIC", 1.0)]],
-    precision: Precision::Single,
-});
+    &[PAPER, &[("PAPER", 1.0), ("ISOTROPIC", 1.0)]],
+));
 
 /// Search: what is not done.
-pub static SEARCH_UNFINISHED: [Shader; 2] = in_both(Shader {
-    name: "search_unfinished",
-    entry: "main",
-    parts: &[SEARCH_TYPES, PREFIX_SUM, include_str!("../../shaders/search_unfinished.wgsl")],
-    overrides: &[&[]],
-    precision: Precision::Single,
-});
+pub static SEARCH_UNFINISHED: [Shader; 2] = in_both(stage(
+    "search_unfinished",
+    "main",
+    &[SEARCH_TYPES, PREFIX_SUM, include_str!("../../shaders/search_unfinished.wgsl")],
+    &[&[]],
+));
 
 /// Search: where the touches of each configuration go.
-pub static SEARCH_COUNT: [Shader; 2] = in_both(Shader {
-    name: "search_results",
-    entry: "count",
-    parts: &[SEARCH_TYPES, PREFIX_SUM, WORKSPACE, SEARCH_RESULTS],
-    overrides: &[&[], PAPER],
-    precision: Precision::Single,
-});
+pub static SEARCH_COUNT: [Shader; 2] =
+    in_both(stage("search_results", "count", &[SEARCH_TYPES, PREFIX_SUM, WORKSPACE, SEARCH_RESULTS], &[&[], PAPER]));
 
 /// Search: records, and touches without gaps.
-pub static SEARCH_GATHER: [Shader; 2] = in_both(Shader {
-    name: "search_results",
-    entry: "gather",
-    parts: &[SEARCH_TYPES, PREFIX_SUM, WORKSPACE, SEARCH_RESULTS],
-    overrides: &[&[], PAPER],
-    precision: Precision::Single,
-});
+pub static SEARCH_GATHER: [Shader; 2] =
+    in_both(stage("search_results", "gather", &[SEARCH_TYPES, PREFIX_SUM, WORKSPACE, SEARCH_RESULTS], &[&[], PAPER]));
 
 /// Graphics with dynamics, and without.
 const MOTIONS: &[&[(&str, f64)]] = &[&[], &[("QUASI_STATIC", 1.0)]];
@@ -240,76 +206,33 @@ const INVERSES: &[&[(&str, f64)]] =
     &[&[], &[("QUASI_STATIC", 1.0)], ISOTROPIC, &[("QUASI_STATIC", 1.0), ("ISOTROPIC", 1.0)]];
 
 /// Frame update: what stiffening springs add to the loads.
-pub static FRAME_STIFFENING: Shader = Shader {
-    name: "frame_stiffening",
-    entry: "relieve",
-    parts: &[FRAME_COMMON, include_str!("../../shaders/frame_stiffening.wgsl")],
-    overrides: &[&[("FACTOR", 8.0), ("STRAIN", 0.1)]],
-    precision: Precision::Single,
-};
+pub static FRAME_STIFFENING: Shader = stage(
+    "frame_stiffening",
+    "relieve",
+    &[FRAME_COMMON, include_str!("../../shaders/frame_stiffening.wgsl")],
+    &[&[("FACTOR", 8.0), ("STRAIN", 0.1)]],
+);
 
 /// Frame update by the inverse: right-hand side.
-pub static FRAME_LOAD: Shader = Shader {
-    name: "frame",
-    entry: "load",
-    parts: &[FRAME_COMMON, FRAME],
-    overrides: INVERSES,
-    precision: Precision::Single,
-};
+pub static FRAME_LOAD: Shader = stage("frame", "load", &[FRAME_COMMON, FRAME], INVERSES);
 
 /// Frame update by the inverse: new state.
-pub static FRAME_ADVANCE: Shader = Shader {
-    name: "frame",
-    entry: "advance",
-    parts: &[FRAME_COMMON, FRAME],
-    overrides: INVERSES,
-    precision: Precision::Single,
-};
+pub static FRAME_ADVANCE: Shader = stage("frame", "advance", &[FRAME_COMMON, FRAME], INVERSES);
 
 /// Frame update by conjugate gradients: first residual and direction.
-pub static FRAME_BEGIN: Shader = Shader {
-    name: "frame_iterative",
-    entry: "begin",
-    parts: &[FRAME_COMMON, FRAME_ITERATIVE],
-    overrides: MOTIONS,
-    precision: Precision::Single,
-};
+pub static FRAME_BEGIN: Shader = stage("frame_iterative", "begin", &[FRAME_COMMON, FRAME_ITERATIVE], MOTIONS);
 
 /// Frame update by conjugate gradients: matrix times direction.
-pub static FRAME_PRODUCT: Shader = Shader {
-    name: "frame_iterative",
-    entry: "product",
-    parts: &[FRAME_COMMON, FRAME_ITERATIVE],
-    overrides: MOTIONS,
-    precision: Precision::Single,
-};
+pub static FRAME_PRODUCT: Shader = stage("frame_iterative", "product", &[FRAME_COMMON, FRAME_ITERATIVE], MOTIONS);
 
 /// Frame update by conjugate gradients: step along the direction.
-pub static FRAME_CORRECT: Shader = Shader {
-    name: "frame_iterative",
-    entry: "correct",
-    parts: &[FRAME_COMMON, FRAME_ITERATIVE],
-    overrides: MOTIONS,
-    precision: Precision::Single,
-};
+pub static FRAME_CORRECT: Shader = stage("frame_iterative", "correct", &[FRAME_COMMON, FRAME_ITERATIVE], MOTIONS);
 
 /// Frame update by conjugate gradients: next direction.
-pub static FRAME_TURN: Shader = Shader {
-    name: "frame_iterative",
-    entry: "turn",
-    parts: &[FRAME_COMMON, FRAME_ITERATIVE],
-    overrides: MOTIONS,
-    precision: Precision::Single,
-};
+pub static FRAME_TURN: Shader = stage("frame_iterative", "turn", &[FRAME_COMMON, FRAME_ITERATIVE], MOTIONS);
 
 /// Frame update by conjugate gradients: new state.
-pub static FRAME_FINISH: Shader = Shader {
-    name: "frame_iterative",
-    entry: "finish",
-    parts: &[FRAME_COMMON, FRAME_ITERATIVE],
-    overrides: MOTIONS,
-    precision: Precision::Single,
-};
+pub static FRAME_FINISH: Shader = stage("frame_iterative", "finish", &[FRAME_COMMON, FRAME_ITERATIVE], MOTIONS);
 
 /// Every shader of the engine.
 pub static ALL: &[&[Shader]] = &[
