@@ -228,7 +228,9 @@ fn nodes_along_a_link_share_its_length_and_its_stiffness() {
 #[test]
 fn a_skin_is_told_by_what_one_knows_of_it() {
     let skin = |keys: &str| {
-        let spheres = "rings = 4\nsegments = 6\n[object.springs]\nkind = \"axial\"\nstiffness = 300\n[object.ground]\nstiffness = 100\n";
+        let spheres = "rings = 4\nsegments = 6\n\
+         [object.springs]\nkind = \"axial\"\nstiffness = 300\n\
+         [object.ground]\nstiffness = 100\n";
         assert!(LEAST.contains(spheres));
         parse(&LEAST.replace(spheres, &format!("edge = 0.004\n{keys}\n"))).unwrap().object
     };
@@ -243,7 +245,8 @@ fn a_skin_is_told_by_what_one_knows_of_it() {
     assert!((plate.bending - 8e-4).abs() < 1e-15 && (plate.tension - 600.0).abs() < 1e-9);
     let foundation = skin("[object.skin]\nfoundation = 1e6\nwidth = 0.01").skin.unwrap();
     assert!((foundation.bending - 0.01).abs() < 1e-15);
-    let solid = "[object.skin]\nwidth = 0.01\n[object.elasticity]\nyoung = 2e4\npoisson = 0.0\ncell = 0.01\n[object.ground]\nstiffness = 1";
+    let solid = "[object.skin]\nwidth = 0.01\n[object.elasticity]\nyoung = 2e4\npoisson = 0.0\ncell = 0.01\n\
+     [object.ground]\nstiffness = 1";
     assert!((skin(solid).skin.unwrap().bending - 0.01).abs() < 1e-15);
 }
 

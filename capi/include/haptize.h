@@ -96,7 +96,7 @@ typedef struct hz_gains {
   double torque_limit[HZ_MAX_JOINTS];
 } hz_gains;
 
-// What a tick has to say beside its torque. Set `size` before the call.
+// The report of a tick beside its torque. Set `size` before the call.
 typedef struct hz_tick {
   // sizeof(hz_tick).
   size_t size;

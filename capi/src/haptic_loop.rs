@@ -39,7 +39,7 @@ pub struct hz_gains {
     pub torque_limit: [f64; HZ_MAX_JOINTS],
 }
 
-/// What a tick has to say beside its torque. Set `size` before the call.
+/// The report of a tick beside its torque. Set `size` before the call.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct hz_tick {

@@ -16,7 +16,7 @@ const TURN: Duration = Duration::from_millis(50);
 /// How long work that is to stop may take to: with all that follows, less than a second, as for the command.
 const GRACE: Duration = Duration::from_millis(700);
 
-/// What comes from the work.
+/// A message of the work: news, or its result.
 enum News<N, T> {
     Told(N),
     Done(T),

@@ -186,7 +186,7 @@ impl Dataset {
         python_of(py, &self.dataset.provenance)
     }
 
-    /// What the bake or the gridization that made this dataset has to say; None for one that was opened.
+    /// The report of the bake or the gridization that made this dataset; None for one that was opened.
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.report.as_ref().map(|report| python_of(py, report)).transpose()

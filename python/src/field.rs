@@ -25,7 +25,7 @@ use std::path::PathBuf;
 #[pyclass(frozen, module = "haptize")]
 pub struct Field {
     field: TorqueField,
-    /// What only a look at the dataset needs.
+    /// The dataset, which only a look at it needs.
     dataset: Py<Dataset>,
 }
 

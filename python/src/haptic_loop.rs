@@ -57,7 +57,7 @@ impl Loop {
         Ok(Self { haptics, warnings, state: None, last: None })
     }
 
-    /// What is beyond a passivity bound, with values that would be passive; empty where all gains keep theirs.
+    /// Gains beyond their passivity bounds, with values that would be passive; empty where all gains keep theirs.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.warnings.clone()

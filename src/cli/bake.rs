@@ -62,7 +62,9 @@ pub struct Arguments {
     max_error: Option<Aim>,
     /// Instead of choosing a uniform grid for --max-error, refine the scene's grid where it errs: by up to so many
     /// levels, itself included, each of half the spacing.
-    #[arg(long, value_name = "LEVELS", requires = "max_error", conflicts_with_all = ["resume", "algorithm", "shard"], value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_LEVELS)))]
+    #[arg(long, value_name = "LEVELS", requires = "max_error",
+        conflicts_with_all = ["resume", "algorithm", "shard"],
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_LEVELS)))]
     refine: Option<u32>,
     /// Maximum number of grid points that --max-error may choose.
     #[arg(long, default_value_t = 2_000_000, value_name = "POINTS")]

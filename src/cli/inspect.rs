@@ -88,7 +88,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let status = format!("{:?}", dataset.status(point)).to_lowercase();
         json["stored"] = serde_json::json!({
             "point": point, "q": *stored, "status": status, "torque": dataset.torque(point),
-            "forces": dataset.forces(point).map(|f| serde_json::json!({"node": f.node, "force": f.force})).collect::<Vec<_>>(),
+            "forces": dataset.forces(point)
+                .map(|f| serde_json::json!({"node": f.node, "force": f.force}))
+                .collect::<Vec<_>>(),
         });
         writeln!(text, "stored at point {point}, q = {}: {status}", numbers(&stored))?;
         writeln!(text, "  torque       {}", efforts(dataset.torque(point), &chain))?;

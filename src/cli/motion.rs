@@ -55,7 +55,8 @@ fn recorded(dataset: &Dataset, file: &Path, topic: Option<&str>) -> Result<Motio
     let course = Course::read(file, topic, &joints)?;
     if course.left_out > 0 {
         tell(format_args!(
-            "haptize: note: {}: {} messages of {} are left out: they lack a joint, or come no later than the one before",
+            "haptize: note: {}: {} messages of {} are left out: they lack a joint, or \
+             come no later than the one before",
             file.display(),
             course.left_out,
             course.topic

@@ -39,7 +39,8 @@ const LOOK: Duration = Duration::from_millis(50);
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct Choices {
     /// Levels of the store: the scene's grid, and as many finer ones less one, each of half the spacing.
-    #[arg(long, default_value_t = 2, value_name = "COUNT", requires = "on_demand", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_LEVELS)))]
+    #[arg(long, default_value_t = 2, value_name = "COUNT", requires = "on_demand",
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_LEVELS)))]
     levels: u32,
     /// Threads that solve; by default one less than there are processors.
     #[arg(long, value_name = "COUNT", requires = "on_demand", value_parser = clap::value_parser!(u16).range(1..=64))]
@@ -58,7 +59,7 @@ impl Choices {
 /// A scene that is solved while it is felt, and since when the program has been at work.
 pub struct Exploring {
     pub on_demand: Arc<OnDemand>,
-    /// What was explored is kept here.
+    /// The file that keeps the explored part.
     file: PathBuf,
     began: Instant,
 }
@@ -150,7 +151,8 @@ impl Explored {
     pub fn json(&self) -> serde_json::Value {
         let Self { done: on_demand::Explored { answers, solved, known, blocks, levels, full }, start } = self;
         json!({
-            "answers": answers, "solved": solved, "known_blocks": known, "blocks": blocks, "levels": levels, "start": start,
+            "answers": answers, "solved": solved, "known_blocks": known, "blocks": blocks, "levels": levels,
+            "start": start,
             "full": full,
         })
     }

@@ -1,5 +1,5 @@
-//! What a command writes: never over one of its inputs, over a file of another kind, or over what is no regular file.
-//! What is replaced is reported.
+//! The files that a command writes: never over one of its inputs, over a file of another kind, or over what is no
+//! regular file. A file that is replaced is reported.
 
 use super::Failure;
 use crate::dataset::{may_be_dataset, resolved};

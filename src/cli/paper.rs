@@ -141,7 +141,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     files.extend(figures.sheet("scrape", &press::titled("Scraping over the sphere", &scraped))?);
 
     let comparison = Comparison::new(sphere, scans);
-    let json = serde_json::json!({ "comparison": comparison, "bake": sweep, "press": pressed.summary(), "scrape": scraped.summary() });
+    let json = serde_json::json!({
+        "comparison": comparison, "bake": sweep, "press": pressed.summary(), "scrape": scraped.summary()
+    });
     let tables = [("table.md", comparison.markdown()), ("table.json", format!("{:#}\n", json["comparison"]))];
     for (name, text) in tables {
         let file = folder.join(name);

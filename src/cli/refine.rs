@@ -101,8 +101,10 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
         )?;
     }
     let json = serde_json::json!({
-        "file": wanted.output.display().to_string(), "nodes": nodes, "by_level": by_level, "equilibria": equilibria, "solved": solved, "blocks": blocks,
-        "bytes": file, "memory": bytes, "most_memory": memory, "error": measured, "aim": aim, "uniform": uniform, "rounds": rounds, "seconds": seconds,
+        "file": wanted.output.display().to_string(), "nodes": nodes, "by_level": by_level,
+        "equilibria": equilibria, "solved": solved, "blocks": blocks, "bytes": file, "memory": bytes,
+        "most_memory": memory, "error": measured, "aim": aim, "uniform": uniform, "rounds": rounds,
+        "seconds": seconds,
         "kept": kept,
     });
     Ok(Report { text, json, whole: kept })

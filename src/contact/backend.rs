@@ -1,4 +1,4 @@
-//! What solves many configurations.
+//! The backends that solve many configurations.
 
 use super::Equilibrium;
 use crate::JointVector;

@@ -1,4 +1,4 @@
-//! What contact needs to know of object and proxy, computed once and shared by all threads.
+//! The data of object and proxy that contact needs, computed once and shared by all threads.
 
 use super::{
     geometry::{RestSurface, smooth::SmoothSurface},

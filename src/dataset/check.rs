@@ -1,4 +1,4 @@
-//! What must hold of every dataset, in memory or in a file, before anything uses it.
+//! The rules that every dataset keeps, in memory or in a file, before anything uses it.
 //!
 //! Lengths fit the grid, contact rows are ordered and within, statuses are known, every number is finite. Checked in an
 //! order in which no check relies on one that comes later, and without allocating, so that hostile counts cost nothing.

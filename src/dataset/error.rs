@@ -1,4 +1,4 @@
-//! What can be wrong with a dataset file, each with the file's name and the remedy.
+//! The errors of dataset files, each with the file's name and the remedy.
 
 use crate::memory::Shortage;
 use std::{io, path::PathBuf};

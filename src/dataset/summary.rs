@@ -1,4 +1,4 @@
-//! What a dataset holds, in a few numbers: for `info`, reports and tests.
+//! A dataset's contents in a few numbers: for `info`, reports and tests.
 
 use super::{Axis, Dataset, Provenance, store::Store};
 use crate::contact::Status;

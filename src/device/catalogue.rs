@@ -49,7 +49,8 @@ pub struct Address {
 
 /// Text is no address of a device.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("\"{text}\" is no device: give one of {known}, or KIND:PLACE; `haptize device list` shows what is there", known = known())]
+#[error("\"{text}\" is no device: give one of {known}, or KIND:PLACE; \
+ `haptize device list` shows what is there", known = known())]
 pub struct AddressError {
     /// The text that was given.
     pub text: String,

@@ -26,7 +26,8 @@ pub enum MotionError {
     #[error("the motion has no waypoints: give it at least one")]
     Empty,
     /// A file without a sample.
-    #[error("{}: holds no sample; each line gives a time in seconds and {joints} coordinates, separated by commas", .file.display())]
+    #[error("{}: holds no sample; each line gives a time in seconds and {joints} coordinates, separated by commas",
+        .file.display())]
     NoSample {
         /// The motion's file.
         file: PathBuf,
@@ -66,7 +67,8 @@ pub enum MotionError {
         file: PathBuf,
     },
     /// A line of the file is not a sample.
-    #[error("{}:{line}: {what}; each line gives a time in seconds and {joints} coordinates, separated by commas", .file.display())]
+    #[error("{}:{line}: {what}; each line gives a time in seconds and {joints} coordinates, separated by commas",
+        .file.display())]
     Line {
         /// The motion's file.
         file: PathBuf,

@@ -49,7 +49,7 @@ pub struct Relayed {
     shared: Arc<Shared>,
 }
 
-/// What both ends look at.
+/// The state that both ends share.
 #[derive(Default)]
 struct Shared {
     /// Time of the last call, since the first [ns].

@@ -46,7 +46,8 @@ pub enum FieldError {
     },
     /// The interpolation needs more memory than is left.
     #[error(
-        "the interpolation: {0}; or set interpolation = \"linear\" in [haptics], which takes less, or take a coarser grid"
+        "the interpolation: {0}; or set interpolation = \"linear\" in [haptics], which takes less, \
+         or take a coarser grid"
     )]
     Memory(#[from] Shortage),
     /// The threshold is not in 0 <= Ith < 1.

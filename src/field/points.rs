@@ -1,4 +1,4 @@
-//! What a field knows of each grid point beside numbers that are interpolated, and what is known where nothing was
+//! The facts that a field has at each grid point beside numbers that are interpolated, and those where nothing was
 //! computed.
 
 use super::{FieldError, Flags, stencil::Lattice};

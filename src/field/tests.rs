@@ -1,4 +1,4 @@
-//! What must hold of the field whatever is interpolated, and of each interpolation.
+//! Properties of the field whatever is interpolated, and of each interpolation.
 
 use super::*;
 use crate::field::synthetic::{grid, half_space};

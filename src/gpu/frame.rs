@@ -313,7 +313,7 @@ const WORK_VECTORS: u64 = 5;
 
 /// Buffers that all stages bind.
 struct Common {
-    /// Of even iterations.
+    /// The parameters of even iterations.
     parameters: FrameParameters,
     even: StorageBuffer,
     structure: StorageBuffer,
@@ -327,7 +327,7 @@ struct Common {
 }
 
 impl Common {
-    /// Of an object whose matrix is `stiffness`, from the state `start`; `is_heavy` where nodes have a weight.
+    /// The update of an object of matrix `stiffness`, from the state `start`; `is_heavy` where nodes have a weight.
     fn new(
         gpu: &Context,
         object: &Object,
@@ -373,7 +373,7 @@ impl Common {
         self.inertia.as_ref().unwrap_or(&self.forces)
     }
 
-    /// What acts on the nodes.
+    /// The forces that act on the nodes.
     fn acting(&self) -> &StorageBuffer {
         self.loads.as_ref().unwrap_or(&self.forces)
     }

@@ -123,7 +123,13 @@ mod tests {
         ];
         compare(&expected, &reflect(Precision::Single));
         compare(&expected[..1], &reflect(Precision::Double));
-        let (name, mut members, size) = layout!(SearchParameters: configurations, joints, proxy_nodes, surface_nodes, triangles, clusters, groups, covered, contacts, support, carriers, max_iterations, reals, words, room, with_tangent, at_rest, at_offsets, at_masks, at_spheres, at_order, at_carriers, at_shapes, at_covered, at_places, at_links, gap_band, first_kc, kc, tolerance, mobility, bulge_mobility, bulge, least_scale, least_distance, softest);
+        let (name, mut members, size) = layout!(
+            SearchParameters: configurations, joints, proxy_nodes, surface_nodes, triangles, clusters, groups,
+            covered, contacts, support, carriers, max_iterations, reals, words, room, with_tangent, at_rest,
+            at_offsets, at_masks, at_spheres, at_order, at_carriers, at_shapes, at_covered, at_places, at_links,
+            gap_band, first_kc, kc, tolerance, mobility, bulge_mobility, bulge, least_scale, least_distance,
+            softest
+        );
         compare(&[(name, members.clone(), size)], &reflect(Precision::Double));
         let first = offset_of!(SearchParameters, gap_band) as u32;
         members.iter_mut().for_each(|(_, offset)| *offset = (*offset).min(first + offset.saturating_sub(first) / 2));

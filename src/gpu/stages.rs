@@ -1,4 +1,4 @@
-//! What a batch goes through, whoever does it: a device, or what stands for one and returns stored results at once.
+//! The stages of a batch, whoever does them: a device, or what stands for one and returns stored results at once.
 
 use super::{context::GpuError, precision::Precision};
 use crate::JointVector;

@@ -1,4 +1,4 @@
-//! What every interpolation answers: which samples, with which weights, make up the torque at a configuration.
+//! The answer of every interpolation: which samples, with which weights, make up the torque at a configuration.
 
 use super::{
     barycentric::{Weights, barycentric, corrected},

@@ -1,4 +1,4 @@
-//! What a gridization promises: linear fields exactly, SciPy's values, and no arrangement of points that breaks it.
+//! The promises of a gridization: linear fields exactly, SciPy's values, and no arrangement of points that breaks it.
 
 use super::*;
 use cloud::mix;

@@ -44,7 +44,8 @@ pub enum ObjectError {
     /// The dense compliance would not fit in memory.
     #[error(
         "the proxy reaches {nodes} surface nodes, which need {} MB of compliance, more than the {} MB of memory that it may take: use \
-         a coarser surface or a smaller grid, close other programs, or raise the limit (ulimit -v)", .bytes.div_ceil(1_000_000), .limit / 1_000_000
+         a coarser surface or a smaller grid, close other programs, or raise the \
+          limit (ulimit -v)", .bytes.div_ceil(1_000_000), .limit / 1_000_000
     )]
     TooLarge {
         /// Surface nodes that the proxy reaches.
@@ -197,7 +198,8 @@ pub enum SurfaceDefect {
         count: usize,
     },
     /// A triangle without area.
-    #[error("triangle {triangle} (nodes {} {} {}) has no area: remove it or merge its nodes", .corners[0], .corners[1], .corners[2])]
+    #[error("triangle {triangle} (nodes {} {} {}) has no area: \
+     remove it or merge its nodes", .corners[0], .corners[1], .corners[2])]
     DegenerateTriangle {
         /// The triangle.
         triangle: u32,
@@ -256,7 +258,8 @@ pub enum SurfaceDefect {
         node: u32,
     },
     /// A one-sided surface, such as a Klein bottle.
-    #[error("the surface has no inside: its triangles cannot be oriented alike across edge {} to {}", .nodes[0], .nodes[1])]
+    #[error("the surface has no inside: its triangles cannot be oriented alike \
+     across edge {} to {}", .nodes[0], .nodes[1])]
     NonOrientable {
         /// The two ends of the edge at which orientation fails.
         nodes: [u32; 2],

@@ -8,7 +8,7 @@
 //!
 //! `alpha <= 1/T`. On the device, the torque comes from the mean velocity of the last tick and is held over the next: a
 //! free inertia obeys `z^2 + (alpha T/2 - 1) z + alpha T/2 = 0`, stable below alpha T = 2; half of that leaves room.
-//! What is not taken in one tick is taken in the next ones.
+//! Energy that is not taken in one tick is taken in the next ones.
 
 use super::{accounts::Accounts, npmi::Motion};
 use crate::{JointVector, scene::HapticsSpec};

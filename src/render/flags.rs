@@ -1,4 +1,4 @@
-//! What a tick has to say beside its numbers: where the look-up was not to be trusted, what was limited, what failed.
+//! The flags of a tick beside its numbers: where the look-up was not to be trusted, what was limited, what failed.
 
 pub use crate::field::Flags;
 

@@ -49,7 +49,7 @@ pub struct LiveEnds {
     pub whereabouts: Vec<triple_buffer::Output<Whereabouts>>,
     /// Equilibria at the proxy.
     pub solutions: Option<triple_buffer::Input<Solution>>,
-    /// What answered the ticks so far.
+    /// The sources that answered the ticks so far.
     pub answers: triple_buffer::Output<Answers>,
 }
 

@@ -73,10 +73,10 @@ pub enum OnDemandError {
     /// No store can be laid over its grid.
     #[error(transparent)]
     Space(#[from] SpaceError),
-    /// What was kept cannot be read.
+    /// The kept dataset cannot be read.
     #[error(transparent)]
     Kept(#[from] DatasetError),
-    /// What was kept is of another scene.
+    /// The kept dataset is of another scene.
     #[error(
         "{}: was not explored with this scene and these levels: give another file, or the scene and --levels of that \
          session",
@@ -96,7 +96,7 @@ pub enum OnDemandError {
 pub struct Explored {
     /// Nodes and equilibria.
     pub solved: Solved,
-    /// What answered the ticks.
+    /// The sources that answered the ticks.
     pub answers: Answers,
     /// Blocks that an earlier session left.
     pub known: u64,
@@ -246,7 +246,7 @@ impl WorkerEnds {
     }
 }
 
-/// What the explorer's thread did.
+/// The work that the explorer's thread did.
 #[derive(Default)]
 struct Done {
     solved: Solved,
@@ -262,7 +262,7 @@ pub struct Exploration {
 }
 
 impl Exploration {
-    /// What answered the ticks so far.
+    /// The sources that answered the ticks so far.
     pub fn answers(&mut self) -> Answers {
         *self.answers.read()
     }

@@ -66,7 +66,8 @@ pub enum RecordingError {
         file: PathBuf,
     },
     /// A line is not what it should be.
-    #[error("{}:{line}: {what}; take a file that `haptize play --record` wrote for a proxy of {joints} joints", .file.display())]
+    #[error("{}:{line}: {what}; take a file that `haptize play --record` wrote for a proxy of {joints} joints",
+        .file.display())]
     Line {
         /// The recording's file.
         file: PathBuf,

@@ -107,7 +107,8 @@ pub struct LogWriter {
 #[non_exhaustive]
 pub enum LogError {
     /// The system refused.
-    #[error("{}: cannot be read or written: {source}; check the path, its permissions and the room left", .path.display())]
+    #[error("{}: cannot be read or written: {source}; check the path, its permissions \
+     and the room left", .path.display())]
     File {
         /// The log.
         path: PathBuf,
@@ -118,10 +119,12 @@ pub enum LogError {
     #[error("{}: exists already; continue it with --resume, or name another file", .0.display())]
     Exists(PathBuf),
     /// Another scene's log.
-    #[error("{}: the log was made with another scene or rig, or one with a plan and one led by hand; it cannot be continued with this one", .0.display())]
+    #[error("{}: the log was made with another scene or rig, or one with a plan and \
+     one led by hand; it cannot be continued with this one", .0.display())]
     OtherScene(PathBuf),
     /// Not a scan log.
-    #[error("{}: not a scan log (its first line is not `{SIGNATURE}`); other tables need a column mapping (--columns)", .0.display())]
+    #[error("{}: not a scan log (its first line is not `{SIGNATURE}`); \
+     other tables need a column mapping (--columns)", .0.display())]
     Foreign(PathBuf),
     /// A line that is wrong.
     #[error("{}:{line}: {message}", .path.display())]

@@ -1,4 +1,4 @@
-//! What a scan needs of a device: joint positions to read, joint torques to command, tick by tick.
+//! The parts of a device that a scan needs: joint positions to read, joint torques to command, tick by tick.
 
 use crate::JointVector;
 

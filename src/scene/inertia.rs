@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use glam::{DMat3, DVec3};
 
-/// What rounding may take from an eigenvalue of an inertia, as a share of its trace: scenes and robot files give five
-/// digits or more.
+/// The most that rounding takes from an eigenvalue of an inertia, as a share of its trace: scenes and robot files
+/// give five digits or more.
 const INERTIA_ROUNDING: f64 = 1e-5;
 
 /// Returns the inertia of a body that `inertia` is the rounding of [kg m^2]: the matrix itself, or, where its least
@@ -63,8 +63,8 @@ mod tests {
         assert!(positive_semidefinite(asymmetric).is_none());
     }
 
-    /// What a file's digits hide below zero is lifted, however small the other moments are: a small moment beside a
-    /// large one would otherwise give a chain an inertia that is not positive definite.
+    /// An eigenvalue that a file's digits push below zero is lifted, however small the other moments are: a small
+    /// moment beside a large one would otherwise give a chain an inertia that is not positive definite.
     #[test]
     fn eigenvalues_below_zero_by_rounding_are_lifted() {
         let [xx, xy, yy, zz] = [2e-3, 0.1, 1e-3, 2e5];

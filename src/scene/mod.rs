@@ -90,7 +90,7 @@ pub struct Rendering {
     pub object: Option<ObjectSpec>,
     /// The multi-link virtual proxy.
     pub proxy: ProxySpec,
-    /// What is drawn of its links.
+    /// The shapes that are drawn for its links.
     pub shapes: Vec<LinkShape>,
     /// The 1 kHz loop.
     pub haptics: HapticsSpec,

@@ -366,7 +366,7 @@ impl Course<'_, '_> {
         Ok(())
     }
 
-    /// What became of the sweep, once the backend is done with it.
+    /// The outcome of the sweep, once the backend is done with it.
     fn finish<E: std::error::Error + Send + Sync + 'static>(
         &mut self,
         streamed: Result<(), E>,

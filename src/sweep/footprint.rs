@@ -1,4 +1,4 @@
-//! What a sweep takes up, stated before it begins.
+//! The memory and disk that a sweep takes, stated before it begins.
 
 use super::{
     chunks::BEHIND,

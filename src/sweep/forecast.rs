@@ -1,4 +1,4 @@
-//! What a sweep is going to take, from a sample of its points.
+//! The time that a sweep is going to take, from a sample of its points.
 //!
 //! Points of the grid are drawn at random and solved by the sweep's own backend. The fraction of them in contact, the
 //! number of contact forces and the time per point follow.

@@ -39,7 +39,7 @@ pub struct ProxyNode {
     pub position: DVec3,
     /// Columns of J_i, one per joint [m/rad, or 1].
     pub jacobian: Vec<DVec3>,
-    /// What it touches, if anything.
+    /// The contact there, if it touches anything.
     pub contact: Option<Contact>,
 }
 

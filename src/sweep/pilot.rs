@@ -1,4 +1,4 @@
-//! What to bake for a given error: spacing, interpolation and tolerance of the solver, from a pilot.
+//! The choice of what to bake for a given error: spacing, interpolation and tolerance of the solver, from a pilot.
 //!
 //! The pilot bakes some coarse grids over the scene's region, holds them against directly solved random configurations,
 //! and measures how the error falls with the spacing: `error ~ h^p`. The spacing that is needed follows, for each

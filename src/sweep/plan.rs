@@ -1,4 +1,4 @@
-//! What each shard of a bake is going to take, before anything is baked.
+//! The cost of each shard of a bake, before anything is baked.
 //!
 //! Which points are skipped is found out for the whole grid, as each shard does. The time of the others follows from a
 //! sample, solved on this machine.

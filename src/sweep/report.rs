@@ -1,4 +1,4 @@
-//! What a sweep did, in numbers.
+//! The report of a sweep, in numbers.
 
 use super::{Footprint, Forecast, Lowered, tally::Tally};
 use crate::contact::MeshRipple;

@@ -1,4 +1,4 @@
-//! What a sweep counts on the way, so that it need not keep its results to sum them up.
+//! The counts that a sweep keeps on the way, so that it need not keep its results to sum them up.
 
 use super::{
     columns::Columns,

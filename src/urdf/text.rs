@@ -216,7 +216,8 @@ fn write_joint(text: &mut String, joint: &ArmJoint, spec: &JointSpec) -> std::fm
 fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, practice: &Practice) -> std::fmt::Result {
     writeln!(
         text,
-        "# One number per joint: {TIP_STIFFNESS:.0} N/m and at most {TIP_FORCE:.0} N where the arm meets the ball, through each joint's lever.\n"
+        "# One number per joint: {TIP_STIFFNESS:.0} N/m and at most {TIP_FORCE:.0} N where the arm meets the ball, \
+         through each joint's lever.\n"
     )?;
     writeln!(text, "[haptics]")?;
     let stiffness: Vec<f64> = practice.levers.iter().map(|lever| TIP_STIFFNESS * lever * lever).collect();

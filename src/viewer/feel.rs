@@ -226,7 +226,7 @@ impl Feel {
         *self.latest.read()
     }
 
-    /// What answered the ticks so far, where contact is solved meanwhile.
+    /// The sources that answered the ticks so far, where contact is solved meanwhile.
     pub fn answers(&mut self) -> Option<Answers> {
         self.exploration.as_mut().map(Exploration::answers)
     }
@@ -259,7 +259,7 @@ fn lock(guide: &Mutex<Guide>) -> MutexGuard<'_, Guide> {
     guide.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What moves the hand's goal.
+/// The part that moves the hand's goal.
 struct Leader {
     guide: Arc<Mutex<Guide>>,
     input: PointerInput,

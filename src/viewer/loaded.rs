@@ -30,7 +30,7 @@ pub struct Loaded {
     pub setup: Arc<Setup>,
     /// Contact forces on the object; absent where there is no object to draw.
     pub forces: Option<Arc<ContactForces>>,
-    /// What solves its contact while it is felt; absent where everything is stored that is felt.
+    /// The solver of its contact while it is felt; absent where everything is stored that is felt.
     pub on_demand: Option<Arc<OnDemand>>,
     /// The report of the bake, if this window baked it.
     pub report: Option<Arc<SweepReport>>,

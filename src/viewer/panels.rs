@@ -226,7 +226,13 @@ impl Viewer {
             match &self.job {
                 Some(job) => {
                     ui.heading(&job.title);
-                    ui.label(RichText::new("Contact is solved at every point of the grid over the joints, once; then it is felt at 1 kHz.").weak());
+                    ui.label(
+                        RichText::new(
+                            "Contact is solved at every point of the grid over the joints, once; \
+                     then it is felt at 1 kHz.",
+                        )
+                        .weak(),
+                    );
                     ui.add_space(GROUP_GAP);
                     let size = vec2(WIDE_PROGRESS + LONE_BUTTON.x, LONE_BUTTON.y);
                     ui.allocate_ui(size, |ui| ui.horizontal(|ui| progress(ui, job, WIDE_PROGRESS)));

@@ -1,6 +1,7 @@
 //! The proxy's side of the tick: effects at contacts, four channels, passivity control and bounds.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
+// clippy.toml allows it inside #[test] functions only; helpers need it, too.
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 mod block;
 mod channels;

@@ -115,7 +115,9 @@ fn an_object_of_unknown_energy_may_give_back_what_it_held_at_the_start() {
 
 #[test]
 fn bounds_are_reported_with_the_value_that_would_be_safe() {
-    let spec = "[haptics]\nproxy_damping = [2.0, 2.0]\nboundary_slope = [1500.0, 3000.0]\ncoupling_stiffness = [2000.0, 5000.0]\nencoder_step = [0.0, 1e-4]\ndevice_friction = [0.0, 0.05]\n";
+    let spec = "[haptics]\nproxy_damping = [2.0, 2.0]\nboundary_slope = [1500.0, 3000.0]\n\
+     coupling_stiffness = [2000.0, 5000.0]\nencoder_step = [0.0, 1e-4]\n\
+     device_friction = [0.0, 0.05]\n";
     let setup = setup(spec).unwrap();
     let found: Vec<(f64, f64)> = setup.exceeded.iter().map(|bound| (bound.value, bound.safe.round())).collect();
     assert_eq!(found, [(3000.0, 2000.0), (5000.0, 4000.0), (5000.0, 1000.0)]);

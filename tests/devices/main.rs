@@ -3,7 +3,8 @@
 //!
 //! Nothing here was tried on hardware. Time is simulated: a tick is a call, not a millisecond.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // clippy.toml allows it inside #[test] functions only; helpers need it, too.
+// clippy.toml allows it inside #[test] functions only; helpers need it, too.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 #[path = "../desktop/mod.rs"]
 mod desktop;

@@ -202,7 +202,8 @@ fn every_link_of_the_documentation_leads_somewhere() {
 
 #[test]
 fn what_is_shown_is_compared() {
-    let text = "```console\n$ one\na 1.5e-3 s\n...\nb\n$ two\n```\n```sh\nthree\n```\n```sh\n# Not run by the tests: slow\nfour\n```\n";
+    let text = "```console\n$ one\na 1.5e-3 s\n...\nb\n$ two\n```\n```sh\nthree\n```\n\
+     ```sh\n# Not run by the tests: slow\nfour\n```\n";
     let (found, left_out) = commands(text);
     assert_eq!(found.iter().map(|shown| shown.command.as_str()).collect::<Vec<_>>(), ["one", "two", "three"]);
     assert_eq!(left_out, ["slow: four"]);

@@ -62,7 +62,8 @@ fn what_is_no_file_is_refused_at_once_by_every_reader() {
     let home = folder.path();
     write_scene(home, OBJECTS[0].1, 4);
     succeed(home, &["bake", "scene.toml", "-o", "x.haptize", "--backend", "cpu"]);
-    let columns = "[table]\nheader = true\n[time]\nperiod = 0.001\n[[joint]]\nname = \"a\"\nposition = { column = \"a\" }\ntorque = { column = \"b\" }\n";
+    let columns = "[table]\nheader = true\n[time]\nperiod = 0.001\n[[joint]]\nname = \"a\"\n\
+     position = { column = \"a\" }\ntorque = { column = \"b\" }\n";
     std::fs::write(home.join("columns.toml"), columns).unwrap();
     std::fs::write(home.join("log.csv"), "a,b\n0,0\n0.1,0.1\n0.2,0.2\n0.3,0.3\n").unwrap();
     std::fs::create_dir(home.join("folder")).unwrap();

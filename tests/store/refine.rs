@@ -24,7 +24,8 @@ const SCENE: &str = r#"
     surface = "facets"
     stiffness = 3000.0
     [grid]
-    axes = [{ start = -0.41, stop = 0.39, count = 9 }, { start = -0.38, stop = 0.42, count = 9 }, { start = 0.006, stop = 0.022, count = 9 }]
+    axes = [{ start = -0.41, stop = 0.39, count = 9 }, { start = -0.38, stop = 0.42, count = 9 },
+        { start = 0.006, stop = 0.022, count = 9 }]
     [[proxy.joint]]
     kind = "revolute"
     axis = [0.0, 1.0, 0.0]

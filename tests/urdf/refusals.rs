@@ -67,7 +67,8 @@ const CASES: &[(&str, &str, usize, &[&str])] = &[
     ("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"meshes/tip.obj\" scale=\"1 0 1\"/>", 3, &["scale"]),
     (
         "<link name=\"hand\"/>",
-        "<link name=\"hand\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"2\"/></inertial></link>",
+        "<link name=\"hand\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"2\"/>\
+         </inertial></link>",
         4,
         &["negative eigenvalue"],
     ),

@@ -84,7 +84,8 @@ mod tests {
         stiffness_per_length = 1.8e5
         tolerance = 1e-11
         [grid]
-        axes = [{ start = -0.2, stop = 0.2, count = 3 }, { start = -0.2, stop = 0.2, count = 3 }, { start = 0.0, stop = 0.01, count = 3 }]
+        axes = [{ start = -0.2, stop = 0.2, count = 3 }, { start = -0.2, stop = 0.2, count = 3 },
+            { start = 0.0, stop = 0.01, count = 3 }]
         [[proxy.joint]]
         kind = "revolute"
         axis = [0.0, 1.0, 0.0]

@@ -1,4 +1,4 @@
-//! What the contact springs that touch leave of a force: the preconditioner of a Newton step.
+//! The rest of a force that touching contact springs leave: the preconditioner of a Newton step.
 //!
 //! Stiff springs are what conjugate gradients take longest for. With g_a the gradient of the depth of spring a, W the
 //! stiffness of the springs and the object stiffened by 1 + mu, Woodbury's identity

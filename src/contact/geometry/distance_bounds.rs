@@ -123,7 +123,8 @@ fn cube(surface: &RestSurface, c: DVec3, half: f64, slack: f64, near: Option<u32
         let matters = |leaf: &Leaf, least: f64| {
             let (middle, size) = leaf.volume.ball();
             let (away, distance) = (c - middle, c.distance(middle));
-            // |g - g_t|, g_t being the direction from a point of that ball: with an angle phi, sin(phi) <= size / distance.
+            // |g - g_t|, g_t being the direction from a point of that ball: with an angle phi,
+            // sin(phi) <= size / distance.
             let turn = if size < distance { (g - away / distance).length() + SQRT_2 * size / distance } else { 2.0 };
             leaf.volume.distance_squared(c).sqrt() - reach * turn.min(2.0) < least
         };

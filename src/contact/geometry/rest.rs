@@ -209,7 +209,8 @@ mod tests {
 
     fn sphere(divisions: u32) -> Object {
         let text = format!(
-            "[object]\nsphere = {{ radius = {RADIUS}, subdivisions = {divisions} }}\nskin = {{ tension = 1.0, foundation = 1.0 }}\n\
+            "[object]\nsphere = {{ radius = {RADIUS}, subdivisions = {divisions} }}\n\
+             skin = {{ tension = 1.0, foundation = 1.0 }}\n\
              [[proxy.joint]]\nkind = \"prismatic\"\naxis = [1.0, 0.0, 0.0]\nlimits = [0.0, 1.0]\nnodes = [{{ at = [0.0, 0.0, 0.0] }}]\n\
              [contact]\nstiffness = 1.0\n[grid]\nspacing = 0.5\n"
         );

@@ -1,4 +1,4 @@
-//! What the arrays of an export mean: the unit of each, and its axes.
+//! The meaning of an export's arrays: the unit of each, and its axes.
 
 use super::super::{Axis, Grid};
 

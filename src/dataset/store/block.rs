@@ -1,4 +1,4 @@
-//! What a block holds: the nodes that were solved, and what they add to the interpolation of the levels below.
+//! The contents of a block: the nodes that were solved, and what they add to the interpolation of the levels below.
 
 use super::{record::width, space::Place};
 use crate::{MAX_JOINTS, contact::Status};

@@ -1,4 +1,4 @@
-//! What the service says of its devices: a frame of JSON, of which the part that the loop needs is read.
+//! The service's message about its devices: a frame of JSON, of which the part that the loop needs is read.
 
 use crate::device::Halt;
 use serde::Deserialize;

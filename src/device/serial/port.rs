@@ -29,7 +29,10 @@ impl Port {
             .open(path);
         let file = opened.map_err(|error| match error.kind() {
             ErrorKind::PermissionDenied => {
-                format!("{path} may not be opened: join its group (usermod -aG dialout $USER, on some systems uucp) and log in again")
+                format!(
+                    "{path} may not be opened: join its group (usermod -aG dialout $USER, \
+                     on some systems uucp) and log in again"
+                )
             }
             ErrorKind::NotFound => format!("{path} is not there: plug the device in"),
             _ => format!("{path}: {error}; end other programs that use it"),

@@ -97,7 +97,8 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
 fn updates(checker: &Checker<'_>, table: &ContactTable) -> Result<u32, SceneError> {
     let Some(value) = &table.updates else { return Ok(0) };
     if table.algorithm != Some(Algorithm::Linearised) {
-        let reason = "updates acts on linearised contact, whose geometry is frozen: add algorithm = \"linearised\", or leave it out";
+        let reason = "updates acts on linearised contact, whose geometry is frozen: \
+         add algorithm = \"linearised\", or leave it out";
         return Err(checker.error(value.span(), reason));
     }
     Ok(*value.get_ref())

@@ -96,9 +96,9 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
 }
 
 fn csv(accuracy: &Accuracy) -> String {
-    let mut text =
-        "study,series,setting,value,points,solved,bytes,cost_median,cost_least,cost_greatest,unit,rms,worst,rms_relative\n"
-            .to_owned();
+    let mut text = "study,series,setting,value,points,solved,bytes,cost_median,cost_least,cost_greatest,\
+         unit,rms,worst,rms_relative\n"
+        .to_owned();
     for row in &accuracy.rows {
         // A String takes everything.
         let _ = writeln!(

@@ -244,7 +244,7 @@ struct Leaf {
 /// A store that is being filled.
 struct Filling<'a> {
     book: Nodebook<'a>,
-    /// Of each level.
+    /// The nodes of each level.
     nodes: Vec<BTreeSet<Place>>,
     leaves: Vec<Leaf>,
     /// Squared errors that the levels below had at solved nodes [N^2 m^2].

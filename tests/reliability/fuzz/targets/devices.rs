@@ -20,7 +20,8 @@ pub const DEVICES: Target = Target {
         let scene = program::scene(program::OBJECTS[0].1, 4);
         [
             "map = [[1, 0], [-1, 1]]\noffset = [0.0, -1.5708]\neffort_limit = [0.5, 0.3]\n",
-            "map = [[0, 1, 0], [1, 0, 0], [0, 0, -1]]\noffset = [0.0, 0.1, 0.0]\nnode = 0\nstiffness = 300.0\ndamping = 0.5\n",
+            "map = [[0, 1, 0], [1, 0, 0], [0, 0, -1]]\noffset = [0.0, 0.1, 0.0]\nnode = 0\n\
+             stiffness = 300.0\ndamping = 0.5\n",
         ]
         .map(|table| format!("{scene}[device]\n{table}").into_bytes())
         .to_vec()

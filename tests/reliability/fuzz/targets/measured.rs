@@ -83,7 +83,8 @@ pub const MAPPINGS: Target = Target {
         };
         let joint = |name: &str, position: &str, torque: &str| {
             format!(
-                "[[joint]]\nname = \"{name}\"\nposition = {{ column = {position} }}\ntorque = {{ column = {torque}, scale = -2.0, offset = 0.1 }}\n"
+                "[[joint]]\nname = \"{name}\"\nposition = {{ column = {position} }}\n\
+                 torque = {{ column = {torque}, scale = -2.0, offset = 0.1 }}\n"
             )
         };
         [
