@@ -120,7 +120,7 @@ impl<'a> Ahead<'a> {
     pub fn serve(&self, mut whereabouts: triple_buffer::Output<Whereabouts>, over: &AtomicBool) {
         let mut solver = self.solver();
         while !over.load(Ordering::Acquire) {
-            if !self.advance(&mut solver, whereabouts.read(), true) {
+            if !self.advance_until(&mut solver, whereabouts.read(), true, over) {
                 thread::sleep(IDLE);
             }
         }
@@ -154,9 +154,16 @@ impl<'a> Ahead<'a> {
     /// Solves the blocks that a proxy `at` wants most, some at most; with `beside` those beside its way, too. False
     /// where none is wanted that nobody has claimed.
     pub fn advance(&self, solver: &mut Solver<'_>, at: &Whereabouts, beside: bool) -> bool {
+        self.advance_until(solver, at, beside, &AtomicBool::new(false))
+    }
+
+    /// The same; once `over` is raised what was claimed is given back unsolved.
+    fn advance_until(&self, solver: &mut Solver<'_>, at: &Whereabouts, beside: bool, over: &AtomicBool) -> bool {
         let blocks = self.claim(at, beside);
         for (level, block) in &blocks {
-            self.full.fetch_or(!self.solve(solver, *level, block), Ordering::Relaxed);
+            if !over.load(Ordering::Acquire) {
+                self.full.fetch_or(!self.solve(solver, *level, block), Ordering::Relaxed);
+            }
             self.claims().remove(&self.store.space().key(*level, block));
         }
         !blocks.is_empty()
