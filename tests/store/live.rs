@@ -35,7 +35,21 @@ struct World {
 impl World {
     /// Two joints beside a ball.
     fn new() -> Self {
-        let scene = Scene::parse(include_str!("../scenes/small.toml"), "small.toml").unwrap();
+        Self::with(2)
+    }
+
+    /// The same arm with as many joints, those beyond two in its wrist.
+    fn with(joints: usize) -> Self {
+        let mut text = include_str!("../scenes/small.toml").to_owned();
+        for k in 2..joints {
+            text = text.replace("count = 9 }", "count = 9 }, { start = -0.2, step = 0.2, count = 3 }");
+            let axis = ["[0, 0, 1]", "[0, 1, 0]"][k % 2];
+            let wrist = format!(
+                "[[proxy.joint]]\nname = \"wrist {k}\"\nkind = \"revolute\"\naxis = {axis}\nlimits = [-1, 1]\nnodes = ["
+            );
+            text = text.replace("nodes = [", &wrist);
+        }
+        let scene = Scene::parse(&text, "small.toml").unwrap();
         let (object, chain) = (build_object(&scene).unwrap(), Chain::new(&scene.proxy));
         Self { scene, object, chain }
     }
@@ -47,7 +61,7 @@ impl World {
     }
 
     fn store(&self) -> Arc<Store> {
-        Arc::new(Store::new(Space::new(&grid_of(&self.scene), LEVELS).unwrap(), Order::Potential, 4000))
+        Arc::new(Store::new(Space::new(&grid_of(&self.scene), LEVELS).unwrap(), Order::Potential, 40_000))
     }
 
     fn dataset(&self, store: &Arc<Store>) -> Dataset {
@@ -71,7 +85,7 @@ impl World {
         };
         let waypoints: Vec<Waypoint> =
             (0..=4 * seconds).map(|k| Waypoint { time: 0.25 * k as f64, q: place() }).collect();
-        Motion::through(&waypoints, 2).unwrap()
+        Motion::through(&waypoints, grid.joints()).unwrap()
     }
 }
 
@@ -144,7 +158,11 @@ fn solved_in_time_nothing_is_missed() {
 
 #[test]
 fn what_was_explored_is_what_a_bake_of_the_same_blocks_is_to_the_bit() {
-    let world = World::new();
+    [2, 3, 6].map(explored_is_baked);
+}
+
+fn explored_is_baked(joints: usize) {
+    let world = World::with(joints);
     let model = world.model();
     let store = world.store();
     let ahead = Ahead::new(&model, Arc::clone(&store));
@@ -158,10 +176,13 @@ fn what_was_explored_is_what_a_bake_of_the_same_blocks_is_to_the_bit() {
                     let (position, velocity) = world.motion(4, 24).at(0.1 * f64::from(step) + 0.01 * f64::from(k));
                     ahead.advance(&mut solver, &Whereabouts { position, velocity, tick: 0 }, true);
                 }
+                // To the finest level at the last place.
+                let last = Whereabouts::at_rest(&world.motion(4, 24).at(3.9 + 0.01 * f64::from(k)).0);
+                while ahead.advance(&mut solver, &last, false) {}
             });
         }
     });
-    let again = world.store();
+    let [again, fewer] = [(); 2].map(|()| world.store());
     let other = Ahead::new(&model, Arc::clone(&again));
     let mut solver = other.solver();
     let blocks = store.blocks();
@@ -170,15 +191,19 @@ fn what_was_explored_is_what_a_bake_of_the_same_blocks_is_to_the_bit() {
         let (level, place) = store.space().block(*key).unwrap();
         assert!(other.solve(&mut solver, level, &place));
         assert_eq!(again.get(level, &place).unwrap().nodes(), block.nodes());
+        if fewer.horizon() + 1 < blocks.len() as u64 {
+            fewer.publish(level, &place, block.nodes().clone()).unwrap();
+        }
     }
     assert!(blocks.iter().any(|(key, _)| store.space().block(*key).unwrap().0 == LEVELS - 1));
     let folder = tempfile::tempdir().unwrap();
-    let files = [(&store, "explored"), (&again, "baked")].map(|(store, name)| {
+    let files = [(&store, "explored"), (&again, "baked"), (&fewer, "fewer")].map(|(store, name)| {
         let path = folder.path().join(name);
         world.dataset(store).save(path.as_path()).unwrap();
         std::fs::read(path).unwrap()
     });
-    assert_eq!(files[0], files[1]);
+    assert!(files[0] == files[1], "{joints} joints");
+    assert!(files[0] != files[2], "{joints} joints: a block less is not seen");
 }
 
 #[test]
