@@ -95,7 +95,8 @@ fn a_session_on_demand_ends_within_a_second_of_a_signal_and_keeps_what_it_has() 
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/organ.toml").display().to_string();
     for signal in listened() {
         let play = ["play", &scene, "--on-demand", "x.haptize", "--seconds", "60", "-o", "p", "--json"];
-        let (output, took) = interrupted(folder.path(), &play, Duration::from_millis(2500), signal);
+        // By then the session has begun, which takes two seconds of a processor, on a busy machine, too.
+        let (output, took) = interrupted(folder.path(), &play, Duration::from_secs(6), signal);
         assert!(took < LONGEST, "{signal}: went on for {took:?}");
         let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         // A machine too busy for the loop gives it a fault.
