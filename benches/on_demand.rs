@@ -36,8 +36,8 @@ use haptize::{
 };
 use std::{path::Path, sync::Arc, time::Duration};
 
-/// Greatest speeds of the tip between two places [m/s]. At 0.4 m/s the roll turns faster than the
-/// device may (`speed_limit`), and the loop stops such a walk with a fault.
+/// Greatest speeds of the tip between two places [m/s]. At 0.4 m/s the roll turns faster than the device may
+/// (`speed_limit`), and the loop stops such a walk with a fault.
 const SPEEDS: [f64; 5] = [0.05, 0.1, 0.15, 0.2, 0.3];
 
 /// Greatest speed of a minimum-jerk motion over its mean [1].

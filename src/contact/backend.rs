@@ -1,4 +1,4 @@
-//! The backends that solve many configurations.
+//! The interface of backends, which solve many configurations.
 
 use super::Equilibrium;
 use crate::JointVector;

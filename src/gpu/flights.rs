@@ -449,7 +449,7 @@ mod tests {
 
     const SIZES: [usize; 9] = [5, 0, 0, 0, 0, 0, 17, 1, 8];
 
-    /// What comes back of chunks of [`SIZES`], whether or not the last device fails.
+    /// Returns what comes back of chunks of [`SIZES`], and whether the last device failed.
     fn flown(devices: &mut Vec<PacedDevice<Odd>>) -> (Numbers, Result<(), GpuError>) {
         let (sizes, taken, notices) = (SIZES.into(), Vec::new(), Vec::new());
         let mut work = Numbers { sizes, given: 0, under_way: 0, most_under_way: 0, taken, notices };

@@ -45,7 +45,7 @@ pub enum ObjectError {
     #[error(
         "the proxy reaches {nodes} surface nodes, which need {} MB of compliance, more than the {} MB of memory that it may take: use \
          a coarser surface or a smaller grid, close other programs, or raise the \
-          limit (ulimit -v)", .bytes.div_ceil(1_000_000), .limit / 1_000_000
+         limit (ulimit -v)", .bytes.div_ceil(1_000_000), .limit / 1_000_000
     )]
     TooLarge {
         /// Surface nodes that the proxy reaches.
