@@ -110,7 +110,7 @@ fn kill_at_random(backend: &str, lines: usize) {
 
 #[test]
 fn a_bake_killed_at_any_moment_continues_to_the_same_dataset_on_the_cpu() {
-    kill_at_random("cpu", 250);
+    kill_at_random("cpu", 120);
 }
 
 #[test]
@@ -256,7 +256,7 @@ fn a_full_disk_is_an_error_and_the_bake_continues_when_there_is_room() {
 #[test]
 #[cfg(target_os = "linux")]
 fn a_bake_without_memory_ends_and_continues_where_there_is_some() {
-    let whole = Undisturbed::new("cpu", 400);
+    let whole = Undisturbed::new("cpu", 200);
     let mut failures = 0;
     for kilobytes in (40_000..64_000).step_by(3_000) {
         let output = limited(whole.folder.path(), &format!("ulimit -v {kilobytes}"));

@@ -251,7 +251,12 @@ fn combination(
                 }
                 cell.paper += tenth(&paper, &configurations);
                 if let Some(context) = &setting.gpu {
-                    let every = if object.surface_nodes > 1000 { 10 } else { 1 };
+                    // A software rasteriser takes a hundred times the CPU's time.
+                    let every = match setting.effort {
+                        Effort::Sample => 4,
+                        Effort::Full if object.surface_nodes > 1000 => 10,
+                        Effort::Full => 1,
+                    };
                     let some: Vec<JointVector> = configurations.iter().step_by(every).copied().collect();
                     on_gpu(context, &model, &some, cell, worst)?;
                 }
