@@ -191,9 +191,10 @@ impl TorqueField {
 
     /// Upper bound of the stiffness of the interpolated torque inside the grid, before any boundary layer, relative to
     /// `slopes`, one per joint [N m/rad]: no Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), is
-    /// greater. One or less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks. A store
-    /// that grows is bounded as it is when this is called. All cells are searched the first time, and not again for the
-    /// same slopes or multiples of them.
+    /// greater. One or less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
+    ///
+    /// A store that grows is bounded as it is when this is called. All cells are searched the first time, and not again
+    /// for the same slopes or multiples of them.
     #[must_use]
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
         match &self.source {

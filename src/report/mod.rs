@@ -208,8 +208,8 @@ pub struct Files {
 /// How often is looked whether it is late.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Writes `figures` into `folder`, drawings before what is made of pixels, and returns as soon as it `is_late`. The rest
-/// is still being drawn then: who ends the process calls [`crate::dataset::discard_unfinished`].
+/// Writes `figures` into `folder`, drawings before what is made of pixels, and returns as soon as it `is_late`. The
+/// rest is still being drawn then: who ends the process calls [`crate::dataset::discard_unfinished`].
 ///
 /// # Errors
 /// As [`write_figures`].
