@@ -51,9 +51,13 @@ fn object(joints: usize) -> Dataset {
 }
 
 fn build(data: &Dataset) -> Haptics {
+    interpolated(data, Interpolation::Linear)
+}
+
+fn interpolated(data: &Dataset, interpolation: Interpolation) -> Haptics {
     let joints = data.grid.joints();
     let spec = haptics(joints);
-    let field = TorqueField::new(data, spec.threshold, &spec.boundary_slope).unwrap();
+    let field = TorqueField::interpolated(data, interpolation, spec.threshold, &spec.boundary_slope).unwrap();
     Haptics::new(field, proxy(joints), &spec).unwrap()
 }
 
@@ -70,8 +74,9 @@ fn hand(joints: usize) -> SimulatedHand {
 
 #[test]
 fn a_tick_allocates_nothing_whatever_it_is_told() {
-    for joints in 1..=MAX_JOINTS {
-        let haptics = build(&object(joints));
+    let ways = [Interpolation::Linear, Interpolation::Potential];
+    for (joints, way) in (1..=MAX_JOINTS).flat_map(|joints| ways.map(|way| (joints, way))) {
+        let haptics = interpolated(&object(joints), way);
         let all = |x: f64| JointVector::from_slice(&vec![x; joints]);
         let mut state = haptics.start(&all(0.0)).unwrap();
         // Free, in contact, outside the grid, at a stop, and what no device should say.
@@ -327,7 +332,7 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
     assert!(touched > 36 * 20, "{touched}");
 }
 
-/// Contact solved between the ticks, by the store and at the proxy.
+/// Contact solved between the ticks, by stores of both orders and at the proxy; and what a store then holds by itself.
 #[test]
 fn contact_that_is_solved_meanwhile_allocates_nothing_in_a_tick() {
     let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/organ.toml")).unwrap();
@@ -337,8 +342,8 @@ fn contact_that_is_solved_meanwhile_allocates_nothing_in_a_tick() {
     let grid = grid_of(&scene);
     let space = Space::new(&grid, 2).unwrap();
     let levers = JointVector::from_slice(&[0.3; MAX_JOINTS]);
-    for direct in [false, true] {
-        let store = Arc::new(Store::new(space.clone(), Order::Potential, 20_000));
+    for (order, direct) in [(Order::Potential, false), (Order::Potential, true), (Order::Linear, false)] {
+        let store = Arc::new(Store::new(space.clone(), order, 20_000));
         let ahead = Ahead::new(&model, Arc::clone(&store));
         let dataset = Dataset::refined(store, grid.clone(), None, scene.text.clone(), Provenance::default());
         let setup = Setup::new(&dataset).unwrap();
@@ -363,6 +368,15 @@ fn contact_that_is_solved_meanwhile_allocates_nothing_in_a_tick() {
         let answers = answers.read();
         assert_eq!(answers.direct > 0, direct, "{answers:?}");
         assert!(answers.changes > 0, "{answers:?}");
+        let mut hand = setup.hand(Motion::through(&way, MAX_JOINTS).unwrap()).unwrap();
+        let mut driver = Driver::new(&setup.haptics, &mut hand).unwrap();
+        let mut touched = 0;
+        assert_no_alloc(|| {
+            for _ in 0..300 {
+                touched += usize::from(driver.tick(1e-3, 1e-3).0.contact);
+            }
+        });
+        assert!(touched > 20, "{order:?}: {touched} ticks in contact");
     }
 }
 

@@ -27,7 +27,7 @@ use resvg::{
     tiny_skia::Rect,
     usvg::{Group, Node, Options, Tree},
 };
-use std::{path::PathBuf, time::Duration};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 
 const CENTRE: DVec3 = DVec3::new(0.2, 0.0, -0.02);
 const RADIUS: f64 = 0.05;
@@ -509,15 +509,20 @@ fn parts_that_do_not_belong_together_are_refused() {
 }
 
 #[test]
-fn figures_are_left_out_when_there_is_no_time_for_them_and_counted() {
-    let (chain, object) = (arm(3), sphere());
-    let (dataset, trace) = (dataset(&chain, &object, counts(3)), recording(&chain, &object, 20));
-    let drawn = |goes_on: &(dyn Fn() -> bool + Sync)| {
-        report::write_figures_while(goes_on, &folder("in time"), &dataset, Some((&chain, &trace))).unwrap()
+fn figures_are_left_out_when_there_is_no_time_for_them_and_told() {
+    let (chain, object) = (Arc::new(arm(3)), sphere());
+    let trace = Arc::new(recording(&chain, &object, 20));
+    let dataset = Arc::new(dataset(&chain, &object, counts(3)));
+    let drawn = |name: &str, is_late: bool| {
+        let figures = report::figures(&dataset, Some((&chain, &trace)));
+        report::write_until(|| is_late, &folder(name), figures).unwrap()
     };
-    let (all, none) = (drawn(&|| true), drawn(&|| false));
-    assert!(all.left_out == 0 && all.written.len() > 6, "{all:?}");
-    assert!(none.left_out >= 5 && none.written.is_empty(), "{none:?}");
+    let all = drawn("in time", false);
+    assert!(all.left_out.is_empty() && all.written.iter().all(|file| file.is_file()), "{all:?}");
+    assert_eq!(all.written, report::write_figures(&folder("in time"), &dataset, Some((&chain, &trace))).unwrap());
+    let late = drawn("late", true);
+    assert!(!late.left_out.is_empty() && late.written.iter().all(|file| file.is_file()), "{late:?}");
+    assert_eq!(late.left_out.len() + late.written.len(), all.written.len());
 }
 
 #[test]

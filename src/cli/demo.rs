@@ -9,6 +9,7 @@ use crate::{dataset::Dataset, render::setup::Setup, report, scene::Scene, sweep:
 use std::{
     fmt::Write,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 /// The paper's sphere, part of the program.
@@ -34,7 +35,7 @@ pub fn run() -> Result<Report, Failure> {
     let (baked, sweep) = bake::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
     bake::warn(&sweep);
     baked.save(&file)?;
-    let dataset = Dataset::load(&file)?;
+    let dataset = Arc::new(Dataset::load(&file)?);
 
     tell(format_args!("pressing it, as fast as it goes and against the clock ..."));
     let setup = Setup::new(&dataset)?;

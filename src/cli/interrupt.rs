@@ -2,7 +2,7 @@
 //!
 //! Work that can stop at a good place takes [`stop_flag`] and looks at it. What has not stopped after [`GRACE`] is
 //! left: files that are half written are removed, and the program ends. A bake's part and a scan's log are on the disk
-//! by then. What follows such work, and may be left out, is begun while there [is time](has_time). All other work ends
+//! by then. What follows such work, and may be left out, is left once it [is late](is_late). All other work ends
 //! at once, and so does everything at a second signal. A signal that the program was started to ignore (`nohup`) stays
 //! ignored.
 
@@ -24,8 +24,9 @@ const INTERRUPTED: i32 = 130;
 /// How long work may take to stop: with all that follows, less than a second.
 const GRACE: Duration = Duration::from_millis(700);
 
-/// How long after a signal work may be begun that may be left out: a figure, which takes some tenths of a second.
-const LAST_BEGINNING: Duration = Duration::from_millis(300);
+/// How long after a signal work goes on that may be left out, such as figures. Longer: more of them are there, and on a
+/// busy machine what remains to be said comes after more than a second.
+const LATE: Duration = Duration::from_millis(600);
 
 /// How long saying so may take where nobody reads.
 const LAST_WORDS: Duration = Duration::from_millis(100);
@@ -71,10 +72,10 @@ pub fn stop_flag() -> &'static AtomicBool {
     &STOP
 }
 
-/// Whether there is time to begin what may be left out after a signal.
-pub fn has_time() -> bool {
+/// Whether a signal came so long ago that what may be left out is left.
+pub fn is_late() -> bool {
     let since = *SINCE.lock().unwrap_or_else(PoisonError::into_inner);
-    since.is_none_or(|since| since.elapsed() < LAST_BEGINNING)
+    since.is_some_and(|since| since.elapsed() >= LATE)
 }
 
 /// Ends the work that looked at the flag: what follows is ended by a signal at once.

@@ -142,7 +142,7 @@ impl Exploring {
         if done.full {
             tell(format_args!("haptize: note: the store is full with {} blocks: what is new is not kept", done.blocks));
         }
-        Ok(Played { trace, timing: Some(timing), explored: Some(Explored { done, start: begun }) })
+        Ok(Played { trace: trace.into(), timing: Some(timing), explored: Some(Explored { done, start: begun }) })
     }
 }
 

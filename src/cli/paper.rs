@@ -33,7 +33,7 @@ use std::{
     fmt::Write as _,
     io::Write as _,
     path::{Path, PathBuf},
-    sync::atomic::AtomicBool,
+    sync::{Arc, atomic::AtomicBool},
     time::Instant,
 };
 
@@ -180,7 +180,7 @@ fn describe(
 }
 
 /// Plays the `motion` of the dataset's scene with a simulated hand, as fast as it goes.
-fn felt(dataset: &Dataset, motion: &str) -> Result<(Setup, Trace), Failure> {
+fn felt(dataset: &Dataset, motion: &str) -> Result<(Setup, Arc<Trace>), Failure> {
     let setup = Setup::new(dataset)?;
     let motion = motion::named(&setup, dataset, motion, None)?;
     let seconds = motion.duration();
@@ -211,7 +211,7 @@ struct Measured {
 
 impl Measured {
     /// Returns the measurement together with how it was felt.
-    fn felt<'a>(&'a self, (setup, trace): &'a (Setup, Trace)) -> Scanned<'a> {
+    fn felt<'a>(&'a self, (setup, trace): &'a (Setup, Arc<Trace>)) -> Scanned<'a> {
         let Self { scene, source, dataset } = self;
         Scanned { scene, samples: &source.samples, dataset, chain: &setup.chain, trace }
     }

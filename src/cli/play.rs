@@ -10,7 +10,7 @@ use super::{
     tell,
 };
 use crate::{
-    dataset::{self, Dataset, replace_file},
+    dataset::{self, Dataset, discard_unfinished, replace_file},
     device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, attach, open},
     render::{
         mcap, realtime,
@@ -29,7 +29,7 @@ use std::{
     collections::BTreeMap,
     fmt::{self, Write},
     path::{Path, PathBuf},
-    sync::atomic::AtomicBool,
+    sync::{Arc, atomic::AtomicBool},
 };
 
 /// Arguments of `haptize play`.
@@ -126,6 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         // With what was solved meanwhile.
         dataset = exploring.on_demand.dataset();
     }
+    let dataset = Arc::new(dataset);
     if let Some(timing) = &played.timing {
         timing.refused.iter().for_each(|refused| tell(format_args!("haptize: note: {refused}")));
     }
@@ -313,7 +314,7 @@ fn drive(setup: &Setup, dataset: &Dataset, address: &Address, motion: Motion, ho
     let played = match exploring {
         Some(exploring) => exploring.play(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan),
         None => realtime::run(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, stop)
-            .map(|(trace, timing)| Played { trace, timing: Some(timing), explored: None })
+            .map(|(trace, timing)| Played { trace: trace.into(), timing: Some(timing), explored: None })
             .map_err(Failure::from),
     };
     // Motors off before anything is drawn or written.
@@ -335,7 +336,7 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Opti
         );
     }
     let told = format!("{} ticks replayed, torque and proxy equal to the last bit\n", recording.ticks());
-    Ok((Played { trace, timing: None, explored: None }, Some(told)))
+    Ok((Played { trace: trace.into(), timing: None, explored: None }, Some(told)))
 }
 
 /// Where traces and figures go.
@@ -417,7 +418,7 @@ impl Outputs {
 /// A session that was played.
 pub struct Played {
     /// Its recording.
-    pub trace: Trace,
+    pub trace: Arc<Trace>,
     /// How punctual it was, if it ran against the clock.
     pub timing: Option<Timing>,
     /// Work done meanwhile, if any.
@@ -436,14 +437,14 @@ pub fn play(
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
     if against_the_clock {
         let (trace, timing) = realtime::run(&setup.haptics, device, graphics.as_mut(), &plan, &AtomicBool::new(false))?;
-        return Ok(Played { trace, timing: Some(timing), explored: None });
+        return Ok(Played { trace: trace.into(), timing: Some(timing), explored: None });
     }
     let played: Result<Trace, SessionError> = session::run(&setup.haptics, device, graphics.as_mut(), &plan);
-    Ok(Played { trace: played?, timing: None, explored: None })
+    Ok(Played { trace: played?.into(), timing: None, explored: None })
 }
 
 /// Writes traces and figures of `played` into `folder`, and returns their paths.
-pub fn write(setup: &Setup, dataset: &Dataset, played: &Played, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+pub fn write(setup: &Setup, dataset: &Arc<Dataset>, played: &Played, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| format!("cannot make the folder {}: {error}; give another by -o", folder.display()))?;
     let ticks = folder.join("trace.csv");
@@ -454,19 +455,21 @@ pub fn write(setup: &Setup, dataset: &Dataset, played: &Played, folder: &Path) -
         replace_file(&frames, |out| played.trace.write_frames(out)).map_err(|error| unwritten(&frames, error))?;
         files.push(frames);
     }
-    let recorded = Some((&setup.chain, &played.trace));
-    let report::Figures { written, left_out } =
-        report::write_figures_while(&interrupt::has_time, folder, dataset, recorded)?;
-    files.extend(written);
-    if left_out > 0 {
-        tell(format_args!(
-            "haptize: note: {left_out} figures are left out after the signal: `haptize play` draws a session that \
-             --record wrote (--replay FILE), and a dataset that was explored"
-        ));
+    let mut figures = report::figures(dataset, Some((&Arc::new(setup.chain.clone()), &played.trace)));
+    if let Some(timing) = played.timing.clone() {
+        figures.push(report::Figure::drawing("jitter", move || report::jitter::jitter(&timing)));
     }
-    if let Some(timing) = &played.timing {
-        let jitter = report::jitter::jitter(timing);
-        files.extend(report::write_both(folder, "jitter", &jitter)?);
+    let report::Files { written, left_out } = report::write_until(interrupt::is_late, folder, figures)?;
+    files.extend(written);
+    if !left_out.is_empty() {
+        discard_unfinished();
+        let names: Vec<_> = left_out.iter().filter_map(|file| file.file_name()?.to_str()).collect();
+        tell(format_args!(
+            "haptize: note: for want of time after the signal these are left out: {}; a session that ends by --seconds \
+             has them all, and `haptize play` draws a session that --record wrote (--replay FILE), and a dataset that \
+             was explored",
+            names.join(", ")
+        ));
     }
     Ok(files)
 }

@@ -11,7 +11,7 @@ use std::{
     fs::{self, File},
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Mutex, MutexGuard, Once, PoisonError},
 };
 use tempfile::{NamedTempFile, TempPath};
 
@@ -72,12 +72,15 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 
 /// Removes the files that are being written, and lets no other begin: for who ends the process at once.
 pub fn discard_unfinished() {
-    let unfinished = unfinished();
-    for path in unfinished.iter() {
-        // A file that has just taken its final name is no longer there.
-        let _ = fs::remove_file(path);
-    }
-    std::mem::forget(unfinished);
+    static DONE: Once = Once::new();
+    DONE.call_once(|| {
+        let unfinished = unfinished();
+        for path in unfinished.iter() {
+            // A file that has just taken its final name is no longer there.
+            let _ = fs::remove_file(path);
+        }
+        std::mem::forget(unfinished);
+    });
 }
 
 /// Returns the regular file that `path` leads to through symbolic links, or `path` itself where nothing is there yet.

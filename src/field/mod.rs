@@ -23,6 +23,7 @@ pub mod range;
 mod refined;
 mod slope;
 pub mod stencil;
+mod stiffness;
 mod work;
 
 pub use batch::{BatchError, check_rows, fill_rows};
@@ -41,11 +42,13 @@ use points::{Checked, Point};
 use potential::Potential;
 use std::sync::Arc;
 use stencil::{Lattice, Stencil};
+use stiffness::Steepest;
 
 /// The contact torque around one object.
 pub struct TorqueField {
     lattice: Lattice,
     source: Source,
+    steepest: Steepest,
 }
 
 /// Source of answers.
@@ -142,7 +145,8 @@ impl TorqueField {
             return Err(FieldError::Slope(*slope));
         }
         if let Some(store) = &dataset.refinement {
-            return Ok(Self { lattice, source: Source::Store(Arc::clone(store)) });
+            let source = Source::Store(Arc::clone(store));
+            return Ok(Self { lattice, source, steepest: Steepest::default() });
         }
         let (points, nearest) = points::survey(&lattice, dataset)?;
         let data = Checked { lattice: &lattice, dataset, points: &points, nearest: &nearest };
@@ -152,7 +156,7 @@ impl TorqueField {
             Interpolation::Potential | Interpolation::Direct => Interpolant::Potential(Potential::new(&data)?),
         };
         let on_grid = OnGrid { points, has_energy: dataset.energy.is_some(), interpolant };
-        Ok(Self { lattice, source: Source::Grid(on_grid) })
+        Ok(Self { lattice, source: Source::Grid(on_grid), steepest: Steepest::default() })
     }
 
     /// Number of joints d.
@@ -188,6 +192,9 @@ impl TorqueField {
     /// Upper bound of the stiffness of the interpolated torque inside the grid, before any boundary layer, relative to
     /// `slopes`, one per joint [N m/rad]: no Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), is
     /// greater. One or less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
+    ///
+    /// A store that grows is bounded as it is when this is called. All cells are searched the first time, and not again
+    /// for the same slopes or multiples of them.
     #[must_use]
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
         match &self.source {
@@ -195,9 +202,9 @@ impl TorqueField {
                 layered.relative_stiffness(&self.lattice, slopes)
             }
             Source::Grid(OnGrid { interpolant: Interpolant::Potential(potential), .. }) => {
-                potential.relative_stiffness(&self.lattice, slopes)
+                self.steepest.norm(slopes, 0, || potential.steepest(&self.lattice, slopes))
             }
-            Source::Store(store) => refined::relative_stiffness(store, slopes),
+            Source::Store(store) => self.steepest.norm(slopes, store.horizon(), || refined::steepest(store, slopes)),
         }
     }
 

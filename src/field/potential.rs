@@ -31,6 +31,7 @@ use super::{
     hermite::Hermite,
     points::{Checked, Generations},
     stencil::{Lattice, Stencil},
+    stiffness::Stiffness,
 };
 use crate::{JointVector, memory, tolerances::LEAST_ENERGY};
 use rayon::prelude::*;
@@ -122,20 +123,15 @@ impl Potential {
         Gradient { torque, energy: self.free_energy + 0.5 * depth * depth, contact: root > 0.0, share }
     }
 
-    /// Upper bound of the Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), over all cells:
+    /// Returns the greatest bound of the stiffness relative to `slopes` over all cells:
     /// `d^2 U / dq_a dq_b = w_a w_b + w w_ab` where w is positive, each factor by its bound over the cell.
-    pub fn relative_stiffness(&self, lattice: &Lattice, slopes: &JointVector) -> f64 {
-        let norm = |point: usize| {
-            let Some(w) = self.root.bounds(lattice, point).filter(|w| w.greatest > 0.0) else { return 0.0 };
-            let entry = |a: usize, b: usize| w.first[a] * w.first[b] + w.greatest * w.second[a][b];
-            square(slopes, entry)
+    pub fn steepest(&self, lattice: &Lattice, slopes: &JointVector) -> Stiffness {
+        let of_cell = |point: usize| {
+            let Some(w) = self.root.bounds(lattice, point).filter(|w| w.greatest > 0.0) else {
+                return Stiffness::default();
+            };
+            Stiffness::new(slopes, |a, b| w.first[a] * w.first[b] + w.greatest * w.second[a][b])
         };
-        (0..lattice.points()).into_par_iter().map(norm).reduce(|| 0.0, f64::max).sqrt()
+        (0..lattice.points()).into_par_iter().map(of_cell).reduce(Stiffness::default, Stiffness::max)
     }
-}
-
-/// Square of the Frobenius norm of `S^-1/2 E S^-1/2`, E of the entries `entry(a, b)`, S = diag(slopes).
-pub(super) fn square(slopes: &JointVector, entry: impl Fn(usize, usize) -> f64) -> f64 {
-    let pairs = (0..slopes.len()).flat_map(|a| (0..slopes.len()).map(move |b| (a, b)));
-    pairs.map(|(a, b)| entry(a, b).powi(2) / (slopes[a] * slopes[b])).sum()
 }

@@ -7,8 +7,8 @@
 use super::{
     Flags, Sample,
     bernstein::{Bernstein, Bounds, place},
-    potential::square,
     stencil::Lattice,
+    stiffness::Stiffness,
 };
 use crate::{
     JointVector, MAX_JOINTS,
@@ -39,8 +39,8 @@ pub(super) fn sample(lattice: &Lattice, store: &Store, q: &[f64], horizon: u64) 
     (sample, root.whole)
 }
 
-/// Upper bound of the Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), over all cells.
-pub(super) fn relative_stiffness(store: &Store, slopes: &JointVector) -> f64 {
+/// Returns the greatest bound of the stiffness relative to `slopes` over all cells.
+pub(super) fn steepest(store: &Store, slopes: &JointVector) -> Stiffness {
     let (space, joints) = (store.space(), slopes.len());
     let last = space.last(0);
     let is_there = |node: &Place| store.get(0, &space.block_of(node)).is_some();
@@ -55,11 +55,14 @@ pub(super) fn relative_stiffness(store: &Store, slopes: &JointVector) -> f64 {
     let steepest_at = |(_, node): (usize, Place)| {
         let cells = (0..1_usize << joints).filter_map(|side| cell(&node, side));
         let added = cells.filter_map(|low| Some((low, store.added(0, &low)?)));
-        added.map(|(low, added)| steepest(store, slopes, (0, low), &parts(store, added))).fold(0.0, f64::max)
+        added
+            .map(|(low, added)| within(store, slopes, (0, low), &parts(store, added)))
+            .fold(Stiffness::default(), Stiffness::max)
     };
     let blocks = store.blocks();
     let base = blocks.par_iter().filter_map(|(key, _)| space.block(*key)).filter(|(level, _)| *level == 0);
-    base.map(|(_, block)| space.nodes(0, &block).map(steepest_at).fold(0.0, f64::max)).reduce(|| 0.0, f64::max).sqrt()
+    base.map(|(_, block)| space.nodes(0, &block).map(steepest_at).fold(Stiffness::default(), Stiffness::max))
+        .reduce(Stiffness::default, Stiffness::max)
 }
 
 /// Returns what interpolates in a cell: w, and for linear stores each slope by itself.
@@ -78,9 +81,9 @@ fn parts(store: &Store, added: Vec<Vec<f64>>) -> Vec<Bernstein> {
     vec![Bernstein::hermite(joints, numbers)]
 }
 
-/// Square of the greatest norm over the `cell`, a level and its first corner, in which the levels up to this one sum up
+/// Returns the greatest bound within the `cell`, a level and its first corner, in which the levels up to this one sum up
 /// to `whole`: where a finer level adds something, with it.
-fn steepest(store: &Store, slopes: &JointVector, cell: (u32, Place), whole: &[Bernstein]) -> f64 {
+fn within(store: &Store, slopes: &JointVector, cell: (u32, Place), whole: &[Bernstein]) -> Stiffness {
     let (space, joints) = (store.space(), slopes.len());
     let (level, low) = cell;
     let finer = level + 1;
@@ -91,27 +94,29 @@ fn steepest(store: &Store, slopes: &JointVector, cell: (u32, Place), whole: &[Be
     }
     // Levels below bound what no finer one changes, and with that the parts where one does.
     let coarse = added.is_empty() || added.iter().any(Option::is_none);
-    let below = if coarse { norm(store, slopes, level, whole) } else { 0.0 };
+    let below = if coarse { of_cell(store, slopes, level, whole) } else { Stiffness::default() };
     let refined = added.into_iter().enumerate().filter_map(|(side, added)| Some((side, added?)));
     let steepest_of = |(side, added): (usize, Vec<Vec<f64>>)| {
         let mut part: Vec<Bernstein> = whole.iter().map(|whole| whole.half(side)).collect();
         part.iter_mut().zip(parts(store, added)).for_each(|(sum, more)| sum.add(&more));
-        steepest(store, slopes, (finer, child(side)), &part)
+        within(store, slopes, (finer, child(side)), &part)
     };
-    refined.map(steepest_of).fold(below, f64::max)
+    refined.map(steepest_of).fold(below, Stiffness::max)
 }
 
-/// Square of a bound of the norm over one cell of `level`: `d tau_a/d q_b = -(w_b s_a + w ds_a/dq_b)` with the slopes
-/// s, those of w or a linear store's own, which it keeps by steps of the base.
-fn norm(store: &Store, slopes: &JointVector, level: u32, parts: &[Bernstein]) -> f64 {
+/// Returns a bound over one cell of `level`: `d tau_a/d q_b = -(w_b s_a + w ds_a/dq_b)` with the slopes s, those of w
+/// or a linear store's own, which it keeps by steps of the base.
+fn of_cell(store: &Store, slopes: &JointVector, level: u32, parts: &[Bernstein]) -> Stiffness {
     let space = store.space();
     let mut per_step = JointVector::zeros(slopes.len());
     per_step.iter_mut().enumerate().for_each(|(a, per_step)| *per_step = 1.0 / space.step(level, a));
-    let Some((root, own)) = parts.split_first().filter(|(root, _)| root.greatest() > 0.0) else { return 0.0 };
+    let Some((root, own)) = parts.split_first().filter(|(root, _)| root.greatest() > 0.0) else {
+        return Stiffness::default();
+    };
     let w = root.bounds(&per_step);
     if own.is_empty() {
-        return square(slopes, |a, b| w.first[a] * w.first[b] + w.greatest * w.second[a][b]);
+        return Stiffness::new(slopes, |a, b| w.first[a] * w.first[b] + w.greatest * w.second[a][b]);
     }
     let own: Vec<Bounds> = own.iter().map(|slope| slope.bounds(&per_step)).collect();
-    square(slopes, |a, b| (own[a].size * w.first[b] + w.greatest * own[a].first[b]) / space.step(0, a))
+    Stiffness::new(slopes, |a, b| (own[a].size * w.first[b] + w.greatest * own[a].first[b]) / space.step(0, a))
 }

@@ -345,10 +345,17 @@ impl<S: Stages> Fleet<'_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::{
-        precision::Precision,
-        solver::free,
-        stages::{StageRoom, Trust},
+    use crate::{
+        contact::{Backend, Model},
+        gpu::{
+            GpuSolver,
+            precision::Precision,
+            solver::free,
+            stages::{StageRoom, Trust},
+        },
+        object::Object,
+        proxy::Chain,
+        scene::Scene,
     };
 
     /// A device that finds the first coordinate of each configuration, in contact where it is odd. It is lost when it
@@ -503,6 +510,19 @@ mod tests {
         }
         let (work, result) = flown(&mut vec![Odd::new(1, 4, 0, false)]);
         assert!(matches!(result, Err(GpuError::Lost(_))) && work.notices.is_empty());
+    }
+
+    #[test]
+    fn what_was_told_before_the_last_device_failed_is_told() {
+        let scene = Scene::parse(include_str!("../../tests/scenes/small.toml"), "small.toml").unwrap();
+        let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+        let model = Model::new(&object, &chain, scene.contact);
+        let devices = [0, 0].map(|lost_after| Odd::new(1, 4, lost_after, false).stages);
+        let mut solver = GpuSolver::of(devices.into(), &model);
+        let solved = solver.solve(&[JointVector::from_slice(&[1.0, 0.0])]);
+        assert!(matches!(solved, Err(GpuError::Lost(_))));
+        let [notice] = &solver.notices()[..] else { panic!("one device of two was lost before") };
+        assert!(notice.contains("device 1 of 2"), "{notice}");
     }
 
     #[test]

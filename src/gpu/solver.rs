@@ -262,9 +262,9 @@ impl<S: Stages> Backend for GpuSolver<'_, S> {
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, GpuError> {
         let configurations = Some(configurations.to_vec());
         let mut work = OneChunk { configurations, equilibria: Vec::new(), notices: Vec::new() };
-        self.stream(&mut work)?;
+        let solved = self.stream(&mut work);
         self.notices.append(&mut work.notices);
-        Ok(work.equilibria)
+        solved.map(|()| work.equilibria)
     }
 
     fn stream(&mut self, work: &mut dyn Work) -> Result<(), GpuError> {

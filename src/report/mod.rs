@@ -32,7 +32,10 @@ use canvas::Canvas;
 use rayon::prelude::*;
 use std::{
     io::Write,
+    ops::Deref,
     path::{Path, PathBuf},
+    sync::mpsc::{self, RecvTimeoutError},
+    time::Duration,
 };
 
 /// Pixels a point in PNG files: sharp on dense screens and in print.
@@ -87,20 +90,69 @@ pub const FIGURES: [&str; 10] = [
 /// Instants shown of the deforming object.
 const INSTANTS: usize = 6;
 
-/// Figures of a folder.
-#[derive(Debug)]
-pub struct Figures {
-    /// Their files.
-    pub written: Vec<PathBuf>,
-    /// How many were not begun.
-    pub left_out: usize,
+/// A figure to be drawn.
+pub struct Figure<'a> {
+    name: &'static str,
+    /// What is made of pixels is no drawing, and has no SVG.
+    is_drawing: bool,
+    draw: Box<dyn FnOnce() -> Result<Canvas, ReportError> + Send + 'a>,
 }
 
-/// Writes all figures that the data allow into `folder`, which is made if it is missing, and returns their paths.
+impl<'a> Figure<'a> {
+    /// The figure `NAME.svg` and `NAME.png`.
+    pub fn drawing(name: &'static str, draw: impl FnOnce() -> Canvas + Send + 'a) -> Self {
+        Self { name, is_drawing: true, draw: Box::new(move || Ok(draw())) }
+    }
+
+    /// The figure `NAME.png`.
+    fn picture(name: &'static str, draw: impl FnOnce() -> Result<Canvas, ReportError> + Send + 'a) -> Self {
+        Self { name, is_drawing: false, draw: Box::new(draw) }
+    }
+
+    /// Returns its files.
+    fn files(&self, folder: &Path) -> Vec<PathBuf> {
+        let png = folder.join(self.name).with_extension("png");
+        let svg = self.is_drawing.then(|| png.with_extension("svg"));
+        svg.into_iter().chain([png]).collect()
+    }
+}
+
+/// Returns all figures that the data allow.
 ///
 /// `cspace.png` (Fig. 3) and `torque.{svg,png}` show the dataset; with a recording of the proxy `chain` also
 /// `motion.{svg,png}` (Fig. 5), `energy.{svg,png}`, with three joints of which the last link alone touches
 /// `force.{svg,png}` (Fig. 8) and, where it has frames and the dataset a surface, `object.png` (Fig. 6).
+pub fn figures<'a, D, C, T>(dataset: &D, recording: Option<(&C, &T)>) -> Vec<Figure<'a>>
+where
+    D: Deref<Target = Dataset> + Clone + Send + 'a,
+    C: Deref<Target = Chain> + Clone + Send + 'a,
+    T: Deref<Target = Trace> + Clone + Send + 'a,
+{
+    let mut figures = Vec::new();
+    let shown = dataset.clone();
+    figures.push(Figure::picture("cspace", move || Ok(space::space(&shown))));
+    let shown = dataset.clone();
+    figures.push(Figure::drawing("torque", move || slices::slices(&shown)));
+    let Some((chain, trace)) = recording else { return figures };
+    let shown = trace.clone();
+    figures.push(Figure::drawing("motion", move || press::press(&shown)));
+    let shown = trace.clone();
+    figures.push(Figure::drawing("energy", move || press::energy(&shown)));
+    if let Some(end) = force::EndForce::new("", chain, trace) {
+        let shown = trace.clone();
+        figures.push(Figure::drawing("force", move || force::force(&[end], &shown)));
+    }
+    if !trace.frames.is_empty() && dataset.surface.is_some() {
+        let (dataset, chain, trace) = (dataset.clone(), chain.clone(), trace.clone());
+        figures.push(Figure::picture("object", move || {
+            let instants = object::instants(&dataset, &chain, &trace, INSTANTS)?;
+            object::object(&dataset, &chain, &instants)
+        }));
+    }
+    figures
+}
+
+/// Writes all [`figures`] that the data allow into `folder`, which is made if it is missing, and returns their paths.
 ///
 /// # Errors
 /// [`ReportError::Write`] when a file cannot be written, [`ReportError::Data`] when recording, chain and dataset do not
@@ -110,44 +162,80 @@ pub fn write_figures(
     dataset: &Dataset,
     recording: Option<(&Chain, &Trace)>,
 ) -> Result<Vec<PathBuf>, ReportError> {
-    Ok(write_figures_while(&|| true, folder, dataset, recording)?.written)
+    let recording = recording.as_ref().map(|(chain, trace)| (chain, trace));
+    let figures = figures(&dataset, recording);
+    let files: Vec<PathBuf> = figures.iter().flat_map(|figure| figure.files(folder)).collect();
+    let (told, written) = mpsc::channel();
+    write_all(folder, figures, &told);
+    drop(told);
+    written.into_iter().try_for_each(|file| file.map(drop)).map(|()| files)
 }
 
-/// Writes the same figures, on all processors, but leaves out those that are to begin when `goes_on` says no.
+/// Writes `figures` into `folder` on all processors, drawings before what is made of pixels, and tells each file.
+fn write_all(folder: &Path, figures: Vec<Figure<'_>>, told: &Told) {
+    // Whom nobody listens to any more is left to finish.
+    let tell = |file: Result<PathBuf, ReportError>| drop(told.send(file));
+    let write_svg = |figure: Figure<'_>| -> Result<(&'static str, Canvas), ReportError> {
+        let canvas = (figure.draw)()?;
+        tell(write(folder.join(figure.name).with_extension("svg"), canvas.svg().as_bytes()));
+        Ok((figure.name, canvas))
+    };
+    let (drawings, mut pictures): (Vec<_>, Vec<_>) = figures.into_iter().partition(|figure| figure.is_drawing);
+    let drawn: Vec<_> = drawings.into_par_iter().with_max_len(1).map(write_svg).collect();
+    for drawing in drawn {
+        match drawing {
+            Ok((name, canvas)) => pictures.push(Figure::picture(name, move || Ok(canvas))),
+            Err(error) => tell(Err(error)),
+        }
+    }
+    let write_pixels =
+        |figure: Figure<'_>| tell((figure.draw)().and_then(|canvas| write_png(folder, figure.name, &canvas)));
+    pictures.into_par_iter().with_max_len(1).for_each(write_pixels);
+}
+
+/// Where files are told once they are written.
+type Told = mpsc::Sender<Result<PathBuf, ReportError>>;
+
+/// Files of some figures.
+#[derive(Debug)]
+pub struct Files {
+    /// Those that are written.
+    pub written: Vec<PathBuf>,
+    /// Those that are not.
+    pub left_out: Vec<PathBuf>,
+}
+
+/// How often is looked whether it is late.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Writes `figures` into `folder`, drawings before what is made of pixels, and returns as soon as it `is_late`. The
+/// rest is still being drawn then: who ends the process calls [`crate::dataset::discard_unfinished`].
 ///
 /// # Errors
 /// As [`write_figures`].
-pub fn write_figures_while(
-    goes_on: &(dyn Fn() -> bool + Sync),
+pub fn write_until(
+    is_late: impl Fn() -> bool,
     folder: &Path,
-    dataset: &Dataset,
-    recording: Option<(&Chain, &Trace)>,
-) -> Result<Figures, ReportError> {
-    type Figure<'a> = Box<dyn Fn() -> Result<Vec<PathBuf>, ReportError> + Send + Sync + 'a>;
-    let png = |name, canvas: Canvas| Ok(vec![write_png(folder, name, &canvas)?]);
-    let both = |name, canvas: Canvas| Ok(write_both(folder, name, &canvas)?.into());
-    let mut figures: Vec<Figure<'_>> = vec![
-        Box::new(move || png("cspace", space::space(dataset))),
-        Box::new(move || both("torque", slices::slices(dataset))),
-    ];
-    if let Some((chain, trace)) = recording {
-        figures.push(Box::new(move || both("motion", press::press(trace))));
-        figures.push(Box::new(move || both("energy", press::energy(trace))));
-        if let Some(end) = force::EndForce::new("", chain, trace) {
-            figures.push(Box::new(move || both("force", force::force(std::slice::from_ref(&end), trace))));
+    figures: Vec<Figure<'static>>,
+) -> Result<Files, ReportError> {
+    let all: Vec<PathBuf> = figures.iter().flat_map(|figure| figure.files(folder)).collect();
+    let mut there = Vec::new();
+    let (told, files) = mpsc::channel();
+    let place = folder.to_owned();
+    rayon::spawn(move || write_all(&place, figures, &told));
+    loop {
+        match files.recv_timeout(LOOK) {
+            Ok(file) => there.push(file),
+            Err(RecvTimeoutError::Timeout) => (),
+            Err(RecvTimeoutError::Disconnected) => break,
         }
-        if !trace.frames.is_empty() && dataset.surface.is_some() {
-            figures.push(Box::new(move || {
-                let instants = object::instants(dataset, chain, trace, INSTANTS)?;
-                png("object", object::object(dataset, chain, &instants)?)
-            }));
+        if is_late() {
+            break;
         }
     }
-    let draw = |figure: &Figure<'_>| goes_on().then(figure).transpose();
-    let drawn: Result<Vec<Option<Vec<PathBuf>>>, ReportError> = figures.par_iter().with_max_len(1).map(draw).collect();
-    let drawn = drawn?;
-    let left_out = drawn.iter().filter(|files| files.is_none()).count();
-    Ok(Figures { written: drawn.into_iter().flatten().flatten().collect(), left_out })
+    let there: Vec<PathBuf> = there.into_iter().collect::<Result<_, _>>()?;
+    let (written, left_out) = all.into_iter().partition(|file| there.contains(file));
+    Ok(Files { written, left_out })
 }
 
 /// Writes `NAME.svg` and `NAME.png` into `folder`, which is made if it is missing.

@@ -82,9 +82,10 @@ impl Work for Resumed<'_> {
 }
 
 impl<'a, B: Backend> WithFallback<'a, B> {
-    /// Leaves the device, which has failed.
+    /// Leaves the device, which has failed. What it told on the way is told first.
     fn leave(&mut self, error: &B::Error) {
         self.left_to_cpu = self.left_to_cpu();
+        self.notices = self.notices();
         self.device = None;
         self.notices.push(format!("solved by {}, since {} failed: {error}", CpuBackend::adapter(), self.name));
     }

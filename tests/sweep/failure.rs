@@ -38,8 +38,8 @@ fn a_file_of_another_kind_is_not_replaced() {
     );
 }
 
-/// The device breaks down for good in the third batch of ten; the sweep goes on, and says so in report and file, also
-/// when it is killed later on and resumed.
+/// The device breaks down for good in the third batch of ten, after a part of it in the same batch; the sweep goes on,
+/// and says both in report and file, also when it is killed later on and resumed.
 #[test]
 fn a_sweep_whose_device_is_lost_goes_on_with_the_cpu() {
     let scene = scene();
@@ -50,7 +50,8 @@ fn a_sweep_whose_device_is_lost_goes_on_with_the_cpu() {
     let report = bake(&sweep(), &mut lossy(), &folder.output(), false, 10, usize::MAX).unwrap();
     assert_eq!(report.left_to_cpu, 10, "half of the first two batches");
     let dataset = Dataset::open(&folder.output()).unwrap();
-    let [notice] = &dataset.provenance.notices[..] else { panic!("{:?}", dataset.provenance) };
+    let [part, notice] = &dataset.provenance.notices[..] else { panic!("{:?}", dataset.provenance) };
+    assert_eq!(part, "from grid point 20 on: went on without a part of it");
     assert!(notice.starts_with("from grid point 20 on: solved by "), "{notice}");
     assert!(notice.ends_with("since a made-up device failed: device lost"), "{notice}");
     assert_eq!(&report.warnings, &dataset.provenance.notices);
@@ -67,7 +68,7 @@ fn a_sweep_whose_device_is_lost_goes_on_with_the_cpu() {
     assert!(matches!(stopped, SweepError::Stopped { done: 60, .. }), "{stopped}");
     bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX).unwrap();
     let resumed = Dataset::open(&folder.output()).unwrap().provenance.notices;
-    assert_eq!(&resumed[..], [notice.as_str(), "from grid point 60 on: resumed on cpu (none)"]);
+    assert_eq!(&resumed[..], [part.as_str(), notice.as_str(), "from grid point 60 on: resumed on cpu (none)"]);
 }
 
 #[test]

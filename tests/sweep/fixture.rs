@@ -33,7 +33,7 @@ pub fn sweep() -> Sweep<'static> {
 }
 
 /// Answers with made-up numbers that depend on the configuration alone, half of them by the CPU; breaks down after some
-/// configurations.
+/// configurations, and tells then that a part of it broke down before.
 pub struct MadeUp {
     pub solved: usize,
     pub left_to_cpu: usize,
@@ -60,6 +60,11 @@ impl Backend for MadeUp {
         }
         self.left_to_cpu += configurations.len() / 2;
         Ok(configurations.iter().map(|q| (self.answer)(q)).collect())
+    }
+
+    fn notices(&mut self) -> Vec<String> {
+        let part = (self.solved > self.breaks_after).then(|| "went on without a part of it".to_owned());
+        part.into_iter().collect()
     }
 
     fn left_to_cpu(&self) -> usize {
