@@ -286,7 +286,7 @@ mod tests {
     fn configurations_are_spread_evenly_over_the_cells_in_contact() {
         let grid = synthetic::grid(&[(0.0, 0.1, 8), (0.0, 0.1, 4)]);
         let columns = columns(&grid);
-        let table = Table::new(2, vec![Block::of(&columns, 0)]);
+        let table = Table::new(SHAPE.width(), vec![Block::of(&columns, 0)]);
         // Lines 4 to 7 of the first axis are in contact: so are cells 3 to 6, three times along the second axis.
         let places = places(&grid, &table, 16, 1200);
         assert_eq!(places.len(), 1200);
@@ -307,7 +307,7 @@ mod tests {
     fn a_window_around_a_configuration_gives_what_the_whole_grid_gives() {
         let grid = synthetic::grid(&[(0.0, 0.01, 90), (0.0, 0.02, 80)]);
         let columns = columns(&grid);
-        let table = Table::new(2, vec![Block::of(&columns, 0)]);
+        let table = Table::new(SHAPE.width(), vec![Block::of(&columns, 0)]);
         let places = places(&grid, &table, 54 * 80, 50);
         let exact: Vec<_> = places.iter().map(|place| (place, JointVector::zeros(2))).collect();
         let slope = JointVector::from_slice(&[1e3, 1e3]);
