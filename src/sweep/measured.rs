@@ -40,6 +40,9 @@ const WHOLE: usize = 1 << 18;
 /// Most grid points around a configuration of which an interpolation is formed [1]: some milliseconds of time.
 const AROUND: usize = 1 << 10;
 
+/// Grid points that a thread looks through at a time [1]: larger leaves threads without, smaller takes memory.
+const STRETCH: usize = 1 << 12;
+
 /// How the error of a dataset is measured.
 #[derive(Clone, Copy)]
 pub(super) struct ErrorCheck<'a> {
@@ -174,17 +177,11 @@ fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize) -> Vec<
             Draw { rank, side, chance: random.between(0.0, 1.0), fractions }
         })
         .collect();
-    // The grid points of these ranks among those in contact, in one pass over the grid.
     let mut by_rank: Vec<usize> = (0..draws.len()).collect();
     by_rank.sort_by_key(|&draw| draws[draw].rank);
+    let ranks: Vec<usize> = by_rank.iter().map(|&draw| draws[draw].rank).collect();
     let mut points = vec![None; draws.len()];
-    let mut wanted = by_rank.into_iter().peekable();
-    let touching = (0..grid.points()).filter(|&point| table.status(point).is_in_contact());
-    for (rank, point) in touching.enumerate() {
-        while let Some(draw) = wanted.next_if(|&draw| draws[draw].rank == rank) {
-            points[draw] = Some(point);
-        }
-    }
+    by_rank.into_iter().zip(of_ranks(grid, table, &ranks)).for_each(|(draw, point)| points[draw] = Some(point));
     let place = |(draw, point): (&Draw, Option<usize>)| {
         let (mut rest, mut cell) = (point?, vec![0; joints]);
         for (a, axis) in grid.axes.iter().enumerate().rev() {
@@ -203,6 +200,34 @@ fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize) -> Vec<
         Some(Place { q, cell })
     };
     draws.iter().zip(points).filter_map(place).take(count).collect()
+}
+
+/// The grid points of `ranks`, which ascend, among those in contact, as far as there are so many; on all cores.
+fn of_ranks(grid: &Grid, table: &Table<'_>, ranks: &[usize]) -> Vec<usize> {
+    let stretches: Vec<usize> = (0..grid.points()).step_by(STRETCH).collect();
+    let touching = |first: usize| {
+        let stretch = first..grid.points().min(first + STRETCH);
+        stretch.filter(|&point| table.status(point).is_in_contact())
+    };
+    let counts: Vec<usize> = stretches.par_iter().map(|&first| touching(first).count()).collect();
+    let ends = counts.iter().scan(0, |end, count| {
+        *end += count;
+        Some(*end)
+    });
+    let found =
+        stretches.par_iter().zip(ends.collect::<Vec<_>>()).zip(&counts).flat_map_iter(|((&first, end), count)| {
+            let begin = end - count;
+            let [from, to] = [begin, end].map(|rank| ranks.partition_point(|&other| other < rank));
+            let mut wanted = ranks[from..to].iter().peekable();
+            let mut found = Vec::with_capacity(to - from);
+            for (rank, point) in (begin..).zip(touching(first)).take_while(|_| from < to) {
+                while wanted.next_if(|&&wanted| wanted == rank).is_some() {
+                    found.push(point);
+                }
+            }
+            found
+        });
+    found.collect()
 }
 
 /// Corners of the cell whose lowest corner is on the lines `cell`, ascending.
