@@ -32,15 +32,22 @@
 //! A mapped file must not be cut short by anyone while it is open: the system then kills the reader (SIGBUS). Programs
 //! of this crate never do that, they rename; the haptic loop reads through [`Dataset::load`], which copies.
 
-use super::{Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, Target, check, replace_file, store};
+use super::{
+    BUFFER, Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, Target, check, replace_file, store,
+};
 use crate::JointMatrix;
 use bytemuck::Pod;
+use rayon::prelude::*;
 use safetensors::{Dtype, tensor::TensorInfo};
 use serde::Serialize;
+#[cfg(unix)]
+use std::os::unix::fs::FileExt;
+#[cfg(windows)]
+use std::os::windows::fs::FileExt;
 use std::{
     collections::BTreeMap,
     fs::{self, File},
-    io::{self, Read, Seek, SeekFrom, Write},
+    io::{self, BufWriter, Read, Seek, SeekFrom, Write},
     path::Path,
 };
 
@@ -59,6 +66,8 @@ pub(super) const CHECKSUM: usize = LENGTH + OPENING.len();
 pub(super) const NO_CHECKSUM: &str = "00000000";
 /// Tensors begin at a multiple of this: a page [bytes].
 pub(super) const PAGE: usize = 4096;
+/// Buffer between a piece of a tensor and the file: what is longer goes there as it is [bytes].
+pub(crate) const PIECE_BUFFER: usize = 1 << 16;
 /// Longest header that is read or written: bounds what a hostile file can make the parser allocate [bytes].
 pub(super) const MAX_HEADER: usize = 16 << 20;
 
@@ -111,16 +120,22 @@ pub(crate) struct Tensor<C> {
     pub(super) contents: C,
 }
 
-/// Where a tensor's numbers come from.
-pub(crate) trait Contents {
-    /// Writes them, little-endian.
-    fn write(&self, writer: &mut impl Write) -> io::Result<()>;
+/// Where a tensor's numbers come from: pieces that follow one another, which all cores write.
+pub(crate) trait Contents: Sync {
+    /// Where each piece begins in the tensor [bytes].
+    fn pieces(&self) -> Vec<usize>;
+    /// Writes the numbers of a piece, little-endian.
+    fn write(&self, piece: usize, writer: &mut impl Write) -> io::Result<()>;
 }
 
 /// Numbers in memory, aligned to their type.
 impl Contents for &[u8] {
-    fn write(&self, writer: &mut impl Write) -> io::Result<()> {
-        writer.write_all(self)
+    fn pieces(&self) -> Vec<usize> {
+        (0..self.len()).step_by(BUFFER).collect()
+    }
+
+    fn write(&self, piece: usize, writer: &mut impl Write) -> io::Result<()> {
+        self.chunks(BUFFER).nth(piece).map_or(Ok(()), |bytes| writer.write_all(bytes))
     }
 }
 
@@ -269,40 +284,62 @@ pub(crate) fn write_container<C: Contents>(
         return Err(inconsistent(format!("its header, scene included, is longer than {MAX_HEADER} bytes")));
     }
     replace_file(target, |writer| {
-        let mut hashed = Hashed { writer: &mut *writer, hasher: crc32fast::Hasher::new(), bytes: 0 };
-        hashed.write_all(&(text.len() as u64).to_le_bytes())?;
-        hashed.write_all(&text)?;
-        for tensor in &tensors {
-            let end = hashed.bytes + tensor.bytes();
-            tensor.contents.write(&mut hashed)?;
-            if hashed.bytes != end {
-                return Err(io::Error::other(format!("tensor {} changed its length meanwhile", tensor.name)));
-            }
+        let mut hasher = crc32fast::Hasher::new();
+        for bytes in [&(text.len() as u64).to_le_bytes()[..], &text] {
+            writer.write_all(bytes)?;
+            hasher.update(bytes);
         }
-        let checksum = digits(hashed.hasher);
+        writer.flush()?;
+        let mut place = LENGTH + text.len();
+        for tensor in &tensors {
+            hasher.combine(&write_tensor(writer.get_ref(), place, tensor)?);
+            place += tensor.bytes();
+        }
         writer.seek(SeekFrom::Start(CHECKSUM as u64))?;
-        writer.write_all(checksum.as_bytes())
+        writer.write_all(digits(hasher).as_bytes())
     })
     .map_err(|source| Error::Write { path: path.into(), source })
 }
 
-/// Counts what goes through, and takes its checksum.
-struct Hashed<W> {
-    writer: W,
-    hasher: crc32fast::Hasher,
-    bytes: usize,
+/// Writes `tensor` at `place` of `file`, its pieces on all cores, and returns its checksum.
+fn write_tensor<C: Contents>(file: &File, place: usize, tensor: &Tensor<C>) -> io::Result<crc32fast::Hasher> {
+    let pieces = tensor.contents.pieces();
+    let write = |piece: usize| {
+        let at = |piece: usize| place + pieces.get(piece).copied().unwrap_or(tensor.bytes());
+        let placed = Placed { file, place: at(piece), hasher: crc32fast::Hasher::new() };
+        let mut writer = BufWriter::with_capacity(PIECE_BUFFER, placed);
+        tensor.contents.write(piece, &mut writer)?;
+        let Placed { place, hasher, .. } = writer.into_inner()?;
+        let is_whole = place == at(piece + 1);
+        is_whole.then_some(hasher).ok_or_else(|| io::Error::other(format!("{} changed meanwhile", tensor.name)))
+    };
+    (0..pieces.len()).into_par_iter().map(write).try_reduce(crc32fast::Hasher::new, |mut before, piece| {
+        before.combine(&piece);
+        Ok(before)
+    })
 }
 
-impl<W: Write> Write for Hashed<W> {
+/// A place in a file, others of which are written at the same time, and the checksum of what goes there.
+struct Placed<'a> {
+    file: &'a File,
+    /// [bytes]
+    place: usize,
+    hasher: crc32fast::Hasher,
+}
+
+impl Write for Placed<'_> {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
-        let count = self.writer.write(buffer)?;
+        #[cfg(unix)]
+        let count = self.file.write_at(buffer, self.place as u64)?;
+        #[cfg(windows)]
+        let count = self.file.seek_write(buffer, self.place as u64)?;
         self.hasher.update(&buffer[..count]);
-        self.bytes += count;
+        self.place += count;
         Ok(count)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.writer.flush()
+        Ok(())
     }
 }
 

@@ -27,8 +27,8 @@ pub use column::Column;
 pub use error::Error;
 pub use export::Format;
 pub(crate) use file::{
-    CONTACTS, Contents as TensorContents, Heading, Kind, TOUCHES, Tensor, check_place, may_be_dataset, surface_tensors,
-    write_container, write_file,
+    CONTACTS, Contents as TensorContents, Heading, Kind, PIECE_BUFFER, TOUCHES, Tensor, check_place, may_be_dataset,
+    surface_tensors, write_container, write_file,
 };
 pub use grid::{Axis, Grid};
 pub use summary::{Refinement, StatusCounts, Summary};

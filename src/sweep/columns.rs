@@ -44,6 +44,11 @@ pub(super) struct Width {
 }
 
 impl Width {
+    /// Bytes of an entry of each column, by [`Section`]: one a point, a contact or a touch.
+    pub fn entries(self) -> [usize; SECTIONS] {
+        Opening { first: 0, points: 1, contacts: 1, touches: 1 }.lengths(self)
+    }
+
     /// Creates the widths for `joints` joints.
     pub fn new(joints: usize, with_tangent: bool, with_touches: bool) -> Self {
         let tangent = if with_tangent { JointMatrix::entries(joints) } else { 0 };
@@ -132,7 +137,7 @@ impl Rows {
 }
 
 /// The columns of a block, in their order there.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) enum Section {
     Torque,
     Energy,
@@ -147,6 +152,17 @@ pub(super) enum Section {
     TouchNodes,
     TouchForces,
     Status,
+}
+
+impl Section {
+    /// The ends of the rows that the column is of, where it has rows.
+    pub fn ends(self) -> Option<Self> {
+        match self {
+            Self::Nodes | Self::Forces => Some(Self::Ends),
+            Self::TouchNodes | Self::TouchForces => Some(Self::TouchEnds),
+            _ => None,
+        }
+    }
 }
 
 /// New results of single points, by number of the grid point: one row of columns each.
@@ -187,12 +203,6 @@ impl Opening {
             *length = count.saturating_mul(size);
         }
         lengths
-    }
-
-    /// Where a column begins behind it, and its length [bytes].
-    pub fn place(self, section: Section, width: Width) -> (usize, usize) {
-        let lengths = self.lengths(width);
-        (lengths[..section as usize].iter().sum(), lengths[section as usize])
     }
 
     /// The columns behind it, `bytes` being all of them.

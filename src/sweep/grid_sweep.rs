@@ -7,7 +7,7 @@ use super::{
     Backend, Footprint, Forecast, FreeSpace, SweepError, SweepReport,
     assembly::{self, Results},
     chunks::{Begun, Solved, together},
-    columns::{Columns, Replaced, Rows, Shape},
+    columns::{Columns, Rows, Shape},
     footprint::{self, Bounds},
     lowest,
     measured::ErrorCheck,
@@ -248,7 +248,7 @@ impl<'a> Sweep<'a> {
         let results = |touching| footprint::results(points, touching, self.shape);
         let memory = |touching| {
             let chunk = footprint::chunk(solved, together, touching, self.shape).saturating_add(slab);
-            chunk.saturating_add(if in_memory { results(touching) } else { assembly::BUFFERS })
+            chunk.saturating_add(if in_memory { results(touching) } else { assembly::buffers() })
         };
         // A shard holds the forces from which lower equilibria are searched for.
         let with_forces = self.with_forces || (self.shard != Shard::WHOLE && self.shape.with_forces);
@@ -284,7 +284,7 @@ impl<'a> Sweep<'a> {
         })?;
         let begun = Begun { tally: Tally::default(), provenance: self.provenance.clone() };
         let solved = self.solve(backend, &mut run, begun, footprint, &mut columns)?;
-        let mut table = Table::new(self.shape.joints, vec![Block::of(&columns, 0)]);
+        let mut table = Table::new(self.shape.width(), vec![Block::of(&columns, 0)]);
         let (report, provenance) = self.complete(solved, &mut table, run.stop, None)?;
         let replaced = std::mem::take(&mut table.replaced);
         columns.replace(0, &replaced).map_err(|source| SweepError::Memory { points, bytes, source })?;
@@ -337,22 +337,15 @@ impl<'a> Sweep<'a> {
             }
         };
         let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
-        let (report, provenance, replaced, forces) = if self.lowest.is_none() && self.error.is_none() {
-            let (report, provenance) = self.report(solved);
-            (report, provenance, Replaced::new(), part.forces())
-        } else {
-            let failed = |source| SweepError::Part { path: kept_in.clone(), source };
-            let map = part.map().map_err(failed)?;
-            let mut table = part.table(&map, self.shape.width()).map_err(failed)?;
-            let (report, provenance) = self.complete(solved, &mut table, run.stop, Some(&kept_in))?;
-            let ([contacts, touches], more) = (part.forces(), table.more());
-            let forces = [contacts.saturating_add_signed(more[0]), touches.saturating_add_signed(more[1])];
-            (report, provenance, table.replaced, forces)
-        };
+        let failed = |source| SweepError::Part { path: kept_in.clone(), source };
+        let map = part.map().map_err(failed)?;
+        let mut table = part.table(&map, self.shape.width()).map_err(failed)?;
+        let (report, provenance) = self.complete(solved, &mut table, stop, Some(&kept_in))?;
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
         let shape = Shape { with_forces: self.with_forces, ..self.shape };
-        let results = Results { part: &part, shape, replaced: &replaced, forces, stop };
+        let results = Results::new(&table, report.points, shape, stop);
         results.assemble(target, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
+        drop(map);
         part.remove()?;
         Ok(report)
     }

@@ -235,7 +235,10 @@ fn neighbours(grid: &Grid, point: usize) -> impl Iterator<Item = usize> + '_ {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{field::synthetic, sweep::table::Block};
+    use crate::{
+        field::synthetic,
+        sweep::{columns::Section, table::Block},
+    };
 
     const SHAPE: Shape =
         Shape { joints: 1, surface_nodes: 9, with_forces: true, with_touches: false, with_tangent: false };
@@ -279,14 +282,14 @@ mod tests {
         // U grows by 1 a step of 1 with torque -1; point 2 holds 0.5 too much.
         let grid = synthetic::grid(&[(0.0, 1.0, 5)]);
         let five = columns(&[1.0, 2.0, 3.5, 4.0, 5.0]);
-        let table = Table::new(1, vec![Block::of(&five, 0)]);
+        let table = Table::new(SHAPE.width(), vec![Block::of(&five, 0)]);
         let around = Neighbourhood::new(&grid, &table);
         let starts: Vec<_> = (0..5).map(|point| around.starts(point, |_| true)).collect();
         assert_eq!(starts, [vec![], vec![], vec![1, 3], vec![], vec![]]);
         assert_eq!(around.starts(2, |n| n == 3), [3]);
         // Below the tolerance nothing is tried.
         let near = columns(&[1.0, 2.0 + 0.5 * EDGE_TOLERANCE, 3.0]);
-        let table = Table::new(1, vec![Block::of(&near, 0)]);
+        let table = Table::new(SHAPE.width(), vec![Block::of(&near, 0)]);
         let grid = synthetic::grid(&[(0.0, 1.0, 3)]);
         assert!((0..3).all(|point| Neighbourhood::new(&grid, &table).starts(point, |_| true).is_empty()));
     }
@@ -296,14 +299,19 @@ mod tests {
     fn replaced_results_are_read_and_written_in_place() {
         let mut whole = columns(&[1.0, 2.0, 3.0, 0.0, 5.0]);
         let (first, second) = (columns(&[1.0, 2.0]), columns(&[3.0, 0.0, 5.0]));
-        let mut table = Table::new(1, vec![Block::of(&first, 0), Block::of(&second, 2)]);
+        let mut table = Table::new(SHAPE.width(), vec![Block::of(&first, 0), Block::of(&second, 2)]);
         let new = || Replaced::from([(1, columns(&[4.0])), (3, columns(&[2.0]))]);
         let replaced = new();
         table.replaced = new();
         whole.replace(0, &replaced).unwrap();
         let expected = columns(&[1.0, 4.0, 3.0, 2.0, 5.0]);
         assert_eq!(whole.block(0), expected.block(0));
-        assert_eq!(table.more(), [4, 0]);
+        for section in [Section::Energy, Section::Nodes, Section::Forces, Section::Status] {
+            let size = SHAPE.width().entries()[section as usize];
+            let runs = table.runs(0..5).map(|(block, points)| block.bytes(section, points, size).to_vec());
+            assert_eq!(runs.collect::<Vec<_>>().concat(), expected.block(0).1[section as usize]);
+            assert_eq!(table.runs(1..4).map(|(_, points)| points).collect::<Vec<_>>(), [0..1, 0..1, 0..1]);
+        }
         for (point, energy) in [1.0, 4.0, 3.0, 2.0, 5.0].into_iter().enumerate() {
             let found = table.result(point);
             assert_eq!((found.energy, found.torque[0], found.iterations), (energy, -1.0, 3));

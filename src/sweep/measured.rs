@@ -40,6 +40,9 @@ const WHOLE: usize = 1 << 18;
 /// Most grid points around a configuration of which an interpolation is formed [1]: some milliseconds of time.
 const AROUND: usize = 1 << 10;
 
+/// Grid points that a thread looks through at a time [1]: larger leaves threads without, smaller takes memory.
+const STRETCH: usize = 1 << 12;
+
 /// How the error of a dataset is measured.
 #[derive(Clone, Copy)]
 pub(super) struct ErrorCheck<'a> {
@@ -174,17 +177,11 @@ fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize) -> Vec<
             Draw { rank, side, chance: random.between(0.0, 1.0), fractions }
         })
         .collect();
-    // The grid points of these ranks among those in contact, in one pass over the grid.
     let mut by_rank: Vec<usize> = (0..draws.len()).collect();
     by_rank.sort_by_key(|&draw| draws[draw].rank);
+    let ranks: Vec<usize> = by_rank.iter().map(|&draw| draws[draw].rank).collect();
     let mut points = vec![None; draws.len()];
-    let mut wanted = by_rank.into_iter().peekable();
-    let touching = (0..grid.points()).filter(|&point| table.status(point).is_in_contact());
-    for (rank, point) in touching.enumerate() {
-        while let Some(draw) = wanted.next_if(|&draw| draws[draw].rank == rank) {
-            points[draw] = Some(point);
-        }
-    }
+    by_rank.into_iter().zip(of_ranks(grid, table, &ranks)).for_each(|(draw, point)| points[draw] = Some(point));
     let place = |(draw, point): (&Draw, Option<usize>)| {
         let (mut rest, mut cell) = (point?, vec![0; joints]);
         for (a, axis) in grid.axes.iter().enumerate().rev() {
@@ -203,6 +200,34 @@ fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize) -> Vec<
         Some(Place { q, cell })
     };
     draws.iter().zip(points).filter_map(place).take(count).collect()
+}
+
+/// The grid points of `ranks`, which ascend, among those in contact, as far as there are so many; on all cores.
+fn of_ranks(grid: &Grid, table: &Table<'_>, ranks: &[usize]) -> Vec<usize> {
+    let stretches: Vec<usize> = (0..grid.points()).step_by(STRETCH).collect();
+    let touching = |first: usize| {
+        let stretch = first..grid.points().min(first + STRETCH);
+        stretch.filter(|&point| table.status(point).is_in_contact())
+    };
+    let counts: Vec<usize> = stretches.par_iter().map(|&first| touching(first).count()).collect();
+    let ends = counts.iter().scan(0, |end, count| {
+        *end += count;
+        Some(*end)
+    });
+    let found =
+        stretches.par_iter().zip(ends.collect::<Vec<_>>()).zip(&counts).flat_map_iter(|((&first, end), count)| {
+            let begin = end - count;
+            let [from, to] = [begin, end].map(|rank| ranks.partition_point(|&other| other < rank));
+            let mut wanted = ranks[from..to].iter().peekable();
+            let mut found = Vec::with_capacity(to - from);
+            for (rank, point) in (begin..).zip(touching(first)).take_while(|_| from < to) {
+                while wanted.next_if(|&&wanted| wanted == rank).is_some() {
+                    found.push(point);
+                }
+            }
+            found
+        });
+    found.collect()
 }
 
 /// Corners of the cell whose lowest corner is on the lines `cell`, ascending.
@@ -286,7 +311,7 @@ mod tests {
     fn configurations_are_spread_evenly_over_the_cells_in_contact() {
         let grid = synthetic::grid(&[(0.0, 0.1, 8), (0.0, 0.1, 4)]);
         let columns = columns(&grid);
-        let table = Table::new(2, vec![Block::of(&columns, 0)]);
+        let table = Table::new(SHAPE.width(), vec![Block::of(&columns, 0)]);
         // Lines 4 to 7 of the first axis are in contact: so are cells 3 to 6, three times along the second axis.
         let places = places(&grid, &table, 16, 1200);
         assert_eq!(places.len(), 1200);
@@ -307,7 +332,7 @@ mod tests {
     fn a_window_around_a_configuration_gives_what_the_whole_grid_gives() {
         let grid = synthetic::grid(&[(0.0, 0.01, 90), (0.0, 0.02, 80)]);
         let columns = columns(&grid);
-        let table = Table::new(2, vec![Block::of(&columns, 0)]);
+        let table = Table::new(SHAPE.width(), vec![Block::of(&columns, 0)]);
         let places = places(&grid, &table, 54 * 80, 50);
         let exact: Vec<_> = places.iter().map(|place| (place, JointVector::zeros(2))).collect();
         let slope = JointVector::from_slice(&[1e3, 1e3]);

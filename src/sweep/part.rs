@@ -11,7 +11,7 @@
 
 use super::{
     Shard, SweepError,
-    columns::{Columns, Opening, Replaced, Section, Width},
+    columns::{Columns, Opening, Width},
     shard,
     table::{Block, Table},
     tally::Tally,
@@ -29,9 +29,6 @@ use std::{
 const MAGIC: &[u8] = b"haptize part 5\n";
 /// Length and checksum before each body [bytes].
 const FRAME: usize = 8 + 4;
-
-/// Buffer for reading columns back [bytes].
-pub(super) const BUFFER: usize = 1 << 16;
 
 /// How the body of a notice begins: as no block of columns does, whose first point has no such number.
 const NOTICE: [u8; 8] = [u8::MAX; 8];
@@ -113,8 +110,6 @@ pub(super) struct Part {
     file: File,
     /// Where the frame behind the binding begins [bytes].
     results: u64,
-    /// Contacts and touches in all.
-    forces: [usize; 2],
 }
 
 impl Part {
@@ -137,7 +132,7 @@ impl Part {
             // Some network file systems have no locks; only the second of two bakes at once would notice.
             Err(TryLockError::Error(_)) => (),
         }
-        let mut part = Self { path: path.into(), file, results: 0, forces: [0; 2] };
+        let mut part = Self { path: path.into(), file, results: 0 };
         if !resume && part.holds_results()? {
             return Err(SweepError::Unfinished { path: path.into() });
         }
@@ -153,9 +148,7 @@ impl Part {
         let (opening, columns) = chunk.block(first);
         let mut body = vec![opening.as_flattened()];
         body.extend(columns);
-        self.write(&body).map_err(|source| SweepError::Part { path: self.path.clone(), source })?;
-        self.forces = add(self.forces, chunk);
-        Ok(())
+        self.write(&body).map_err(|source| SweepError::Part { path: self.path.clone(), source })
     }
 
     /// Adds something that provenance will tell.
@@ -175,11 +168,6 @@ impl Part {
         let Self { path, file, .. } = self;
         drop(file);
         std::fs::remove_file(&path).map_err(|source| SweepError::Part { path, source })
-    }
-
-    /// Number of contacts and of touches in it.
-    pub fn forces(&self) -> [usize; 2] {
-        self.forces
     }
 
     /// Where it is.
@@ -205,50 +193,6 @@ impl Part {
         body.iter().try_for_each(|piece| self.file.write_all(piece))
     }
 
-    /// Passes the bytes of one column of all points, block by block, to `take`, which reads all of them. Points in
-    /// `replaced` have the results given there.
-    pub fn column(
-        &self,
-        section: Section,
-        width: Width,
-        replaced: &Replaced,
-        take: &mut dyn FnMut(&mut dyn Read) -> io::Result<()>,
-    ) -> io::Result<()> {
-        let mut left = self.file.metadata()?.len().saturating_sub(self.results);
-        let mut reader = BufReader::with_capacity(BUFFER, &self.file);
-        reader.seek(SeekFrom::Start(self.results))?;
-        while left > 0 {
-            let (mut length, mut bytes) = ([0; 8], [0; Opening::BYTES]);
-            reader.read_exact(&mut length)?;
-            reader.seek_relative((FRAME - length.len()) as i64)?;
-            let length = u64::from_le_bytes(length);
-            let (first, others) = bytes.split_at_mut(NOTICE.len());
-            reader.read_exact(first)?;
-            let mut done = NOTICE.len();
-            if first != NOTICE {
-                reader.read_exact(others)?;
-                let opening = Opening::of(bytes).ok_or(io::ErrorKind::InvalidData)?;
-                if replaced.range(opening.first..opening.first + opening.points).next().is_some() {
-                    let mut block = bytes.to_vec();
-                    reader.by_ref().take(length - Opening::BYTES as u64).read_to_end(&mut block)?;
-                    let mut columns =
-                        Columns::decode(&block, opening.first, width).ok_or(io::ErrorKind::InvalidData)?;
-                    columns.replace(opening.first, replaced).map_err(io::Error::other)?;
-                    take(&mut columns.block(opening.first).1[section as usize])?;
-                    done = length as usize;
-                } else {
-                    let (start, bytes) = opening.place(section, width);
-                    reader.seek_relative(start as i64)?;
-                    take(&mut reader.by_ref().take(bytes as u64))?;
-                    done = Opening::BYTES + start + bytes;
-                }
-            }
-            reader.seek_relative(length as i64 - done as i64)?;
-            left = left.checked_sub(FRAME as u64 + length).ok_or(io::ErrorKind::UnexpectedEof)?;
-        }
-        Ok(())
-    }
-
     /// Maps the part's file into memory. The file is locked: no other bake changes it.
     pub fn map(&self) -> io::Result<Mmap> {
         // SAFETY: the mapping is read-only. Another program that truncates the file ends this process, as it would with
@@ -270,7 +214,7 @@ impl Part {
                 blocks.push(Block { first: opening.first, sections: opening.sections(columns, width) });
             }
         }
-        Ok(Table::new(width.joints, blocks))
+        Ok(Table::new(width, blocks))
     }
 
     /// The binding of the file that is there, which `reader` then stands behind with `left` bytes left; `None` when the
@@ -317,7 +261,7 @@ impl Part {
             return Err(SweepError::OtherPart { path: self.path.clone(), difference });
         }
         let (points, width) = (binding.points(), binding.width());
-        let (results, mut tally, mut forces) = (whole, Tally::default(), [0; 2]);
+        let (results, mut tally) = (whole, Tally::default());
         loop {
             let before = whole;
             let Some(body) = next(&mut whole)? else { break };
@@ -329,7 +273,6 @@ impl Part {
             match Columns::decode(&body, first, width) {
                 Some(chunk) if chunk.points() <= points - tally.points => {
                     tally.add(&chunk);
-                    forces = add(forces, &chunk);
                 }
                 _ => {
                     whole = before;
@@ -340,7 +283,7 @@ impl Part {
         drop(reader);
         self.file.set_len(whole).map_err(failed)?;
         self.file.seek(SeekFrom::Start(whole)).map_err(failed)?;
-        (self.results, self.forces) = (results, forces);
+        self.results = results;
         binding.provenance.date = found.provenance.date;
         Ok(Some(tally))
     }
@@ -384,11 +327,6 @@ fn body(bytes: &[u8], place: &mut usize) -> Option<Range<usize>> {
     let end = bytes.len() - rest.len();
     *place = end;
     Some(end - body.len()..end)
-}
-
-/// `forces` and those of `chunk`.
-fn add([contacts, touches]: [usize; 2], chunk: &Columns) -> [usize; 2] {
-    [contacts + chunk.contacts.nodes.len(), touches + chunk.touches.nodes.len()]
 }
 
 /// The next frame's body, of a file with `left` bytes left; `None` when there is no whole one.

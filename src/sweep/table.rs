@@ -1,6 +1,6 @@
 //! The results of all grid points, read point by point in any order: in memory, or in the part on the disk.
 
-use super::columns::{Columns, Replaced, SECTIONS, Section};
+use super::columns::{Columns, Replaced, SECTIONS, Section, Width};
 use crate::{
     JointVector,
     contact::{Equilibrium, NodeForce, Status},
@@ -11,13 +11,14 @@ use std::ops::Range;
 
 /// Results of all points of a grid, with the new ones of single points over them.
 pub(super) struct Table<'a> {
-    joints: usize,
+    width: Width,
     /// In the order of the points.
     blocks: Vec<Block<'a>>,
     pub replaced: Replaced,
 }
 
 /// Columns of consecutive points as bytes, by [`Section`]; they need not be aligned.
+#[derive(Clone, Copy)]
 pub(super) struct Block<'a> {
     /// Number of the first point.
     pub first: usize,
@@ -77,25 +78,38 @@ impl<'a> Block<'a> {
         Status::from_number(self.sections[Section::Status as usize][row]).unwrap_or(Status::Outside)
     }
 
+    /// The column `section` of points, an entry of which takes `size` bytes.
+    pub fn bytes(&self, section: Section, points: Range<usize>, size: usize) -> &'a [u8] {
+        let entries = match section.ends() {
+            Some(ends) => self.rows(ends, points),
+            None => points,
+        };
+        &self.sections[section as usize][size * entries.start..size * entries.end]
+    }
+
+    fn points(&self) -> usize {
+        self.sections[Section::Status as usize].len()
+    }
+
     fn forces(&self, row: usize) -> Vec<NodeForce> {
         let force = |contact: usize| NodeForce {
             node: self.number(Section::Nodes, contact),
             force: DVec3::from_array([0, 1, 2].map(|k| self.number::<f32>(Section::Forces, 3 * contact + k).into())),
         };
-        self.row(Section::Ends, row).map(force).collect()
+        self.rows(Section::Ends, row..row + 1).map(force).collect()
     }
 
-    /// Which contacts, or touches, are those of a point; `ends` are their ends.
-    fn row(&self, ends: Section, row: usize) -> Range<usize> {
-        let end = |row: usize| self.number::<u64>(ends, row) as usize;
-        (if row == 0 { 0 } else { end(row - 1) })..end(row)
+    /// Which contacts, or touches, are those of points; `ends` are their ends.
+    pub fn rows(&self, ends: Section, points: Range<usize>) -> Range<usize> {
+        let before = |point: usize| point.checked_sub(1).map_or(0, |row| self.number::<u64>(ends, row) as usize);
+        before(points.start)..before(points.end)
     }
 }
 
 impl<'a> Table<'a> {
     /// The points of `blocks`, which follow one another from point 0 on.
-    pub fn new(joints: usize, blocks: Vec<Block<'a>>) -> Self {
-        Self { joints, blocks, replaced: Replaced::new() }
+    pub fn new(width: Width, blocks: Vec<Block<'a>>) -> Self {
+        Self { width, blocks, replaced: Replaced::new() }
     }
 
     /// Status of a point.
@@ -105,7 +119,7 @@ impl<'a> Table<'a> {
 
     /// Result of a point.
     pub fn result(&self, point: usize) -> PointResult {
-        self.read(point, |block, row| block.result(row, self.joints))
+        self.read(point, |block, row| block.result(row, self.width.joints))
     }
 
     /// Forces on the object's nodes at a point, ascending by node [N].
@@ -116,21 +130,25 @@ impl<'a> Table<'a> {
     /// Result of a point as it was before it was replaced.
     pub fn before(&self, point: usize) -> PointResult {
         let block = self.block(point);
-        block.result(point - block.first, self.joints)
+        block.result(point - block.first, self.width.joints)
     }
 
-    /// By how many contacts and touches the new results exceed those that they replace.
-    pub fn more(&self) -> [isize; 2] {
-        let mut more = [0; 2];
-        for (&point, row) in &self.replaced {
-            let block = self.block(point);
-            let point = point - block.first;
-            more[0] += row.contacts.nodes.len() as isize - block.row(Section::Ends, point).len() as isize;
-            if !row.touches.ends.is_empty() {
-                more[1] += row.touches.nodes.len() as isize - block.row(Section::TouchEnds, point).len() as isize;
-            }
-        }
-        more
+    /// The blocks that hold `points`, in their order, and which of a block's points those are.
+    pub fn runs(&self, points: Range<usize>) -> impl Iterator<Item = (Block<'_>, Range<usize>)> {
+        let Range { start: mut point, end } = points;
+        std::iter::from_fn(move || {
+            let new = self.replaced.range(point..end).next();
+            let (block, rows) = match new {
+                _ if point >= end => return None,
+                Some((&first, row)) if first == point => (Block::of(row, first), 0..1),
+                _ => {
+                    let (block, end) = (self.block(point), new.map_or(end, |(&first, _)| first));
+                    (*block, point - block.first..block.points().min(end - block.first))
+                }
+            };
+            point += rows.len();
+            Some((block, rows))
+        })
     }
 
     fn block(&self, point: usize) -> &Block<'a> {

@@ -4,7 +4,7 @@ use crate::fixture::{Folder, MadeUp, POINTS, SCENE, answer, bake, scene, sweep, 
 use glam::DVec3;
 use haptize::{
     JointVector,
-    contact::{Equilibrium, Model, NodeForce, Status},
+    contact::{Equilibrium, Model, NodeForce, Status, Touch},
     dataset::Dataset,
     object::Object,
     proxy::Chain,
@@ -101,6 +101,47 @@ fn the_number_of_threads_leaves_no_trace() {
     for (threads, chunk) in [(2, POINTS), (3, 17), (5, 1)] {
         assert!(baked(threads, chunk) == one, "{threads} threads, chunks of {chunk}");
     }
+}
+
+/// A grid of several pieces that threads write side by side, in chunks that do not end where pieces do.
+#[test]
+fn a_file_is_the_same_whichever_number_of_threads_put_it_together() {
+    let friction = SCENE.to_owned() + "\n[haptics.friction]\ncoefficient = 0.4\n";
+    let mut scene = Scene::parse(&friction, "small.toml").unwrap();
+    for (axis, count) in scene.grid.axes.iter_mut().zip([100, 130]) {
+        (axis.step, axis.count) = (axis.step * axis.count as f64 / count as f64, count);
+    }
+    let sweep = sweep_of(&scene, "none", "");
+    let touching = |q: &[f64]| {
+        let equilibrium = answer(q);
+        let touch = |on: &NodeForce| Touch { proxy_node: on.node, carriers: Vec::new(), force: on.force };
+        Equilibrium { touches: equilibrium.forces.iter().rev().skip(1).rev().map(touch).collect(), ..equilibrium }
+    };
+    let put_together = |threads| {
+        let folder = Folder::new();
+        let mut backend = MadeUp { answer: touching, ..MadeUp::default() };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| bake(&sweep, &mut backend, &folder.output(), false, 777, usize::MAX)).unwrap();
+        std::fs::read(folder.output()).unwrap()
+    };
+    let one = put_together(1);
+    for threads in [2, 3, 7] {
+        assert!(put_together(threads) == one, "{threads} threads");
+    }
+    let folder = Folder::new();
+    std::fs::write(folder.output(), one).unwrap();
+    let dataset = Dataset::open(&folder.output()).unwrap();
+    let touches = dataset.touches.as_ref().unwrap();
+    let mut end = 0;
+    for point in 0..dataset.grid.points() {
+        let expected = touching(&dataset.grid.configuration(point));
+        assert_eq!(dataset.torque(point), &expected.torque[..]);
+        let forces: Vec<_> = dataset.forces(point).map(|on| (on.node, on.force.as_vec3())).collect();
+        assert_eq!(forces, expected.forces.iter().map(|on| (on.node, on.force.as_vec3())).collect::<Vec<_>>());
+        end += expected.touches.len();
+        assert_eq!(touches.offsets[point + 1], end as u64);
+    }
+    assert!(end > 4096 && end == touches.nodes.len(), "{end}");
 }
 
 /// Skipping changes nothing but gaps far from contact, and those are then lower bounds.

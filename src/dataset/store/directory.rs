@@ -55,8 +55,8 @@ impl<T> Directory<T> {
     fn probes(&self, key: u64) -> impl Iterator<Item = &AtomicPtr<Entry<T>>> {
         // Fibonacci hashing: 2^64 over the golden ratio scatters neighbouring keys (Knuth, as above).
         let first = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> self.shift) as usize;
-        let (before, after) = self.slots.split_at(first);
-        after.iter().chain(before).take(MOST_PROBES)
+        let (count, last) = (self.slots.len(), self.slots.len() - 1);
+        (0..MOST_PROBES.min(count)).map(move |probe| &self.slots[(first + probe) & last])
     }
 
     /// The value of `key`.

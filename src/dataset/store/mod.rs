@@ -38,6 +38,7 @@ use crate::{JointVector, MAX_JOINTS};
 pub(crate) use block::beyond;
 use directory::{Directory, Refusal};
 use record::{MAX_WIDTH, mixed, sets, slope, width};
+use space::MOST_BLOCK_JOINTS;
 use std::sync::{
     Mutex, PoisonError,
     atomic::{AtomicU64, Ordering},
@@ -422,17 +423,21 @@ impl Store {
         // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to
         // the other. With blocks of one node they do so along all axes.
         let parity = (0..D).map(|a| ((low[a] & 1) as usize) << a).sum::<usize>();
-        let is_one = self.space.block_nodes() == 1;
+        let is_one = D > MOST_BLOCK_JOINTS;
         let (odd, places) = if is_one { (C - 1, 0) } else { (parity, C - 1) };
         let even = (C - 1) ^ odd;
-        let first = self.space.key(level, &self.space.block_of(low));
+        // Keys of the block of the first corner, and of those beside it by sets of axes.
+        let mut keys = [self.space.key(level, &self.space.block_of(low)); C];
+        for a in 0..D {
+            let (near, beyond) = keys.split_at_mut(1 << a);
+            beyond.iter_mut().zip(near).for_each(|(beyond, near)| *beyond = near.wrapping_add(self.space.stride(a)));
+        }
         let mut gathered = Gathered { found: false, whole: true, any: false, failed: false };
         let (mut beside, mut inside) = (0_usize, 0_usize);
         loop {
-            let beyond: u64 = (0..D).map(|a| self.space.stride(a) & (beside as u64 >> a & 1).wrapping_neg()).sum();
             // The corner whose coordinates are all even belongs to a level below: a block of it alone does not exist.
             let is_below = is_one && level > 0 && beside == parity;
-            let block = if is_below { None } else { self.blocks.get(first + beyond) };
+            let block = if is_below { None } else { self.blocks.get(keys[beside]) };
             let block = block.filter(|block| block.number < horizon);
             gathered.found |= block.is_some();
             gathered.whole &= is_below || block.is_some();
