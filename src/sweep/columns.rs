@@ -189,7 +189,7 @@ impl Opening {
         lengths
     }
 
-    /// Where a column begins behind it, and its length [bytes].
+    /// Returns where a column begins behind it, and its length [bytes].
     pub fn place(self, section: Section, width: Width) -> (usize, usize) {
         let lengths = self.lengths(width);
         (lengths[..section as usize].iter().sum(), lengths[section as usize])

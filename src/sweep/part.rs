@@ -182,7 +182,7 @@ impl Part {
         self.forces
     }
 
-    /// Where it is.
+    /// Returns where it is.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -376,7 +376,7 @@ pub(super) fn next(bytes: &[u8], place: &mut usize) -> Option<(Frame, Range<usiz
     Some((frame, body))
 }
 
-/// Where the body of the frame at `place` lies, if it is whole.
+/// Returns where the body of the frame at `place` lies, if it is whole.
 fn body(bytes: &[u8], place: &mut usize) -> Option<Range<usize>> {
     let mut rest = bytes.get(*place..)?;
     let mut left = rest.len() as u64;

@@ -119,7 +119,7 @@ impl<'a> Table<'a> {
         block.result(point - block.first, self.joints)
     }
 
-    /// By how many contacts and touches the new results exceed those that they replace.
+    /// Returns by how many contacts and touches the new results exceed those that they replace.
     pub fn more(&self) -> [isize; 2] {
         let mut more = [0; 2];
         for (&point, row) in &self.replaced {

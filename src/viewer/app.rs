@@ -294,7 +294,7 @@ impl Viewer {
         self.session.as_ref()?.feel.guide().time()
     }
 
-    /// How punctual the haptic thread has been, and how costly its ticks; none where nothing is open.
+    /// Returns how punctual the haptic thread has been, and how costly its ticks; none where nothing is open.
     #[must_use]
     pub fn timing(&self) -> Option<Timing> {
         Some(self.session.as_ref()?.history.timing())
@@ -313,7 +313,7 @@ impl Viewer {
         Some(self.session.as_ref()?.history.last()?.contact_torque.norm())
     }
 
-    /// Where the proxy's last node is shown, when the 3-D scene fills `rect`.
+    /// Returns where the proxy's last node is shown, when the 3-D scene fills `rect`.
     #[must_use]
     pub fn tip_in(&self, rect: egui::Rect) -> Option<egui::Pos2> {
         self.scene.tip_in(rect)

@@ -121,7 +121,7 @@ impl Guide {
         self.playing.map(|number| (self.time, self.motions[number].1.duration()))
     }
 
-    /// Where the hand is led [rad or m].
+    /// Returns where the hand is led [rad or m].
     #[must_use]
     pub fn goal(&self) -> JointVector {
         self.goal
