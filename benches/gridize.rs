@@ -5,7 +5,8 @@
 
 use haptize::{
     contact::Status,
-    gridize::{GridizeOptions, Interpolation, JointLabel, Samples, gridize},
+    dataset::JointLabel,
+    gridize::{GridizeOptions, Interpolation, Samples, gridize},
 };
 use std::{path::Path, process::Command, time::Instant};
 

@@ -33,6 +33,7 @@ use haptize::{
         sample,
     },
 };
+use rustix::time::{ClockId, clock_gettime};
 use std::{hint::black_box, path::Path, sync::Arc};
 
 /// Rms errors for which a store is filled, over the rms torque [1].
@@ -66,9 +67,7 @@ struct Cost {
 
 /// Processor time of this process [s].
 fn processor_time() -> f64 {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: it writes to `time`, which is one.
-    assert_eq!(unsafe { libc::clock_gettime(libc::CLOCK_PROCESS_CPUTIME_ID, &raw mut time) }, 0);
+    let time = clock_gettime(ClockId::ProcessCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 

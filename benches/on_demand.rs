@@ -34,6 +34,7 @@ use haptize::{
         build_object, grid_of,
     },
 };
+use rustix::time::{ClockId, clock_gettime};
 use std::{path::Path, sync::Arc, time::Duration};
 
 /// Greatest speeds of the tip between two places [m/s]. At 0.4 m/s the roll turns faster than the device may
@@ -45,9 +46,7 @@ const MINIMUM_JERK: f64 = 1.875;
 
 /// Processor time of this thread [s].
 fn processor_time() -> f64 {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: it writes to `time`, which is one.
-    assert_eq!(unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) }, 0);
+    let time = clock_gettime(ClockId::ThreadCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
@@ -207,12 +206,12 @@ impl World<'_> {
         let created =
             ticks.iter().map(|t| t.accounts.created() - t.accounts.taken_from_field()).fold(f64::MIN, f64::max);
         let residual =
-            ticks.iter().map(|t| t.accounts.residual().abs() / t.accounts.turnover.max(1e-6)).fold(0.0, f64::max);
+            ticks.iter().map(|t| t.accounts.residual().abs() / t.accounts.exchanged.max(1e-6)).fold(0.0, f64::max);
         let port = ticks.iter().filter_map(|t| t.accounts.device_port()).fold(f64::MAX, f64::min);
         let odd = ticks.iter().filter(|t| !t.contact_torque.is_finite() || t.fault.is_some()).count();
         println!(
-            "created less taken: at most {created:.2e} J; residual of the accounts at most {residual:.1e} of their \
-             turnover; the device's port at least {port:.2e} J; {odd} ticks not finite or at fault"
+            "created less taken: at most {created:.2e} J; energy balance error at most {residual:.1e} of the energy \
+             exchanged; the device's port at least {port:.2e} J; {odd} ticks not finite or at fault"
         );
         Seen { felt: (felt / size).sqrt(), steepest, exact }
     }

@@ -160,8 +160,11 @@ fn peer(root: &Path, scene: &Scene, processes: usize) -> Result<Peer, Box<dyn Er
             "prismatic": joint.kind == JointKind::Prismatic,
             "origin": joint.origin.to_array(), "axis": joint.axis.to_array(),
         })).collect::<Vec<_>>(),
-        "proxy": chain.nodes.iter().map(|node| json!({"link": node.link, "position": node.position.to_array()})).collect::<Vec<_>>(),
-        "configurations": (0..grid.points()).step_by(PEER_STRIDE).map(|p| grid.configuration(p).to_vec()).collect::<Vec<_>>(),
+        "proxy": chain.nodes.iter().map(|node| json!({
+            "link": node.link, "position": node.position.to_array(),
+        })).collect::<Vec<_>>(),
+        "configurations": (0..grid.points())
+            .step_by(PEER_STRIDE).map(|p| grid.configuration(p).to_vec()).collect::<Vec<_>>(),
         "stiffness": scene.contact.stiffness, "tolerance": scene.contact.tolerance,
         "max_iterations": scene.contact.max_iterations,
     });

@@ -1,5 +1,5 @@
-// One workgroup over all configurations of a batch: each invocation owns a run of consecutive ones, so that the order of
-// what it lists does not depend on timing.
+// One workgroup over all configurations of a batch: each invocation owns a run of consecutive ones, so that the order
+// of what it lists does not depend on timing.
 
 override WORKGROUP: u32 = 256u;
 

@@ -167,7 +167,8 @@ fn balance(local: u32) {
     slots = min(listed, parameters.support);
     for (var row = local; row < row_count; row += WORKGROUP) {
         let at = numbers(row);
-        set_reaction(row, Variation(-kc * force_over_kc(at) * vector_at(at + NORMAL), vec3<real>(0.0), vec3<real>(0.0)));
+        let force = -kc * force_over_kc(at) * vector_at(at + NORMAL);
+        set_reaction(row, Variation(force, vec3<real>(0.0), vec3<real>(0.0)));
     }
     sync();
     if local == 0u {

@@ -6,6 +6,11 @@ use std::{
     path::Path,
 };
 
+/// Greatest number in SI units that a device or a dataset may give for a position [rad or m], a torque [N m] or an
+/// energy [J]. Nothing that is haptized comes near it, and its square times any gain is still far from overflow, so
+/// that no account or torque of the haptic loop can become infinite.
+pub(crate) const GREATEST_INPUT: f64 = 1e9;
+
 /// How the text begins that Git LFS leaves in the place of a file that it has not fetched.
 const POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
 

@@ -96,8 +96,7 @@ pub mod viewer;
 
 pub mod cli;
 
-pub mod tolerances;
-
+mod csv;
 mod input;
 mod joint_matrix;
 mod joint_vector;

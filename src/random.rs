@@ -36,6 +36,15 @@ pub fn scattered(number: u32) -> f64 {
     f64::from((word >> 22) ^ word) / 2_147_483_648.0 - 1.0
 }
 
+/// SplitMix64's finalizer (Steele, Lea and Flood, 2014).
+#[must_use]
+pub fn mix(value: u64) -> u64 {
+    let mut z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
 /// Numbers in `[-1, 1)`.
 #[cfg(test)]
 pub(crate) fn sequence(seed: u64) -> impl FnMut() -> f64 {

@@ -62,6 +62,12 @@ fn new_writes_scenes_that_bake_and_replaces_nothing() {
     assert_eq!(std::fs::read_to_string(folder.path().join("my.toml")).unwrap(), "# mine");
     assert_eq!(haptize(folder.path(), &["new"]).status.code(), Some(0));
     assert!(folder.path().join("sphere.toml").is_file());
+
+    for (first, typed) in [("my.toml", "haptize new -o my.toml"), ("mesh", "haptize new --from mesh")] {
+        let output = haptize(folder.path(), &["new", first]);
+        assert_eq!(output.status.code(), Some(2), "{first}");
+        assert!(text(&output.stderr).contains(typed), "{}", text(&output.stderr));
+    }
 }
 
 #[test]

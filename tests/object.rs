@@ -459,8 +459,10 @@ fn missing_and_unknown_files_are_refused_by_name() {
 fn hostile_counts_are_refused_without_reserving_memory() {
     let header = |vertices: &str, list: &str, format: &str| {
         format!(
-            "ply\nformat {format} 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n\
-             element face 1\nproperty list {list} int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
+            "ply\nformat {format} 1.0\nelement vertex {vertices}\n\
+             property float x\nproperty float y\nproperty float z\n\
+             element face 1\nproperty list {list} int vertex_indices\n\
+             end_header\n0 0 0\n1 0 0\n0 1 0\n"
         )
     };
     let binary = "binary_little_endian";

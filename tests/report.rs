@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use haptize::{
     JointVector,
     contact::Status,
-    dataset::{Axis, Contacts, Dataset, Grid, Provenance, Surface},
+    dataset::{Axis, Contacts, Dataset, Grid, JointLabel, Provenance, Surface},
     device::Applied,
     object::Object,
     proxy::{Chain, Joint, Node as ProxyNode},
@@ -15,7 +15,7 @@ use haptize::{
         flags::Flags,
         haptic::Inputs,
         timing::{Durations, Timing},
-        trace::{Frame, JointLabel, Tick, Trace},
+        trace::{Frame, Tick, Trace},
     },
     report::{
         self,

@@ -445,7 +445,8 @@ fn broken_scenes_point_at_their_line_and_say_what_to_do() {
 #[test]
 fn the_caret_stands_under_the_value() {
     let shown = diagnostic(&LEAST.replace("stiffness = 300", "stiffness = -300")).to_string();
-    let expected = "folder/least.toml:8:13: stiffness is -300: it must be positive\n  |\n8 | stiffness = -300\n  |             ^^^^";
+    let expected = "folder/least.toml:8:13: stiffness is -300: it must be positive\n  |\n\
+                    8 | stiffness = -300\n  |             ^^^^";
     assert_eq!(shown, expected);
 }
 

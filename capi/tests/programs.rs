@@ -127,7 +127,8 @@ fn cmake_finds_what_is_installed() {
     let (recipe, build) = (files.path("recipe"), files.path("recipe/build"));
     std::fs::create_dir(&recipe).unwrap();
     let text = format!(
-        "cmake_minimum_required(VERSION 3.15)\nproject(recipe C)\nlist(APPEND CMAKE_MODULE_PATH {}/share/haptize/cmake)\n\
+        "cmake_minimum_required(VERSION 3.15)\nproject(recipe C)\n\
+         list(APPEND CMAKE_MODULE_PATH {}/share/haptize/cmake)\n\
          find_package(Haptize REQUIRED)\nadd_executable(program {HERE}/examples/press.c)\n\
          target_link_libraries(program Haptize::Haptize)\n",
         prefix.display()

@@ -1,7 +1,10 @@
 //! Scattered measurements put on a grid.
 
 use crate::{arrays, dataset::Dataset, errors};
-use haptize::gridize::{self as library, GridizeOptions, Interpolation, JointLabel, Samples};
+use haptize::{
+    dataset::JointLabel,
+    gridize::{self as library, GridizeOptions, Interpolation, Samples},
+};
 use pyo3::{exceptions::PyValueError, prelude::*};
 use std::time::SystemTime;
 
@@ -12,7 +15,10 @@ use std::time::SystemTime;
 /// names, units ("rad" or "m"): of the joints. epsilon: torque above which a configuration counts as contact [N m].
 /// smooth: smooth torques within their deviation first. interpolation: "linear", or "natural" for two joints.
 #[pyfunction]
-#[pyo3(signature = (q, tau, step, *, deviations = None, names = None, units = None, epsilon = None, smooth = false, interpolation = "linear"))]
+#[pyo3(signature = (
+    q, tau, step, *, deviations = None, names = None, units = None, epsilon = None, smooth = false,
+    interpolation = "linear"
+))]
 #[allow(clippy::too_many_arguments)] // As many as Python's caller may name.
 pub fn gridize(
     py: Python<'_>,

@@ -1,26 +1,18 @@
 //! `haptize bake`: a scene haptized into a dataset.
 
 use super::{
-    Failure, Report,
-    bar::Bar,
-    info, interrupt, max_error,
+    Failure, Report, max_error,
     output::{self, Kind},
     reach, refine,
     shard::ShardChoice,
-    tell,
+    watch::{describe, warn, watched},
 };
 use crate::{
     scene::{Algorithm, Scene},
     store::space::MAX_LEVELS,
-    sweep::{
-        Aim, BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, Shard, Sweep, SweepReport,
-    },
+    sweep::{Aim, BackendChoice, Bake, Shard, Sweep, SweepReport},
 };
-use std::{
-    fmt::{self, Write},
-    path::{Path, PathBuf},
-    time::SystemTime,
-};
+use std::path::PathBuf;
 
 /// Arguments of `haptize bake`.
 #[derive(clap::Args)]
@@ -141,124 +133,4 @@ fn run_shard(arguments: &Arguments, scene: &Scene, shard: Shard) -> Result<Repor
     json["file"] = file.to_string().into();
     json["shard"] = serde_json::to_value(shard)?;
     Ok(Report { text, json, whole: true })
-}
-
-/// Runs `bake`, dated now, with a progress bar. Ctrl-C stops it.
-pub fn watched<T, E: Into<Failure>>(
-    scene: &Scene,
-    backend: BackendChoice,
-    bake: impl FnOnce(Bake<'_>) -> Result<T, E>,
-) -> Result<T, Failure> {
-    let stop = interrupt::stop_flag();
-    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
-    let mut announced = false;
-    let mut progress = |progress: Progress| {
-        if !std::mem::replace(&mut announced, true) {
-            announce(&progress);
-        }
-        let message = format!("{} in contact, {:.0}/s", progress.contact_points, progress.rate);
-        bar.set(progress.done as u64, progress.points as u64, message);
-    };
-    let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
-    let result = bake(Bake { scene, backend, measured: None, aim: None, date: &date, stop, progress: &mut progress });
-    bar.finish();
-    interrupt::over();
-    result.map_err(Into::into)
-}
-
-/// Prints the warnings of a bake on standard error.
-pub fn warn(report: &SweepReport) {
-    report.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
-}
-
-/// Describes what was baked into `file`, for people; `aim`: the rms error over the rms torque that was asked for, if
-/// any.
-pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Option<f64>) -> fmt::Result {
-    let SweepReport { points, contact_points, unconverged, overflowed, .. } = report;
-    let SweepReport { seconds, configurations_per_second, algorithm, backend, adapter, left_to_cpu, .. } = report;
-    let Iterations { mean, max } = report.iterations;
-    let lost = unconverged + overflowed;
-    writeln!(text, "{}: {points} points, {contact_points} in contact, {lost} not converged", file.display())?;
-    writeln!(
-        text,
-        "  solved       in {seconds:.2} s, {configurations_per_second:.0} configurations a second, {algorithm} on \
-         {backend} ({adapter})"
-    )?;
-    if let Some(forecast) = report.forecast {
-        let size = std::fs::metadata(file).map_or(0, |file| file.len() as usize);
-        let time = forecast.seconds.map_or(String::new(), |seconds| {
-            format!("{} from rest (predicted {}), ", duration(report.solving_seconds), duration(seconds))
-        });
-        writeln!(text, "  forecast     {time}{} of disk (predicted {})", megabytes(size), megabytes(forecast.disk))?;
-    }
-    if *left_to_cpu > 0 {
-        writeln!(text, "  by the CPU   {left_to_cpu} of them, which the GPU did not decide")?;
-    }
-    writeln!(
-        text,
-        "  residual     at most {:.1e} where converged; iterations {mean:.1} on average, {max} at most",
-        report.max_residual
-    )?;
-    if let Some(skin) = report.skin {
-        writeln!(text, "  skin         {skin}")?;
-    }
-    info::mesh_ripple(text, report.mesh_ripple)?;
-    lowered(text, report.lowered)?;
-    info::error(text, report.error.as_ref(), aim)
-}
-
-/// Describes what the search for lower equilibria did.
-pub fn lowered(text: &mut String, lowered: Option<Lowered>) -> fmt::Result {
-    let Some(Lowered { points, converged, greatest, rounds, searches, seconds }) = lowered else { return Ok(()) };
-    writeln!(
-        text,
-        "  lowered      {points} points by neighbours' equilibria, {converged} of them unconverged from rest, energy \
-         by at most {:.1} %; {rounds} rounds, {searches} searches, {seconds:.2} s",
-        100.0 * greatest
-    )
-}
-
-/// Prints what the sweep is going to take, before it begins.
-fn announce(progress: &Progress) {
-    if let Some(remedy) = progress.mesh_ripple.and_then(|ripple| ripple.remedy()) {
-        tell(format_args!("haptize: {remedy}"));
-    }
-    let Progress { points, done, footprint: Footprint { memory, disk }, forecast, .. } = progress;
-    let resumed = if *done > 0 { format!(", {done} of them done") } else { String::new() };
-    let size = match (disk, forecast) {
-        (Bounds { most: 0, .. }, _) => None,
-        (_, Some(forecast)) => {
-            Some(format!("about {} of disk (twice that for a moment at the end)", megabytes(forecast.disk)))
-        }
-        // Few points, or a shard, which is not put together at the end.
-        (Bounds { least, most }, None) => Some(format!("{} to {} of disk", megabytes(*least), megabytes(*most))),
-    };
-    let size = size.map_or(String::new(), |size| format!(" and {size}"));
-    tell(format_args!(
-        "haptize: {points} points{resumed}; results take at most {} of memory{size}",
-        megabytes(memory.most)
-    ));
-    let Some(Forecast { contact_fraction, seconds, sampled, .. }) = forecast else { return };
-    let time = seconds.map(|seconds| seconds * points.saturating_sub(*done) as f64 / *points as f64);
-    let time = time.map_or(String::new(), |seconds| format!(", solved in about {}", duration(seconds)));
-    tell(format_args!(
-        "haptize: predicted from {sampled} of them: {:.0} % in contact{time}; finding lower equilibria and measuring \
-         accuracy come on top",
-        100.0 * contact_fraction
-    ));
-}
-
-/// Writes a time as people say it: `0.4 s`, `35 s`, `12 min`, `7.5 h`.
-pub fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s < 10.0 => format!("{s:.1} s"),
-        s if s < 120.0 => format!("{s:.0} s"),
-        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.1} h", s / 3600.0),
-    }
-}
-
-/// Rounded up, with unit.
-pub fn megabytes(bytes: usize) -> String {
-    format!("{} MB", (bytes as f64 / 1e6).ceil())
 }

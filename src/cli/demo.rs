@@ -4,7 +4,7 @@
 //! The press runs twice: as fast as it goes, which gives the same trace and figures on every machine, and against the
 //! clock, which shows what a tick costs on this one and how punctual it is.
 
-use super::{Failure, Report, bake, motion, output::Folder, play, tell};
+use super::{Failure, Report, motion, output::Folder, played, tell, watch};
 use crate::{dataset::Dataset, render::setup::Setup, report, scene::Scene, sweep::BackendChoice};
 use std::{
     fmt::Write,
@@ -26,14 +26,14 @@ pub fn run() -> Result<Report, Failure> {
     let folder = Path::new(FOLDER);
     std::fs::create_dir_all(folder)
         .map_err(|error| format!("cannot make the folder ./{FOLDER}: {error}; change to a folder of yours"))?;
-    let names = play::FILES.into_iter().chain(report::FIGURES).chain([DATASET]);
+    let names = played::FILES.into_iter().chain(report::FIGURES).chain([DATASET]);
     let earlier = Folder::check(folder, names, [])?;
     let scene = Scene::parse(SCENE, "datasets/sphere.toml")?;
     let file: PathBuf = folder.join(DATASET);
 
     tell(format_args!("haptizing the sphere, contact at {} configurations ...", points(&scene)));
-    let (baked, sweep) = bake::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
-    bake::warn(&sweep);
+    let (baked, sweep) = watch::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
+    watch::warn(&sweep);
     baked.save(&file)?;
     let dataset = Arc::new(Dataset::load(&file)?);
 
@@ -41,29 +41,29 @@ pub fn run() -> Result<Report, Failure> {
     let setup = Setup::new(&dataset)?;
     let motion = motion::named(&setup, &dataset, "press", None)?;
     let seconds = motion.duration();
-    let mut played = play::play(&setup, &dataset, &mut setup.hand(motion.clone())?, seconds, false)?;
-    played.timing = play::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, true)?.timing;
+    let mut played = played::play(&setup, &dataset, &mut setup.hand(motion.clone())?, seconds, false)?;
+    played.timing = played::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, true)?.timing;
 
     tell(format_args!("drawing ..."));
     let mut files = vec![file.clone()];
-    files.extend(play::write(&setup, &dataset, &played, folder)?);
+    files.extend(played::write(&setup, &dataset, &played, folder)?);
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
 
     let rate = scene.graphics.map_or(0.0, |graphics| graphics.rate);
     let press = played.trace.summary();
     let held = dataset.summary();
     let mut text = String::new();
-    bake::describe(&mut text, &file, &sweep, None)?;
+    watch::describe(&mut text, &file, &sweep, None)?;
     let torque = held.torque.as_flattened().iter().fold(0.0_f64, |most, tau| most.max(tau.abs()));
     writeln!(text, "  torque       at most {torque:.3} N m at a joint")?;
     if let (Some(force), Some(nodes)) = (held.max_force, held.max_contacts) {
         writeln!(text, "  force        at most {force:.2} N on a node of the object, at most {nodes} nodes at once")?;
     }
     write!(text, "press, as fast as it goes: ")?;
-    play::describe(&mut text, &press)?;
+    played::describe(&mut text, &press)?;
     if let Some(timing) = &played.timing {
         writeln!(text, "press against the clock, {:.0} ticks and {rate:.0} frames a second:", scene.haptics.rate)?;
-        play::describe_timing(&mut text, timing)?;
+        played::describe_timing(&mut text, timing)?;
     }
     writeln!(text, "written: {}", names.join(" "))?;
     writeln!(text, "next: haptize info {0}, haptize play {0} --motion scrape, haptize --help", file.display())?;

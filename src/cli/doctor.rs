@@ -189,15 +189,11 @@ fn writing() -> Finding {
     }
 }
 
-/// May a thread of this process run under a real-time policy? Tried on a thread that ends at once.
+/// May a thread of this process run with the priority of the haptic loop? Tried on a thread that ends at once.
 #[cfg(target_os = "linux")]
 fn scheduling() -> Finding {
-    let ask = || {
-        let parameters = libc::sched_param { sched_priority: 1 };
-        // SAFETY: pid 0 is the calling thread, `parameters` outlives the call, and the thread ends right after it.
-        unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) == 0 }
-    };
-    let permitted = thread::Builder::new().spawn(ask).is_ok_and(|thread| thread.join().unwrap_or(false));
+    let asking = thread::Builder::new().spawn(|| crate::render::clock::raise_priority().is_ok());
+    let permitted = asking.is_ok_and(|thread| thread.join().unwrap_or(false));
     Finding {
         subject: "real-time scheduling",
         good: permitted,

@@ -128,7 +128,7 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
     writeln!(text, " on {} ({})", from.backend, from.adapter)
 }
 
-/// How much a contact point feels the mesh, and what to do about it.
+/// Writes how much a contact point feels the mesh, and what to do about it.
 pub fn mesh_ripple(text: &mut String, ripple: Option<MeshRipple>) -> fmt::Result {
     let Some(ripple) = ripple else { return Ok(()) };
     writeln!(text, "  mesh ripple  {ripple}")?;

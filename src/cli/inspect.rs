@@ -8,9 +8,8 @@ use crate::{
     field::TorqueField,
     object::Object,
     proxy::{Chain, Joint},
-    scene::{Algorithm, GridSpec, JointKind, Scene},
+    scene::{Algorithm, AxisSpec, GRID_STEP_SLACK, GridSpec, Scene},
     sweep::{Inspection, build_object},
-    tolerances::GRID_STEP_SLACK,
 };
 use clap::ValueEnum;
 use glam::DVec3;
@@ -24,30 +23,59 @@ use std::{
 #[command(after_help = "\
 Examples:
   haptize inspect sphere.haptize --q 0.1,1.65,-1.7
-  haptize inspect sphere.toml --q=-0.34,1.6,-1.72     with = where the first coordinate is negative")]
+  haptize inspect sphere.toml --q=-0.34,1.6,-1.72     with = where the first coordinate is negative
+  haptize inspect sphere.toml --q 50%,50%,90%         in parts of each joint's haptized range")]
 pub struct Arguments {
     /// A scene or a dataset.
     file: PathBuf,
-    /// The configuration: one coordinate per joint [rad or m], separated by commas. Write --q=-0.3,... if the first is
-    /// negative.
+    /// The configuration: one coordinate per joint [rad or m], separated by commas, or a percentage of the range that
+    /// the grid covers, from 0% at its first line to 100% at its last. Write --q=-0.3,... if the first is negative.
     #[arg(
         long,
         value_name = "A,B,C",
         value_delimiter = ',',
         num_args = 1,
         allow_hyphen_values = true,
-        required = true
+        required = true,
+        value_parser = coordinate
     )]
-    q: Vec<f64>,
+    q: Vec<Coordinate>,
+}
+
+/// A coordinate of the configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Coordinate {
+    /// As it is [rad or m].
+    Absolute(f64),
+    /// Fraction of the grid's range [1].
+    Fraction(f64),
+}
+
+impl Coordinate {
+    /// Returns the coordinate on `axis` [rad or m].
+    fn on(self, axis: &AxisSpec) -> f64 {
+        match self {
+            Self::Absolute(q) => q,
+            Self::Fraction(part) => axis.start + part * (axis.count - 1) as f64 * axis.step,
+        }
+    }
+}
+
+/// Parses a coordinate: `-0.3` or `50%`.
+fn coordinate(text: &str) -> Result<Coordinate, String> {
+    let number =
+        super::fraction(text).map_err(|_| "give a number [rad or m] such as -0.3, or a percentage such as 50%")?;
+    Ok(if text.trim_end().ends_with('%') { Coordinate::Fraction(number) } else { Coordinate::Absolute(number) })
 }
 
 /// Solves the configuration. For a dataset, also reports what it interpolates there and what it stores at the nearest
 /// grid point.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
-    let q = &arguments.q;
     let (scene, object, dataset) = read(&arguments.file)?;
     let chain = Chain::new(&scene.proxy);
-    if q.len() != chain.joints.len() || !q.iter().all(|x| x.is_finite()) {
+    let given = &arguments.q;
+    let q: &Vec<f64> = &given.iter().zip(&scene.grid.axes).map(|(q, axis)| q.on(axis)).collect();
+    if given.len() != chain.joints.len() || !q.iter().all(|x| x.is_finite()) {
         let names: Vec<_> = chain.joints.iter().map(|joint| joint.name.as_str()).collect();
         return Err(format!("--q must be {} finite numbers: {}", names.len(), names.join(",")).into());
     }
@@ -130,7 +158,7 @@ fn outside(chain: &Chain, grid: &GridSpec, q: &[f64]) -> Vec<String> {
     for ((joint, axis), &q) in chain.joints.iter().zip(&grid.axes).zip(q) {
         let [least, greatest] = joint.limits;
         let last = axis.start + (axis.count - 1) as f64 * axis.step;
-        let (name, unit) = (&joint.name, if joint.kind == JointKind::Revolute { "rad" } else { "m" });
+        let (name, unit) = (&joint.name, joint.kind.unit());
         let slack = GRID_STEP_SLACK * axis.step;
         if q < least || q > greatest {
             found.push(format!("{name} = {q} {unit} is beyond the joint's limits, {least} to {greatest}"));
@@ -174,8 +202,7 @@ fn describe(text: &mut String, inspection: &Inspection, chain: &Chain) -> fmt::R
 
 /// Writes joint efforts, each with its unit.
 fn efforts(values: &[f64], chain: &Chain) -> String {
-    let unit = |kind| if kind == JointKind::Revolute { "N m" } else { "N" };
-    let one = |(value, joint): (&f64, &Joint)| format!("{} {value:.5} {}", joint.name, unit(joint.kind));
+    let one = |(value, joint): (&f64, &Joint)| format!("{} {value:.5} {}", joint.name, joint.kind.effort_unit());
     values.iter().zip(&chain.joints).map(one).collect::<Vec<_>>().join(", ")
 }
 

@@ -1,6 +1,6 @@
 //! `haptize bake --max-error`: a grid chosen for an error, and baked.
 
-use super::{Failure, Report, bake, tell};
+use super::{Failure, Report, tell, watch};
 use crate::{
     scene::Scene,
     sweep::{Aim, BackendChoice, Bake, Choice, Pilot, PilotError},
@@ -26,7 +26,7 @@ pub struct AccuracyGoal<'a> {
 /// Chooses, states and bakes. Nothing is baked where no grid keeps the error; exit code 1 where the error that the bake
 /// measures is larger.
 pub fn run(scene: &Scene, wanted: &AccuracyGoal<'_>, backend: BackendChoice) -> Result<Report, Failure> {
-    let (pilot, choice, report) = bake::watched(scene, backend, |bake| {
+    let (pilot, choice, report) = watch::watched(scene, backend, |bake| {
         tell(format_args!("haptize: pilot: coarse grids against random configurations ..."));
         let pilot = Pilot::run(scene, wanted.aim, bake.backend, bake.stop)?;
         let choice = pilot.choose(scene, wanted.points, bake.backend)?;
@@ -36,7 +36,7 @@ pub fn run(scene: &Scene, wanted: &AccuracyGoal<'_>, backend: BackendChoice) -> 
         let report = bake.to_file(wanted.output, wanted.resume)?;
         Ok::<_, PilotError>((pilot, choice, report))
     })?;
-    bake::warn(&report);
+    watch::warn(&report);
     let is_kept = report.error.as_ref().is_some_and(|error| error.relative() <= pilot.relative);
     let mut json = serde_json::to_value(&report)?;
     json["file"] = wanted.output.display().to_string().into();
@@ -44,7 +44,7 @@ pub fn run(scene: &Scene, wanted: &AccuracyGoal<'_>, backend: BackendChoice) -> 
     json["choice"] = serde_json::to_value(&choice)?;
     json["kept"] = is_kept.into();
     let mut text = String::new();
-    bake::describe(&mut text, wanted.output, &report, Some(pilot.relative))?;
+    watch::describe(&mut text, wanted.output, &report, Some(pilot.relative))?;
     if !is_kept {
         writeln!(text, "  the aim was missed: the dataset is whole, and errs by more; ask for a smaller error")?;
     }
@@ -69,7 +69,7 @@ fn state(pilot: &Pilot, choice: &Choice) {
     tell(format_args!(
         "haptize: predicted: about {:.0} s, {} to {} on the disk",
         choice.seconds.ceil(),
-        bake::megabytes(disk.least),
-        bake::megabytes(disk.most),
+        watch::megabytes(disk.least),
+        watch::megabytes(disk.most),
     ));
 }

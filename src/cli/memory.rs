@@ -43,7 +43,8 @@ unsafe impl GlobalAlloc for Remembering {
 #[cfg(unix)]
 mod answer {
     use super::{FAILED, Ordering};
-    use std::sync::atomic::AtomicBool;
+    use rustix::stdio::{stderr, stdout};
+    use std::{os::fd::BorrowedFd, sync::atomic::AtomicBool};
 
     /// Whether a thread has begun to answer: of several that find no memory at once only one speaks.
     static ANSWERED: AtomicBool = AtomicBool::new(false);
@@ -67,16 +68,16 @@ mod answer {
             // SAFETY: waits for a signal, and may do so in a signal handler; the other thread ends the process.
             unsafe { libc::pause() };
         }
-        say(2, ["haptize: ", "\n"], failed);
+        say(stderr(), ["haptize: ", "\n"], failed);
         if JSON {
-            say(1, ["{\n  \"error\": \"", "\"\n}\n"], failed);
+            say(stdout(), ["{\n  \"error\": \"", "\"\n}\n"], failed);
         }
         // SAFETY: ends the process, and may do so in a signal handler.
         unsafe { libc::_exit(1) }
     }
 
-    /// Writes what is to be said between `around` to the file descriptor `file`, without allocating.
-    fn say(file: libc::c_int, around: [&str; 2], failed: usize) {
+    /// Writes what is to be said between `around` to `file`, without allocating.
+    fn say(file: BorrowedFd<'_>, around: [&str; 2], failed: usize) {
         let (mut digits, mut first, mut rest) = ([0; 20], 20, failed);
         while rest > 0 {
             first -= 1;
@@ -86,8 +87,8 @@ mod answer {
         for part in
             [around[0].as_bytes(), SAID[0].as_bytes(), &digits[first..], SAID[1].as_bytes(), around[1].as_bytes()]
         {
-            // SAFETY: the part is valid for reading, and `write` may be called in a signal handler.
-            unsafe { libc::write(file, part.as_ptr().cast(), part.len()) };
+            // Where nobody listens there is nobody to tell.
+            let _ = rustix::io::write(file, part);
         }
     }
 

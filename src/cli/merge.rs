@@ -1,11 +1,11 @@
 //! `haptize merge`: the shards of a bake put together into its dataset.
 
 use super::{
-    Failure, Report, bake,
+    Failure, Report,
     bar::Bar,
     info, interrupt,
     output::{self, Kind},
-    tell,
+    tell, watch,
 };
 use crate::sweep::{Merge, MergeError, Merged, Progress, Sweep, ranges};
 use std::{
@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     bar.finish();
     interrupt::over();
     let merged = merged?;
-    bake::warn(&merged.report);
+    watch::warn(&merged.report);
     let mut json = serde_json::to_value(&merged.report)?;
     json["file"] = output.display().to_string().into();
     json["shards"] = merged.shards.into();
@@ -90,7 +90,7 @@ fn describe(file: &Path, merged: &Merged) -> Result<String, Failure> {
         "  merged       in {:.2} s, {} on {} ({})",
         report.seconds, report.algorithm, report.backend, report.adapter
     )?;
-    bake::lowered(&mut text, report.lowered)?;
+    watch::lowered(&mut text, report.lowered)?;
     info::error(&mut text, report.error.as_ref(), None)?;
     Ok(text)
 }

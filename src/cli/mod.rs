@@ -47,12 +47,14 @@ mod paper;
 mod plan;
 mod play;
 mod playback_report;
+mod played;
 mod reach;
 mod refine;
 mod scan;
 mod shard;
 mod stability;
 mod view;
+mod watch;
 
 pub use memory::Remembering;
 

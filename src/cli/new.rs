@@ -24,6 +24,17 @@ pub struct Arguments {
     /// The file to write; by default the scene's name in the current folder, ending in .toml.
     #[arg(short, long)]
     output: Option<PathBuf>,
+    /// Takes no value: a first argument is answered with the option that it belongs to.
+    #[arg(hide = true, value_parser = misplaced)]
+    misplaced: Option<String>,
+}
+
+/// Refuses a first argument, and says what to type.
+fn misplaced(text: &str) -> Result<String, String> {
+    Err(match Example::from_str(text, true) {
+        Ok(_) => format!("type `haptize new --from {text}` to begin with this scene"),
+        Err(_) => format!("type `haptize new -o {text}` to write this file"),
+    })
 }
 
 /// A scene that is part of the program.

@@ -1,6 +1,6 @@
 //! `haptize play SCENE --on-demand FILE`: contact that is solved while it is felt, and kept.
 
-use super::{Failure, interrupt, play::Played, tell};
+use super::{Failure, interrupt, tell};
 use crate::{
     device::Device,
     render::{
@@ -9,6 +9,8 @@ use crate::{
         on_demand::{self, OnDemand},
         realtime,
         session::Plan,
+        timing::Timing,
+        trace::Trace,
     },
     store::space::MAX_LEVELS,
 };
@@ -130,7 +132,7 @@ impl Exploring {
         device: &mut dyn Device,
         graphics: Option<&mut Graphics<'_>>,
         plan: &Plan,
-    ) -> Result<Played, Failure> {
+    ) -> Result<(Trace, Timing, Explored), Failure> {
         let start = *haptics.start(&device.read(0.0).position)?.proxy();
         let (live, exploration) = self.on_demand.begin(&start)?;
         let begun = self.began.elapsed().as_secs_f64();
@@ -142,7 +144,7 @@ impl Exploring {
         if done.full {
             tell(format_args!("haptize: note: the store is full with {} blocks: what is new is not kept", done.blocks));
         }
-        Ok(Played { trace: trace.into(), timing: Some(timing), explored: Some(Explored { done, start: begun }) })
+        Ok((trace, timing, Explored { done, start: begun }))
     }
 }
 

@@ -201,7 +201,7 @@ fn probe(output: &Path, folder: &Path) -> Result<(), Failure> {
     })
 }
 
-/// Where a file is or is to be, by one name.
+/// Returns where a file is or is to be, by one name.
 fn place(file: &Path) -> PathBuf {
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder =

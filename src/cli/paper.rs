@@ -1,14 +1,14 @@
 //! `haptize paper`: the figures and numbers of the paper, remade with the scenes that are part of the program.
 
 use super::{
-    Failure, Report, bake,
+    Failure, Report,
     bar::Bar,
     gridize::{self, Source},
     interrupt, motion,
     output::Folder,
-    play,
+    played,
     scan::{self, Course},
-    tell,
+    tell, watch,
 };
 use crate::{
     dataset::{Dataset, replace_file},
@@ -109,8 +109,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         .map_err(|error| format!("cannot make the folder {}: {error}; give another by -o", folder.display()))?;
     let scene = Scene::parse(SPHERE, "datasets/paper.toml")?;
     tell(format_args!("section 4.1: haptizing and pressing the sphere ..."));
-    let (dataset, sweep) = bake::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
-    bake::warn(&sweep);
+    let (dataset, sweep) = watch::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
+    watch::warn(&sweep);
     dataset.save(&folder.join("paper.haptize"))?;
     let (setup, pressed) = felt(&dataset, "press")?;
     let (_, scraped) = felt(&dataset, "scrape")?;
@@ -184,7 +184,7 @@ fn felt(dataset: &Dataset, motion: &str) -> Result<(Setup, Arc<Trace>), Failure>
     let setup = Setup::new(dataset)?;
     let motion = motion::named(&setup, dataset, motion, None)?;
     let seconds = motion.duration();
-    let played = play::play(&setup, dataset, &mut setup.hand(motion)?, seconds, false)?;
+    let played = played::play(&setup, dataset, &mut setup.hand(motion)?, seconds, false)?;
     Ok((setup, played.trace))
 }
 

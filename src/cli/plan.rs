@@ -1,6 +1,6 @@
 //! `haptize plan`: what each shard of a bake is going to take, and lines that start them all.
 
-use super::{Failure, Report, bake, interrupt};
+use super::{Failure, Report, interrupt, watch};
 use crate::{
     scene::Scene,
     sweep::{BackendChoice, Plan},
@@ -132,12 +132,12 @@ fn describe(text: &mut String, plan: &Plan, arguments: &Arguments, lines: &Lines
             text,
             "  time         {} for all on {} threads such as here, {} for the longest shard, {} of it to set up; \
              lower equilibria and the error come on top, in the merge",
-            bake::duration(all),
+            watch::duration(all),
             plan.threads,
-            bake::duration(longest),
-            bake::duration(plan.setup)
+            watch::duration(longest),
+            watch::duration(plan.setup)
         )?,
-        _ => writeln!(text, "  time         not predicted for a GPU; {} to set up each", bake::duration(plan.setup))?,
+        _ => writeln!(text, "  time         not predicted for a GPU; {} to set up each", watch::duration(plan.setup))?,
     }
     let solved = || plan.shards.iter().map(|shard| shard.solved);
     let (least, most) = (solved().min().unwrap_or(0), solved().max().unwrap_or(0));
@@ -146,10 +146,10 @@ fn describe(text: &mut String, plan: &Plan, arguments: &Arguments, lines: &Lines
     writeln!(
         text,
         "  disk         {} a shard, {} the dataset, twice that for a moment in the merge",
-        bake::megabytes(bytes),
-        bake::megabytes(plan.dataset)
+        watch::megabytes(bytes),
+        watch::megabytes(plan.dataset)
     )?;
-    writeln!(text, "  memory       {} a process", bake::megabytes(plan.memory))?;
+    writeln!(text, "  memory       {} a process", watch::megabytes(plan.memory))?;
     for (name, lines) in [("Slurm", &lines.slurm), ("GNU parallel", &lines.parallel), ("HyperQueue", &lines.hyperqueue)]
     {
         writeln!(text, "\n{name}:")?;

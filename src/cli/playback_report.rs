@@ -1,7 +1,7 @@
 //! The report of `haptize play` beside its traces: the force at the end of the proxy, of one dataset or of two
 //! felt by the same motion, where the torque came from, and what the dataset does not hold.
 
-use super::{Failure, play};
+use super::{Failure, played};
 use crate::{
     dataset::{Dataset, Provenance},
     device::Motion,
@@ -41,7 +41,7 @@ impl PlaybackReport {
     pub fn beside(&mut self, path: &Path, motion: Motion, seconds: f64) -> Result<(), Failure> {
         let dataset = Dataset::load(path)?;
         let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", path.display()))?;
-        let played = play::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, false)?;
+        let played = played::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, false)?;
         self.forces.extend(EndForce::new(&name(path, &dataset), &setup.chain, &played.trace));
         if self.forces.len() < 2 {
             return Err(format!(

@@ -1,9 +1,9 @@
 //! `haptize reach`: where contact is, before anything is baked, and the grid that follows.
 
 use super::{
-    Failure, Report, bake, interrupt,
+    Failure, Report, interrupt,
     output::{self, Kind},
-    tell,
+    tell, watch,
 };
 use crate::{
     dataset::replace_file,
@@ -197,8 +197,8 @@ fn describe(text: &mut String, reach: &Reach, costs: &[Cost], arguments: &Argume
             "{:<14} {:<13} {:<19} {}{doubt}",
             format!("{} %", 100.0 * relative),
             format!("{points:.2e}"),
-            bake::duration(*seconds),
-            bake::megabytes(*bytes as usize)
+            watch::duration(*seconds),
+            watch::megabytes(*bytes as usize)
         )?;
     }
     Ok(())

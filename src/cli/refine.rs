@@ -1,6 +1,6 @@
 //! `haptize bake --max-error ERROR --refine LEVELS`: the scene's grid, refined where the interpolation errs.
 
-use super::{Failure, Report, bake::megabytes, tell};
+use super::{Failure, Report, tell, watch::megabytes};
 use crate::{
     contact::Model,
     dataset::{Dataset, Provenance, Surface},

@@ -6,6 +6,7 @@ use crate::{
     studies::stability::{Bound, Case, CaseResult, Effort, FILES, Setting, cases, table, write_all},
     sweep::{OTHER_ADAPTER, remedied},
 };
+use serde_json::json;
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
 /// Which cases, on what.
@@ -65,8 +66,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         None => Vec::new(),
     };
     spent.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let row = |(case, seconds): &(&Case, f64)| serde_json::json!({ "room": case.room, "case": case.name, "seconds": seconds });
-    let mut json = serde_json::json!({
+    let row = |(case, seconds): &(&Case, f64)| json!({ "room": case.room, "case": case.name, "seconds": seconds });
+    let mut json = json!({
         "outcomes": rows, "failed": failed, "adapter": adapter, "seconds": seconds,
         "spent": spent.iter().map(row).collect::<Vec<_>>(),
         "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),

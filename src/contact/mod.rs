@@ -22,11 +22,16 @@ mod solver;
 mod solvers;
 
 pub use backend::{Backend, CHUNKS_IN_FLIGHT, Work};
+pub(crate) use equilibrium::energy::RESIDUAL_FLOOR;
 pub use mesh_ripple::MeshRipple;
 pub use model::{Model, MotionBound};
 pub use proximity::Proximity;
 pub use solver::Solver;
 pub(crate) use solvers::{SHARE, Solvers};
+
+/// Least squared length, area or distance that is divided by [m^2, m^4]: far below any mesh of this world (edges over
+/// 1 nm) and far above the smallest normal f64, so that a quotient stays finite.
+pub(crate) const MINIMUM_SQUARE: f64 = 1e-60;
 
 /// How the solution of one configuration ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,6 +93,24 @@ pub struct Equilibrium {
     pub forces: Vec<NodeForce>,
     /// Contacts seen from the proxy.
     pub touches: Vec<Touch>,
+}
+
+impl Equilibrium {
+    /// Returns the result of a configuration of `joints` joints without contact, `gap` away from it [m].
+    #[must_use]
+    pub fn free(gap: f64, joints: usize) -> Self {
+        Self {
+            status: Status::Free,
+            iterations: 0,
+            residual: 0.0,
+            energy: 0.0,
+            gap,
+            torque: JointVector::zeros(joints),
+            forces: Vec::new(),
+            tangent: None,
+            touches: Vec::new(),
+        }
+    }
 }
 
 /// Contact force f_j on one node of the object.

@@ -5,10 +5,10 @@ use super::{
     reach,
 };
 use crate::JointVector;
+use crate::contact::geometry::LENGTH_ROUNDING;
 use crate::object::{Compliance, Object, ObjectError};
 use crate::proxy::Chain;
 use crate::scene::ContactSpec;
-use crate::tolerances::LENGTH_ROUNDING;
 use std::sync::Arc;
 
 /// Stiffness of a rigid contact point, in units of the stiffness of the object's softest node (one over the trace of
@@ -142,8 +142,8 @@ impl<'a> Model<'a> {
         self.kc = 3.0 * self.contact.stiffness;
     }
 
-    /// How far the surface can be from where it rests when the object stores the energy `elastic` [J]: for any sum g of
-    /// the nodes' displacements |g . u|^2 <= |g . C g| |u|^2, the last in the energy norm.
+    /// Returns how far the surface can be from where it rests when the object stores the energy `elastic` [J]: for any
+    /// sum g of the nodes' displacements |g . u|^2 <= |g . C g| |u|^2, the last in the energy norm.
     #[must_use]
     pub fn motion_bound(&self, elastic: f64) -> MotionBound {
         let norm = (2.0 * elastic.max(0.0)).sqrt() * (1.0 + LENGTH_ROUNDING);

@@ -7,10 +7,9 @@ use super::linear::support::dot;
 use super::model::Model;
 use super::reach;
 use super::{Equilibrium, NodeForce, Status, Touch};
-use crate::JointVector;
+use crate::contact::MINIMUM_SQUARE;
 use crate::proxy::Pose;
 use crate::scene::Algorithm;
-use crate::tolerances::MINIMUM_SQUARE;
 use glam::DVec3;
 
 /// Solves configurations one after another with memory of its own; one per thread.
@@ -111,8 +110,7 @@ impl<'a> Solver<'a> {
         if !gap.is_finite() {
             return unknown(joints);
         }
-        let mut equilibrium = nothing(Status::Free, joints);
-        equilibrium.gap = gap;
+        let mut equilibrium = Equilibrium::free(gap, joints);
         if gap >= 0.0 {
             return equilibrium;
         }
@@ -296,24 +294,9 @@ fn push(sums: &mut [DVec3], marked: &mut [bool], touched: &mut Vec<u32>, node: u
     sums[node as usize] += force;
 }
 
-/// An equilibrium without contact.
-fn nothing(status: Status, joints: usize) -> Equilibrium {
-    Equilibrium {
-        status,
-        iterations: 0,
-        residual: 0.0,
-        energy: 0.0,
-        gap: 0.0,
-        torque: JointVector::zeros(joints),
-        forces: Vec::new(),
-        tangent: None,
-        touches: Vec::new(),
-    }
-}
-
 /// No result: nothing is known to be balanced.
 fn unknown(joints: usize) -> Equilibrium {
-    Equilibrium { residual: 1.0, ..nothing(Status::Unconverged, joints) }
+    Equilibrium { status: Status::Unconverged, residual: 1.0, ..Equilibrium::free(0.0, joints) }
 }
 
 /// True when every number is finite.

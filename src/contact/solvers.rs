@@ -21,7 +21,7 @@ impl<'a> Solvers<'a> {
         Self { model, solvers: (0..threads).map(|_| Mutex::new(Solver::new(model))).collect() }
     }
 
-    /// How many there are.
+    /// Returns how many there are.
     pub fn threads(&self) -> usize {
         self.solvers.len()
     }

@@ -4,7 +4,7 @@
 //! parts, so that they can be compared.
 
 use super::{Dataset, Surface};
-use crate::scene::{JointKind, Rendering, Shape};
+use crate::scene::{Rendering, Shape};
 use glam::DVec3;
 
 /// Greatest share of its radius by which a node of a sphere is off it: what rounding leaves of coordinates far from the
@@ -27,10 +27,7 @@ impl Dataset {
             return Err(format!("the grid has {} axes and the proxy of the scene {} joints", axes.len(), joints.len()));
         }
         for (axis, joint) in axes.iter().zip(joints) {
-            let unit = match joint.kind {
-                JointKind::Revolute => "rad",
-                JointKind::Prismatic => "m",
-            };
+            let unit = joint.kind.unit();
             if axis.unit != unit {
                 return Err(format!(
                     "axis {} is in {}, joint {} of the scene in {unit}",

@@ -13,14 +13,14 @@
 //! | `torque` | f64 | n1 .. nd, d | tau [N m; N at prismatic joints] |
 //! | `energy` | f64 | n1 .. nd | U [J] |
 //! | `tangent` | f32 | n1 .. nd, d (d + 1) / 2 | d tau/d q, lower triangle, where the interpolation uses it [N m/rad] |
-//! | `gap` | f32 | n1 .. nd | smallest signed distance at rest, or farther than two grid steps from contact a positive lower bound of it [m] |
+//! | `gap` | f32 | n1 .. nd | smallest signed distance at rest; a positive lower bound far from contact [m] |
 //! | `residual`, `iterations` | f32, u32 | n1 .. nd | of the contact solver |
 //! | `status` | u8 | n1 .. nd | [`crate::contact::Status`] |
 //! | `contact_offsets` | u64 | points + 1 | rows of the next two |
 //! | `contact_nodes`, `contact_forces` | u32, f32 | c and c, 3 | object node, force on it [N] |
-//! | `touch_offsets`, `touch_nodes`, `touch_forces` | u64, u32, f32 | as these | the same on nodes of the proxy, where an effect needs it |
+//! | `touch_offsets`, `touch_nodes`, `touch_forces` | u64, u32, f32 | as these | on nodes of the proxy, where needed |
 //! | `surface_nodes`, `surface_triangles` | f64, u32 | S, 3 and T, 3 | at rest [m] |
-//! | `inner_nodes`, `tetrahedra` | f64, u32 | I, 3 and V, 4 | of a mesh of tetrahedra; inner nodes are numbered from S on [m] |
+//! | `inner_nodes`, `tetrahedra` | f64, u32 | I, 3 and V, 4 | of tetrahedra; inner nodes count from S on [m] |
 //! | `regions` | u32 | V | physical volume of each tetrahedron, where the mesh names any |
 //!
 //! In Python: `safetensors.numpy.load_file("sphere.haptize")["torque"]`.

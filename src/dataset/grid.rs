@@ -1,6 +1,6 @@
 //! The uniform grid over C-space.
 
-use crate::{JointVector, MAX_JOINTS};
+use crate::{JointVector, MAX_JOINTS, csv::plain, scene::effort_unit};
 use serde::{Deserialize, Serialize};
 
 /// Grid coordinates `start + k step`, `k < count`, of one joint.
@@ -16,6 +16,15 @@ pub struct Axis {
     pub step: f64,
     /// Number of grid lines.
     pub count: usize,
+}
+
+/// Name and unit of one joint.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JointLabel {
+    /// As in the dataset.
+    pub name: String,
+    /// `rad` or `m`.
+    pub unit: String,
 }
 
 /// A uniform grid, last axis fastest.
@@ -42,7 +51,27 @@ impl Axis {
     /// Unit of what acts along the axis: a torque, or a force where the joint is prismatic.
     #[must_use]
     pub fn effort_unit(&self) -> &'static str {
-        if self.unit == "m" { "N" } else { "N m" }
+        effort_unit(&self.unit)
+    }
+}
+
+impl JointLabel {
+    /// Unit of what acts along the joint's axis.
+    #[must_use]
+    pub fn effort_unit(&self) -> &'static str {
+        effort_unit(&self.unit)
+    }
+
+    /// Returns the heading of the column that holds the joint's `what`, a coordinate.
+    #[must_use]
+    pub fn heading(&self, what: &str) -> String {
+        format!("{what} {} [{}]", plain(&self.name), self.unit)
+    }
+
+    /// Returns the heading of the column that holds the joint's `what`, a torque or force.
+    #[must_use]
+    pub fn effort_heading(&self, what: &str) -> String {
+        format!("{what} {} [{}]", plain(&self.name), self.effort_unit())
     }
 }
 

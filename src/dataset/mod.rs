@@ -30,7 +30,7 @@ pub(crate) use file::{
     CONTACTS, Contents as TensorContents, Heading, Kind, PIECE_BUFFER, TOUCHES, Tensor, check_place, may_be_dataset,
     surface_tensors, write_container, write_file,
 };
-pub use grid::{Axis, Grid};
+pub use grid::{Axis, Grid, JointLabel};
 pub use summary::{Refinement, StatusCounts, Summary};
 
 use crate::contact::{MeshRipple, NodeForce, Status};

@@ -16,7 +16,7 @@
 use super::{
     Clamps, Coordinates, Halt, Hardware, Key, Limits, Measurement, Scheduler, halt::LONGEST_AGE, hardware::Command,
 };
-use crate::{JointVector, tolerances::GREATEST_INTERVAL};
+use crate::{JointVector, scene::GREATEST_INTERVAL};
 use std::sync::{
     Arc,
     atomic::{AtomicBool, Ordering},

@@ -286,7 +286,10 @@ mod tests {
         let session = r#""session":{"configure":{"profile":{"name":"dev.haptize:loop"}}},"#;
         assert_eq!(
             message(session, "049D", Some([0.0, 0.0, 1.5])),
-            r#"{"session":{"configure":{"profile":{"name":"dev.haptize:loop"}}},"inverse3":[{"device_id":"049D","commands":{"set_cursor_force":{"vector":{"x":0.0,"y":0.0,"z":1.5}}}}]}"#
+            concat!(
+                r#"{"session":{"configure":{"profile":{"name":"dev.haptize:loop"}}},"inverse3":[{"device_id":"049D","#,
+                r#""commands":{"set_cursor_force":{"vector":{"x":0.0,"y":0.0,"z":1.5}}}}]}"#
+            )
         );
         assert_eq!(
             message("", "049D", None),

@@ -4,7 +4,11 @@
 //! `q(s) = q_0 + (q_1 - q_0)(10 s^3 - 15 s^4 + 6 s^5)`, s from 0 to 1. Files give samples, joined by straight lines:
 //! one row a sample, comma-separated, time in seconds and then one coordinate per joint.
 
-use crate::{JointVector, input, scene::Waypoint, tolerances::GREATEST_INPUT};
+use crate::{
+    JointVector,
+    input::{self, GREATEST_INPUT},
+    scene::Waypoint,
+};
 use std::{
     io::{self, BufRead, BufReader},
     path::{Path, PathBuf},

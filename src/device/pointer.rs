@@ -5,7 +5,7 @@
 //! it feels. Between the pointer's reports the hand holds still. They are exchanged without a lock: the latest counts.
 
 use super::{Applied, Device, HandError, Reading, hand::Arm};
-use crate::{JointVector, scene::HapticsSpec, tolerances::GREATEST_INPUT};
+use crate::{JointVector, input::GREATEST_INPUT, scene::HapticsSpec};
 
 /// The device, for the haptic loop.
 #[derive(Debug)]

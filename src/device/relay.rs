@@ -23,7 +23,7 @@ const PASSED: f64 = 0.75;
 /// How often the program looks for the next reading: several times in a period of 1 ms.
 const LOOK: Duration = Duration::from_micros(100);
 
-/// A torque, numbered so that a new one of the same size is told from an old one.
+/// A torque, numbered so that a new one of the same size differs from an old one.
 #[derive(Clone, Copy)]
 struct Order {
     number: u64,

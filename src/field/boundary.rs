@@ -34,8 +34,12 @@
 //! it stiffer, raise Ks to the bound, and the bound by bv.
 
 use super::stencil::Lattice;
-use crate::{JointVector, MAX_JOINTS, tolerances::LEAST_GAP};
+use crate::{JointVector, MAX_JOINTS};
 use std::{cmp::Reverse, collections::BinaryHeap};
+
+/// Least gap, and least slope of the gap field, that is divided by [m, m/sqrt(J)]: a picometre is far below any depth
+/// that a force belongs to, and gaps are stored in f32, which keeps their relative accuracy down to 1e-38.
+pub const LEAST_GAP: f64 = 1e-12;
 
 /// The layer of one grid.
 #[derive(Clone, Copy, Debug)]

@@ -17,13 +17,14 @@
 //! Points that were not computed carry the torque of the nearest one that was. So the torque does not end inside the
 //! object where the measurements do: it keeps the value that it has there.
 
+use super::boundary::LEAST_GAP;
 use super::{
     FieldError,
     boundary::BoundaryLayer,
     points::{Checked, Generations, plausible},
     stencil::{Lattice, Stencil},
 };
-use crate::{JointVector, tolerances::LEAST_GAP};
+use crate::JointVector;
 
 /// Interleaved point by point, so that a corner is one stretch of memory.
 pub(super) struct Layered {

@@ -29,6 +29,8 @@ mod work;
 pub use batch::{BatchError, check_rows, fill_rows};
 pub use error::FieldError;
 pub use flags::Flags;
+pub(crate) use potential::LEAST_ENERGY;
+pub(crate) use slope::GRADIENT_STEP;
 
 use crate::{
     JointVector, MAX_JOINTS,

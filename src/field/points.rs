@@ -2,7 +2,7 @@
 //! computed.
 
 use super::{FieldError, Flags, stencil::Lattice};
-use crate::{JointMatrix, contact::Status, dataset::Dataset, tolerances::GREATEST_INPUT};
+use crate::{JointMatrix, contact::Status, dataset::Dataset, input::GREATEST_INPUT};
 use std::collections::VecDeque;
 
 /// Values of a grid point that are not interpolated.

@@ -33,8 +33,12 @@ use super::{
     stencil::{Lattice, Stencil},
     stiffness::Stiffness,
 };
-use crate::{JointVector, memory, tolerances::LEAST_ENERGY};
+use crate::{JointVector, contact::RESIDUAL_FLOOR, memory};
 use rayon::prelude::*;
+
+/// Least stored energy over that of free space whose square root is distinguished from zero [J]: a nanonewton over a
+/// femtometre, as in [`RESIDUAL_FLOOR`].
+pub const LEAST_ENERGY: f64 = RESIDUAL_FLOOR * RESIDUAL_FLOOR;
 
 /// The potential of one dataset.
 pub(super) struct Potential {

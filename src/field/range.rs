@@ -31,8 +31,8 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Least c that counts outside the grid [m; steps for measured datasets]: a thousand times its rounding, and in a second
-/// of steps towards the object a nanometre.
+/// Least c that counts outside the grid [m; steps for measured datasets]: a thousand times its rounding, and in a
+/// second of steps towards the object a nanometre.
 const CREEP: f64 = 1e-12;
 
 /// By how much rounding may carry x over the grid's border, over the spacing [1].

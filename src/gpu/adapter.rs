@@ -56,7 +56,7 @@ impl AdapterChoice {
 pub struct AdapterSummary {
     /// Such as `llvmpipe (LLVM 15.0.6, 256 bits)`.
     pub name: String,
-    /// Where it is: on the PCI bus, such as `0000:01:00.0`, if the driver tells it. Adapters that would not differ
+    /// Where it is: on the PCI bus, such as `0000:01:00.0`, if the driver says it. Adapters that would not differ
     /// otherwise are counted: `#1`, `#2`.
     pub address: String,
     /// Driver and its version.

@@ -30,8 +30,8 @@ const LAST_WORK: Duration = Duration::from_secs(1);
 pub enum GpuError {
     /// No adapter of the kind asked for.
     #[error(
-        "no {wanted} Vulkan, Metal or DX12 adapter; found: {found}. Install your GPU's Vulkan driver (or Mesa's software \
-         Vulkan, package mesa-vulkan-drivers, for --backend gpu without a GPU), or use --backend cpu"
+        "no {wanted} Vulkan, Metal or DX12 adapter; found: {found}. Install your GPU's Vulkan driver (or Mesa's \
+         software Vulkan, package mesa-vulkan-drivers, for --backend gpu without a GPU), or use --backend cpu"
     )]
     NoAdapter {
         /// `hardware` or `usable`.
@@ -80,8 +80,8 @@ pub enum GpuError {
     /// Only a part of a large object's compliance is formed, beyond which nobody would see the paper's iteration
     /// go.
     #[error(
-        "the GPU takes objects of at most {limit} surface nodes, not {nodes}, by the paper's iteration. Use --backend cpu for \
-         this scene"
+        "the GPU takes objects of at most {limit} surface nodes, not {nodes}, by the paper's iteration. Use --backend \
+         cpu for this scene"
     )]
     TooManyNodes {
         /// Nodes on the surface.

@@ -141,7 +141,7 @@ impl Detection {
         &self.buffers.list
     }
 
-    /// How far gaps can be trusted.
+    /// Returns how far gaps can be trusted.
     pub fn trust(&self) -> Trust {
         self.trust
     }

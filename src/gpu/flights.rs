@@ -84,7 +84,8 @@ impl<S: Stages> PacedDevice<S> {
         Ok(())
     }
 
-    /// How long the device worked on what was submitted at `since` and is done now, if it works on one thing at a time.
+    /// Returns how long the device worked on what was submitted at `since` and is done now, if it works on one thing at
+    /// a time.
     fn worked(&mut self, since: Instant) -> Duration {
         let now = Instant::now();
         let begun = since.max(std::mem::replace(&mut self.done, now));
@@ -175,7 +176,7 @@ impl<'w> Queue<'w> {
         &self.chunks[section.chunk - self.handed].configurations[section.places.clone()]
     }
 
-    /// Where the equilibria of `section`, the earliest that has none, are to be added.
+    /// Returns where the equilibria of `section`, the earliest that has none, are to be added.
     fn equilibria(&mut self, section: &Section) -> (&[JointVector], &mut Vec<Equilibrium>) {
         let chunk = &mut self.chunks[section.chunk - self.handed];
         (&chunk.configurations[section.places.clone()], &mut chunk.equilibria)
@@ -350,7 +351,6 @@ mod tests {
         gpu::{
             GpuSolver,
             precision::Precision,
-            solver::free,
             stages::{StageRoom, Trust},
         },
         object::Object,
@@ -463,7 +463,7 @@ mod tests {
         let conclude = |_: &Odd, landed: Landed<'_>, _: &mut HostTime, equilibria: &mut Vec<Equilibrium>| {
             let gaps = landed.detected.gaps;
             assert!(gaps.iter().zip(landed.configurations).all(|(gap, q)| *gap == q[0]));
-            equilibria.extend(gaps.into_iter().map(|gap| free(gap, 1)));
+            equilibria.extend(gaps.into_iter().map(|gap| Equilibrium::free(gap, 1)));
             Ok(())
         };
         let result = fly(devices, &mut Queue::new(&mut work), &mut HostTime::default(), conclude);

@@ -118,7 +118,8 @@ mod tests {
     #[test]
     fn every_shared_struct_is_laid_out_as_in_wgsl() {
         let expected = [
-            layout!(Parameters: configurations, joints, proxy_nodes, surface_nodes, triangles, clusters, groups, gap_band),
+            layout!(Parameters: configurations, joints, proxy_nodes, surface_nodes, triangles, clusters, groups,
+                gap_band),
             layout!(FrameParameters: nodes, period, odd, groups),
         ];
         compare(&expected, &reflect(Precision::Single));

@@ -52,5 +52,7 @@ pub use context::{Context, GpuError};
 pub use flights::HostTime;
 pub use frame::{FrameCost, FrameError, FrameMethod, FrameUpdate};
 pub use pipeline::BatchCapacity;
+pub(crate) use shaders::GPU_LEAST_DIVISOR;
 pub use solver::GpuSolver;
 pub use timing::KernelTime;
+pub use unpack::GPU_SETTLED_RESIDUAL;

@@ -14,9 +14,26 @@ use crate::{
     contact::{self, geometry::bounding_volumes::CULLING_SLACK},
     proxy,
     scene::{Algorithm, JointKind},
-    tolerances,
 };
 use glam::DVec3;
+
+/// Part of the band of gaps at rest within which contact or not is decided in f64, relative to the object's extent [1]:
+/// distances between coordinates of up to some extents are rounded by 6e-8 of each.
+const GPU_GAP_BAND_PER_EXTENT: f64 = 1e-6;
+
+/// The other part of the band, for each joint, relative to the chain's reach [1]: a joint turns a lever no longer than
+/// the reach by a cosine and a sine that are rounded by 6e-8 each, and rounds products and sums as often again; six of
+/// these roundings in all.
+const GPU_GAP_BAND_PER_JOINT: f64 = 4e-7;
+
+/// Widening of bounding spheres, relative to the object's extent [1]: coordinates of up to ten extents (a proxy node
+/// far away) are rounded to f32 by 6e-8 each.
+const GPU_BOUND_SLACK: f64 = 1e-6;
+
+/// Greatest contact stiffness of the energy form in f32, in units of the stiffness of the object's softest node [1]: a
+/// depth is known to about 1e-6 of the object's displacement, a force to this many times that. What is stiffer is
+/// stiffened from there in f64, where nothing moves by more than a thousandth of its displacement.
+const GPU_STIFFNESS: f64 = 1e3;
 
 /// The device's copy of arm and surface at rest.
 pub struct DeviceModel {
@@ -40,7 +57,7 @@ pub struct DeviceModel {
 
 /// Contact stiffness of the energy form in f32 [N/m]; what is stiffer is stiffened when the result is settled in f64.
 pub(super) fn stiffness(model: &contact::Model<'_>) -> f64 {
-    model.kc.min(tolerances::GPU_STIFFNESS / model.max_nodal_compliance)
+    model.kc.min(GPU_STIFFNESS / model.max_nodal_compliance)
 }
 
 impl DeviceModel {
@@ -57,8 +74,8 @@ impl DeviceModel {
             return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });
         }
         let extent = extent(model);
-        let rounding = tolerances::GPU_GAP_BAND_PER_EXTENT * extent
-            + tolerances::GPU_GAP_BAND_PER_JOINT * chain.joints.len() as f64 * reach(chain, model.surface.centre);
+        let rounding = GPU_GAP_BAND_PER_EXTENT * extent
+            + GPU_GAP_BAND_PER_JOINT * chain.joints.len() as f64 * reach(chain, model.surface.centre);
         // A smooth surface stands off the flat triangles.
         let gap_band = model.surface.bulge + rounding;
         let order: Vec<u32> = model.surface.bounds.order().collect();
@@ -102,7 +119,7 @@ pub(super) fn extent(model: &contact::Model<'_>) -> f64 {
 /// Returns the margin of bounding spheres, for stages that compute in `precision` [m].
 pub(super) fn culling_slack(model: &contact::Model<'_>, precision: Precision) -> f64 {
     match precision {
-        Precision::Single => tolerances::GPU_BOUND_SLACK * extent(model),
+        Precision::Single => GPU_BOUND_SLACK * extent(model),
         Precision::Double => CULLING_SLACK * model.surface.extent,
     }
 }
@@ -137,7 +154,7 @@ fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 
         let centre = corners.clone().sum::<DVec3>() / nodes.len() as f64;
         let radius = corners.map(|c| c.distance(centre)).fold(0.0, f64::max);
         let [x, y, z, _] = padded(centre);
-        [x, y, z, (radius + tolerances::GPU_BOUND_SLACK * extent) as f32]
+        [x, y, z, (radius + GPU_BOUND_SLACK * extent) as f32]
     };
     let triangles = &model.object.triangles;
     let cluster = |numbers: &[u32]| {

@@ -33,7 +33,7 @@ impl Default for BatchCapacity {
 }
 
 /// Most memory that one buffer takes, on a GPU and on a software rasteriser, whose memory is the host's [B]. There are
-/// a few of such a size a section in flight. No adapter tells how much memory it has: where it runs out, there is
+/// a few of such a size a section in flight. No adapter reports how much memory it has: where it runs out, there is
 /// another try with half the room.
 const HARDWARE_BUDGET: u64 = 128 << 20;
 const SOFTWARE_BUDGET: u64 = 16 << 20;

@@ -283,7 +283,7 @@ impl SearchLane {
         }
     }
 
-    /// How many configurations are unfinished, the number of all touches, and what was staged.
+    /// Returns how many configurations are unfinished, the number of all touches, and what was staged.
     fn read(
         &self,
         context: &Context,

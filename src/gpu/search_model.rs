@@ -11,10 +11,28 @@ use super::{
 };
 use crate::{
     contact::{self, law::depth::MINIMUM_CURVATURE_RADIUS},
+    contact::{equilibrium::energy::CONTINUATION_START, geometry::DEPTH_ROUNDING},
     scene::Algorithm,
-    tolerances::{self, CONTINUATION_START, DEPTH_ROUNDING},
 };
 use glam::DVec3;
+
+/// Least relative residual that the f32 solver is asked for [1]: rounding of f32 (6e-8) grows over sums of about a
+/// hundred products to a few 1e-6, so 1e-5 is the least that can be distinguished from zero.
+const GPU_LEAST_TOLERANCE: f64 = 1e-5;
+
+/// Distance of a node to an edge or vertex, relative to the object's extent, below which f32 does not resolve the
+/// direction between them [1]: coordinates of one extent carry 6e-8, and 16 times that gives a direction good to 6 %,
+/// where the pseudonormal is the better one.
+const GPU_LEAST_DISTANCE_PER_EXTENT: f64 = 1e-6;
+
+/// Rounding error of a depth, relative to the longest edge of the surface [1]: three coordinates of a corner relative
+/// to the proxy node, each rounded by 6e-8 of at most an edge, enter with weights that sum to one.
+const GPU_DEPTH_ROUNDING_PER_EDGE: f64 = 2e-7;
+
+/// Most iterations of one configuration in f32, whatever the scene allows: hardly any that needs more ends there, a
+/// group that goes on holds up its whole batch, and what is not converged is solved in f64 with all the scene's
+/// iterations.
+const GPU_MAX_ITERATIONS: u32 = 100;
 
 /// Most rows of a configuration: contacts, and proxy nodes that have touched. What exceeds them is left to the CPU.
 pub(super) const CONTACTS: usize = 64;
@@ -133,11 +151,11 @@ impl Limits {
             Precision::Single => Self {
                 first_kc,
                 kc,
-                tolerance: contact.tolerance.max(tolerances::GPU_LEAST_TOLERANCE),
-                iterations: contact.max_iterations.min(tolerances::GPU_MAX_ITERATIONS),
+                tolerance: contact.tolerance.max(GPU_LEAST_TOLERANCE),
+                iterations: contact.max_iterations.min(GPU_MAX_ITERATIONS),
                 with_tangent: false,
-                depth_rounding: tolerances::GPU_DEPTH_ROUNDING_PER_EDGE * longest_edge(model),
-                least_distance: tolerances::GPU_LEAST_DISTANCE_PER_EXTENT * extent(model),
+                depth_rounding: GPU_DEPTH_ROUNDING_PER_EDGE * longest_edge(model),
+                least_distance: GPU_LEAST_DISTANCE_PER_EXTENT * extent(model),
             },
         }
     }

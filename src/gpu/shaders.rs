@@ -5,16 +5,40 @@
 //! switches are override constants.
 
 use super::precision::Precision;
-use crate::{
-    contact::{
-        Status,
-        equilibrium::{energy, newton, tangent},
-        geometry::facet,
-        law::depth,
-    },
-    tolerances,
+use crate::contact::{
+    MINIMUM_SQUARE, Status,
+    equilibrium::{energy, newton, tangent},
+    geometry::{LENGTH_ROUNDING, facet},
+    law::depth,
 };
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+
+/// Stands for "no distance yet" in f32 kernels [m]: above any distance in a scene, and its square is still finite.
+const GPU_FAR_AWAY: f32 = 1e18;
+
+/// Least divisor in f32 kernels: a hundred times the least normal number (1.2e-38), below which a device may flush to
+/// zero. Squared edge lengths stay above it down to 1e-18 m.
+pub const GPU_LEAST_DIVISOR: f32 = 1e-36;
+
+/// Widening of distances within which f32 kernels search, relative to these [1]: they follow from sums of up to some
+/// hundred products, each rounded by 6e-8.
+const GPU_SEARCH_SLACK: f64 = 1e-4;
+
+/// The least step of the search for the closest point of a bent facet, for f32 [1]: some roundings of a weight.
+const GPU_FACET_STEP: f64 = 4.0 * f32::EPSILON as f64;
+
+/// [`energy::ENERGY_ROUNDING`] for f32, whose eps is 1.2e-7.
+const GPU_ENERGY_ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
+
+/// [`energy::GIVE_UP_LENGTH`] for f32: coordinates do not change visibly under a step this much smaller than the first.
+const GPU_GIVE_UP_LENGTH: f64 = 1e-6;
+
+/// [`energy::INNER_TOLERANCE_FLOOR`] for f32: eps times the about 1e3 by which rounding grows over some tens of
+/// iterations.
+const GPU_INNER_TOLERANCE_FLOOR: f64 = 1e-4;
+
+/// Relative residual of the paper's step 2 in f32 [1]: ten times better than the least tolerance of the iteration.
+const GPU_PAPER_INNER_TOLERANCE: f64 = 1e-6;
 
 /// One entry point with everything it needs.
 #[derive(Clone, Copy, Debug)]
@@ -270,8 +294,8 @@ fn constants(precision: Precision) -> String {
         text.push_str(&format!("const STATUS_{name}: u32 = {}u;\n", status as u8));
     }
     for (name, count) in [
-        ("INNER_ITERATIONS_PER_UNKNOWN", tolerances::INNER_ITERATIONS_PER_UNKNOWN),
-        ("MODEL_PASSES", tolerances::MODEL_PASSES),
+        ("INNER_ITERATIONS_PER_UNKNOWN", newton::INNER_ITERATIONS_PER_UNKNOWN),
+        ("MODEL_PASSES", newton::MODEL_PASSES),
         ("FACET_ITERATIONS", facet::FACET_ITERATIONS),
         ("DAMPING_ATTEMPTS", newton::DAMPING_ATTEMPTS as usize),
         ("NUDGE_HALVINGS", energy::NUDGE_HALVINGS as usize),
@@ -298,18 +322,18 @@ fn constants(precision: Precision) -> String {
 
 /// Numbers that rounding has nothing to do with.
 const NUMBERS: [(&str, f64); 17] = [
-    ("FAR_AWAY", tolerances::GPU_FAR_AWAY as f64),
+    ("FAR_AWAY", GPU_FAR_AWAY as f64),
     ("LEAST_CONVEXITY", depth::LEAST_CONVEXITY),
-    ("RESIDUAL_FLOOR", tolerances::RESIDUAL_FLOOR),
-    ("ACCEPTED_SHARE", tolerances::ACCEPTED_SHARE),
-    ("POOR_SHARE", tolerances::POOR_SHARE),
-    ("GOOD_SHARE", tolerances::GOOD_SHARE),
-    ("INNER_TOLERANCE", tolerances::INNER_TOLERANCE),
+    ("RESIDUAL_FLOOR", energy::RESIDUAL_FLOOR),
+    ("ACCEPTED_SHARE", energy::ACCEPTED_SHARE),
+    ("POOR_SHARE", energy::POOR_SHARE),
+    ("GOOD_SHARE", energy::GOOD_SHARE),
+    ("INNER_TOLERANCE", energy::INNER_TOLERANCE),
     ("PROBE_TOLERANCE", energy::PROBE_TOLERANCE),
     ("RESPONSE_TOLERANCE", tangent::RESPONSE_TOLERANCE),
-    ("CONTINUATION_FACTOR", tolerances::CONTINUATION_FACTOR),
-    ("STAGE_TOLERANCE", tolerances::STAGE_TOLERANCE),
-    ("STALLED_LENGTH", tolerances::STALLED_LENGTH),
+    ("CONTINUATION_FACTOR", energy::CONTINUATION_FACTOR),
+    ("STAGE_TOLERANCE", energy::STAGE_TOLERANCE),
+    ("STALLED_LENGTH", energy::STALLED_LENGTH),
     ("NUDGE_LENGTH", energy::NUDGE_LENGTH),
     ("LEAST_DAMPING", newton::LEAST_DAMPING),
     ("DAMPING_GROWTH", newton::DAMPING_GROWTH),
@@ -319,14 +343,14 @@ const NUMBERS: [(&str, f64); 17] = [
 
 /// Numbers that follow from rounding: in f32, and in f64.
 const ROUNDED: [(&str, f64, f64); 8] = [
-    ("LEAST_DIVISOR", tolerances::GPU_LEAST_DIVISOR as f64, tolerances::MINIMUM_SQUARE),
-    ("FACET_STEP", tolerances::GPU_FACET_STEP, facet::FACET_STEP),
-    ("LENGTH_ROUNDING", tolerances::GPU_SEARCH_SLACK, tolerances::LENGTH_ROUNDING),
-    ("ENERGY_ROUNDING", tolerances::GPU_ENERGY_ROUNDING, tolerances::ENERGY_ROUNDING),
+    ("LEAST_DIVISOR", GPU_LEAST_DIVISOR as f64, MINIMUM_SQUARE),
+    ("FACET_STEP", GPU_FACET_STEP, facet::FACET_STEP),
+    ("LENGTH_ROUNDING", GPU_SEARCH_SLACK, LENGTH_ROUNDING),
+    ("ENERGY_ROUNDING", GPU_ENERGY_ROUNDING, energy::ENERGY_ROUNDING),
     ("PIVOT_ROUNDING", f32::EPSILON as f64, f64::EPSILON),
-    ("INNER_TOLERANCE_FLOOR", tolerances::GPU_INNER_TOLERANCE_FLOOR, tolerances::INNER_TOLERANCE_FLOOR),
-    ("GIVE_UP_LENGTH", tolerances::GPU_GIVE_UP_LENGTH, energy::GIVE_UP_LENGTH),
-    ("PAPER_INNER_TOLERANCE", tolerances::GPU_PAPER_INNER_TOLERANCE, tolerances::INNER_TOLERANCE_FLOOR),
+    ("INNER_TOLERANCE_FLOOR", GPU_INNER_TOLERANCE_FLOOR, energy::INNER_TOLERANCE_FLOOR),
+    ("GIVE_UP_LENGTH", GPU_GIVE_UP_LENGTH, energy::GIVE_UP_LENGTH),
+    ("PAPER_INNER_TOLERANCE", GPU_PAPER_INNER_TOLERANCE, energy::INNER_TOLERANCE_FLOOR),
 ];
 
 impl Shader {

@@ -15,13 +15,12 @@ use super::{
     pipeline::{BatchCapacity, Pipeline},
     precision::Precision,
     stages::{Detected, Found, Recorded, Stages, Trust},
-    unpack::unpack,
+    unpack::{GPU_RESOLVED_RESIDUAL, unpack},
 };
 use crate::{
     JointVector,
     contact::{self, Backend, Equilibrium, Solvers, Status, Work},
     scene::Algorithm,
-    tolerances::GPU_RESOLVED_RESIDUAL,
 };
 use std::{sync::Arc, time::Instant};
 
@@ -119,7 +118,7 @@ impl<'a, S: Stages> GpuSolver<'a, S> {
         self.devices.iter().all(|device| device.stages.trust().precision == Precision::Double)
     }
 
-    /// Where the time of the host went since the solver was made.
+    /// Returns where the time of the host went since the solver was made.
     #[must_use]
     pub fn host_time(&self) -> HostTime {
         self.time
@@ -138,7 +137,7 @@ impl HostPart<'_> {
         let Landed { configurations, detected: Detected { gaps, touching }, found } = landed;
         let begin = Instant::now();
         let mut results: Vec<Equilibrium> =
-            gaps.iter().zip(configurations).map(|(&gap, q)| free(gap, q.len())).collect();
+            gaps.iter().zip(configurations).map(|(&gap, q)| Equilibrium::free(gap, q.len())).collect();
         let assembled = Instant::now();
         self.decide_free(trust, configurations, &touching, &mut results);
         let settled = self.settle(trust, configurations, &touching, &found, &results)?;
@@ -217,21 +216,6 @@ impl HostPart<'_> {
                 Status::Overflow => true,
                 Status::Free | Status::Outside => false,
             }
-    }
-}
-
-/// No contact.
-pub(super) fn free(gap: f64, joints: usize) -> Equilibrium {
-    Equilibrium {
-        status: Status::Free,
-        iterations: 0,
-        residual: 0.0,
-        energy: 0.0,
-        gap,
-        torque: JointVector::zeros(joints),
-        forces: Vec::new(),
-        tangent: None,
-        touches: Vec::new(),
     }
 }
 

@@ -81,7 +81,7 @@ pub trait Stages {
     /// Returns the bounds on what it takes at a time.
     fn room(&self) -> StageRoom;
 
-    /// How far its results can be trusted.
+    /// Returns how far its results can be trusted.
     fn trust(&self) -> Trust;
 
     /// Submits where the proxy is at each configuration of a section, and whether it touches.

@@ -7,19 +7,32 @@
 //! or two away, to a residual that owes nothing to f32. The paper's iteration is taken as it is: what it leads to is
 //! defined by its steps.
 
-use super::{model::stiffness, precision::Precision, solver::free, stages::Found};
+use super::{model::stiffness, precision::Precision, stages::Found};
 use crate::{
     JointMatrix, JointVector,
     contact::{
-        self, Equilibrium, NodeForce, Status,
+        self, Equilibrium, MINIMUM_SQUARE, NodeForce, Status,
         equilibrium::energy::StoppingCriteria,
         geometry::closest_point::{ClosestPoint, Feature},
         law::depth::Carriers,
     },
     scene::Algorithm,
-    tolerances::{GPU_RESOLVED_RESIDUAL, GPU_SETTLED_RESIDUAL, MINIMUM_SQUARE, SETTLING_STEPS},
 };
 use glam::DVec3;
+
+/// Largest relative residual of a GPU's result that is passed on as converged, however rough the scene's tolerance [1]:
+/// what is promised of f32. What has more is solved in f64.
+pub const GPU_RESOLVED_RESIDUAL: f64 = 1e-4;
+
+/// Steps in f64 from a result of the f32 kernel at most [1]. They converge quadratically: where f32 found an
+/// equilibrium, one leads from its 1e-5 to 1e-8. Four let contacts within rounding of none come and go; what needs more
+/// was not near one, and may end at another.
+const SETTLING_STEPS: u32 = 4;
+
+/// Residual of the contact forces of the energy form that is allowed after these steps unless the scene asks for less,
+/// relative, in the energy norm [1]: soft directions of a deep dent raise it a hundredfold in the torque, which is to
+/// agree to 1e-5 with the CPU's.
+pub const GPU_SETTLED_RESIDUAL: f64 = 1e-7;
 
 /// The equilibrium at `q`, where the gap at rest is `gap`, that the kernels `found` in `precision` for the
 /// configuration in this place, whose touches begin there; `None` when they wrote nothing: records are zero before,
@@ -39,7 +52,7 @@ pub(super) fn unpack(
     let (&[residual, energy], amounts) = found.amounts.get(each * place..each * (place + 1))?.split_first_chunk()?;
     let (torque, tangent) = amounts.split_at_checked(q.len())?;
     let torque = JointVector::from_slice(torque);
-    let mut result = Equilibrium { status, iterations, residual, energy, torque, ..free(gap, q.len()) };
+    let mut result = Equilibrium { status, iterations, residual, energy, torque, ..Equilibrium::free(gap, q.len()) };
     let mut parts = Vec::new();
     for k in start..start + touches as usize {
         let touch = touch_of(model, found, k, &mut parts)?;

@@ -5,12 +5,21 @@
 //! radians are never weighed against metres by their accidental size. With joints of a single unit this is the
 //! triangulation of the raw coordinates.
 //!
-//! Samples within [`MERGE_DISTANCE`](crate::tolerances::MERGE_DISTANCE) are averaged into one point: duplicates have no
-//! triangulation. The jitter is a hash of a point's own coordinates, hence the same in every run and in any order.
+//! Samples within [`MERGE_DISTANCE`] are averaged into one point: duplicates have no triangulation. The jitter is a
+//! hash of a point's own coordinates, hence the same in every run and in any order.
 
 use super::{GridizeError, samples::Samples};
-use crate::{MAX_JOINTS, tolerances};
+use crate::{MAX_JOINTS, random::mix};
 use std::collections::HashMap;
+
+/// Samples closer than this fraction of the extent are one point: far below any encoder's resolution (a 16-bit encoder
+/// over the range resolves 1.5e-5), far above rounding.
+pub const MERGE_DISTANCE: f64 = 1e-9;
+
+/// Greatest displacement of a point before it is tetrahedralised, as a fraction of the extent. Without it every cell
+/// of an exact grid is cospherical and each predicate runs its exact branch. It must exceed the predicates' static
+/// error, about 1e-15 of the products involved, by a margin for cells of 1/100 of the extent.
+pub const JITTER: f64 = 1.0 / (1_u64 << 40) as f64;
 
 /// Extent of the samples off the best line or plane below which they count as flat: less than an encoder resolves.
 const FLAT_CLOUD: f64 = 1e-6;
@@ -101,7 +110,7 @@ impl Cloud {
             let squares = samples.deviations.iter().flat_map(|column| &column[sample * joints..(sample + 1) * joints]);
             let squares = squares.map(|deviation| deviation * deviation);
             let position = self.scaled(q);
-            let cell = position.map(|x| (x / tolerances::MERGE_DISTANCE).round() as i64);
+            let cell = position.map(|x| (x / MERGE_DISTANCE).round() as i64);
             let point = *cells.entry(cell).or_insert(counts.len());
             if point == counts.len() {
                 counts.push(1.0);
@@ -192,12 +201,4 @@ fn jitter(position: &Position, joints: usize, most: f64) -> Position {
         *x += most * unit;
     }
     moved
-}
-
-/// SplitMix64's finalizer (Steele, Lea and Flood, 2014).
-pub(super) fn mix(value: u64) -> u64 {
-    let mut z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }

@@ -23,8 +23,8 @@ use super::{
 use crate::MAX_JOINTS;
 use std::collections::HashMap;
 
-/// [`JITTER`] for 4 to 6 joints, where circumspheres are computed in floating point: on a cell of cospherical points
-/// squeezed to thickness t the centre is known to about 1e-16 / t, and must be known better than t.
+/// [`JITTER`](super::cloud::JITTER) for 4 to 6 joints, where circumspheres are computed in floating point: on a cell of
+/// cospherical points squeezed to thickness t the centre is known to about 1e-16 / t, and must be known better than t.
 pub(super) const HYPER_JITTER: f64 = 1e-7;
 
 /// A point counts as beyond a facet from this height on: below the jitter, above the rounding of a height.

@@ -21,17 +21,21 @@ mod smooth;
 mod space;
 mod tetrahedra;
 
-pub use samples::{JointLabel, Samples, SamplesError};
+pub use samples::{Samples, SamplesError};
 
 use crate::{
     MAX_JOINTS,
     contact::Status,
     dataset::{Axis, Dataset, Grid, Provenance},
-    tolerances,
+    scene::GRID_LINE,
 };
-use cloud::Cloud;
+use cloud::{Cloud, JITTER};
 use interpolant::{Interpolant, Linear};
 use rayon::prelude::*;
+
+/// Fraction by which a position just outside the hull is pulled towards its centre: 100 times the jitter, so that a
+/// grid point on a hull facet is found as long as the hull is thicker than about 1/50 of its extent there.
+const HULL_PULL: f64 = 100.0 * JITTER;
 
 /// [`HULL_PULL`] for 4 to 6 joints.
 const HYPER_PULL: f64 = 100.0 * hyperspace::HYPER_JITTER;
@@ -201,9 +205,9 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
     let torque = match (options.interpolation, cloud.joints) {
         (Interpolation::Natural, 2) => fill(&plane::NaturalNeighbours::new(&cloud)?, &cloud, &grid),
         (Interpolation::Natural, joints) => return Err(GridizeError::NaturalNeighbours(joints)),
-        (Interpolation::Linear, 1) => fill_linear(line::Line::new(&cloud), linear(tolerances::HULL_PULL), &grid),
-        (Interpolation::Linear, 2) => fill_linear(plane::Plane::new(&cloud)?, linear(tolerances::HULL_PULL), &grid),
-        (Interpolation::Linear, 3) => fill_linear(space::Space::new(&cloud)?, linear(tolerances::HULL_PULL), &grid),
+        (Interpolation::Linear, 1) => fill_linear(line::Line::new(&cloud), linear(HULL_PULL), &grid),
+        (Interpolation::Linear, 2) => fill_linear(plane::Plane::new(&cloud)?, linear(HULL_PULL), &grid),
+        (Interpolation::Linear, 3) => fill_linear(space::Space::new(&cloud)?, linear(HULL_PULL), &grid),
         _ => fill_linear(hyperspace::Hyperspace::new(&cloud), linear(HYPER_PULL), &grid),
     };
     let (torque, inside) = torque;
@@ -269,7 +273,7 @@ fn grid(samples: &Samples, steps: &[f64]) -> Result<Grid, GridizeError> {
         let column = || samples.configurations.iter().skip(joint).step_by(joints).copied();
         let [low, high] = [column().fold(f64::INFINITY, f64::min), column().fold(f64::NEG_INFINITY, f64::max)];
         // Of a step beyond all reason the slack must not reach across the samples.
-        let slack = tolerances::GRID_LINE * ((high - low) / step).min(1.0);
+        let slack = GRID_LINE * ((high - low) / step).min(1.0);
         let first = (low / step - slack).ceil();
         let last = (high / step + slack).floor();
         let count = last - first + 1.0;

@@ -4,7 +4,8 @@
 //! Neighbours on the curve are neighbours in space, so locating the next point is a short walk; the random rounds keep
 //! points on lines and surfaces from building many simplices that later points destroy.
 
-use super::cloud::{Position, mix};
+use super::cloud::Position;
+use crate::random::mix;
 
 /// Rounds stop halving here: a Hilbert sort of so few points is as good as a random order.
 const SMALLEST_ROUND: usize = 64;

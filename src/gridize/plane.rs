@@ -6,7 +6,11 @@ use super::{
     cloud::{Cloud, Position},
     interpolant::{Interpolant, Simplex, Triangulation, pulled_in},
 };
-use crate::{MAX_JOINTS, tolerances};
+use super::{
+    HULL_PULL,
+    cloud::{JITTER, MERGE_DISTANCE},
+};
+use crate::MAX_JOINTS;
 use spade::{
     DelaunayTriangulation, HasPosition, HierarchyHintGenerator, NaturalNeighbor, Point2, PositionInTriangulation,
     Triangulation as _, handles::FixedVertexHandle,
@@ -28,7 +32,7 @@ impl HasPosition for Vertex {
 
 /// `at` as spade takes it: it refuses denormal numbers, which the unit box has no use for.
 fn planar(at: &Position) -> Point2<f64> {
-    let clear = |x: f64| if x.abs() < tolerances::MERGE_DISTANCE * tolerances::JITTER { 0.0 } else { x };
+    let clear = |x: f64| if x.abs() < MERGE_DISTANCE * JITTER { 0.0 } else { x };
     Point2::new(clear(at[0]), clear(at[1]))
 }
 
@@ -110,8 +114,7 @@ impl Interpolant for NaturalNeighbours<'_> {
     fn weights(&self, walk: &mut NeighbourWalk<'_>, at: &Position, weights: &mut Vec<(u32, f64)>) {
         walk.neighbours.get_weights(planar(at), &mut walk.found);
         if walk.found.is_empty() {
-            walk.neighbours
-                .get_weights(planar(&pulled_in(at, &self.cloud.centre, tolerances::HULL_PULL)), &mut walk.found);
+            walk.neighbours.get_weights(planar(&pulled_in(at, &self.cloud.centre, HULL_PULL)), &mut walk.found);
         }
         weights.clear();
         weights.extend(walk.found.iter().map(|&(vertex, weight)| (self.mesh.vertex(vertex).data().point, weight)));

@@ -1,16 +1,6 @@
 //! Scattered measurements of a contact torque: what a scan or an imported log hands to the gridization.
 
-use super::cloud::mix;
-use crate::MAX_JOINTS;
-
-/// Name and unit of one joint.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct JointLabel {
-    /// The joint's name.
-    pub name: String,
-    /// `rad` or `m`.
-    pub unit: String,
-}
+use crate::{MAX_JOINTS, dataset::JointLabel, random::mix};
 
 /// Scattered configurations q with the contact torque tau measured at each.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,19 +1,20 @@
 //! Three joints: linear interpolation on Delaunay tetrahedra.
 
+use super::cloud::JITTER;
 use super::{
     GridizeError,
     cloud::{Cloud, Position},
     interpolant::{Simplex, Triangulation},
     tetrahedra::Tetrahedra,
 };
-use crate::{MAX_JOINTS, tolerances};
+use crate::MAX_JOINTS;
 
 /// Tetrahedra of the jittered points of a cloud.
 pub(super) struct Space(Tetrahedra);
 
 impl Space {
     pub fn new(cloud: &Cloud) -> Result<Self, GridizeError> {
-        Tetrahedra::new(cloud.jittered(tolerances::JITTER), &cloud.spanning).map(Self)
+        Tetrahedra::new(cloud.jittered(JITTER), &cloud.spanning).map(Self)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The promises of a gridization: linear fields exactly, SciPy's values, and no arrangement of points that breaks it.
 
 use super::*;
-use cloud::mix;
+use crate::{dataset::JointLabel, random::mix};
 
 fn label(name: usize) -> JointLabel {
     JointLabel { name: format!("joint {name}"), unit: "rad".to_owned() }
@@ -147,7 +147,7 @@ fn the_search_without_a_triangulation_agrees_with_the_tetrahedra() {
     let given = samples(&points, |q| (5.0 * q[0]).sin() + q[1] * q[2]);
     let cloud = Cloud::new(&given).unwrap();
     let grid = grid(&given, &[0.05]).unwrap();
-    let (pull, cloud) = (tolerances::HULL_PULL, &cloud);
+    let (pull, cloud) = (HULL_PULL, &cloud);
     let (a, a_inside) = fill_linear(space::Space::new(cloud).unwrap(), (pull, cloud), &grid);
     let (b, b_inside) = fill_linear(hyperspace::Hyperspace::new(cloud), (pull, cloud), &grid);
     assert_eq!(a_inside, b_inside);

@@ -5,10 +5,7 @@
 //! over the same place would give.
 
 use super::{ImportError, mapping::Keep};
-use crate::{
-    JointVector, MAX_JOINTS,
-    gridize::{JointLabel, Samples},
-};
+use crate::{JointVector, MAX_JOINTS, dataset::JointLabel, gridize::Samples};
 use std::collections::BTreeMap;
 
 /// Cells of C-space that an import averages in: about 1 kB each.

@@ -3,7 +3,7 @@
 
 use super::check::check;
 use crate::{
-    gridize::JointLabel,
+    dataset::JointLabel,
     scene::{self, Diagnostic},
 };
 use serde::Deserialize;

@@ -48,7 +48,7 @@ pub(super) fn check(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), Surfa
     Ok(())
 }
 
-/// Where an edge of `one` meets the triangle `other` without sharing a node with it.
+/// Returns where an edge of `one` meets the triangle `other` without sharing a node with it.
 fn meeting(nodes: &[DVec3], one: [u32; 3], other: [u32; 3]) -> Option<DVec3> {
     let facet = other.map(|node| nodes[node as usize]);
     (0..3).map(|k| [one[k], one[(k + 1) % 3]]).filter(|ends| !ends.iter().any(|end| other.contains(end))).find_map(

@@ -43,9 +43,10 @@ pub enum ObjectError {
     },
     /// The dense compliance would not fit in memory.
     #[error(
-        "the proxy reaches {nodes} surface nodes, which need {} MB of compliance, more than the {} MB of memory that it may take: use \
-         a coarser surface or a smaller grid, close other programs, or raise the \
-         limit (ulimit -v)", .bytes.div_ceil(1_000_000), .limit / 1_000_000
+        "the proxy reaches {nodes} surface nodes, which need {} MB of compliance, more than the {} MB of memory \
+         that it may take: use a coarser surface or a smaller grid, close other programs, or raise the limit \
+         (ulimit -v)",
+        .bytes.div_ceil(1_000_000), .limit / 1_000_000
     )]
     TooLarge {
         /// Surface nodes that the proxy reaches.
@@ -97,8 +98,8 @@ pub enum ObjectError {
     },
     /// A body without the tetrahedra that the scene names, or with some that it does not.
     #[error(
-        "the tetrahedra of the scene's object and those that are stored do not agree, as in datasets of earlier versions, \
-         which held none: bake the scene again"
+        "the tetrahedra of the scene's object and those that are stored do not agree, as in datasets of earlier \
+         versions, which held none: bake the scene again"
     )]
     OtherTetrahedra,
     /// The lattice that fills the surface would be too fine.
@@ -158,9 +159,11 @@ pub enum ObjectError {
     },
     /// The stiffness is singular, though every part is grounded: springs and ground leave a motion free.
     #[error(
-        "the stiffness is not positive definite (reciprocal condition {reciprocal_condition:.0e}): node {node} can move \
-         along ({:.2}, {:.2}, {:.2}) almost without force; axial springs leave such mechanisms, and a skin on sliver \
-         triangles comes near them: ground more nodes, stiffen the ground, use isotropic springs, or mesh evenly", .direction.x, .direction.y, .direction.z
+        "the stiffness is not positive definite (reciprocal condition {reciprocal_condition:.0e}): node {node} can \
+         move along ({:.2}, {:.2}, {:.2}) almost without force; axial springs leave such mechanisms, and a skin on \
+         sliver triangles comes near them: ground more nodes, stiffen the ground, use isotropic springs, or mesh \
+         evenly",
+        .direction.x, .direction.y, .direction.z
     )]
     Mechanism {
         /// The node that moves most.
@@ -230,8 +233,8 @@ pub enum SurfaceDefect {
     },
     /// An edge with a triangle on one side only.
     #[error(
-        "the surface is open: edge {} to {} has a triangle on one side only ({triangle}); there are {edges} such edges: \
-         close the holes", .nodes[0], .nodes[1]
+        "the surface is open: edge {} to {} has a triangle on one side only ({triangle}); there are {edges} such \
+         edges: close the holes", .nodes[0], .nodes[1]
     )]
     Open {
         /// The two ends of one such edge.
@@ -266,8 +269,8 @@ pub enum SurfaceDefect {
     },
     /// Two sheets of the surface cross or touch.
     #[error(
-        "the surface crosses or touches itself: triangles {} and {} meet near ({:.4}, {:.4}, {:.4}) m: part the pieces, or join \
-         them into one surface (a boolean union in Blender or MeshLab)",
+        "the surface crosses or touches itself: triangles {} and {} meet near ({:.4}, {:.4}, {:.4}) m: part the \
+         pieces, or join them into one surface (a boolean union in Blender or MeshLab)",
         .triangles[0], .triangles[1], .place.x, .place.y, .place.z
     )]
     Crossing {

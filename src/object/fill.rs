@@ -12,7 +12,7 @@
 
 use super::ObjectError;
 use super::elasticity::Solid;
-use crate::tolerances::GRID_LINE;
+use crate::scene::GRID_LINE;
 use glam::{DVec3, IVec3};
 use std::collections::HashMap;
 

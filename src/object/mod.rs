@@ -257,7 +257,7 @@ fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {
     Ok(())
 }
 
-/// How messages call the surface.
+/// Returns how messages call the surface.
 fn surface_name(spec: &ObjectSpec) -> String {
     match &spec.shape {
         Shape::Sphere { .. } | Shape::Icosphere { .. } => "sphere".to_owned(),

@@ -81,7 +81,7 @@ impl Mesh<'_> {
         self.nodes[self.triangles[t][(k + 2) % 3] as usize]
     }
 
-    /// Where the node in the middle of edge `k` of triangle `t` goes [m].
+    /// Returns where the node in the middle of edge `k` of triangle `t` goes [m].
     fn midpoint(&self, t: usize, k: usize) -> DVec3 {
         let (across, back) = self.across(t, k);
         let ends = [(t, k), (across, back)];

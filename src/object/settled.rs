@@ -1,8 +1,11 @@
 //! Where an object comes to rest under constant loads.
 
 use super::{Factor, FactorError, Object, Stiffening};
-use crate::tolerances::SETTLED;
 use glam::DVec3;
+
+/// Last step of an equilibrium of stiffening springs over its displacement [1]: a pixel is a thousandth of a
+/// picture.
+const SETTLED: f64 = 1e-9;
 
 /// Steps after which an equilibrium of stiffening springs is as good as it gets: each leaves at most 1 - 1/kappa of the
 /// error, and kappa is at most 100.

@@ -66,7 +66,7 @@ impl Stiffening {
         &self.unit_strain_force
     }
 
-    /// By how much K1 u exceeds the springs' force grad W(u), added to `force` [N].
+    /// Adds to `force` by how much K1 u exceeds the springs' force grad W(u) [N].
     pub fn relieve(&self, displacement: &[DVec3], force: &mut [DVec3]) {
         for (node, force) in force.iter_mut().enumerate() {
             *force += self.relief_on(node, displacement);

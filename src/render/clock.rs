@@ -70,6 +70,7 @@ mod system {
         let _ = clock_nanosleep_absolute(ClockId::Monotonic, &time);
     }
 
+    /// Gives the calling thread a real-time priority.
     pub fn raise_priority() -> io::Result<()> {
         let parameter = libc::sched_param { sched_priority: PRIORITY };
         // SAFETY: `parameter` is valid for reading; the thread is the calling one.
@@ -152,5 +153,5 @@ mod system {
     pub fn unlock_memory() {}
 }
 
-pub use system::{counter_rate, now, processor, sleep_until, unlock_memory};
-use system::{lock_memory, raise_priority, take_short_turns};
+pub use system::{counter_rate, now, processor, raise_priority, sleep_until, unlock_memory};
+use system::{lock_memory, take_short_turns};

@@ -9,7 +9,7 @@
 //! *Solved.* A store of nodes at several levels keeps no forces. There a thread of its own solves the equilibrium of
 //! the scene in the dataset once a frame; its forces are those of the configuration itself.
 
-use super::graphics::GraphicsError;
+use super::graphics_error::GraphicsError;
 use crate::{
     contact::{Model, NodeForce, Solver, Status},
     dataset::{Dataset, Surface},

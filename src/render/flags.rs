@@ -27,7 +27,7 @@ pub enum Fault {
     #[error("the device leapt: look for lost encoder counts or raise speed_limit")]
     Leap,
     /// The device's port has given more energy than it took, by more than
-    /// [`GREATEST_GIVEN_ENERGY`](crate::tolerances::GREATEST_GIVEN_ENERGY).
+    /// [`GREATEST_GIVEN_ENERGY`](super::haptic::GREATEST_GIVEN_ENERGY).
     #[error(
         "the loop gave the hand energy from nowhere: lower the gains to the bounds that were reported or name \
          passivity_control"

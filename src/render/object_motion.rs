@@ -15,7 +15,7 @@
 //!
 //! `ObjectMotion::load` and `ObjectMotion::advance` are the twins of the entry points in `shaders/frame.wgsl`.
 
-use super::graphics::GraphicsError;
+use super::graphics_error::GraphicsError;
 use crate::{
     object::{Factor, Object, Stiffening, settled},
     scene::GraphicsEffects,

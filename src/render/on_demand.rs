@@ -214,7 +214,7 @@ struct WorkerEnds {
 }
 
 impl WorkerEnds {
-    /// Solves in threads of their own until `over` is raised; tells through `ready` that they have begun, or why not.
+    /// Solves in threads of their own until `over` is raised; reports through `ready` that they have begun, or why not.
     fn serve(
         self,
         model: &Model<'_>,

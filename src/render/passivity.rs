@@ -11,8 +11,7 @@
 //! - Encoder, per joint, if its step Delta is given: `K <= 2 fc / Delta`, fc the device's dry friction (Diolaiti,
 //!   Niemeyer, Barbagli and Salisbury 2006; Abbott and Okamura 2005).
 
-use super::trace::JointLabel;
-use crate::{field::TorqueField, scene::HapticsSpec};
+use crate::{dataset::JointLabel, field::TorqueField, scene::HapticsSpec};
 use serde::Serialize;
 
 /// A gain and its passivity bound. Beyond it the loop runs, and may create energy.

@@ -13,10 +13,12 @@ use super::{
     graphics::Graphics,
     haptic::{Haptics, Inputs},
     session::{Driver, Frames, Plan, SessionError},
-    trace::{JointLabel, Tick, Trace, plain},
+    trace::{Tick, Trace},
 };
 use crate::{
     JointVector,
+    csv::Table,
+    dataset::JointLabel,
     device::{Applied, Device, Reading},
     input,
 };
@@ -131,29 +133,28 @@ impl Recording {
     /// Those of `out`.
     pub fn write(&self, joints: &[JointLabel], out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "# a session of haptize {}; `haptize play --replay` gives it again", env!("CARGO_PKG_VERSION"))?;
-        write!(out, "{START}")?;
-        write_vector(out, &self.start, joints.len())?;
-        write!(out, "\n{KEPT}")?;
-        self.kept.iter().try_for_each(|time| write!(out, ",{time}"))?;
-        write!(out, "\nelapsed [s],interval [s],age [s],restart,frames")?;
-        for what in ["position", "hand", "torque", "proxy", "held"] {
-            for joint in joints {
-                let unit = match (what, joint.unit.as_str()) {
-                    ("torque" | "held", "m") => "N",
-                    ("torque" | "held", _) => "N m",
-                    (_, unit) => unit,
-                };
-                write!(out, ",{what} {} [{unit}]", plain(&joint.name))?;
-            }
+        let mut table = Table::new(out);
+        // Empty fields where the session has no such vector.
+        let vector = |table: &mut Table<_>, vector: &JointVector| {
+            (0..joints.len()).try_for_each(|joint| table.optional(vector.get(joint)).map(|_| ()))
+        };
+        vector(table.field(START)?, &self.start)?;
+        table.end()?;
+        table.field(KEPT)?.fields(&self.kept)?.end()?;
+        table.fields(["elapsed [s]", "interval [s]", "age [s]", "restart", "frames"])?;
+        for what in ["position", "hand"] {
+            table.fields(joints.iter().map(|joint| joint.heading(what)))?;
         }
-        writeln!(out)?;
+        table.fields(joints.iter().map(|joint| joint.effort_heading("torque")))?;
+        table.fields(joints.iter().map(|joint| joint.heading("proxy")))?;
+        table.fields(joints.iter().map(|joint| joint.effort_heading("held")))?.end()?;
         for row in &self.rows {
             let Inputs { position, age, elapsed, interval } = &row.inputs;
-            write!(out, "{elapsed},{interval},{age},{},{}", u8::from(row.restart), row.frames)?;
-            for vector in [position, &row.hand, &row.torque, &row.proxy, &row.held] {
-                write_vector(out, vector, joints.len())?;
+            table.fields([elapsed, interval, age])?.field(u8::from(row.restart))?.field(row.frames)?;
+            for column in [position, &row.hand, &row.torque, &row.proxy, &row.held] {
+                vector(&mut table, column)?;
             }
-            writeln!(out)?;
+            table.end()?;
         }
         Ok(())
     }
@@ -266,13 +267,6 @@ impl Device for Playback<'_> {
         let held = row.map(|row| row.held).filter(|held| held.len() == torque.len());
         Applied::whole(&held.unwrap_or(*torque))
     }
-}
-
-fn write_vector(out: &mut impl Write, vector: &JointVector, joints: usize) -> io::Result<()> {
-    for a in 0..joints {
-        if vector.len() == joints { write!(out, ",{}", vector[a])? } else { write!(out, ",")? }
-    }
-    Ok(())
 }
 
 fn row(text: &str, joints: usize) -> Result<Row, String> {

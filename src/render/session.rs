@@ -9,9 +9,9 @@ use super::{
     graphics::{Graphics, GraphicsError},
     haptic::{Haptics, Inputs, State},
     live::Live,
-    trace::{Frame, JointLabel, Tick, Trace},
+    trace::{Frame, Tick, Trace},
 };
-use crate::{JointVector, device::Device, memory};
+use crate::{JointVector, dataset::JointLabel, device::Device, memory};
 
 /// How long, and what to keep of the object's shape.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,7 +112,7 @@ impl<'session> Driver<'session> {
         self.restart = true;
     }
 
-    /// Where the device was when the session began [rad or m].
+    /// Returns where the device was when the session began [rad or m].
     #[must_use]
     pub fn start(&self) -> &JointVector {
         &self.start

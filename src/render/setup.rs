@@ -9,17 +9,15 @@ use super::{
     own_motion,
     passivity::{self, Bound},
     session::Plan,
-    trace::JointLabel,
 };
 use crate::{
     JointVector,
-    dataset::{Dataset, Grid},
+    dataset::{Dataset, Grid, JointLabel},
     device::{HandError, Motion, SimulatedHand},
     field::{FieldError, TorqueField, range::HaptizedRange},
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{BOUNDARY_SLOPE, HapticsSpec, Interpolation, ProxyInertia, Rendering, SceneError, THRESHOLD},
-    tolerances::LEVER_ARM,
+    scene::{BOUNDARY_SLOPE, HapticsSpec, Interpolation, LEVER_ARM, ProxyInertia, Rendering, SceneError, THRESHOLD},
 };
 use std::{collections::BTreeMap, sync::Arc};
 

@@ -1,7 +1,8 @@
 //! The torques that the device has been under, tick by tick: a position that was measured some time ago belongs to the
 //! torque of that time, and only with it is the work at the device's port right.
 
-use crate::{JointVector, tolerances::GREATEST_POSITION_AGE};
+use super::watchdog::GREATEST_POSITION_AGE;
+use crate::JointVector;
 
 /// The last torques on the device, in a ring as long as a position may be old.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,7 +9,7 @@ use super::{
     flags::{Fault, Flags},
     haptic::Inputs,
 };
-use crate::{JointVector, device::Applied};
+use crate::{JointVector, csv::Table, dataset::JointLabel, device::Applied};
 use glam::DVec3;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -60,15 +60,6 @@ pub struct Frame {
     pub nodes: Vec<DVec3>,
 }
 
-/// A joint's name and the unit of its coordinate.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct JointLabel {
-    /// As in the dataset.
-    pub name: String,
-    /// `rad` or `m`.
-    pub unit: String,
-}
-
 /// Everything that was recorded.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
@@ -105,7 +96,7 @@ pub struct Summary {
     pub max_device_torque_step: f64,
     /// Largest residual of the energy accounts [J].
     pub max_account_residual: f64,
-    /// The same over the whole session's turnover [1].
+    /// The same over the energy that the whole session exchanged [1].
     pub max_relative_account_residual: f64,
     /// Least that proxy and coupling had absorbed at any tick [J]: not below zero but for rounding.
     pub min_absorbed: f64,
@@ -168,8 +159,8 @@ impl Trace {
         if let (Some(first), Some(last)) = (self.ticks.first(), self.ticks.last()) {
             s.seconds = last.time - first.time;
             s.contact_share = self.ticks.iter().filter(|tick| tick.contact).count() as f64 / self.ticks.len() as f64;
-            if last.accounts.turnover > 0.0 {
-                s.max_relative_account_residual = s.max_account_residual / last.accounts.turnover;
+            if last.accounts.exchanged > 0.0 {
+                s.max_relative_account_residual = s.max_account_residual / last.accounts.exchanged;
             }
             s.leak = last.accounts.leak;
             s.hold_gain = last.accounts.hold_gain();
@@ -185,47 +176,30 @@ impl Trace {
     /// # Errors
     /// Those of `out`.
     pub fn write_ticks(&self, out: &mut impl Write) -> io::Result<()> {
-        write!(out, "time [s]")?;
-        for (what, torque) in [
-            ("hand", false),
-            ("device", false),
-            ("proxy", false),
-            ("device torque", true),
-            ("held torque", true),
-            ("contact torque", true),
-        ] {
-            for joint in &self.joints {
-                let unit = match (torque, joint.unit.as_str()) {
-                    (false, unit) => unit,
-                    (true, "m") => "N",
-                    (true, _) => "N m",
-                };
-                write!(out, ",{what} {} [{unit}]", plain(&joint.name))?;
-            }
+        let mut table = Table::new(out);
+        table.field("time [s]")?;
+        for what in ["hand", "device", "proxy"] {
+            table.fields(self.joints.iter().map(|joint| joint.heading(what)))?;
         }
-        write!(out, ",contact index,contact,contact nodes,flags,fault,clamps,halt")?;
-        for (name, _) in Accounts::default().named() {
-            write!(out, ",{name} [J]")?;
+        for what in ["device torque", "held torque", "contact torque"] {
+            table.fields(self.joints.iter().map(|joint| joint.effort_heading(what)))?;
         }
-        writeln!(out)?;
+        table.fields(["contact index", "contact", "contact nodes", "flags", "fault", "clamps", "halt"])?;
+        table.fields(Accounts::default().named().map(|(name, _)| format!("{name} [J]")))?;
+        table.end()?;
         for tick in &self.ticks {
-            write!(out, "{}", tick.time)?;
+            table.field(tick.time)?;
             let torques = [&tick.device_torque, &tick.applied.torque, &tick.contact_torque];
             for vector in [&tick.hand, &tick.device, &tick.proxy].into_iter().chain(torques) {
-                for value in vector.iter() {
-                    write!(out, ",{value}")?;
-                }
+                table.fields(vector.iter())?;
             }
-            let fault = tick.fault.map(|fault| fault.to_string()).unwrap_or_default();
-            let (index, contact, nodes) = (tick.index, u8::from(tick.contact), tick.contact_nodes);
-            let halt = tick.applied.halt.map(|halt| halt.to_string()).unwrap_or_default();
-            let (flags, clamps) = (tick.flags.bits(), tick.applied.clamps.bits());
-            write!(out, ",{index},{contact},{nodes},{flags},{fault},{clamps},{halt}")?;
+            table.field(tick.index)?.field(u8::from(tick.contact))?.field(tick.contact_nodes)?;
+            table.field(tick.flags.bits())?.optional(tick.fault)?;
+            table.field(tick.applied.clamps.bits())?.optional(tick.applied.halt)?;
             for (_, account) in tick.accounts.named() {
-                write!(out, ",")?;
-                account.map_or(Ok(()), |joules| write!(out, "{joules}"))?;
+                table.optional(account)?;
             }
-            writeln!(out)?;
+            table.end()?;
         }
         Ok(())
     }
@@ -235,19 +209,15 @@ impl Trace {
     /// # Errors
     /// Those of `out`.
     pub fn write_frames(&self, out: &mut impl Write) -> io::Result<()> {
-        writeln!(out, "time [s],node,x [m],y [m],z [m]")?;
+        let mut table = Table::new(out);
+        table.fields(["time [s]", "node", "x [m]", "y [m]", "z [m]"])?.end()?;
         for frame in &self.frames {
             for (node, n) in frame.nodes.iter().enumerate() {
-                writeln!(out, "{},{node},{},{},{}", frame.time, n.x, n.y, n.z)?;
+                table.field(frame.time)?.field(node)?.fields([n.x, n.y, n.z])?.end()?;
             }
         }
         Ok(())
     }
-}
-
-/// A joint's name without the characters that structure a CSV file.
-pub(super) fn plain(name: &str) -> String {
-    name.chars().map(|c| if matches!(c, ',' | '"' | '\n' | '\r') { '_' } else { c }).collect()
 }
 
 /// Euclidean distance of two vectors of the same length.

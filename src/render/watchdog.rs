@@ -15,11 +15,12 @@
 //! `n = W/T + 1`, so that the mean is taken to be `W / (n_k - 1)`. One pause alone, however long it may be
 //! ([`GREATEST_INTERVAL`]), lengthens it by half and is never enough.
 
-use super::{flags::Fault, haptic::Inputs};
-use crate::{
-    JointVector,
-    tolerances::{GREATEST_INPUT, GREATEST_INTERVAL, GREATEST_POSITION_AGE},
-};
+use super::{flags::Fault, inputs::Inputs};
+use crate::{JointVector, input::GREATEST_INPUT, scene::GREATEST_INTERVAL};
+
+/// Greatest age of a device's position on which a torque may rest [s]: ten ticks at 1 kHz. A hand, which moves at below
+/// 10 Hz, has gone on by no more than half a radian of its phase.
+pub const GREATEST_POSITION_AGE: f64 = 0.01;
 
 /// Least time between two ticks [s]: a device's encoder steps, of 1e-5 rad or so, divided by less would give velocities
 /// of tens of rad/s to a device at rest.

@@ -134,8 +134,9 @@ impl Canvas {
     pub fn polyline(&mut self, points: &[(f64, f64)], colour: Colour, width: f64, dashes: Option<[f64; 2]>) {
         let path = Path(points, false);
         let dashes = dashes.map_or_else(String::new, |[dash, gap]| format!(r#" stroke-dasharray="{dash} {gap}""#));
+        let ends = r#"stroke-linejoin="round" stroke-linecap="round""#;
         self.mark(format_args!(
-            r#"<path d="{path}" fill="none" stroke="{colour}" stroke-width="{}" stroke-linejoin="round" stroke-linecap="round"{dashes}{}/>"#,
+            r#"<path d="{path}" fill="none" stroke="{colour}" stroke-width="{}" {ends}{dashes}{}/>"#,
             Number(width),
             Opacity(colour)
         ));
@@ -180,9 +181,8 @@ impl Canvas {
         let [x, y, width, height] = [area.x, area.y, area.width, area.height].map(Number);
         // Named after its rectangle: of several sheets in one page, only equal clips have equal names.
         let name = format!("clip_{x}_{y}_{width}_{height}");
-        self.mark(format_args!(
-            r#"<clipPath id="{name}"><rect x="{x}" y="{y}" width="{width}" height="{height}"/></clipPath><g clip-path="url(#{name})">"#
-        ));
+        let clip = format_args!(r#"<rect x="{x}" y="{y}" width="{width}" height="{height}"/>"#);
+        self.mark(format_args!(r#"<clipPath id="{name}">{clip}</clipPath><g clip-path="url(#{name})">"#));
         marks(self);
         self.mark(format_args!("</g>"));
     }

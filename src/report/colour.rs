@@ -115,7 +115,7 @@ impl ColourMap {
         self.at(self.share(value).clamp(0.0, 1.0))
     }
 
-    /// Where `value` lies between the ends of the colour bar, 0 to 1; beyond that outside.
+    /// Returns where `value` lies between the ends of the colour bar, 0 to 1; beyond that outside.
     #[must_use]
     pub fn share(&self, value: f64) -> f64 {
         let [low, high] = self.range();

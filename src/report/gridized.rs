@@ -9,7 +9,7 @@ use super::{
     chart,
     colour::ColourMap,
     plot::{self, Panel, Scale},
-    press::{subscript, torque_unit},
+    press::subscript,
     ticks,
 };
 use crate::{contact::Status, dataset::Dataset, gridize::Samples};
@@ -60,7 +60,7 @@ pub fn gridized(samples: &Samples, dataset: &Dataset) -> Canvas {
     };
     let name =
         |joint: usize| format!("q{} {} [{}]", subscript(joint + 1), grid.axes[joint].name, grid.axes[joint].unit);
-    let unit = torque_unit(&grid.axes[joints - 1].unit);
+    let unit = grid.axes[joints - 1].effort_unit();
     let up = if joints == 1 { format!("τ [{unit}]") } else { name(shown[1]) };
     for (number, (what, spots)) in [("samples", &before), ("grid", &after)].into_iter().enumerate() {
         let left = chart::MARGIN + 40.0 + number as f64 * (PANEL + 42.0);

@@ -5,7 +5,7 @@ use super::{
     canvas::{Area, Canvas},
     chart, colour,
     plot::{self, Entry, Mark, Panel, Scale},
-    press::{subscript, torque_unit},
+    press::subscript,
     ticks,
 };
 use crate::gridize::Samples;
@@ -43,7 +43,7 @@ pub fn hysteresis(forward: &Samples, backward: &Samples, lead: usize) -> Canvas 
         };
         let lead_label = &forward.joints[lead];
         let across = format!("q{} {} [{}]", subscript(lead + 1), lead_label.name, lead_label.unit);
-        let up = format!("τ{} {} [{}]", subscript(joint + 1), label.name, torque_unit(&label.unit));
+        let up = format!("τ{} {} [{}]", subscript(joint + 1), label.name, label.effort_unit());
         let panel = Panel {
             area,
             across: Scale::linear(ticks::snapped(range(|samples| &samples.configurations, lead)), across),

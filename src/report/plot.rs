@@ -68,7 +68,7 @@ impl Scale {
         Self { range: [low, high.max(10.0_f64.powf(0.1) * low)], title: title.into(), steps: Steps::Logarithmic }
     }
 
-    /// Where `value` lies between the ends, 0 to 1; beyond that outside.
+    /// Returns where `value` lies between the ends, 0 to 1; beyond that outside.
     fn share(&self, value: f64) -> f64 {
         let [low, high] = self.range;
         match self.steps {

@@ -116,7 +116,7 @@ fn predicted(dataset: &Dataset, lattice: &Lattice, q: &[f64]) -> Option<Vec<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gridize::{Interpolation, JointLabel};
+    use crate::{dataset::JointLabel, gridize::Interpolation};
 
     /// Samples of sin 4 q1 + q2 over a jittered lattice, each with an error of `noise` of one sign or the other.
     fn samples(noise: f64) -> Samples {

@@ -12,6 +12,7 @@ use crate::{
         accounts::Accounts,
         trace::{Tick, Trace},
     },
+    scene::effort_unit,
 };
 
 /// Draws joint contact torque, change of configuration and number of contacting object nodes against time, contact
@@ -112,7 +113,7 @@ fn per_joint(trace: &Trace, names: [&str; 2], torque: bool, value: impl Fn(&Tick
             let name = format!("{symbol}{} {}", subscript(number + 1), joint.name);
             curve(trace, &name, colour::series(number), |tick| value(tick, number).unwrap_or(f64::NAN))
         });
-        let unit = if torque { torque_unit(unit) } else { unit };
+        let unit = if torque { effort_unit(unit) } else { unit };
         Lane { title: format!("{what} [{unit}]"), curves: curves.collect(), height: 130.0, counts: false }
     });
     let lanes: Vec<Lane> = lanes.collect();
@@ -140,9 +141,4 @@ pub(super) fn contact_intervals(ticks: &[Tick]) -> Vec<[f64; 2]> {
 pub(super) fn subscript(number: usize) -> String {
     const DIGITS: [char; 10] = ['₀', '₁', '₂', '₃', '₄', '₅', '₆', '₇', '₈', '₉'];
     number.to_string().bytes().map(|byte| DIGITS[usize::from(byte - b'0')]).collect()
-}
-
-/// Unit of the generalised force that belongs to a joint coordinate in `unit`.
-pub(super) fn torque_unit(unit: &str) -> &'static str {
-    if unit == "m" { "N" } else { "N m" }
 }

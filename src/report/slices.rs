@@ -9,7 +9,7 @@ use super::{
     chart::{self, Curve, Lane, Stack},
     colour::{self, ColourMap},
     plot::{self, Entry, Mark, Panel, Scale},
-    press::{subscript, torque_unit},
+    press::subscript,
     ticks,
 };
 use crate::{contact::Status, dataset::Dataset};
@@ -174,7 +174,7 @@ impl Slice {
             "τ{} {} [{}]",
             subscript(joint + 1),
             dataset.grid.axes[joint].name,
-            torque_unit(&dataset.grid.axes[joint].unit)
+            dataset.grid.axes[joint].effort_unit()
         );
         plot::colour_bar(canvas, bar, map, &title, Anchor::End);
     }
@@ -217,7 +217,7 @@ impl Slice {
         Scale::linear(range, format!("q{} {} [{}]", subscript(self.axes[side] + 1), axis.name, axis.unit))
     }
 
-    /// Where the plane lies, and how much of it is in contact.
+    /// Returns where the plane lies, and how much of it is in contact.
     fn caption(&self, dataset: &Dataset) -> String {
         let q = dataset.grid.configuration(self.origin);
         let fixed: Vec<String> = (0..dataset.grid.joints())
@@ -301,7 +301,7 @@ fn line(dataset: &Dataset) -> Canvas {
         headline: "Joint contact torque over C-space".to_owned(),
         across: format!("q₁ {} [{}]", axis.name, axis.unit),
         lanes: vec![Lane {
-            title: format!("τ₁ {} [{}]", axis.name, torque_unit(&axis.unit)),
+            title: format!("τ₁ {} [{}]", axis.name, axis.effort_unit()),
             curves: vec![curve],
             height: 240.0,
             counts: false,

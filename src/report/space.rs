@@ -11,7 +11,7 @@ use super::{
     chart,
     colour::{self, ColourMap},
     plot::{self, Entry, Mark},
-    press::{subscript, torque_unit},
+    press::subscript,
     raster::{Camera, Raster},
     slices::{is_mixed, torque_size},
     ticks,
@@ -60,7 +60,7 @@ pub fn space(dataset: &Dataset) -> Canvas {
     space_box.label(&mut canvas, raster.camera(), direction, dataset);
     canvas.picture((PICTURE.x, PICTURE.y), raster.picture());
     let unit =
-        if is_mixed(dataset) { "N m" } else { dataset.grid.axes.first().map_or("N m", |axis| torque_unit(&axis.unit)) };
+        if is_mixed(dataset) { "N m" } else { dataset.grid.axes.first().map_or("N m", |axis| axis.effort_unit()) };
     let bar = Area { x: PICTURE.right() + 30.0, y: PICTURE.y + 110.0, width: 14.0, height: 260.0 };
     plot::colour_bar(&mut canvas, bar, map, &format!("‖τ‖ [{unit}]"), Anchor::Start);
     canvas
@@ -148,7 +148,7 @@ impl Box3 {
         Self { ranges, sides, cell: cells.product::<f64>().powf(1.0 / shown as f64).min(0.1) }
     }
 
-    /// Where a configuration lies.
+    /// Returns where a configuration lies.
     fn place(&self, q: &[f64]) -> DVec3 {
         DVec3::from_array(std::array::from_fn(|axis| {
             let [low, high] = self.ranges[axis];

@@ -1,7 +1,10 @@
 //! Records of a chunk of an MCAP file, taken out of their compression.
 
-use super::{RosError, messages::LONGEST_RECORD};
+use super::RosError;
 use std::{borrow::Cow, io::Read, path::Path};
+
+/// Longest record or chunk that is read [bytes]: a chunk of a recorder's is a few MiB.
+pub(super) const LONGEST_RECORD: u64 = 1 << 28;
 
 /// A chunk as the file holds it.
 pub(super) struct Chunk<'a> {
@@ -51,8 +54,8 @@ impl<'a> Chunk<'a> {
             other => {
                 let name = String::from_utf8_lossy(other);
                 return Err(refuse(format!(
-                    "its chunks are compressed by {name}, and lz4 and zstd are read: write it without by `mcap decompress \
-                     IN.mcap -o OUT.mcap`"
+                    "its chunks are compressed by {name}, and lz4 and zstd are read: write it without by `mcap \
+                     decompress IN.mcap -o OUT.mcap`"
                 )));
             }
         };

@@ -63,8 +63,8 @@ impl Course {
         }
         if course.samples.is_empty() {
             let what = format!(
-                "no message of {} gives the positions of {}; its last one names {}: give another topic by --topic, or the \
-                 joints these names",
+                "no message of {} gives the positions of {}; its last one names {}: give another topic by --topic, or \
+                 the joints these names",
                 course.topic,
                 joints.join(", "),
                 if names.is_empty() { "none".to_owned() } else { names.join(", ") }

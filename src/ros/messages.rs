@@ -4,7 +4,11 @@
 //! text's length says, up to 4 GB, before it looks whether they are there, and its reader takes a record that is longer
 //! than its chunk for one that is not. Memory is that of the longest record or chunk.
 
-use super::{MESSAGE_ENCODING, RosError, TYPE, chunk::Chunk, is_mcap};
+use super::{
+    MESSAGE_ENCODING, RosError, TYPE,
+    chunk::{Chunk, LONGEST_RECORD},
+    is_mcap,
+};
 use crate::input;
 use mcap::{
     McapError,
@@ -17,9 +21,6 @@ use std::{
     io::{BufReader, ErrorKind, Read},
     path::{Path, PathBuf},
 };
-
-/// Longest record or chunk that is read [bytes]: a chunk of a recorder's is a few MiB.
-pub(super) const LONGEST_RECORD: u64 = 1 << 28;
 
 /// The messages: topic, log time [ns], bytes.
 pub(super) struct Messages {

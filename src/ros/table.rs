@@ -6,7 +6,7 @@
 //! zero, the time at which it was logged.
 
 use super::{JointState, RosError, TYPE, messages::Messages};
-use crate::input;
+use crate::{csv::plain, input};
 use std::{
     collections::{BTreeMap, BTreeSet},
     fmt::Write as _,
@@ -169,9 +169,4 @@ pub(super) fn chosen(path: &Path, topic: Option<&str>) -> Result<String, RosErro
         (None, []) => Err(wrong(&format!("no message of it is a {TYPE}"))),
         (None, _) => Err(wrong("name one of several topics by --topic")),
     }
-}
-
-/// A joint's name without the characters that structure a table.
-pub(super) fn plain(name: &str) -> String {
-    name.chars().map(|c| if matches!(c, ',' | '"' | '\n' | '\r') { '_' } else { c }).collect()
 }

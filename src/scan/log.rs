@@ -6,11 +6,7 @@
 //! the plan, time, measured configuration, contact torque on the proxy (minus control torque, gravity already
 //! subtracted), standard deviation of a single tick's torque, ticks averaged, status.
 
-use crate::{
-    JointVector, MAX_JOINTS,
-    gridize::{JointLabel, Samples},
-    input,
-};
+use crate::{JointVector, MAX_JOINTS, csv::Table, dataset::JointLabel, gridize::Samples, input};
 use std::{
     fmt::Write as _,
     fs::{File, OpenOptions},
@@ -138,20 +134,14 @@ pub enum LogError {
     },
 }
 
-fn effort(unit: &str) -> &'static str {
-    if unit == "m" { "N" } else { "N m" }
-}
-
 impl LogHeader {
     fn columns(&self) -> String {
-        let mut text = "point,time [s]".to_owned();
-        for (what, is_effort) in [("q", false), ("tau", true), ("std", true)] {
-            for JointLabel { name, unit } in &self.joints {
-                let unit = if is_effort { effort(unit) } else { unit };
-                let _ = write!(text, ",{what} {name} [{unit}]");
-            }
+        let mut columns = vec!["point".to_owned(), "time [s]".to_owned()];
+        columns.extend(self.joints.iter().map(|joint| joint.heading("q")));
+        for what in ["tau", "std"] {
+            columns.extend(self.joints.iter().map(|joint| joint.effort_heading(what)));
         }
-        text + ",ticks,status"
+        columns.join(",") + ",ticks,status"
     }
 
     /// The first two lines.
@@ -217,20 +207,21 @@ impl LogWriter {
     /// # Errors
     /// Those of the file.
     pub fn append(&mut self, row: &ScanRow) -> Result<(), LogError> {
-        let mut text = format!("{},{}", row.point, row.time);
-        for vector in [&row.q, &row.torque, &row.deviation] {
-            for value in vector.iter() {
-                let _ = write!(text, ",{value}");
-            }
-        }
-        let _ = writeln!(text, ",{},{}", row.ticks, row.status.name());
-        self.write(&text)
+        let written = write_row(row, &mut self.file).and_then(|()| self.file.flush());
+        written.map_err(|source| LogError::File { path: self.path.clone(), source })
     }
 
     fn write(&mut self, text: &str) -> Result<(), LogError> {
         let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.flush());
         written.map_err(|source| LogError::File { path: self.path.clone(), source })
     }
+}
+
+fn write_row(row: &ScanRow, out: impl Write) -> io::Result<()> {
+    let mut table = Table::new(out);
+    table.field(row.point)?.field(row.time)?;
+    table.fields(row.q.iter().chain(row.torque.iter()).chain(row.deviation.iter()))?;
+    table.field(row.ticks)?.field(row.status.name())?.end()
 }
 
 /// Length of the file up to its last line end [bytes].

@@ -23,16 +23,18 @@ pub use trajectory::Trajectory;
 
 use crate::{
     JointVector,
-    gridize::JointLabel,
-    proxy::{Chain, Pose},
-    scene::{JointKind, PlanSpec, ScanSpec},
-    tolerances,
+    dataset::JointLabel,
+    proxy::{Chain, Joint, Pose},
+    scene::{PlanSpec, ScanSpec},
 };
 use glam::DVec3;
 use std::{
     collections::HashSet,
     sync::atomic::{AtomicBool, Ordering},
 };
+
+/// Acceleration of gravity [m/s^2], standard value.
+pub const GRAVITY: f64 = 9.806_65;
 
 /// Time for which a device is braked after a limit [s]: several time constants of damping against inertia.
 const BRAKE_TIME: f64 = 0.3;
@@ -117,12 +119,8 @@ struct Driver<'a> {
 /// Names and units of a chain's joints.
 #[must_use]
 pub fn labels(chain: &Chain) -> Vec<JointLabel> {
-    let unit = |kind| if kind == JointKind::Revolute { "rad" } else { "m" };
-    chain
-        .joints
-        .iter()
-        .map(|joint| JointLabel { name: joint.name.clone(), unit: unit(joint.kind).to_owned() })
-        .collect()
+    let label = |joint: &Joint| JointLabel { name: joint.name.clone(), unit: joint.kind.unit().to_owned() };
+    chain.joints.iter().map(label).collect()
 }
 
 /// A rig and a log, ready to scan.
@@ -295,7 +293,7 @@ impl<'a> Driver<'a> {
     /// Holds `torque` and the weight of the links for a tick.
     fn hold(&mut self, torque: &JointVector) -> Result<(), RigError> {
         self.chain.pose(&self.reading.position, &mut self.pose);
-        let weight = self.chain.gravity_torque(&self.pose, DVec3::new(0.0, 0.0, -tolerances::GRAVITY));
+        let weight = self.chain.gravity_torque(&self.pose, DVec3::new(0.0, 0.0, -GRAVITY));
         let mut total = *torque;
         total.iter_mut().zip(weight.iter()).for_each(|(total, weight)| *total -= weight);
         self.reading = self.rig.hold(&total, self.period)?;

@@ -132,7 +132,7 @@ fn steady_torque_is_that_of_the_block_where_it_is_touched_and_nothing_elsewhere(
 fn gravity_is_subtracted() {
     let mut scene = scene();
     scene.scan.simulated.corner.z -= 1.0;
-    let heavy = scene.proxy.joints.iter().map(|joint| joint.mass).sum::<f64>() * tolerances::GRAVITY * 0.1;
+    let heavy = scene.proxy.joints.iter().map(|joint| joint.mass).sum::<f64>() * GRAVITY * 0.1;
     let bench = Bench::new(scene);
     let (report, rows) = bench.scan();
     assert_eq!(report.unwrap().steady, 16);
@@ -183,24 +183,31 @@ fn limits_stop_the_scan_log_the_point_and_let_it_go_on_after_it() {
     limited(&|scene| scene.scan.limits.workspace[0].z = -0.008, "outside the workspace");
 }
 
+/// A simulated rig whose readings pass through a function.
+struct Altered<F>(SimulatedRig, F);
+
+impl<F: FnMut(RigReading) -> Result<RigReading, RigError>> Rig for Altered<F> {
+    fn hold(&mut self, torque: &JointVector, period: f64) -> Result<RigReading, RigError> {
+        let reading = self.0.hold(torque, period)?;
+        (self.1)(reading)
+    }
+    fn description(&self) -> String {
+        self.0.description()
+    }
+    fn is_simulated(&self) -> bool {
+        true
+    }
+}
+
 #[test]
 fn a_rig_that_fails_ends_the_scan_and_keeps_the_log() {
-    struct Failing(SimulatedRig, usize);
-    impl Rig for Failing {
-        fn hold(&mut self, torque: &JointVector, period: f64) -> Result<RigReading, RigError> {
-            self.1 += 1;
-            if self.1 > 3000 { Err(RigError("no answer".to_owned())) } else { self.0.hold(torque, period) }
-        }
-        fn description(&self) -> String {
-            self.0.description()
-        }
-        fn is_simulated(&self) -> bool {
-            true
-        }
-    }
     let bench = Bench::new(scene());
     let mut log = LogWriter::create(&bench.path(), &bench.header()).unwrap();
-    let mut rig = Failing(bench.rig(), 0);
+    let mut readings = 0;
+    let mut rig = Altered(bench.rig(), |reading| {
+        readings += 1;
+        if readings > 3000 { Err(RigError("no answer".to_owned())) } else { Ok(reading) }
+    });
     let result = bench.session(&mut rig, &mut log, |session| session.scan(&bench.plan, &[]));
     assert!(result.err().unwrap().to_string().contains("no answer"));
     assert!(!ScanLog::read(&bench.path()).unwrap().rows.is_empty());
@@ -240,22 +247,10 @@ fn a_guided_scan_logs_the_object_alone_and_never_the_hand() {
 
 #[test]
 fn a_hand_on_the_device_in_a_planned_scan_leaves_the_point_open() {
-    struct Held(SimulatedRig);
-    impl Rig for Held {
-        fn hold(&mut self, torque: &JointVector, period: f64) -> Result<RigReading, RigError> {
-            let reading = self.0.hold(torque, period)?;
-            Ok(RigReading { held: (2.0..3.5).contains(&reading.time), ..reading })
-        }
-        fn description(&self) -> String {
-            self.0.description()
-        }
-        fn is_simulated(&self) -> bool {
-            true
-        }
-    }
     let bench = Bench::new(scene());
     let mut log = LogWriter::create(&bench.path(), &bench.header()).unwrap();
-    let mut rig = Held(bench.rig());
+    let held = |reading: RigReading| Ok(RigReading { held: (2.0..3.5).contains(&reading.time), ..reading });
+    let mut rig = Altered(bench.rig(), held);
     let report = bench.session(&mut rig, &mut log, |session| session.scan(&bench.plan, &[])).unwrap();
     assert!(!report.whole && report.steady < 16 && report.steady > 0, "{report:?}");
     drop(log);

@@ -8,7 +8,8 @@
 use super::{Plan, Stop};
 use crate::{
     JointVector,
-    gridize::JointLabel,
+    csv::{Table, plain},
+    dataset::JointLabel,
     ros::{JointState, JointStateWriter},
 };
 use std::{
@@ -54,13 +55,11 @@ impl Trajectory {
     /// # Errors
     /// Those of `out`.
     pub fn write_csv(&self, joints: &[JointLabel], out: &mut impl Write) -> io::Result<()> {
-        write!(out, "time [s]")?;
-        joints.iter().try_for_each(|joint| write!(out, ",{} [{}]", joint.name.replace([',', '"'], "_"), joint.unit))?;
-        writeln!(out)?;
+        let mut table = Table::new(out);
+        table.field("time [s]")?;
+        table.fields(joints.iter().map(|joint| format!("{} [{}]", plain(&joint.name), joint.unit)))?.end()?;
         for (time, q) in &self.rows {
-            write!(out, "{time}")?;
-            q.iter().try_for_each(|q| write!(out, ",{q}"))?;
-            writeln!(out)?;
+            table.field(time)?.fields(q.iter())?.end()?;
         }
         Ok(())
     }

@@ -25,10 +25,10 @@ pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, Spe
 pub use shape::{LinkForm, LinkShape, LinkSurface, MAX_SHAPES, MAX_SURFACE};
 pub use spec::{
     Algorithm, AxisSpec, BOUNDARY_SLOPE, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec,
-    FrictionSpec, GraphicsEffects, GraphicsSpec, GridSpec, GroundNodes, GroundSpec, HandSpec, HapticEffects,
-    HapticsSpec, InclusionPlace, InclusionSpec, Interpolation, JointKind, JointSpec, MAX_CONTACT_NODES, Material,
-    MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec, Shape, SkinSpec, SpringKind, SpringSpec,
-    StiffeningSpec, THRESHOLD, Waypoint,
+    FrictionSpec, GREATEST_INTERVAL, GRID_LINE, GRID_STEP_SLACK, GraphicsEffects, GraphicsSpec, GridSpec, GroundNodes,
+    GroundSpec, HandSpec, HapticEffects, HapticsSpec, InclusionPlace, InclusionSpec, Interpolation, JointKind,
+    JointSpec, LEVER_ARM, MAX_CONTACT_NODES, Material, MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec,
+    Shape, SkinSpec, SpringKind, SpringSpec, StiffeningSpec, THRESHOLD, Waypoint, effort_unit,
 };
 
 pub(crate) use inertia::positive_semidefinite;

@@ -9,6 +9,14 @@ use serde::Deserialize;
 use std::ops::Range;
 use std::path::PathBuf;
 
+/// Greatest time between two ticks [s]: a whole period of a hand's fastest motion, 10 Hz. After more, the position
+/// before says nothing about the velocity.
+pub const GREATEST_INTERVAL: f64 = 0.1;
+
+/// Lever arm with which a prismatic joint counts among revolute ones [m]: a tenth of a metre, the size of a tool in a
+/// hand. Gains' defaults and errors over joints of both kinds are converted with it.
+pub const LEVER_ARM: f64 = 0.1;
+
 /// The deformable virtual object (section 2.1).
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectSpec {
@@ -230,6 +238,29 @@ pub enum JointKind {
     Prismatic,
 }
 
+impl JointKind {
+    /// Unit of its coordinate.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Revolute => "rad",
+            Self::Prismatic => "m",
+        }
+    }
+
+    /// Unit of the torque, or force, that acts along it.
+    #[must_use]
+    pub fn effort_unit(self) -> &'static str {
+        effort_unit(self.unit())
+    }
+}
+
+/// Returns the unit of what acts along a coordinate in `unit`: a torque, or a force where that is a length.
+#[must_use]
+pub fn effort_unit(unit: &str) -> &'static str {
+    if unit == "m" { "N" } else { "N m" }
+}
+
 /// A contact node of a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProxyNodeSpec {
@@ -328,6 +359,13 @@ pub struct AxisSpec {
     /// At least 2.
     pub count: usize,
 }
+
+/// How far beyond an end a grid line may lie and still count, in steps [1]: spacings such as pi/60 are written with a
+/// handful of digits, and 1e-6 of a step changes no torque that is interpolated between lines.
+pub const GRID_STEP_SLACK: f64 = 1e-6;
+
+/// A grid line this fraction of a step outside the samples' range still lies on its end.
+pub const GRID_LINE: f64 = 1e-9;
 
 /// Threshold Ith of the contact index unless the scene names one [1]: the paper's.
 pub const THRESHOLD: f64 = 0.5;

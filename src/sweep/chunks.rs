@@ -40,7 +40,7 @@ pub(super) trait Store: Send {
     fn append(&mut self, first: usize, chunk: &Columns) -> Result<(), SweepError>;
     /// Adds something that provenance will tell.
     fn note(&mut self, notice: &str) -> Result<(), SweepError>;
-    /// Where an interrupted sweep continues from.
+    /// Returns where an interrupted sweep continues from.
     fn path(&self) -> Option<&Path>;
 }
 

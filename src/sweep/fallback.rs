@@ -1,8 +1,8 @@
 //! A backend on a device that may fail for good, and the CPU in its place from then on.
 //!
 //! A GPU is lost by a driver's reset, by sleep, by being pulled out, or by other programs that take its memory. Its
-//! solver first tries again by itself with smaller batches, and then goes on with its other devices; what it cannot mend
-//! ends here. The batches under way and all that follow are then solved by the CPU, so that a sweep of hours goes on,
+//! solver first tries again with smaller batches, and then goes on with its other devices; what it cannot mend ends
+//! here. The batches under way and all that follow are then solved by the CPU, so that a sweep of hours goes on,
 //! and [`Backend::notices`] reports it.
 
 use super::{Backend, CpuBackend};

@@ -287,7 +287,8 @@ impl FreeSpace<'_> {
         if least < 0.0 && proximity.gap(&centre) < 0.0 { Found::Touching(block.middle()) } else { Found::Unknown }
     }
 
-    /// How far a node moves at most, within the block of half-widths `wide` around the configuration placed last.
+    /// Returns how far a node moves at most, within the block of half-widths `wide` around the configuration placed
+    /// last.
     fn motion(&self, proximity: &Proximity<'_>, node: usize, wide: &JointVector) -> f64 {
         let link = self.model.chain.nodes[node].link;
         (0..=link).map(|j| self.slope(proximity, node, j, wide) * wide[j]).sum()

@@ -21,7 +21,7 @@ use crate::{
     dataset::{self, Axis, Contacts, Dataset, Grid, Heading, Provenance, Surface, Target},
     memory,
     object::{Object, Skin},
-    scene::{HapticsSpec, JointKind, Scene},
+    scene::{HapticsSpec, Scene},
 };
 use clap::ValueEnum;
 use std::{
@@ -96,10 +96,7 @@ pub struct Sweep<'a> {
 pub fn grid_of(scene: &Scene) -> Grid {
     let axes = scene.proxy.joints.iter().zip(&scene.grid.axes).map(|(joint, axis)| Axis {
         name: joint.name.clone(),
-        unit: match joint.kind {
-            JointKind::Revolute => "rad".into(),
-            JointKind::Prismatic => "m".into(),
-        },
+        unit: joint.kind.unit().into(),
         start: axis.start,
         step: axis.step,
         count: axis.count,
@@ -169,7 +166,7 @@ impl<'a> Sweep<'a> {
         self.provenance.mesh_ripple = MeshRipple::new(model);
     }
 
-    /// How much a contact point feels the mesh, where that was looked at.
+    /// Returns how much a contact point feels the mesh, where that was looked at.
     pub(super) fn mesh_ripple(&self) -> Option<MeshRipple> {
         self.provenance.mesh_ripple
     }
@@ -257,7 +254,7 @@ impl<'a> Sweep<'a> {
         Footprint { memory: Bounds::of(self.proxy_nodes, memory), disk: Bounds::of(self.proxy_nodes, disk) }
     }
 
-    /// Where [`Sweep::bake`] keeps what it has of `output`.
+    /// Returns where [`Sweep::bake`] keeps what it has of `output`.
     #[must_use]
     pub fn part_of(output: &Path) -> PathBuf {
         with_suffix(output, ".part")
@@ -406,7 +403,7 @@ impl<'a> Sweep<'a> {
         (SweepReport { skin: self.skin, forecast: self.forecast, ..report }, provenance)
     }
 
-    /// How free space is found, where it is.
+    /// Returns how free space is found, where it is.
     pub(super) fn free_space(&self) -> Option<FreeSpace<'_>> {
         self.model.map(|model| FreeSpace::new(model, &self.grid))
     }

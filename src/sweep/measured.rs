@@ -18,8 +18,7 @@ use crate::{
     dataset::{Dataset, Grid, InterpolationError, MeasuredError},
     field::{FieldError, TorqueField},
     random::Random,
-    scene::Interpolation,
-    tolerances::LEVER_ARM,
+    scene::{Interpolation, LEVER_ARM},
 };
 use rayon::prelude::*;
 use std::{

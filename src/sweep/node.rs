@@ -19,13 +19,13 @@
 use crate::{
     JointVector,
     contact::{Model, Solver, Status},
+    field::{GRADIENT_STEP, LEAST_ENERGY, boundary::LEAST_GAP},
     scene::{Algorithm, Interpolation, Scene},
     store::{
         Order, Space,
         record::{mixed, slope, width},
         root_of,
     },
-    tolerances::{GRADIENT_STEP, LEAST_ENERGY, LEAST_GAP},
 };
 
 /// Depth behind the boundary at which contact is solved for a free node, over its gap [1]. Larger: the slope is that of
@@ -43,7 +43,7 @@ const STEPS: usize = 6;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the scene's algorithm is not \"energy\", and nodes that refine a grid need the energy of contact with its \
-                                            tangent: set algorithm = \"energy\" in [contact], or bake the grid alone"
+     tangent: set algorithm = \"energy\" in [contact], or bake the grid alone"
 )]
 pub struct NoEnergy;
 

@@ -170,7 +170,7 @@ impl Part {
         std::fs::remove_file(&path).map_err(|source| SweepError::Part { path, source })
     }
 
-    /// Where it is.
+    /// Returns where it is.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -319,7 +319,7 @@ pub(super) fn next(bytes: &[u8], place: &mut usize) -> Option<(Frame, Range<usiz
     Some((frame, body))
 }
 
-/// Where the body of the frame at `place` lies, if it is whole.
+/// Returns where the body of the frame at `place` lies, if it is whole.
 fn body(bytes: &[u8], place: &mut usize) -> Option<Range<usize>> {
     let mut rest = bytes.get(*place..)?;
     let mut left = rest.len() as u64;

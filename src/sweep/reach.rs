@@ -12,7 +12,7 @@ use crate::{
     object::Object,
     proxy::Chain,
     random::Random,
-    scene::{AxisSpec, JointKind, Scene, SceneError},
+    scene::{AxisSpec, Scene, SceneError},
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -287,7 +287,7 @@ fn along(scene: &Scene, joint: usize, met: &[Met], wanted: &[Met]) -> JointReach
     let margin = MARGIN * (high - low).max(MARGIN * (greatest - least));
     JointReach {
         name: spec.name.clone(),
-        unit: if spec.kind == JointKind::Revolute { "rad" } else { "m" },
+        unit: spec.kind.unit(),
         limits: spec.limits,
         range: [
             (((low - margin) / ROUNDED_TO).floor() * ROUNDED_TO).max(least),

@@ -87,7 +87,7 @@ impl Shard {
         (stretch % self.count + self.count - self.turn(stretch / self.count)) % self.count
     }
 
-    /// By how many places shard 0 is behind the first stretch of a round, less than the number of shards.
+    /// Returns by how many places shard 0 is behind the first stretch of a round, less than the number of shards.
     fn turn(self, round: usize) -> usize {
         Random::new(round as u64 + 1).between(0.0, self.count as f64) as usize % self.count
     }

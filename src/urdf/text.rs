@@ -110,11 +110,12 @@ fn write(
     heading(text, &format!("C-space: {} = {points} configurations", lines.join(" x ")))?;
     writeln!(
         text,
-        "# Coarse, for a first look: narrow the ranges to those that you use, and raise the counts, or bake with --max-error.\n"
+        "# Coarse, for a first look: narrow the ranges to those that you use, and raise the counts, or bake with \
+         --max-error.\n"
     )?;
     writeln!(text, "[grid]\naxes = [")?;
     for (([start, stop], count), spec) in practice.axes.iter().zip(&proxy.joints) {
-        let unit = unit(spec.kind);
+        let unit = spec.kind.unit();
         writeln!(
             text,
             "    {{ start = {}, stop = {}, count = {count} }}, # {unit}: {}",
@@ -180,7 +181,7 @@ fn write_joint(text: &mut String, joint: &ArmJoint, spec: &JointSpec) -> std::fm
     entry(text, "kind", if turns { "\"revolute\"" } else { "\"prismatic\"" }, "")?;
     entry(text, "origin", &vector(spec.origin, 9), "m")?;
     entry(text, "axis", &vector(spec.axis, 9), "")?;
-    entry(text, "limits", &list(&spec.limits, |x| number(*x, 9)), unit(spec.kind))?;
+    entry(text, "limits", &list(&spec.limits, |x| number(*x, 9)), spec.kind.unit())?;
     if inertial.mass > 0.0 {
         entry(text, "mass", &significant(inertial.mass), "kg")?;
         entry(text, "centre_of_mass", &vector(inertial.centre, 6), "m")?;
@@ -235,10 +236,8 @@ fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, practice: &Pra
     entry(text, "torque_rate_limit", &list(&limits, |x| coarse(300.0 * x)), "N m/s or N/s")?;
     for (joint, spec) in arm.joints.iter().zip(&proxy.joints) {
         let rated = [
-            joint
-                .effort
-                .map(|x| format!("{} {}", coarse(x), if spec.kind == JointKind::Revolute { "N m" } else { "N" })),
-            joint.velocity.map(|x| format!("{} {}/s", coarse(x), unit(spec.kind))),
+            joint.effort.map(|x| format!("{} {}", coarse(x), spec.kind.effort_unit())),
+            joint.velocity.map(|x| format!("{} {}/s", coarse(x), spec.kind.unit())),
         ];
         let rated: Vec<String> = rated.into_iter().flatten().collect();
         if !rated.is_empty() {
@@ -269,13 +268,6 @@ pub(super) fn entry(text: &mut String, key: &str, value: &str, meaning: &str) ->
 /// Returns text that stays within a comment.
 fn comment(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
-}
-
-fn unit(kind: JointKind) -> &'static str {
-    match kind {
-        JointKind::Revolute => "rad",
-        JointKind::Prismatic => "m",
-    }
 }
 
 fn list<T>(values: &[T], each: impl FnMut(&T) -> String) -> String {

@@ -267,10 +267,25 @@ impl Viewer {
 
     /// Lets motion `name` of the scene lead the hand; false where it has none such.
     pub fn play(&mut self, name: &str) -> bool {
-        let Some(session) = &self.session else { return false };
-        let mut guide = session.feel.guide();
-        let number = guide.names().iter().position(|known| *known == name);
-        number.inspect(|&number| guide.play(number)).is_some()
+        let number = self.motion(name);
+        let guide = self.session.as_ref().map(|session| session.feel.guide());
+        number.zip(guide).is_some_and(|(number, mut guide)| {
+            guide.play(number);
+            true
+        })
+    }
+
+    /// Plays motion `name` of the scene, if it has one, from its beginning, where hand and proxy are put.
+    ///
+    /// # Errors
+    /// In words, when the loop cannot be started.
+    pub fn begin_motion(&mut self, name: &str) -> Result<(), String> {
+        let number = self.motion(name);
+        number.zip(self.session.as_mut()).map_or(Ok(()), |(number, session)| session.begin(number))
+    }
+
+    fn motion(&self, name: &str) -> Option<usize> {
+        self.session.as_ref()?.feel.guide().names().iter().position(|known| *known == name)
     }
 
     /// Time in the motion that leads, and its duration [s].
@@ -279,7 +294,7 @@ impl Viewer {
         self.session.as_ref()?.feel.guide().time()
     }
 
-    /// How punctual the haptic thread has been, and how costly its ticks; none where nothing is open.
+    /// Returns how punctual the haptic thread has been, and how costly its ticks; none where nothing is open.
     #[must_use]
     pub fn timing(&self) -> Option<Timing> {
         Some(self.session.as_ref()?.history.timing())
@@ -298,7 +313,7 @@ impl Viewer {
         Some(self.session.as_ref()?.history.last()?.contact_torque.norm())
     }
 
-    /// Where the proxy's last node is shown, when the 3-D scene fills `rect`.
+    /// Returns where the proxy's last node is shown, when the 3-D scene fills `rect`.
     #[must_use]
     pub fn tip_in(&self, rect: egui::Rect) -> Option<egui::Pos2> {
         self.scene.tip_in(rect)

@@ -121,7 +121,8 @@ impl Camera {
 }
 
 impl Ray {
-    /// Where the ray meets the plane through `point` with `normal`; `None` when it runs along it or away from it.
+    /// Returns where the ray meets the plane through `point` with `normal`; `None` when it runs along it or away from
+    /// it.
     #[must_use]
     pub fn meet_plane(&self, point: Vec3, normal: Vec3) -> Option<Vec3> {
         let slope = self.direction.dot(normal);

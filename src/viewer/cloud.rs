@@ -198,7 +198,7 @@ fn size(dataset: &Dataset, point: usize) -> f64 {
     dataset.torque(point).iter().map(|tau| tau * tau).sum::<f64>().sqrt()
 }
 
-/// Where a configuration lies in the box from -1 to 1; missing joints in its middle, or on its floor.
+/// Returns where a configuration lies in the box from -1 to 1; missing joints in its middle, or on its floor.
 fn place(dataset: &Dataset, q: &JointVector) -> Vec3 {
     let mut place = Vec3::new(0.0, 0.0, if dataset.grid.joints() < 3 { -1.0 } else { 0.0 });
     for (joint, axis) in dataset.grid.axes.iter().enumerate().take(3) {

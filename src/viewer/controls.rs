@@ -119,7 +119,7 @@ impl Controls {
         };
     }
 
-    /// How the torque is interpolated between grid points, and what a tick costs with each way.
+    /// Shows how the torque is interpolated between grid points, and what a tick costs with each way.
     fn interpolation(&mut self, ui: &mut Ui, dataset: &Dataset) {
         ui.horizontal(|ui| {
             let label = ui.label("Interpolation").on_hover_text("How the torque follows from the grid points around");

@@ -1,31 +1,32 @@
 //! Who leads the hand: the pointer, keys, or one of the scene's motions, which plays, pauses and can be scrubbed.
 
-use super::loaded::Loaded;
-use crate::{JointVector, MAX_JOINTS, device::Motion, scene::Waypoint};
+use super::{approach, loaded::Loaded};
+use crate::{JointVector, MAX_JOINTS, dataset::Dataset, device::Motion};
 use eframe::egui;
+use std::sync::Arc;
 
 /// The target that the simulated hand follows. The caller passes the time; this type reads no clock.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Guide {
     motions: Vec<(&'static str, Motion)>,
     /// Number of the motion that leads; none: the pointer does.
     playing: Option<usize>,
     /// Whether the motion goes on.
     running: bool,
-    /// Since the motion began; below zero while the hand is led to where it begins [s].
+    /// Since the motion began [s].
     time: f64,
     /// Where the hand is led [rad or m].
     goal: JointVector,
-    /// Where the hand was when the motion was chosen [rad or m].
-    from: JointVector,
     /// Least and greatest coordinate of each joint [rad or m].
     limits: Vec<[f64; 2]>,
     /// Whether a haptic device leads, and nobody here does.
     handed_over: bool,
     /// Where the hand is at first [rad or m].
     home: JointVector,
-    /// The way back there, and the time in it [s], while the hand takes it.
-    way_home: Option<(Motion, f64)>,
+    /// The way there, or to where the motion begins, and the time in it [s], while the hand takes it.
+    approach: Option<(Motion, f64)>,
+    /// The free space that this way leads through; absent: it is straight.
+    space: Option<Arc<Dataset>>,
     /// Keys that are held; none while the window has not the keyboard.
     keys: Option<Keys>,
     /// Since the window last said so [s].
@@ -44,9 +45,6 @@ pub struct Keys {
     /// Whether the hand is to go back to where it was at first.
     pub home: bool,
 }
-
-/// Time in which the hand is led to the beginning of a motion [s].
-pub const LEAD_IN: f64 = 0.8;
 
 /// How far a key moves a joint in a second, as a share of its range [1/s]: all of it in four
 /// seconds, slowly enough to press with care.
@@ -73,11 +71,11 @@ impl Guide {
             running: false,
             time: 0.0,
             goal: loaded.start(),
-            from: loaded.start(),
             limits,
             handed_over: false,
             home: loaded.start(),
-            way_home: None,
+            approach: None,
+            space: Some(Arc::clone(&loaded.dataset)),
             keys: None,
             silence: 0.0,
             window: None,
@@ -120,10 +118,10 @@ impl Guide {
     /// Time in the motion that leads, and its duration [s].
     #[must_use]
     pub fn time(&self) -> Option<(f64, f64)> {
-        self.playing.map(|number| (self.time.max(0.0), self.motions[number].1.duration()))
+        self.playing.map(|number| (self.time, self.motions[number].1.duration()))
     }
 
-    /// Where the hand is led [rad or m].
+    /// Returns where the hand is led [rad or m].
     #[must_use]
     pub fn goal(&self) -> JointVector {
         self.goal
@@ -132,10 +130,24 @@ impl Guide {
     /// Lets motion `number` lead, from its beginning. A hand that is elsewhere is taken there first, without a blow.
     pub fn play(&mut self, number: usize) {
         if let Some((_, motion)) = self.motions.get(number) {
-            let time = if motion.at(0.0).0 == self.goal { 0.0 } else { -LEAD_IN };
-            (self.playing, self.running, self.time, self.from) = (Some(number), true, time, self.goal);
-            self.way_home = None;
+            let begin = motion.at(0.0).0;
+            (self.playing, self.running, self.time) = (Some(number), true, 0.0);
+            self.take_to(begin);
         }
+    }
+
+    /// Lets motion `number` lead, from its beginning, where the hand is put.
+    pub fn begin(&mut self, number: usize) {
+        if let Some((_, motion)) = self.motions.get(number) {
+            self.goal = motion.at(0.0).0;
+        }
+        self.play(number);
+    }
+
+    /// Takes the hand to `end` by a way through free space, where there is one.
+    fn take_to(&mut self, end: JointVector) {
+        let way = || approach::way(self.space.as_deref(), &self.goal, &end).map(|way| (way, 0.0));
+        self.approach = if self.goal == end { None } else { way() };
     }
 
     /// Stops the motion where it is, or lets it go on.
@@ -145,7 +157,7 @@ impl Guide {
 
     /// Goes to `time` in the motion that leads [s].
     pub fn scrub(&mut self, time: f64) {
-        self.time = time;
+        (self.time, self.approach) = (time, None);
         self.advance(0.0);
     }
 
@@ -154,7 +166,7 @@ impl Guide {
         for (goal, [least, greatest]) in goal.iter_mut().zip(&self.limits) {
             *goal = goal.max(*least).min(*greatest);
         }
-        (self.playing, self.running, self.goal, self.way_home) = (None, false, goal, None);
+        (self.playing, self.running, self.goal, self.approach) = (None, false, goal, None);
     }
 
     /// Sets the keys that are held, until the next call; none: the window has not the keyboard.
@@ -183,8 +195,7 @@ impl Guide {
     /// The hand goes back to where it was at first, without a blow.
     fn go_home(&mut self) {
         self.point(self.goal);
-        let ends = [(0.0, self.goal), (LEAD_IN, self.home)].map(|(time, q)| Waypoint { time, q });
-        self.way_home = Motion::through(&ends, self.goal.len()).ok().map(|way| (way, 0.0));
+        self.take_to(self.home);
     }
 
     /// Moves the hand by the keys that are held and the motion that plays, over `elapsed` [s]. Returns where it is led
@@ -194,7 +205,7 @@ impl Guide {
         self.silence += elapsed;
         self.unasked += elapsed;
         if let Some(keys) = self.keys.filter(|_| self.silence < LONGEST_SILENCE) {
-            if keys.home && self.way_home.is_none() && self.goal != self.home {
+            if keys.home && (self.playing.is_some() || self.approach.is_none()) && self.goal != self.home {
                 self.go_home();
             }
             self.steer(&keys.speeds, elapsed);
@@ -209,31 +220,22 @@ impl Guide {
 
     /// `elapsed` [s] go by; answers with where the hand is led now.
     fn advance(&mut self, elapsed: f64) -> JointVector {
-        if let Some((way, time)) = &mut self.way_home {
+        let elapsed = if self.playing.is_none() || self.running { elapsed } else { 0.0 };
+        if let Some((way, time)) = &mut self.approach {
             *time += elapsed;
             self.goal = way.at(*time).0;
             if *time >= way.duration() {
-                self.way_home = None;
+                self.approach = None;
             }
-        }
-        if let Some((_, motion)) = self.playing.and_then(|number| self.motions.get(number)) {
-            if self.running {
-                self.time += elapsed;
-                if self.time >= motion.duration() {
-                    // From the beginning again; where that is elsewhere, the hand is led there first.
-                    let (end, begin) = (motion.at(motion.duration()).0, motion.at(0.0).0);
-                    (self.time, self.from) = (if end == begin { 0.0 } else { -LEAD_IN }, end);
-                }
-            }
-            self.time = self.time.min(motion.duration());
+        } else if let Some((_, motion)) = self.playing.and_then(|number| self.motions.get(number)) {
+            let duration = motion.duration();
+            self.time = (self.time + elapsed).min(duration);
             self.goal = motion.at(self.time).0;
-            if self.time < 0.0 {
-                // Minimum jerk, as between the way points of a motion.
-                let s = 1.0 + self.time / LEAD_IN;
-                let share = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
-                for (goal, from) in self.goal.iter_mut().zip(self.from.iter()) {
-                    *goal = from + share * (*goal - from);
-                }
+            if self.running && self.time >= duration {
+                // From the beginning again; where that is elsewhere, the hand is led there first.
+                let begin = motion.at(0.0).0;
+                self.time = 0.0;
+                self.take_to(begin);
             }
         }
         self.goal
@@ -242,7 +244,8 @@ impl Guide {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::approach::LEAD_IN, *};
+    use crate::scene::Waypoint;
 
     /// A hand at rest in the middle of two joints, of whose limits the second's are closer; the window has the keyboard
     /// and says so.
@@ -254,11 +257,11 @@ mod tests {
             running: false,
             time: 0.0,
             goal: start,
-            from: start,
             limits: vec![[-1.0, 1.0], [-0.2, 0.2]],
             handed_over: false,
             home,
-            way_home: None,
+            approach: None,
+            space: None,
             keys: Some(Keys::default()),
             silence: f64::NEG_INFINITY,
             window: None,

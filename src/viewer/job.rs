@@ -193,7 +193,7 @@ impl Job {
         }
     }
 
-    /// How far it has come.
+    /// Returns how far it has come.
     #[must_use]
     pub fn progress(&self) -> Progress {
         self.progress

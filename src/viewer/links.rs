@@ -1,6 +1,6 @@
 //! Shapes of links as the device draws them.
 
-use super::{shapes::Colour, view_renderer::filled};
+use super::shapes::Colour;
 use crate::{
     gpu::{Context, GpuError},
     proxy::{Pose, shape_frame, shape_triangles},
@@ -93,6 +93,24 @@ fn columns(frame: DAffine3) -> [f32; 16] {
         vector.iter().chain([last]).enumerate().for_each(|(row, number)| columns[4 * column + row] = *number as f32);
     }
     columns
+}
+
+/// A buffer that holds `contents`, of whole words. wgpu's own way to make one panics where the device is lost.
+pub(super) fn filled(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    label: &str,
+    contents: &[u8],
+    usage: wgpu::BufferUsages,
+) -> wgpu::Buffer {
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: contents.len() as u64,
+        usage: usage | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    queue.write_buffer(&buffer, 0, contents);
+    buffer
 }
 
 #[cfg(test)]

@@ -104,7 +104,7 @@ impl Loaded {
             .collect()
     }
 
-    /// Where the device is at first: at the beginning of the first motion, else in the middle of the grid.
+    /// Returns where the device is at first: at the beginning of the first motion, else in the middle of the grid.
     #[must_use]
     pub fn start(&self) -> JointVector {
         self.motions().first().map_or_else(|| self.middle(), |(_, motion)| motion.at(0.0).0)

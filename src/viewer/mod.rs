@@ -6,8 +6,9 @@
 //! | `session` | a dataset being felt |
 //! | `window`, `offscreen` | the two places where it is drawn: a window, a picture |
 //! | `theme`, `palette` | sizes and type, colours |
-//! | `loaded`, `job`, `background` | what is open, how it is baked or read, and all else that the window must not wait for |
+//! | `loaded`, `job`, `background` | what is open, how it is baked or read, and what the window must not wait for |
 //! | `feel`, `guide`, `history` | the haptic loop beside the window, who leads the hand, what was felt lately |
+//! | `approach` | the way to where a motion begins |
 //! | `lead` | a haptic device that leads in the place of all these |
 //! | `scene`, `overlay`, `body` | the 3-D panel, what lies on top of its picture, the object on the GPU |
 //! | `steering`, `node_drag`, `camera` | whence it is seen, and the pointer's grip on the proxy |
@@ -20,6 +21,7 @@
 //! haptic thread waits for nothing here; see `feel`.
 
 mod app;
+mod approach;
 mod background;
 mod body;
 mod camera;

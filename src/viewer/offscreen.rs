@@ -1,7 +1,7 @@
 //! The window's picture without a window: the same panels, laid out and painted by egui into a texture that is read
 //! back.
 
-use super::{Start, TickSource, ViewError, Viewer, dress, guide::LEAD_IN, pixels, theme};
+use super::{Start, TickSource, ViewError, Viewer, dress, pixels, theme};
 use crate::{
     dataset::replace_file,
     gpu::{AdapterChoice, Context, GpuError},
@@ -79,10 +79,9 @@ pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), V
     if let Some(error) = viewer.error() {
         return Err(ViewError::Open(error.to_owned()));
     }
-    viewer.play(&picture.motion);
+    viewer.begin_motion(&picture.motion).map_err(ViewError::Open)?;
     viewer.advance(FRAME, &egui);
-    // The hand may have to be led to where the motion begins first.
-    for _ in 0..((picture.time + LEAD_IN) / FRAME).ceil() as usize {
+    for _ in 0..(picture.time / FRAME).ceil() as usize {
         if viewer.time_in_motion().is_some_and(|(time, duration)| time < picture.time.min(duration) - 0.5 * FRAME) {
             viewer.advance(FRAME, &egui);
         }

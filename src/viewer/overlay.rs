@@ -95,7 +95,7 @@ fn colours(ui: &Ui, painter: &Painter, rect: Rect, body: &Body, quantity: Quanti
     painter.text(bar.right_bottom() + vec2(0.0, FINE_GAP), Align2::CENTER_TOP, number(top), small, text);
 }
 
-/// Where the bar of colours lies in the picture `rect`.
+/// Returns where the bar of colours lies in the picture `rect`.
 fn bar(rect: Rect) -> Rect {
     let [least, most] = BAR_WIDTH;
     let width = (rect.width() - LEFT_OF_BAR + BAR_END.x).clamp(least, most);

@@ -99,8 +99,8 @@ impl Viewer {
             let rate = self.frame_rate.map_or_else(String::new, |rate| format!(", {rate:.0} frames/s"));
             let drawn = format!("drawn by {} ({}){rate}", short(&adapter.name), adapter.kind);
             ui.label(RichText::new(drawn).weak().small()).on_hover_text(format!(
-                "{adapter}\nAnother adapter draws and computes where {ADAPTER_VARIABLE} is set to a part of its name or \
-                 to its address before haptize starts; haptize doctor lists them"
+                "{adapter}\nAnother adapter draws and computes where {ADAPTER_VARIABLE} is set to a part of its name \
+                 or to its address before haptize starts; haptize doctor lists them"
             ));
             let Some(session) = &mut self.session else { return };
             if let Some(tick) = session.history.last() {
@@ -229,7 +229,7 @@ impl Viewer {
                     ui.label(
                         RichText::new(
                             "Contact is solved at every point of the grid over the joints, once; \
-                     then it is felt at 1 kHz.",
+                             then it is felt at 1 kHz.",
                         )
                         .weak(),
                     );

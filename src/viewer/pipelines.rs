@@ -2,7 +2,7 @@
 //! of one rounded cone. All share view and light (`shaders/draw_common.wgsl`), samples a pixel, and a depth buffer.
 
 use super::{links::Corner, shapes::Shape};
-use crate::tolerances::GPU_LEAST_DIVISOR;
+use crate::gpu::GPU_LEAST_DIVISOR;
 use bytemuck::{Pod, Zeroable};
 
 /// Gamma-encoded, as the window takes textures.

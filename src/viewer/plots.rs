@@ -141,7 +141,7 @@ impl Plots {
         hold_still
     }
 
-    /// How long the time axis is.
+    /// Lets the user choose how long the time axis is.
     fn span(&mut self, ui: &mut Ui) {
         let label = ui.label("Last");
         let span = egui::ComboBox::from_id_salt("span").width(SPAN_WIDTH).selected_text(format!("{} s", self.seconds));

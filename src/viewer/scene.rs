@@ -177,7 +177,7 @@ impl SceneView {
         Ok(())
     }
 
-    /// Where the proxy's last node is shown in `rect`.
+    /// Returns where the proxy's last node is shown in `rect`.
     #[must_use]
     pub fn tip_in(&self, rect: Rect) -> Option<egui::Pos2> {
         let tip = self.pose.nodes.last()?.as_vec3();

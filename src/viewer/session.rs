@@ -172,6 +172,15 @@ impl Session {
         Ok(())
     }
 
+    /// Plays motion `number` from its beginning, where hand and proxy are put: for pictures, which have no past.
+    ///
+    /// # Errors
+    /// In words, when the loop cannot be started.
+    pub fn begin(&mut self, number: usize) -> Result<(), String> {
+        self.feel.guide().begin(number);
+        self.go_on(Ok((Arc::clone(&self.loaded.setup.haptics), self.advice.clone())))
+    }
+
     /// Goes on with another loop, the hand where it is.
     fn go_on(&mut self, made: Result<Tuned, SetupError>) -> Result<(), String> {
         let (haptics, advice) = made.map_err(|error| error.to_string())?;

@@ -57,13 +57,13 @@ fn texts(loaded: &Loaded) -> [(&'static str, String); 3] {
             "2  Store",
             format!(
                 "Each configuration holds a torque. The map on the right shows them over the joints {joints}; \
-         all of them are the dataset."
+                 all of them are the dataset."
             ),
         ),
         (
             "3  Look up",
             "1000 times a second the torque is interpolated where the arm is: the ring on the map. \
-         The plots show what is felt."
+             The plots show what is felt."
                 .into(),
         ),
     ]

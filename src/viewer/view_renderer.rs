@@ -3,7 +3,7 @@
 
 use super::{
     camera::Camera,
-    links::DrawnLinks,
+    links::{DrawnLinks, filled},
     pipelines::{self, DEPTH, FORMAT, View, bind},
     shapes::{Shape, unit_shape},
 };
@@ -183,24 +183,6 @@ impl ViewRenderer {
         self.context.queue.submit([commands]);
         Ok(&targets.picture)
     }
-}
-
-/// A buffer that holds `contents`, of whole words. wgpu's own way to make one panics where the device is lost.
-pub(super) fn filled(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    label: &str,
-    contents: &[u8],
-    usage: wgpu::BufferUsages,
-) -> wgpu::Buffer {
-    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size: contents.len() as u64,
-        usage: usage | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    queue.write_buffer(&buffer, 0, contents);
-    buffer
 }
 
 /// Whence the light comes, to the right of the eye, above and behind it, in any unit: over its right shoulder. It goes

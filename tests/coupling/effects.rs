@@ -22,7 +22,7 @@ fn pressed(depth: f64, along: impl Fn(f64) -> f64) -> impl Fn(f64) -> [f64; 2] {
 }
 
 fn balanced(accounts: &Accounts) {
-    assert!(accounts.residual().abs() <= 1e-12 * accounts.turnover, "{accounts:?}");
+    assert!(accounts.residual().abs() <= 1e-12 * accounts.exchanged, "{accounts:?}");
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn friction_takes_energy_in_every_tick_and_the_accounts_close() {
             let output = setup.haptics.tick(&mut state, &Inputs { position, age: 0.0, elapsed, interval });
             balanced(&output.accounts);
             let taken = output.accounts.friction_dissipation;
-            assert!(taken >= before - 1e-12 * output.accounts.turnover, "tick {k}: {taken} J after {before}");
+            assert!(taken >= before - 1e-12 * output.accounts.exchanged, "tick {k}: {taken} J after {before}");
             (before, elapsed, time) = (taken, interval, time + interval);
         }
         assert!(before > 0.1, "{before} J");

@@ -7,12 +7,11 @@ use haptize::{
     field::TorqueField,
     render::{
         flags::Fault,
-        haptic::Inputs,
+        haptic::{GREATEST_GIVEN_ENERGY, Inputs},
         passivity,
         setup::{Setup, labels},
     },
     scene::{HapticsSpec, Interpolation, Waypoint},
-    tolerances::GREATEST_GIVEN_ENERGY,
 };
 
 /// What the port has given beyond what it took, at most, in ten seconds in a hand that presses 10 mm deep [J].
@@ -91,7 +90,7 @@ fn energy_created_at_the_object_s_port_is_taken_by_the_controller() {
             5.0,
             |_| [0.0, 0.01],
             |output| {
-                assert!(output.accounts.residual().abs() <= 1e-11 * output.accounts.turnover);
+                assert!(output.accounts.residual().abs() <= 1e-11 * output.accounts.exchanged);
                 greatest = greatest.max(output.accounts.created());
             },
         );

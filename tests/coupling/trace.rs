@@ -5,9 +5,8 @@ use haptize::{
     JointVector,
     dataset::Dataset,
     device::Motion,
-    render::{session, setup::Setup},
+    render::{accounts::ACCOUNT_ROUNDING, session, setup::Setup},
     scene::Waypoint,
-    tolerances::ACCOUNT_ROUNDING,
 };
 
 /// Every effect that books energy.
@@ -88,7 +87,7 @@ fn the_accounts_close_from_the_columns_of_the_file_alone() {
         "control dissipation",
     ];
     let kept = ["kinetic", "spring", "bristles"];
-    let rounding = ACCOUNT_ROUNDING * columns.get("turnover [J]").last().unwrap();
+    let rounding = ACCOUNT_ROUNDING * columns.get("exchanged [J]").last().unwrap();
     let spent: Vec<f64> = columns.sum(&taken).iter().zip(columns.sum(&kept)).map(|(a, b)| a + b).collect();
     assert!(largest_difference(&columns.sum(&given), &spent) < rounding);
     // No term is there for nothing: without it the account does not close.

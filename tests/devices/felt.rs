@@ -55,6 +55,6 @@ pub fn run(haptics: &Haptics, device: &mut dyn Device, count: usize, mut between
 
 /// Whether the accounts of all `ticks` close to rounding.
 pub fn accounts_close(ticks: &[Tick]) -> bool {
-    let turnover = ticks.last().map_or(0.0, |tick| tick.accounts.turnover);
-    turnover > 0.0 && ticks.iter().all(|tick| tick.accounts.residual().abs() <= 1e-11 * turnover)
+    let exchanged = ticks.last().map_or(0.0, |tick| tick.accounts.exchanged);
+    exchanged > 0.0 && ticks.iter().all(|tick| tick.accounts.residual().abs() <= 1e-11 * exchanged)
 }

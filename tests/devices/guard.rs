@@ -257,7 +257,7 @@ fn accounts_close_and_sessions_replay_when_the_device_holds_less_than_was_asked_
     let booked = ticks.last().unwrap().accounts.port_work - ticks[0].accounts.port_work;
     assert!((work - booked).abs() < 1e-12, "{work} {booked}");
 
-    let joints = ["a", "b"].map(|name| haptize::render::trace::JointLabel { name: name.into(), unit: "rad".into() });
+    let joints = ["a", "b"].map(|name| haptize::dataset::JointLabel { name: name.into(), unit: "rad".into() });
     let trace = Trace { joints: joints.to_vec(), start: all(2, -0.2), ticks, ..Trace::default() };
     let file = tempfile::NamedTempFile::new().unwrap();
     Recording::of(&trace).write(&trace.joints, &mut file.as_file()).unwrap();

@@ -99,7 +99,9 @@ fn device(id: &str, position: [f64; 3], ready: bool, full: bool) -> Value {
     let [x, y, z] = position;
     let mut device = json!({
         "device_id": id,
-        "state": {"cursor_position": {"z": z, "x": x, "y": y}, "angular_position": {"a0": 0}, "transform": {}, "mode": "idle"},
+        "state": {
+            "cursor_position": {"z": z, "x": x, "y": y}, "angular_position": {"a0": 0}, "transform": {}, "mode": "idle",
+        },
         "status": {"calibrated": ready, "ready": true, "power_supply": true, "in_use": false, "started": true},
     });
     if full {

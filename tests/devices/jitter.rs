@@ -5,9 +5,10 @@
 
 use crate::{felt::half_space_loop, inverse3, serial, tip, vendor};
 use haptize::{
+    dataset::JointLabel,
     device::{Device, Halt},
     proxy::Chain,
-    render::{realtime, session::Plan, trace::JointLabel},
+    render::{realtime, session::Plan},
 };
 use std::sync::atomic::AtomicBool;
 
@@ -54,8 +55,8 @@ fn row(name: &str, device: &mut dyn Device, joints: usize) {
 #[test]
 fn each_deadline_against_each_emulator_is_accounted_for() {
     println!(
-        "| device | ticks | period: median [us] | 99 % | worst | lateness: median [us] | 99 % | worst | late by the system \
-         | by the hypervisor | without torque |"
+        "| device | ticks | period: median [us] | 99 % | worst | lateness: median [us] | 99 % | worst | late by the \
+         system | by the hypervisor | without torque |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     serial::beside_two_diy(|device| row("2diy", device, 2));

@@ -1,6 +1,8 @@
 //! The program: `haptize device`, and `play` with a device.
 
 use haptize::scan::{RowStatus, ScanLog};
+#[cfg(unix)]
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use std::{
     path::Path,
@@ -255,7 +257,7 @@ impl crate::emulator::Firmware for Watched {
 /// Plays in `folder` with an emulated 2DIY, sends `signal` once it is pushed, and returns with how many commands it was
 /// still pushed afterwards.
 #[cfg(unix)]
-fn pushed_after(folder: &Path, signal: libc::c_int) -> usize {
+fn pushed_after(folder: &Path, signal: Signal) -> usize {
     use std::{
         os::unix::process::CommandExt,
         process::Stdio,
@@ -276,7 +278,7 @@ fn pushed_after(folder: &Path, signal: libc::c_int) -> usize {
         // SAFETY: the call is one that may be made between fork and exec.
         unsafe {
             play.pre_exec(move || {
-                libc::signal(signal, libc::SIG_DFL);
+                libc::signal(signal.as_raw(), libc::SIG_DFL);
                 Ok(())
             })
         };
@@ -291,8 +293,7 @@ fn pushed_after(folder: &Path, signal: libc::c_int) -> usize {
             std::thread::sleep(Duration::from_millis(1));
         }
         let signalled = Instant::now();
-        // SAFETY: the process is ours, and not waited for yet.
-        assert_eq!(unsafe { libc::kill(play.id() as libc::pid_t, signal) }, 0);
+        kill_process(Pid::from_child(&play), signal).unwrap();
         (play.wait_with_output().unwrap(), signalled)
     });
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -320,12 +321,12 @@ fn a_signal_ends_the_torque_within_two_ticks_and_the_session_keeps_its_files() {
     let path = folder.path();
     std::fs::write(path.join("s.toml"), SLIDES).unwrap();
     assert_eq!(haptize(path, &["bake", "s.toml", "-o", "s.haptize", "--backend", "cpu"]).status.code(), Some(0));
-    for signal in [libc::SIGINT, libc::SIGTERM] {
+    for signal in [Signal::INT, Signal::TERM] {
         let mut ticks = Vec::new();
         while ticks.len() < 10 && !ticks.iter().any(|ticks| *ticks <= 2) {
             ticks.push(pushed_after(path, signal));
         }
-        eprintln!("signal {signal}: torque for {ticks:?} more commands");
-        assert!(ticks.iter().any(|ticks| *ticks <= 2), "signal {signal}: torque for {ticks:?} more commands");
+        eprintln!("signal {signal:?}: torque for {ticks:?} more commands");
+        assert!(ticks.iter().any(|ticks| *ticks <= 2), "signal {signal:?}: torque for {ticks:?} more commands");
     }
 }

@@ -6,13 +6,14 @@ use crate::{
     felt::{PERIOD, all, half_space_loop},
 };
 use haptize::{
+    dataset::JointLabel,
     device::{
         Device, Guard, Halt, Hardware, JointDevice, LONGEST_AGE, LinearMap, RAMP_TIME, TipDevice, WARM_TIME, Watchdog,
         vendor::{ForceDimension, OpenHaptics},
         with_scheduler,
     },
     proxy::Chain,
-    render::{realtime, session::Plan, trace::JointLabel},
+    render::{realtime, session::Plan},
     scene::DeviceSpec,
 };
 use libloading::Library;

@@ -5,12 +5,11 @@ use glam::DVec3;
 use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Solver, Status, Touch},
-    gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver},
+    gpu::{AdapterChoice, BatchCapacity, Context, GPU_SETTLED_RESIDUAL, GpuError, GpuSolver},
     object::{Compliance, Object},
     proxy::Chain,
     scene::{Algorithm, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
     sweep::Backend,
-    tolerances::GPU_SETTLED_RESIDUAL,
 };
 use std::sync::Arc;
 

@@ -29,7 +29,8 @@ pub const OBJECTS: [(&str, &str); 5] = [
     ("springs", "mesh = { file = \"cube.obj\", scale = 0.04 }\nsprings = { kind = \"isotropic\", stiffness = 300.0 }"),
     (
         "skin",
-        "mesh = { file = \"cube.obj\", scale = 0.04, refine = 0.03 }\nskin = { thickness = 0.002, young = 1e5, foundation = 1e6 }",
+        "mesh = { file = \"cube.obj\", scale = 0.04, refine = 0.03 }\n\
+         skin = { thickness = 0.002, young = 1e5, foundation = 1e6 }",
     ),
     ("tetrahedra", "tetrahedra = { file = \"block.msh\", scale = 0.4 }\nelasticity = { young = 2e4, poisson = 0.3 }"),
     (

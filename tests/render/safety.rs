@@ -80,7 +80,7 @@ fn a_device_that_fails_is_let_go_smoothly_with_the_reason() {
             );
         }
         assert_eq!(output.fault, None);
-        assert!(output.torque.norm() > 0.5 && output.accounts.residual().abs() < 1e-11 * output.accounts.turnover);
+        assert!(output.torque.norm() > 0.5 && output.accounts.residual().abs() < 1e-11 * output.accounts.exchanged);
     }
     let field = TorqueField::new(&data, 0.5, &spec.boundary_slope).unwrap();
     let differing = JointsError { field: 2, proxy: 3, gains: 2 };

@@ -127,7 +127,7 @@ fn what_arrives_while_it_is_felt_makes_no_jump_and_no_energy_from_nowhere() {
             let accounts = &tick.accounts;
             // The field, arrivals included, gives no more than the proxy's damping takes.
             assert!(accounts.created() <= accounts.taken_from_field() + 1e-12, "{accounts:?}");
-            assert!(accounts.residual().abs() <= 1e-10 * accounts.turnover.max(1e-6), "{accounts:?}");
+            assert!(accounts.residual().abs() <= 1e-10 * accounts.exchanged.max(1e-6), "{accounts:?}");
             assert!(accounts.device_port().unwrap() > -1e-9, "{accounts:?}");
             if let Some(before) = before {
                 // The turning joint's, in N m.

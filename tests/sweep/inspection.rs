@@ -40,6 +40,10 @@ fn an_inspection_tells_the_same_from_scene_and_dataset() {
     }
     assert_eq!(from_scene, from_dataset);
     assert_eq!(from_scene["warnings"].as_array().map(Vec::len), Some(0));
+    let in_percent = haptize(&["inspect", "small.toml", "--q=16.6666666667%,100%"]);
+    assert!(relative_error(&torque(&in_percent), &torque(&from_scene)) < 1e-6, "{in_percent}");
+    let elsewhere = haptize(&["inspect", "small.toml", "--q=17%,100%"]);
+    assert!(relative_error(&torque(&elsewhere), &torque(&from_scene)) > 1e-6, "{elsewhere}");
     let beyond = haptize(&["inspect", "small.toml", "--q=-9.0,0.042"]);
     assert!(beyond["warnings"][0].as_str().unwrap().contains("beyond the joint's limits"), "{beyond}");
 }

@@ -2,6 +2,7 @@
 
 use crate::fixture::{Folder, SCENE};
 use haptize::dataset::Dataset;
+use rustix::process::{Pid, Signal, kill_process};
 use std::path::Path;
 
 /// Everything but the date, bit for bit.
@@ -65,8 +66,7 @@ fn a_killed_program_is_resumed_to_the_same_numbers() {
 fn an_interrupted_program_says_how_to_resume() {
     let folder = Folder::new();
     let interrupted = program_at_work(&folder, 10_000);
-    // SAFETY: kill(2) has no conditions; the process is our child and not yet waited for.
-    assert_eq!(unsafe { libc::kill(interrupted.id() as i32, libc::SIGINT) }, 0);
+    kill_process(Pid::from_child(&interrupted), Signal::INT).unwrap();
     let output = interrupted.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let message = String::from_utf8(output.stderr).unwrap();

@@ -120,7 +120,7 @@ fn hostile_xml_is_refused_soon() {
     assert!(refusal(&format!("<robot>{}", "<a>".repeat(100_000))).contains("not well-formed"));
     assert!(refusal(&format!("<robot>{}</robot>", "<a/>".repeat(2 << 20))).contains("not well-formed"));
     let chain: String = (0..2000)
-        .map(|k| format!("<link name=\"l{k}\"/><joint name=\"j{k}\" type=\"fixed\"><parent link=\"l{k}\"/><child link=\"l{}\"/></joint>", k + 1))
+        .map(|k| format!("<link name=\"l{k}\"/>{}", joint(&format!("l{k}"), &format!("l{}", k + 1))))
         .collect();
     let long = format!("<robot>{chain}<link name=\"l2000\"/></robot>");
     assert!(arm(&long, "l2000", &[]).unwrap_err().to_string().contains("no joint moves"));

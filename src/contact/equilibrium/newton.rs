@@ -25,7 +25,14 @@ use super::woodbury::Woodbury;
 use crate::contact::law::depth::Contact;
 use crate::contact::law::springs::{Springs, add_contact_hessian, stretched_and_bent};
 use crate::contact::linear::support::{Support, dot, root};
-use crate::tolerances::{INNER_ITERATIONS_PER_UNKNOWN, MODEL_PASSES};
+
+/// Conjugate-gradient iterations of one step at most, per unknown [1]: exact arithmetic needs one per unknown,
+/// rounding at stiff contact, and passes for other touching contacts, a few times as many.
+pub const INNER_ITERATIONS_PER_UNKNOWN: usize = 4;
+
+/// Passes of conjugate gradients in one step at most, each for another set of touching contacts [1]: sets
+/// settle in two or three; more are cut off by a decrease that no longer grows.
+pub const MODEL_PASSES: usize = 6;
 
 /// Least damping of a Newton step that is not zero, in the object's own stiffness [1]: less changes a step by less than
 /// the tenth that its model is good for where damping is needed at all. With 0.01, 64 hard balls on 2,027 nodes

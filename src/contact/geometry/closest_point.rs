@@ -5,7 +5,7 @@
 //! its force by them; weights of corners that the feature does not touch are exactly zero.
 
 use super::facet::Facet;
-use crate::tolerances::MINIMUM_SQUARE;
+use crate::contact::MINIMUM_SQUARE;
 use glam::DVec3;
 
 /// Part of a triangle. Edge k joins corners k and (k + 1) % 3.

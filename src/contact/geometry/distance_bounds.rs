@@ -12,11 +12,11 @@
 //!
 //! So away from the surface bounds are sharp to second order in h.
 
+use super::DEPTH_ROUNDING;
 use super::RestSurface;
 use super::bounding_volumes::Leaf;
 use super::closest_point::{closest_point, point_at};
 use super::normals;
-use crate::tolerances::DEPTH_ROUNDING;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::SQRT_2;

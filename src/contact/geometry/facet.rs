@@ -6,7 +6,7 @@
 use super::closest_point::{ClosestPoint, Feature, closest_point};
 use super::normals::{area_vector, unit_or_zero};
 use super::quartic::{CONTROLS, Jet, place};
-use crate::tolerances::MINIMUM_SQUARE;
+use crate::contact::MINIMUM_SQUARE;
 use glam::DVec3;
 
 /// Steps of Newton's method for the closest point of a bent facet at most: from the flat triangle's closest point three

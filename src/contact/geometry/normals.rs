@@ -7,8 +7,8 @@
 //! fail.
 
 use super::closest_point::Feature;
+use crate::contact::MINIMUM_SQUARE;
 use crate::object::Topology;
-use crate::tolerances::MINIMUM_SQUARE;
 use glam::DVec3;
 
 /// Corner positions of triangle `t`.
@@ -75,9 +75,9 @@ pub fn vertex_normal(positions: &[DVec3], triangles: &[[u32; 3]], topology: &Top
     unit_or_zero(sum)
 }
 
-/// How often the surface winds around `x`: the solid angles of all triangles over 4 pi (Van Oosterom & Strackee 1983).
-/// One inside, zero outside; it changes nowhere but on the surface, also where deformation has folded that over itself
-/// [1].
+/// Returns how often the surface winds around `x`: the solid angles of all triangles over 4 pi (Van Oosterom & Strackee
+/// 1983). One inside, zero outside; it changes nowhere but on the surface, also where deformation has folded that over
+/// itself [1].
 #[cfg(test)]
 #[must_use]
 pub fn winding_number(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3) -> f64 {

@@ -4,8 +4,8 @@
 //! where a triangle has no area, and is nowhere too great by more than rounding: in the plane's place an edge is taken
 //! by mistake only where it is as near as rounding can tell.
 
+use crate::contact::MINIMUM_SQUARE;
 use crate::contact::linear::wide::{Kernel, widest};
-use crate::tolerances::MINIMUM_SQUARE;
 use glam::DVec3;
 
 /// Triangles in a packet.

@@ -211,7 +211,8 @@ mod tests {
         let text = format!(
             "[object]\nsphere = {{ radius = {RADIUS}, subdivisions = {divisions} }}\n\
              skin = {{ tension = 1.0, foundation = 1.0 }}\n\
-             [[proxy.joint]]\nkind = \"prismatic\"\naxis = [1.0, 0.0, 0.0]\nlimits = [0.0, 1.0]\nnodes = [{{ at = [0.0, 0.0, 0.0] }}]\n\
+             [[proxy.joint]]\nkind = \"prismatic\"\naxis = [1.0, 0.0, 0.0]\nlimits = [0.0, 1.0]\n\
+             nodes = [{{ at = [0.0, 0.0, 0.0] }}]\n\
              [contact]\nstiffness = 1.0\n[grid]\nspacing = 0.5\n"
         );
         Object::build(&Scene::parse(&text, "sphere.toml").unwrap().object).unwrap()

@@ -217,7 +217,7 @@ impl SmoothSurface {
         &self.nodes[self.starts[t as usize] as usize..self.starts[t as usize + 1] as usize]
     }
 
-    /// How facet `t` hangs on them.
+    /// Returns how facet `t` hangs on them.
     #[inline]
     #[must_use]
     pub fn shape(&self, t: u32) -> &Shape {
@@ -250,8 +250,8 @@ impl SmoothSurface {
         self.shape[t as usize]
     }
 
-    /// By how much the facets at rest stand off the flat triangles of the mesh at most, whose nodes are at `positions`
-    /// [m].
+    /// Returns by how much the facets at rest stand off the flat triangles of the mesh at most, whose nodes are at
+    /// `positions` [m].
     #[must_use]
     pub fn bulge(&self, positions: &[DVec3]) -> f64 {
         let farthest = |(t, facet): (usize, &Facet)| {

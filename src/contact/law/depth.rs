@@ -15,11 +15,11 @@
 //! what is along N and along the feature: zero on faces. One form for flat and bent facets, faces, edges and vertices,
 //! so that a product needs no branch. It is needed because contact points creep over the surface when it is left out.
 
+use crate::contact::MINIMUM_SQUARE;
 use crate::contact::geometry::closest_point::ClosestPoint;
 use crate::contact::geometry::closest_point::Feature;
 use crate::contact::geometry::facet::{Facet, directions};
 use crate::contact::geometry::smooth::{CARRIERS, Shape};
-use crate::tolerances::MINIMUM_SQUARE;
 use glam::DVec3;
 use std::ops::Neg;
 
@@ -317,7 +317,7 @@ impl Contact {
         variation
     }
 
-    /// By how much a variation brings the feature nearer, to first order [m].
+    /// Returns by how much a variation brings the feature nearer, to first order [m].
     #[inline]
     #[must_use]
     pub fn depth_change(&self, variation: &Variation) -> f64 {

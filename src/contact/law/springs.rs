@@ -28,7 +28,7 @@ impl<'a> Springs<'a> {
         (push != 0.0 || row.multiplier != 0.0).then(|| stretched_and_bent(row, push, v))
     }
 
-    /// How the displacement `vector` on the support varies row `k`.
+    /// Returns how the displacement `vector` on the support varies row `k`.
     #[inline]
     #[must_use]
     pub fn variation(self, k: usize, vector: &[f64]) -> Variation {
@@ -36,7 +36,7 @@ impl<'a> Springs<'a> {
         self.contacts[k].variation(|j| DVec3::from_array(nodes[slots[j] as usize]))
     }
 
-    /// By how much the displacement `vector` on the support deepens row `k`, to first order [m].
+    /// Returns by how much the displacement `vector` on the support deepens row `k`, to first order [m].
     #[inline]
     #[must_use]
     pub fn depth_change(self, k: usize, vector: &[f64]) -> f64 {

@@ -3,7 +3,9 @@
 //! form that reads back to the same value.
 
 use super::super::{Axis, Dataset, Error, replace_file};
+use crate::csv::{Table, quoted};
 use std::{
+    fmt::{self, Debug, Display},
     io::{self, Write},
     path::{Path, PathBuf},
 };
@@ -33,62 +35,55 @@ pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Err
 
 fn write_points(dataset: &Dataset, writer: &mut impl Write) -> io::Result<()> {
     let axes = &dataset.grid.axes;
-    let mut header: Vec<String> = axes.iter().map(|axis| quoted(&format!("{} [{}]", axis.name, axis.unit))).collect();
-    header.extend(axes.iter().map(effort));
+    let Dataset { energy, gap, residual, iterations, contacts, .. } = dataset;
+    let mut table = Table::new(writer);
+    table.fields(axes.iter().map(|axis| quoted(&format!("{} [{}]", axis.name, axis.unit))))?;
+    table.fields(axes.iter().map(effort))?;
     let optional = [
-        ("energy [J]", dataset.energy.is_some()),
-        ("gap [m]", dataset.gap.is_some()),
+        ("energy [J]", energy.is_some()),
+        ("gap [m]", gap.is_some()),
         (STATUS, true),
-        ("residual [1]", dataset.residual.is_some()),
-        ("iterations", dataset.iterations.is_some()),
-        ("contacts", dataset.contacts.is_some()),
+        ("residual [1]", residual.is_some()),
+        ("iterations", iterations.is_some()),
+        ("contacts", contacts.is_some()),
     ];
-    header.extend(optional.iter().filter(|(_, present)| *present).map(|(name, _)| (*name).to_string()));
-    writeln!(writer, "{}", header.join(","))?;
+    table.fields(optional.iter().filter(|(_, present)| *present).map(|(name, _)| name))?.end()?;
     for point in 0..dataset.grid.points() {
-        for coordinate in dataset.grid.configuration(point).iter().chain(dataset.torque(point)) {
-            write!(writer, "{coordinate:?},")?;
-        }
-        if let Some(energy) = &dataset.energy {
-            write!(writer, "{:?},", energy[point])?;
-        }
-        if let Some(gap) = &dataset.gap {
-            write!(writer, "{:?},", gap[point])?;
-        }
-        write!(writer, "{}", dataset.status[point])?;
-        if let Some(residual) = &dataset.residual {
-            write!(writer, ",{:?}", residual[point])?;
-        }
-        if let Some(iterations) = &dataset.iterations {
-            write!(writer, ",{}", iterations[point])?;
-        }
-        if dataset.contacts.is_some() {
-            write!(writer, ",{}", dataset.forces(point).len())?;
-        }
-        writeln!(writer)?;
+        let numbers = [&dataset.grid.configuration(point)[..], dataset.torque(point)].concat();
+        table.fields(numbers.iter().chain(energy.as_ref().map(|energy| &energy[point])).map(Shortest))?;
+        table.fields(gap.as_ref().map(|gap| Shortest(&gap[point])))?.field(dataset.status[point])?;
+        table.fields(residual.as_ref().map(|residual| Shortest(&residual[point])))?;
+        table.fields(iterations.as_ref().map(|iterations| iterations[point]))?;
+        table.fields(contacts.as_ref().map(|_| dataset.forces(point).len()))?.end()?;
     }
     Ok(())
 }
 
 fn write_contacts(dataset: &Dataset, writer: &mut impl Write) -> io::Result<()> {
-    writeln!(writer, "point (row of the other file from 0),node,force x [N],force y [N],force z [N]")?;
+    let mut table = Table::new(writer);
+    let forces = ["force x [N]", "force y [N]", "force z [N]"];
+    table.fields(["point (row of the other file from 0)", "node"])?.fields(forces)?.end()?;
     let Some(contacts) = &dataset.contacts else { return Ok(()) };
     for point in 0..dataset.grid.points() {
         let (nodes, forces) = contacts.row(point);
         for (node, force) in nodes.iter().zip(forces.chunks_exact(3)) {
-            writeln!(writer, "{point},{node},{:?},{:?},{:?}", force[0], force[1], force[2])?;
+            table.field(point)?.field(node)?.fields(force.iter().map(Shortest))?.end()?;
         }
     }
     Ok(())
+}
+
+/// A number in the shortest form, with an exponent where it is very large or small.
+struct Shortest<T>(T);
+
+impl<T: Debug> Display for Shortest<T> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(formatter)
+    }
 }
 
 /// Header of a joint's torque or, of a prismatic joint, force.
 fn effort(axis: &Axis) -> String {
     let unit = axis.effort_unit();
     quoted(&format!("{} {} [{unit}]", if unit == "N" { "force" } else { "torque" }, axis.name))
-}
-
-/// A text as one field (RFC 4180): joints may be named anything.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
 }

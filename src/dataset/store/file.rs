@@ -6,7 +6,7 @@
 //! |---|---|---|---|
 //! | `block_keys` | u64 | b | level and coordinates of each block (`space.rs`), ascending |
 //! | `block_nodes` | u64 | b | bit p: the block has the node at place p |
-//! | `node_records` | f32 | n, 1 + d (d + 1) / 2 | numbers of each node, in the order of blocks and places (`record.rs`) |
+//! | `node_records` | f32 | n, 1 + d (d + 1) / 2 | numbers of each node, by block and place (`record.rs`) |
 //! | `node_gap` | f32 | n | smallest signed distance at rest [m] |
 //! | `node_status` | u8 | n | [`crate::contact::Status`] |
 //! | `surface_nodes`, `surface_triangles`, ... | | | the object's geometry, as in a dataset's file |
@@ -19,7 +19,8 @@
 //!
 //! ```text
 //! keys, nodes, w = t("block_keys"), t("block_nodes"), t("node_records")[:, 0]
-//! bits, side = 60 // d, 2 if d <= 3 else 1           # bits of a key for each coordinate, the level above them; nodes of a block
+//! bits = 60 // d                                     # of a key for each coordinate; the level stands above them
+//! side = 2 if d <= 3 else 1                          # nodes of a block, along each axis
 //! place = [(b, p) for b, s in enumerate(nodes) for p in range(side**d) if int(s) >> p & 1]
 //! level = [int(k) >> bits * d for k in keys]
 //! node = lambda b, p: [side * (int(keys[b]) >> bits * (d - 1 - a) & 2**bits - 1) + (p >> a & 1) for a in range(d)]

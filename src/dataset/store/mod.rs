@@ -159,13 +159,13 @@ impl Store {
         self.blocks.capacity()
     }
 
-    /// Where its nodes lie.
+    /// Returns where its nodes lie.
     #[must_use]
     pub fn space(&self) -> &Space {
         &self.space
     }
 
-    /// How it interpolates.
+    /// Returns how it interpolates.
     #[must_use]
     pub fn order(&self) -> Order {
         self.order

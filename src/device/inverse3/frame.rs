@@ -82,9 +82,11 @@ mod tests {
     #[test]
     fn frames_are_read_with_whatever_they_hold_or_lack() {
         let read = |text: &str| Frame::parse(text);
-        let full = r#"{"session_id":15,"inverse3":[{"device_id":"04BA","config":{"type":"inverse3"},"state":{"angular_position":
-            {"a0":-69.31704},"cursor_position":{"x":0.0206,"y":-0.0276,"z":0},"mode":"idle","transform":{}},
-            "status":{"calibrated":true,"in_use":false,"power_supply":true,"ready":true,"started":true}}],"verse_grip":[]}"#;
+        let full = r#"{"session_id":15,"inverse3":[{"device_id":"04BA","config":{"type":"inverse3"},"state":
+            {"angular_position":{"a0":-69.31704},"cursor_position":{"x":0.0206,"y":-0.0276,"z":0},"mode":"idle",
+            "transform":{}},
+            "status":{"calibrated":true,"in_use":false,"power_supply":true,"ready":true,"started":true}}],
+            "verse_grip":[]}"#;
         let frame = read(full).unwrap();
         let device = frame.devices().next().unwrap();
         assert_eq!((device.id(), device.is_ready()), ("04BA", Some(true)));

@@ -5,7 +5,9 @@
 //! | message | bytes |
 //! |---|---|
 //! | reset | `00 00` |
-//! | setup | `01 id`, motors: `mask`, a direction each; encoders: `mask`, a direction each; `0` sensors, `0` pwm pins; for each encoder in the order of ports `f32` offset [deg], `f32` counts per revolution |
+//! | setup | `01 id`, motors, encoders, `0` sensors, `0` pwm pins, scales |
+//! | motors, encoders | `mask`, a direction each |
+//! | scales, of each encoder in the order of ports | `f32` offset [deg], `f32` counts per revolution |
 //! | torques | `02 id`, `f32` torque of each motor in the order of ports [N m] |
 //! | reply to torques | `id`, `f32` angle of each encoder in the order of ports [deg] |
 //!

@@ -83,7 +83,9 @@ macro_rules! functions {
                     #[allow(non_snake_case)]
                     let $name = unsafe { library.get(concat!(stringify!($name), "\0").as_bytes()) }
                         .map(|symbol| *symbol)
-                        .map_err(|error| format!("the library has no {}: {error}; install a newer one", stringify!($name)))?;
+                        .map_err(|error| {
+                            format!("the library has no {}: {error}; install a newer one", stringify!($name))
+                        })?;
                 )*
                 Ok(Self { $($name,)* _library: library })
             }

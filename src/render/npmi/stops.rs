@@ -51,7 +51,7 @@ pub(super) fn solve_in_box(matrix: &JointMatrix, right: &JointVector, low: &Join
     Solved { point, side }
 }
 
-/// Where coordinate `a` belongs, judged by `point` for the present sides.
+/// Returns where coordinate `a` belongs, judged by `point` for the present sides.
 fn corrected(
     a: usize,
     side: Side,

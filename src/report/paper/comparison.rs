@@ -343,7 +343,7 @@ fn extent(counts: &[usize]) -> String {
     counts.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x ")
 }
 
-/// How the plan's points lie.
+/// Returns how the plan's points lie.
 fn lines(scan: &ScanSpec) -> String {
     match &scan.plan {
         PlanSpec::Workspace(plan) => {

@@ -86,7 +86,8 @@ impl Camera {
         self.eye = target + distance * towards;
     }
 
-    /// Where `point` appears; `None` behind the eye or if it is not a number. It may lie beyond the picture's edges.
+    /// Returns where `point` appears; `None` behind the eye or if it is not a number. It may lie beyond the picture's
+    /// edges.
     #[must_use]
     pub fn project(&self, point: DVec3) -> Option<Projected> {
         let [right, up, towards] = self.axes;

@@ -19,7 +19,6 @@ use crate::{
     JointVector,
     proxy::{Chain, Pose, solve_positive},
     scene::{Cover, JointKind, ProxySpec, SpecimenSpec},
-    tolerances,
 };
 use glam::DVec3;
 use noise::Noise;
@@ -53,7 +52,7 @@ impl SimulatedRig {
         let mut rig = Self {
             sponge: Sponge::new(spec),
             spec: *spec,
-            gravity: DVec3::new(0.0, 0.0, -tolerances::GRAVITY),
+            gravity: DVec3::new(0.0, 0.0, -crate::scan::GRAVITY),
             contacts: vec![NodeContact::default(); chain.nodes.len()],
             pose: chain.new_pose(),
             velocity: JointVector::zeros(position.len()),

@@ -139,7 +139,8 @@ impl Sponge {
         (least.0 > 0.0 && least.0 <= 2.0 * radius && self.shadow(least.1, position, radius) > 0.0).then_some(least.1)
     }
 
-    /// How far the node's foremost point is below `face`, if it is above the block's shadow; negative outside [m].
+    /// Returns how far the node's foremost point is below `face`, if it is above the block's shadow; negative outside
+    /// [m].
     fn depth(&self, face: Face, position: DVec3, radius: f64) -> f64 {
         let relative = position[face.axis] - self.corner[face.axis];
         let below = if face.upper { self.size[face.axis] - relative } else { relative };

@@ -6,8 +6,7 @@
 use super::super::check::Checker;
 use super::super::error::SceneError;
 use super::super::file::{AxisTable, GridTable};
-use super::super::{AxisSpec, GridSpec, JointSpec};
-use crate::tolerances::GRID_STEP_SLACK;
+use super::super::{AxisSpec, GRID_STEP_SLACK, GridSpec, JointSpec};
 use toml::Spanned;
 
 /// Most grid points: `point * joints + joint` then fits 32 bits, as GPU kernels count.

@@ -7,13 +7,10 @@ use super::super::check::Checker;
 use super::super::error::SceneError;
 use super::super::file::{FourChannelTable, FrictionTable, HapticsTable, PerJoint};
 use super::super::{
-    BOUNDARY_SLOPE, ContactDampingSpec, FourChannelSpec, FrictionSpec, HandSpec, HapticEffects, HapticsSpec,
-    Interpolation, JointKind, JointSpec, ProxyInertia, THRESHOLD,
+    BOUNDARY_SLOPE, ContactDampingSpec, FourChannelSpec, FrictionSpec, GREATEST_INTERVAL, HandSpec, HapticEffects,
+    HapticsSpec, Interpolation, JointKind, JointSpec, LEVER_ARM, ProxyInertia, THRESHOLD,
 };
-use crate::{
-    JointVector,
-    tolerances::{GREATEST_INTERVAL, LEVER_ARM},
-};
+use crate::JointVector;
 use toml::Spanned;
 
 /// How a default changes from revolute to prismatic joints.

@@ -98,7 +98,7 @@ fn updates(checker: &Checker<'_>, table: &ContactTable) -> Result<u32, SceneErro
     let Some(value) = &table.updates else { return Ok(0) };
     if table.algorithm != Some(Algorithm::Linearised) {
         let reason = "updates acts on linearised contact, whose geometry is frozen: \
-         add algorithm = \"linearised\", or leave it out";
+                      add algorithm = \"linearised\", or leave it out";
         return Err(checker.error(value.span(), reason));
     }
     Ok(*value.get_ref())
@@ -136,8 +136,8 @@ fn stiffness(
             Ok((per_length * mean / 3.0, Some(per_length)))
         }
         (None, None) => {
-            let message = "contact has no stiffness: add stiffness [N/m] of each node, or \"rigid\", or stiffness_per_length \
-                           [N/m^2] of links";
+            let message = "contact has no stiffness: add stiffness [N/m] of each node, or \"rigid\", or \
+                           stiffness_per_length [N/m^2] of links";
             Err(checker.error(span, message))
         }
     }

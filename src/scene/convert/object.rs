@@ -138,7 +138,7 @@ fn material(checker: &Checker<'_>, table: &ObjectTable, span: Range<usize>) -> R
         (None, None) if table.skin.is_some() && table.tetrahedra.is_none() => Ok(Material::Hollow),
         (None, None) => {
             let message = "the object has no material: add [object.springs] or [object.elasticity], \
-             or to a surface [object.skin]";
+                           or to a surface [object.skin]";
             Err(checker.error(span, message))
         }
         (Some(_), Some(elasticity)) => {

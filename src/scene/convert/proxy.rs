@@ -4,8 +4,8 @@ use super::super::check::Checker;
 use super::super::error::SceneError;
 use super::super::file::{JointTable, NodesTable, Number, ProxyTable};
 use super::super::inertia::positive_semidefinite;
-use super::super::{JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
-use crate::{MAX_JOINTS, tolerances::GRID_LINE};
+use super::super::{GRID_LINE, JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
+use crate::MAX_JOINTS;
 use glam::DMat3;
 use toml::Spanned;
 

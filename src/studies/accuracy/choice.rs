@@ -1,7 +1,10 @@
 //! For a given error: which spacing and interpolation, and what it costs.
 
 use super::{Accuracy, Row, Study};
-use crate::{scene::Interpolation, sweep::spacing::order, tolerances::FARTHEST_EXTRAPOLATION};
+use crate::{
+    scene::Interpolation,
+    sweep::{FARTHEST_EXTRAPOLATION, spacing::order},
+};
 use serde::Serialize;
 
 /// Errors that are asked for, relative to the rms of the torque [1].

@@ -1,7 +1,7 @@
 //! The cost of accuracy in time: work-precision diagrams of one scene against directly solved configurations.
 //!
 //! The reference is equation (2) in the energy form, in f64, with the geometry that follows the deformation, solved to
-//! [`REFERENCE_TOLERANCE`](crate::tolerances::REFERENCE_TOLERANCE) at random configurations of the scene's grid that no
+//! [`REFERENCE_TOLERANCE`](crate::sweep::REFERENCE_TOLERANCE) at random configurations of the scene's grid that no
 //! dataset holds. Its own error is how much it moves when it is asked for a hundredth of that. Errors are Euclidean
 //! norms over the joints; a prismatic joint counts with the lever arm of 0.1 m, so that all are N m. `rms` is over all
 //! configurations, in contact or not, and is set beside the rms of the reference torque itself. Accuracy is
@@ -302,4 +302,9 @@ impl Cost {
         let baseline = baseline.max(f64::MIN_POSITIVE);
         Self { median: self.median / baseline, least: self.least / baseline, greatest: self.greatest / baseline }
     }
+}
+
+/// Returns `text` as it stands between tags.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -1,17 +1,19 @@
 //! The files of a study: figures, one table of all rows as CSV, and one page that holds them all.
 
 use super::{
-    Accuracy, Row, Study,
+    Accuracy, Cost, Row, Study,
     choice::{TARGETS, limits, offers},
     effects::{self, Effects},
-    figures,
+    escaped, figures,
 };
 use crate::{
+    csv::{Table, quoted},
     report::{ReportError, canvas::Canvas, write, write_both},
     scene::Interpolation,
 };
 use std::{
     fmt::{self, Write as _},
+    io,
     path::{Path, PathBuf},
 };
 
@@ -84,43 +86,30 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
     for (name, canvas, _) in &sheets {
         files.extend(write_both(folder, name, canvas)?);
     }
-    files.push(write(folder.join("accuracy.csv"), csv(accuracy).as_bytes())?);
+    files.push(write(folder.join("accuracy.csv"), &csv(accuracy).unwrap_or_default())?);
     let priced = accuracy.effects.as_ref().map(|priced| (priced, effects::figure(priced)));
     if let Some((effects, figure)) = &priced {
         files.extend(write_both(folder, "effects", figure)?);
-        files.push(write(folder.join("effects.csv"), effects::csv(effects).as_bytes())?);
+        files.push(write(folder.join("effects.csv"), &effects::csv(effects).unwrap_or_default())?);
     }
     let html = page(accuracy, &sheets, priced.as_ref()).unwrap_or_default();
     files.push(write(folder.join("accuracy.html"), html.as_bytes())?);
     Ok(files)
 }
 
-fn csv(accuracy: &Accuracy) -> String {
-    let mut text = "study,series,setting,value,points,solved,bytes,cost_median,cost_least,cost_greatest,\
-         unit,rms,worst,rms_relative\n"
-        .to_owned();
+fn csv(accuracy: &Accuracy) -> io::Result<Vec<u8>> {
+    let mut text = Vec::new();
+    let mut table = Table::new(&mut text);
+    let costs = ["cost_median", "cost_least", "cost_greatest"];
+    table.fields(["study", "series", "setting", "value", "points", "solved", "bytes"])?.fields(costs)?;
+    table.fields(["unit", "rms", "worst", "rms_relative"])?.end()?;
     for row in &accuracy.rows {
-        // A String takes everything.
-        let _ = writeln!(
-            text,
-            "{},{},\"{}\",{},{},{},{},{},{},{},{},{},{},{}",
-            study_name(row.study),
-            row.series,
-            row.setting.replace('"', "'"),
-            row.value,
-            row.points,
-            row.solved,
-            row.bytes,
-            row.cost.median,
-            row.cost.least,
-            row.cost.greatest,
-            row.unit,
-            row.rms,
-            row.worst,
-            row.rms / row.size
-        );
+        let Cost { median, least, greatest } = row.cost;
+        table.field(study_name(row.study))?.field(&row.series)?.field(quoted(&row.setting))?.field(row.value)?;
+        table.field(row.points)?.field(row.solved)?.field(row.bytes)?.fields([median, least, greatest])?;
+        table.field(row.unit)?.fields([row.rms, row.worst, row.rms / row.size])?.end()?;
     }
-    text
+    Ok(text)
 }
 
 fn study_name(study: Study) -> &'static str {
@@ -223,11 +212,6 @@ fn unreached(accuracy: &Accuracy) -> Option<f64> {
     (offers.len() < TARGETS.len()).then_some(least)
 }
 
-/// `text` between tags.
-pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
 fn page(
     accuracy: &Accuracy,
     sheets: &[(&str, Canvas, &str)],
@@ -240,13 +224,14 @@ fn page(
         "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>What accuracy costs: {name}</title>\n<style>\
          body{{font:16px/1.5 system-ui,sans-serif;max-width:980px;margin:2em auto;padding:0 1em;color:#222b36}}\
          table{{border-collapse:collapse;font-size:14px}}td,th{{padding:.2em .8em;text-align:right;white-space:nowrap;\
-         border-bottom:1px solid #e2e6ec}}td:first-child,th:first-child{{text-align:left}}svg{{max-width:100%;height:auto}}</style>\n\
+         border-bottom:1px solid #e2e6ec}}td:first-child,th:first-child{{text-align:left}}\
+         svg{{max-width:100%;height:auto}}</style>\n\
          <h1>What accuracy costs in time: {name}</h1>\n<p>Reference: {} random configurations solved directly to a \
-         residual of {:.0e}, {} in contact, {} left out because contact did not converge there. The rms torque is {:.4} \
-         N m; the reference itself errs by {:.1e} N m. Times are ratios, the least of {} runs; accuracy is the same in every \
-         run.</p>\n",
+         residual of {:.0e}, {} in contact, {} left out because contact did not converge there. The rms torque is \
+         {:.4} N m; the reference itself errs by {:.1e} N m. Times are ratios, the least of {} runs; accuracy is the \
+         same in every run.</p>\n",
         accuracy.configurations,
-        crate::tolerances::REFERENCE_TOLERANCE,
+        crate::sweep::REFERENCE_TOLERANCE,
         accuracy.in_contact,
         accuracy.left_out,
         accuracy.torque,
@@ -299,9 +284,9 @@ fn offers_table(html: &mut String, accuracy: &Accuracy) -> fmt::Result {
 /// Writes the table of all rows of all studies.
 fn all_rows(html: &mut String, accuracy: &Accuracy) -> fmt::Result {
     html.push_str(
-        "<h2>All rows</h2>\n<table><tr><th>study<th>series<th>setting<th>points or iterations<th>solved<th>bytes<th>time",
+        "<h2>All rows</h2>\n<table><tr><th>study<th>series<th>setting<th>points or iterations<th>solved<th>bytes",
     );
-    html.push_str("<th>median<th>most<th>rms<th>worst<th>unit<th>relative</tr>\n");
+    html.push_str("<th>time<th>median<th>most<th>rms<th>worst<th>unit<th>relative</tr>\n");
     for row in &accuracy.rows {
         writeln!(
             html,

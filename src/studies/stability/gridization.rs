@@ -6,13 +6,13 @@
 use super::{Bound, Case, CaseResult, Effort, Failure, Setting};
 use crate::{
     contact::Status,
-    dataset::Dataset,
-    gridize::{GridizeOptions, Interpolation, JointLabel, Samples, gridize},
+    dataset::{Dataset, JointLabel},
+    gridize::{GridizeOptions, Interpolation, Samples, gridize},
 };
 use std::f64::consts::{PI, TAU};
 
 /// Error of a gridized torque relative to the greatest one, where exact arithmetic has none: weights of slivers are
-/// known to the jitter ([`JITTER`], 1e-12) over their thickness, of a thousandth and more, and [`HYPER_WEIGHT`] bounds
+/// known to the jitter (`JITTER`, 1e-12) over their thickness, of a thousandth and more, and [`HYPER_WEIGHT`] bounds
 /// them in 4 to 6 joints.
 const GRIDIZED_LINEAR: f64 = 1e-9;
 
@@ -255,11 +255,6 @@ mod tests {
 
     #[test]
     fn a_sample_of_every_case_keeps_its_bounds() {
-        let setting = Setting { effort: Effort::Sample, gpu: None };
-        for case in cases() {
-            let outcomes = (case.run)(&setting).unwrap();
-            let failed: Vec<CaseResult> = outcomes.iter().filter(|outcome| !outcome.passed()).cloned().collect();
-            assert!(!outcomes.is_empty() && failed.is_empty(), "{}", super::super::table(&failed));
-        }
+        super::super::assert_samples_keep_their_bounds(cases());
     }
 }

@@ -150,6 +150,18 @@ fn figure(value: f64) -> String {
     }
 }
 
+/// Runs a sample of each of `cases` on the CPU.
+#[cfg(test)]
+fn assert_samples_keep_their_bounds(cases: impl IntoIterator<Item = Case>) {
+    let setting = Setting { effort: Effort::Sample, gpu: None };
+    for case in cases {
+        let outcomes = (case.run)(&setting).unwrap();
+        assert!(!outcomes.is_empty(), "{}", case.name);
+        let failed: Vec<CaseResult> = outcomes.into_iter().filter(|outcome| !outcome.passed()).collect();
+        assert!(failed.is_empty(), "{}", table(&failed));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

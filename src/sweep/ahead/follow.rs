@@ -5,7 +5,7 @@ use super::Whereabouts;
 use crate::{
     JointMatrix, JointVector,
     contact::{Equilibrium, Model, Solver, Status},
-    tolerances::LEAST_ENERGY,
+    field::LEAST_ENERGY,
 };
 use std::{
     sync::atomic::{AtomicBool, Ordering},

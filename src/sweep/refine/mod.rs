@@ -24,9 +24,8 @@ use crate::{
     JointVector, MAX_JOINTS,
     contact::{Model, Solvers, Status},
     dataset::Grid,
-    scene::{JointKind, Scene},
+    scene::{JointKind, LEVER_ARM, Scene},
     store::{Nodes, Order, Place, PublishError, Space, SpaceError, Store},
-    tolerances::LEVER_ARM,
 };
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 

@@ -1,11 +1,17 @@
 //! Prices as text, as CSV and as a section of the page.
 
 use super::{
-    super::{Cost, page::escaped},
+    super::{Cost, escaped},
     Effects,
 };
-use crate::report::canvas::Canvas;
-use std::fmt::{self, Write as _};
+use crate::{
+    csv::{Table, quoted},
+    report::canvas::Canvas,
+};
+use std::{
+    fmt::{self, Write as _},
+    io,
+};
 
 /// The table, for people.
 ///
@@ -34,34 +40,40 @@ pub(in super::super) fn describe(text: &mut String, effects: &Effects) -> fmt::R
     effects.notes.iter().try_for_each(|note| writeln!(text, "  note         {note}"))
 }
 
-/// All prices, a row each.
-pub(in super::super) fn csv(effects: &Effects) -> String {
-    let mut text = "name,setting".to_owned();
+/// Returns all prices, a row each.
+///
+/// # Errors
+/// None in memory.
+pub(in super::super) fn csv(effects: &Effects) -> io::Result<Vec<u8>> {
+    let mut text = Vec::new();
+    let mut table = Table::new(&mut text);
+    table.fields(["name", "setting"])?;
     for place in ["", "within_"] {
         for what in ["bake", "tick", "frame", "gpu_frame", "device", "dataset"] {
-            // A String takes everything, here and below.
-            let _ = write!(text, ",{place}{what}_median,{place}{what}_least,{place}{what}_greatest");
+            table.fields(["median", "least", "greatest"].map(|kind| format!("{place}{what}_{kind}")))?;
         }
     }
-    text.push_str(",device_bytes,device_buffers,dispatches,pipelines,dataset_bytes\n");
+    table.fields(["device_bytes", "device_buffers", "dispatches", "pipelines", "dataset_bytes"])?.end()?;
     for price in &effects.prices {
-        let _ = write!(text, "{},\"{}\"", price.name, price.setting.replace('"', "'"));
+        table.field(&price.name)?.field(quoted(&price.setting))?;
         let columns = price.columns();
         for cost in [0, 1].into_iter().flat_map(|place| columns.map(|costs| costs[place])) {
-            let _ = match cost {
-                Some(Cost { median, least, greatest }) => write!(text, ",{median},{least},{greatest}"),
-                None => write!(text, ",,,"),
-            };
-        }
-        let _ = match price.device {
-            Some(takes) => {
-                write!(text, ",{},{},{},{}", takes.bytes, takes.buffers, takes.dispatches, takes.pipelines)
+            let numbers = |Cost { median, least, greatest }| [median, least, greatest].map(Some);
+            for number in cost.map_or([None; 3], numbers) {
+                table.optional(number)?;
             }
-            None => write!(text, ",,,,"),
+        }
+        let (bytes, counts) = match price.device {
+            Some(takes) => (Some(takes.bytes), [takes.buffers, takes.dispatches, takes.pipelines].map(Some)),
+            None => (None, [None; 3]),
         };
-        let _ = writeln!(text, ",{}", price.dataset_bytes);
+        table.optional(bytes)?;
+        for count in counts {
+            table.optional(count)?;
+        }
+        table.field(price.dataset_bytes)?.end()?;
     }
-    text
+    Ok(text)
 }
 
 /// The section of the page: figure and table.

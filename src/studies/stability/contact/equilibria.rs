@@ -158,8 +158,8 @@ impl Space<'_> {
     }
 }
 
-/// By how much U changes between two configurations beside the work of the torque, by the trapezoidal rule; where one
-/// is flagged there is no telling [J].
+/// Returns by how much U changes between two configurations beside the work of the torque, by the trapezoidal rule;
+/// where one is flagged there is no telling [J].
 fn unexplained((from, before): &(Vec<f64>, Equilibrium), (to, after): &(Vec<f64>, Equilibrium)) -> f64 {
     if before.status.is_failed() || after.status.is_failed() {
         return 0.0;

@@ -118,8 +118,8 @@ pub fn curl(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
 /// Half the width of a stencil [m or rad].
 const STENCIL: f64 = 1e-6;
 
-/// How far a configuration's torque is from the slope of U, relative: of it, and of those a step before and after in
-/// each joint; `None` where one is flagged.
+/// Returns how far a configuration's torque is from the slope of U, relative: of it, and of those a step before and
+/// after in each joint; `None` where one is flagged.
 fn stencil_error(results: &[Equilibrium]) -> Option<f64> {
     let (here, around) = results.split_first()?;
     if results.iter().any(|result| result.status != Status::Contact) {

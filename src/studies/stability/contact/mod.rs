@@ -34,18 +34,11 @@ pub fn cases() -> Vec<Case> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{CaseResult, Effort, Setting, table};
     use super::*;
 
     /// On the CPU; the GPU's half is in `tests/gpu`.
     #[test]
     fn a_sample_of_every_case_keeps_its_bounds() {
-        let setting = Setting { effort: Effort::Sample, gpu: None };
-        for case in cases() {
-            let outcomes = (case.run)(&setting).unwrap();
-            assert!(!outcomes.is_empty(), "{}", case.name);
-            let failed: Vec<CaseResult> = outcomes.into_iter().filter(|outcome| !outcome.passed()).collect();
-            assert!(failed.is_empty(), "{}", table(&failed));
-        }
+        super::super::assert_samples_keep_their_bounds(cases());
     }
 }

@@ -5,9 +5,8 @@ use crate::{
     JointVector,
     device::{Device, Motion},
     fixtures::worlds::block,
-    render::{haptic::Inputs, setup::Setup},
+    render::{accounts::ACCOUNT_ROUNDING, haptic::Inputs, setup::Setup},
     scene::Waypoint,
-    tolerances::ACCOUNT_ROUNDING,
 };
 
 pub(super) fn rest(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
@@ -66,7 +65,7 @@ hand = { stiffness = [600.0, 400.0], damping = [0.2, 20.0], inertia = [0.1, 0.1]
         watch.tick(&output);
         let grown = output.accounts.friction_dissipation - taken;
         taken = output.accounts.friction_dissipation;
-        least = f64::min(least, grown / output.accounts.turnover.max(f64::MIN_POSITIVE));
+        least = f64::min(least, grown / output.accounts.exchanged.max(f64::MIN_POSITIVE));
         // Slipping takes power; a bristle that holds takes next to none.
         let slips_now = grown > 1e-3 * period;
         slips += usize::from(slips_now && stuck);
@@ -76,7 +75,7 @@ hand = { stiffness = [600.0, 400.0], damping = [0.2, 20.0], inertia = [0.1, 0.1]
     let mut outcomes =
         watch.outcomes("ten minutes of stick and slip", &format!("dragged for {seconds} s by a soft hand"));
     outcomes.push(CaseResult {
-        measure: "energy given by friction in one tick, over the turnover [1]".into(),
+        measure: "energy given by friction in one tick, relative to the energy exchanged [1]".into(),
         worst: -least,
         bound: Bound::AtMost(ACCOUNT_ROUNDING),
         note: format!("{slips} slips, {taken:.3} J taken"),

@@ -4,10 +4,10 @@ use super::{Bound, CaseResult, DESKTOP, Failure, Setting, Watch, on_time, open, 
 use crate::{
     fixtures::worlds::block,
     render::{
+        haptic::GREATEST_GIVEN_ENERGY,
         passivity::{greatest_slope, greatest_stiffness},
         setup::Setup,
     },
-    tolerances::GREATEST_GIVEN_ENERGY,
 };
 
 /// The half space felt with Ks and Kvc at `factor` times their bounds, and with what `others` name.

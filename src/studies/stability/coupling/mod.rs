@@ -17,12 +17,12 @@ use crate::{
     JointVector,
     device::{Applied, Device, Motion, Reading, SimulatedHand},
     render::{
+        accounts::ACCOUNT_ROUNDING,
         flags::Fault,
-        haptic::{Inputs, Output},
+        haptic::{GREATEST_GIVEN_ENERGY, Inputs, Output},
         setup::Setup,
     },
     scene::{HapticsSpec, Waypoint},
-    tolerances::{ACCOUNT_ROUNDING, GREATEST_GIVEN_ENERGY},
 };
 
 /// The cases of these files.
@@ -55,9 +55,9 @@ device_damping = 0.02
 struct Watch {
     limit: JointVector,
     torque: f64,
-    /// Worst of all runs, each over its own turnover at its end.
+    /// Worst of all runs, each over the energy that it exchanged.
     residual: f64,
-    /// Greatest residual of the present run, and its turnover so far [J].
+    /// Greatest residual of the present run, and the energy that it has exchanged so far [J].
     run: [f64; 2],
     given: f64,
     /// At the object's port, beyond what the controller took there [J].
@@ -98,7 +98,7 @@ impl Watch {
         for (torque, limit) in output.torque.iter().zip(self.limit.iter()) {
             self.torque = self.torque.max(torque.abs() / limit);
         }
-        self.run = [self.run[0].max(accounts.residual().abs()), accounts.turnover];
+        self.run = [self.run[0].max(accounts.residual().abs()), accounts.exchanged];
         self.given = self.given.max(-accounts.device_port().unwrap_or(0.0));
         self.created = self.created.max(accounts.created() - accounts.control_dissipation);
         if let Some(before) = self.device.replace(output.device) {
@@ -123,6 +123,7 @@ impl Watch {
 
     fn note(&self) -> String {
         match self.faults.first() {
+            None if self.runs == 1 => "1 run, not let go".into(),
             None => format!("{} runs, none let go", self.runs),
             Some(first) => format!("{} of {} runs let go: {first}", self.faults.len(), self.runs),
         }
@@ -139,7 +140,7 @@ impl Watch {
         };
         vec![
             judged("torque over its limit [1]", self.torque, 1.0),
-            judged("residual of the accounts over their turnover [1]", self.residual, ACCOUNT_ROUNDING),
+            judged("energy balance error, relative to the energy exchanged [1]", self.residual, ACCOUNT_ROUNDING),
             judged("energy given from nowhere [J]", self.given, 2.0 * GREATEST_GIVEN_ENERGY),
         ]
     }

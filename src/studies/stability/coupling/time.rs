@@ -3,7 +3,10 @@
 use super::{
     Altered, Bound, CaseResult, DESKTOP, Failure, Setting, Watch, drive, noise, on_time, open, presses, seconds,
 };
-use crate::{device::Reading, render::flags::Fault, tolerances::GREATEST_GIVEN_ENERGY};
+use crate::{
+    device::Reading,
+    render::{flags::Fault, haptic::GREATEST_GIVEN_ENERGY},
+};
 use std::collections::VecDeque;
 
 pub(super) fn jitter(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {

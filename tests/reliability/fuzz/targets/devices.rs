@@ -104,12 +104,13 @@ fn heard(protocol: &dyn Protocol, bytes: &[u8]) -> String {
 /// States of a device as the service sent them: one in full, one of a tick, and one of two devices, one of which says
 /// nothing.
 const SERVICE: [&str; 3] = [
-    r#"{"session_id":15,"session":{"session_id":15,"config":{"profile":{"name":"default"}}},"inverse3":[{"device_id":"04BA","config":
-{"type":"inverse3","device_info":{"major_version":7,"id":"04BA","device_type":4},"handedness":"right","mount":{},"filters":{"force_gate":
-{"gain":0.3},"damping":{"scalar":-1}}},"state":{"angular_position":{"a0":-69.31704,"a1":137.62952,"a2":19.832787},"body_orientation":
-{"x":-0.0498,"y":0.6954,"z":-0.0022,"w":0.7169},"cursor_position":{"x":0.0206,"y":-0.0276,"z":0.1995},"cursor_velocity":{"x":0,"y":0,"z":0},
-"mode":"idle","control_domain":"undefined","transform":{}},"status":{"calibrated":true,"in_use":false,"power_supply":true,"ready":true}}],
-"verse_grip":[],"custom_verse_grip":[]}"#,
+    r#"{"session_id":15,"session":{"session_id":15,"config":{"profile":{"name":"default"}}},"inverse3":[{
+"device_id":"04BA","config":{"type":"inverse3","device_info":{"major_version":7,"id":"04BA","device_type":4},
+"handedness":"right","mount":{},"filters":{"force_gate":{"gain":0.3},"damping":{"scalar":-1}}},"state":{
+"angular_position":{"a0":-69.31704,"a1":137.62952,"a2":19.832787},"body_orientation":{"x":-0.0498,"y":0.6954,
+"z":-0.0022,"w":0.7169},"cursor_position":{"x":0.0206,"y":-0.0276,"z":0.1995},"cursor_velocity":{"x":0,"y":0,"z":0},
+"mode":"idle","control_domain":"undefined","transform":{}},"status":{"calibrated":true,"in_use":false,
+"power_supply":true,"ready":true}}],"verse_grip":[],"custom_verse_grip":[]}"#,
     r#"{"inverse3":[{"device_id":"04BA","state":{"cursor_position":{"x":0,"y":-1.5e-2,"z":0.25}}}]}"#,
     r#"{"inverse3":[{"device_id":"048D","status":{"calibrated":false,"ready":true}},{"device_id":"049D"}]}"#,
 ];

@@ -90,8 +90,10 @@ pub const MAPPINGS: Target = Target {
         [
             ("[time]\ncolumn = 1\ngap = 0.5\n".to_owned() + &joint("a", "2", "4"), table(",", "# a table\n")),
             (
-                "[table]\ndelimiter = \" \"\nheader = true\nbad_rows = \"drop\"\n[time]\nperiod = 0.01\n[filter]\nspeed_rows = 2\noutliers = 5.0\ndecimate = 2\n\
-                 [torque]\nkeep = \"average\"\nlead = \"b\"\nstill = 0.01\ncell = [0.05, 0.05]\n".to_owned()
+                "[table]\ndelimiter = \" \"\nheader = true\nbad_rows = \"drop\"\n[time]\nperiod = 0.01\n\
+                 [filter]\nspeed_rows = 2\noutliers = 5.0\ndecimate = 2\n\
+                 [torque]\nkeep = \"average\"\nlead = \"b\"\nstill = 0.01\ncell = [0.05, 0.05]\n"
+                    .to_owned()
                     + &joint("a", "\"x\"", "\"t\"")
                     + &joint("b", "\"y\"", "\"u\""),
                 table(" ", "time x y t u\n"),

@@ -57,7 +57,8 @@ pub const PLY: Target = Target {
 fn binary_ply(order: &str) -> Vec<u8> {
     let little = order == "little";
     let mut bytes = format!(
-        "ply\nformat binary_{order}_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty double z\n\
+        "ply\nformat binary_{order}_endian 1.0\nelement vertex 4\n\
+         property float x\nproperty float y\nproperty double z\n\
          element face 4\nproperty list uchar int vertex_indices\nend_header\n"
     )
     .into_bytes();

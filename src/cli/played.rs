@@ -1,0 +1,177 @@
+//! A session that was played: its files, and what there is to say about it.
+
+use super::{Failure, interrupt, on_demand::Explored, tell};
+use crate::{
+    dataset::{Dataset, discard_unfinished, replace_file},
+    device::Device,
+    render::{
+        realtime,
+        session::{self, SessionError},
+        setup::Setup,
+        steal::Steal,
+        timing::{Percentiles, Timing},
+        trace::{Summary, Trace},
+    },
+    report,
+};
+use std::{
+    fmt::{self, Write},
+    path::{Path, PathBuf},
+    sync::{Arc, atomic::AtomicBool},
+};
+
+/// Files beside [`report::FIGURES`].
+pub const FILES: [&str; 4] = ["trace.csv", "frames.csv", "jitter.svg", "jitter.png"];
+
+/// Shapes of the object that are kept.
+pub const SNAPSHOTS: usize = 60;
+
+/// Says that a file cannot be written, and why.
+pub fn unwritten(path: &Path, error: impl fmt::Display) -> String {
+    format!("cannot write {}: {error}; free some space or give another place", path.display())
+}
+
+/// A session that was played.
+pub struct Played {
+    /// Its recording.
+    pub trace: Arc<Trace>,
+    /// How punctual it was, if it ran against the clock.
+    pub timing: Option<Timing>,
+    /// Work done meanwhile, if any.
+    pub explored: Option<Explored>,
+}
+
+impl Played {
+    /// A session against the clock, in which contact was solved meanwhile.
+    pub fn on_demand((trace, timing, explored): (Trace, Timing, Explored)) -> Self {
+        Self { trace: trace.into(), timing: Some(timing), explored: Some(explored) }
+    }
+}
+
+/// Plays for `seconds` what `device` does.
+pub fn play(
+    setup: &Setup,
+    dataset: &Dataset,
+    device: &mut dyn Device,
+    seconds: f64,
+    against_the_clock: bool,
+) -> Result<Played, Failure> {
+    let mut graphics = setup.graphics(dataset)?;
+    let plan = setup.plan(dataset, seconds, SNAPSHOTS);
+    if against_the_clock {
+        let (trace, timing) = realtime::run(&setup.haptics, device, graphics.as_mut(), &plan, &AtomicBool::new(false))?;
+        return Ok(Played { trace: trace.into(), timing: Some(timing), explored: None });
+    }
+    let played: Result<Trace, SessionError> = session::run(&setup.haptics, device, graphics.as_mut(), &plan);
+    Ok(Played { trace: played?.into(), timing: None, explored: None })
+}
+
+/// Writes traces and figures of `played` into `folder`, and returns their paths.
+pub fn write(setup: &Setup, dataset: &Arc<Dataset>, played: &Played, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| format!("cannot make the folder {}: {error}; give another by -o", folder.display()))?;
+    let ticks = folder.join("trace.csv");
+    replace_file(&ticks, |out| played.trace.write_ticks(out)).map_err(|error| unwritten(&ticks, error))?;
+    let mut files = vec![ticks];
+    if !played.trace.frames.is_empty() {
+        let frames = folder.join("frames.csv");
+        replace_file(&frames, |out| played.trace.write_frames(out)).map_err(|error| unwritten(&frames, error))?;
+        files.push(frames);
+    }
+    let mut figures = report::figures(dataset, Some((&Arc::new(setup.chain.clone()), &played.trace)));
+    if let Some(timing) = played.timing.clone() {
+        figures.push(report::Figure::drawing("jitter", move || report::jitter::jitter(&timing)));
+    }
+    let report::Files { written, left_out } = report::write_until(interrupt::is_late, folder, figures)?;
+    files.extend(written);
+    if !left_out.is_empty() {
+        discard_unfinished();
+        let names: Vec<_> = left_out.iter().filter_map(|file| file.file_name()?.to_str()).collect();
+        tell(format_args!(
+            "haptize: note: for want of time after the signal these are left out: {}; a session that ends by --seconds \
+             has them all, and `haptize play` draws a session that --record wrote (--replay FILE), and a dataset that \
+             was explored",
+            names.join(", ")
+        ));
+    }
+    Ok(files)
+}
+
+/// Says in millijoules what was added to the loop's energy, or taken from it.
+fn exchanged(joules: f64) -> String {
+    let verb = if joules > 0.0 { "injected" } else { "removed" };
+    format!("{verb} {:.2} mJ", 1e3 * joules.abs())
+}
+
+/// Describes what was felt, for people.
+pub fn describe(text: &mut String, s: &Summary) -> fmt::Result {
+    writeln!(text, "{:.2} s, {} ticks, {:.0} % in contact", s.seconds, s.ticks, 100.0 * s.contact_share)?;
+    write!(text, "  contact      torque at most {:.4} N m", s.max_contact_torque)?;
+    // What was measured, and a store, do not say how many nodes of the object are in contact.
+    match s.max_contact_nodes {
+        0 => writeln!(text)?,
+        nodes => writeln!(text, ", {nodes} object nodes")?,
+    }
+    writeln!(
+        text,
+        "  steepest     {:.4} N m in a millisecond on the proxy, {:.4} on the device",
+        s.max_contact_torque_step, s.max_device_torque_step
+    )?;
+    writeln!(
+        text,
+        "  energy       interpolation {}, sample-and-hold {}; the balance closes to {:.0e} (relative)",
+        exchanged(s.leak),
+        exchanged(s.hold_gain),
+        s.max_relative_account_residual
+    )?;
+    for (count, what) in [
+        (s.outside, "in free space outside the haptized range"),
+        (s.held, "held at the border of the haptized range: for more room, bake a wider grid"),
+        (s.absent, "beside absent grid points"),
+        (s.unconverged, "beside unconverged grid points"),
+        (s.limited, "with the device's torque limited"),
+        (s.faults, "without torque, after a fault"),
+    ] {
+        if count > 0 {
+            writeln!(text, "  note         {count} ticks {what}")?;
+        }
+    }
+    Ok(())
+}
+
+/// Describes how punctual it was, for people.
+pub fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
+    let mut line = |what: &str, p: Percentiles| {
+        let Percentiles { p50, p99, p999, p9999, max, .. } = p;
+        writeln!(
+            text,
+            "  {what:<12} median {p50:.1} us, 99 % {p99:.1}, 99.9 % {p999:.1}, 99.99 % {p9999:.1}, most {max:.1}"
+        )
+    };
+    line("period", timing.interval)?;
+    line("lateness", timing.lateness)?;
+    line("tick", timing.tick_cost)?;
+    line("frame", timing.frame_cost)?;
+    let Timing { missed_deadlines, missed_frames, unrecorded, .. } = timing;
+    writeln!(
+        text,
+        "  missed       {missed_deadlines} deadlines (ticks left out because an earlier one ran late), \
+         {missed_frames} frames, {unrecorded} records"
+    )?;
+    let Some(Steal { late, late_beside_steal, seconds }) = timing.steal.filter(|steal| steal.late > 0) else {
+        return Ok(());
+    };
+    write!(text, "  late         {late} ticks by more than half a period")?;
+    if late_beside_steal > 0 {
+        write!(
+            text,
+            ", {late_beside_steal} of them while the hypervisor took the processor ({seconds:.2} s in all): give the \
+             virtual machine processors of its own"
+        )?;
+    }
+    if late > late_beside_steal {
+        let own = late - late_beside_steal;
+        write!(text, "; {own} by this system: give the loop real-time priority (haptize doctor) or an idle core")?;
+    }
+    writeln!(text)
+}
