@@ -1,7 +1,7 @@
 //! The way on which the hand is led to where a motion begins: through free space, where there is such a way.
 //!
 //! Dijkstra's algorithm over the grid's points finds the way; a point in contact costs as much as a detour of
-//! [`CONTACT_COST`] points. Stretches whose cells are all free are then replaced by straight lines.
+//! [`CONTACT_COST`] points. Stretches are then replaced by straight lines where these touch no more.
 
 use crate::{
     JointVector,
@@ -42,8 +42,10 @@ fn between(dataset: &Dataset, from: &JointVector, to: &JointVector) -> Vec<Joint
     way.push(*to);
     let (mut corners, mut here) = (Vec::new(), 0);
     loop {
-        let is_straight =
-            |&there: &usize| is_along_one_joint(&way[here..=there]) || is_line_free(dataset, &way[here], &way[there]);
+        let is_straight = |&there: &usize| match touched(dataset, way[here..=there].iter().copied()) {
+            0 => is_line_free(dataset, &way[here], &way[there]),
+            least => touched(dataset, line(grid, &way[here], &way[there])) <= least,
+        };
         let farthest = (here + 2..way.len()).rev().find(is_straight);
         here = farthest.unwrap_or(here + 1);
         if here + 1 >= way.len() {
@@ -93,22 +95,35 @@ fn neighbours(grid: &Grid, point: usize) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Whether at most one joint moves along `way`.
-fn is_along_one_joint(way: &[JointVector]) -> bool {
-    let moves = |joint: usize| way.iter().any(|q| q[joint] != way[0][joint]);
-    (0..way[0].len()).filter(|&joint| moves(joint)).count() <= 1
+/// Returns configurations on the line from `from` to `to`, two or more a grid step.
+fn line(grid: &Grid, from: &JointVector, to: &JointVector) -> impl Iterator<Item = JointVector> {
+    let lines = grid.axes.iter().enumerate().map(|(joint, axis)| (to[joint] - from[joint]).abs() / axis.step);
+    let samples = 2 * lines.fold(1.0, f64::max).ceil() as usize;
+    let (from, to) = (*from, *to);
+    (0..=samples).map(move |sample| {
+        let mut q = from;
+        for (x, end) in q.iter_mut().zip(to.iter()) {
+            *x += sample as f64 / samples as f64 * (end - *x);
+        }
+        q
+    })
+}
+
+/// Returns how many grid points in contact are the nearest one of some of `configurations`, which lie in a row.
+fn touched(dataset: &Dataset, configurations: impl Iterator<Item = JointVector>) -> usize {
+    let grid = &dataset.grid;
+    let mut points: Vec<usize> = configurations.filter_map(|q| grid.nearest(&grid.clamp(&q))).collect();
+    points.dedup();
+    points.iter().filter(|point| dataset.status(**point) != Status::Free).count()
 }
 
 /// Whether all corners of all cells that the line from `from` to `to` leads through are free.
 fn is_line_free(dataset: &Dataset, from: &JointVector, to: &JointVector) -> bool {
     let grid = &dataset.grid;
-    let lines = grid.axes.iter().enumerate().map(|(joint, axis)| (to[joint] - from[joint]).abs() / axis.step);
-    let samples = 2 * lines.fold(1.0, f64::max).ceil() as usize;
-    (0..=samples).all(|sample| {
-        let share = sample as f64 / samples as f64;
+    line(grid, from, to).all(|q| {
         let mut points = vec![0];
-        for (joint, axis) in grid.axes.iter().enumerate() {
-            let at = (from[joint] + share * (to[joint] - from[joint]) - axis.start) / axis.step;
+        for (x, axis) in q.iter().zip(&grid.axes) {
+            let at = (x - axis.start) / axis.step;
             let [low, high] = [at.floor(), at.ceil()].map(|line| line.clamp(0.0, (axis.count - 1) as f64) as usize);
             points = points.iter().flat_map(|point| [low, high].map(|line| point * axis.count + line)).collect();
         }
@@ -151,6 +166,7 @@ mod tests {
         let plane = plane();
         let [inside, outside, corner] = [[0.4, 0.0], [0.9, 0.0], [0.9, 0.9]].map(|q| JointVector::from_slice(&q));
         let out = way(Some(&plane), &inside, &outside).unwrap();
+        assert_eq!(out.duration(), LEAD_IN);
         assert!((0..1000).all(|k| out.at(out.duration() * k as f64 / 1e3).0[1].abs() < 1e-12), "{out:?}");
         assert_eq!(way(Some(&plane), &outside, &corner), way(None, &outside, &corner));
     }
