@@ -53,4 +53,4 @@ pub use flights::HostTime;
 pub use frame::{FrameCost, FrameError, FrameMethod, FrameUpdate};
 pub use pipeline::BatchCapacity;
 pub use solver::GpuSolver;
-pub use timing::KernelTime;
+pub use timing::{KernelTime, SearchCounts};
