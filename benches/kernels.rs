@@ -12,7 +12,7 @@ use glam::DVec3;
 use haptize::{
     JointVector,
     contact::Model,
-    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver, KernelTime, stages::Stages},
+    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver, KernelTime, SearchCounts, stages::Stages},
     object::Object,
     proxy::Chain,
     scene::{Algorithm, GraphicsEffects, Scene, Shape},
@@ -47,6 +47,19 @@ const FEW_WORKGROUPS: f64 = 128.0;
 /// Size of what is copied [B], and how often.
 const COPIED: u64 = 64 << 20;
 const COPIES: usize = 16;
+
+/// Operations in f64 [1], and bytes from the cache [B], of what the search counts. A pair of nodes: a number of C times
+/// three of a force, added up. A bent facet: 2,200 for its control points and 1,600 for the point closest to the proxy
+/// node, from a dozen nodes, their masks and their displacements. A step of an elimination: a product, subtracted.
+const PAIR: [f64; 2] = [6.0, 8.0];
+const FACET: [f64; 2] = [3_800.0, 800.0];
+const ELIMINATION: [f64; 2] = [2.0, 16.0];
+
+/// Operations in f64 [1/s] and bytes from the second-level cache [B/s] of an H200, by its data sheet and as measured.
+const H200: [f64; 2] = [34e12, 5.5e12];
+
+/// Share of these operations that lanes which diverge and wait for each other are expected to reach [1].
+const LIKELY: f64 = 1.0 / 6.0;
 
 /// Every so many-th configuration is solved where the host is timed beside a software rasteriser.
 const HOST_STRIDE: usize = 16;
@@ -88,6 +101,7 @@ fn kernels(context: &Arc<Context>, scene: &Scene) -> Result<(), Box<dyn Error>> 
     for algorithm in [Algorithm::Energy, Algorithm::Paper, Algorithm::Linearised] {
         sweep(context, &swept, algorithm, adapter)?;
     }
+    predict(context, if hardware { 1 } else { HOST_STRIDE }, adapter)?;
     let rings = if hardware { &RINGS[..] } else { &RINGS[..3] };
     rings.iter().try_for_each(|&rings| frames(context, scene, rings, adapter))
 }
@@ -138,6 +152,68 @@ fn sweep(context: &Arc<Context>, scene: &Scene, algorithm: Algorithm, adapter: A
     };
     table(&context.kernel_times()?, "configuration", count, &BTreeMap::new(), seconds, adapter);
     Ok(())
+}
+
+/// The search in f64 for every `stride`-th configuration of the shipped sphere scene: what it takes, counted by the
+/// kernels themselves, and the rate on an H200 that follows.
+fn predict(context: &Arc<Context>, stride: usize, adapter: Adapter) -> Result<(), Box<dyn Error>> {
+    let scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/sphere.toml"))?;
+    let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
+    let model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
+    let configurations: Vec<JointVector> = sample(&scene).into_iter().step_by(stride).collect();
+    let mut solver = GpuSolver::new(Arc::clone(context), &model)?;
+    if !solver.is_exact() {
+        println!("\nno f64 here: nothing is counted of the search in f64");
+        return Ok(());
+    }
+    context.kernel_times()?;
+    let (_, begin) = (context.search_counts(), Instant::now());
+    solver.solve(&configurations)?;
+    let (seconds, times, counts) = (begin.elapsed().as_secs_f64(), context.kernel_times()?, context.search_counts());
+    println!("\nsearch in f64, the shipped sphere scene, {} configurations", configurations.len());
+    let work = work(&counts);
+    let dispatches = |name: &str| times.iter().find(|kernel| kernel.name == name).map_or(1, |kernel| kernel.dispatches);
+    let operations = work.iter().map(|&(name, [operations, _])| (name, operations / dispatches(name) as f64)).collect();
+    let touching = counts.configurations as usize;
+    table(&times, "configuration in contact", |_| touching, &operations, seconds, adapter);
+    let (each, trials) = (|sum: u64| sum as f64 / counts.configurations as f64, counts.trials as f64);
+    println!(
+        "  {touching} in contact, {:.2} trials each. A trial: {:.0} nodes displaced by {:.0}, {:.1} proxy nodes near, {:.0} \
+         facets measured, {:.1} iterations with {:.0} pairs, {:.0} steps of eliminations",
+        each(counts.trials),
+        counts.displaced as f64 / trials,
+        counts.displaced_pairs as f64 / counts.displaced as f64,
+        counts.candidates as f64 / trials,
+        counts.facets as f64 / trials,
+        counts.iterations as f64 / trials,
+        counts.stepped_pairs as f64 / counts.iterations as f64,
+        counts.eliminations as f64 / trials,
+    );
+    println!("  {:<24} {:>18} {:>10}  bound on an H200 by", "a configuration takes", "[M operations]", "[kB]");
+    let mut whole = [0.0; 2];
+    for (name, amounts) in work {
+        let [operations, bytes] = amounts.map(|amount| amount / counts.configurations as f64);
+        let bound = if operations / (LIKELY * H200[0]) > bytes / H200[1] { "arithmetic" } else { "memory" };
+        println!("  {name:<24} {:>18.3} {:>10.1}  {bound}", 1e-6 * operations, 1e-3 * bytes);
+        whole = [whole[0] + operations, whole[1] + bytes];
+    }
+    let [peak, memory] = [0, 1].map(|k| 1e-6 * H200[k] / whole[k]);
+    println!(
+        "  an H200: {memory:.1} million in contact a second by its memory, {peak:.1} by its arithmetic at the peak, \
+         {:.1} as it is likely",
+        memory.min(LIKELY * peak)
+    );
+    Ok(())
+}
+
+/// Operations and bytes of what was counted, by kernel.
+fn work(counts: &SearchCounts) -> [(&'static str, [f64; 2]); 3] {
+    let sum = |parts: &[(u64, [f64; 2])]| [0, 1].map(|k| parts.iter().map(|(count, of)| *count as f64 * of[k]).sum());
+    [
+        ("search_detect", sum(&[(counts.displaced_pairs, PAIR), (counts.facets, FACET)])),
+        ("search_judge", sum(&[(counts.judged_pairs, PAIR)])),
+        ("search_step", sum(&[(counts.stepped_pairs, PAIR), (counts.eliminations, ELIMINATION)])),
+    ]
 }
 
 /// Where the host's time goes for every `stride`-th configuration of a scene: beside the adapter, and beside what it

@@ -11,6 +11,9 @@ struct Closest {
     point: ClosestPoint,
 }
 
+// Facets that this invocation has measured.
+var<private> measured: u32;
+
 // The facet closest to x, if there is one no farther than `within`; facet `likely`, where there is one, is tried first.
 // No facet has left its place at rest by more than `moved`.
 fn closest_facet(x: vec3<real>, within: real, moved: real, likely: u32) -> Closest {
@@ -43,6 +46,7 @@ fn closest_facet(x: vec3<real>, within: real, moved: real, likely: u32) -> Close
         if facet != best.facet && !is_beyond(facet, x, best.distance) {
             form(facet, x);
             let point = closest_on_facet();
+            measured += 1u;
             let away = length(jet_at(point.weights).point);
             if away < best.distance || (away == best.distance && facet < best.facet) {
                 best = Closest(away, facet, point);

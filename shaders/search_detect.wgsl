@@ -166,6 +166,19 @@ fn write_rows(candidates: u32, reach: real, local: u32) {
     }
 }
 
+// Notes what this took; for one invocation.
+fn account(candidates: u32, displaced: u32) {
+    var facets = real(0.0);
+    for (var k = 0u; k < WORKGROUP; k += 1u) {
+        facets += shares[k];
+    }
+    tally(TRIALS, 1u);
+    tally(CANDIDATES, candidates);
+    tally(FACETS, u32(facets));
+    tally(DISPLACED, displaced);
+    tally(DISPLACED_PAIRS, displaced * word(SLOTS));
+}
+
 @compute @workgroup_size(WORKGROUP)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -183,7 +196,13 @@ fn main(
             reach = frozen_reach(local);
         }
         let candidates = list_candidates(reach, local);
-        displace(list_groups(candidates, local), local);
+        let displaced = list_groups(candidates, local);
+        displace(displaced, local);
         write_rows(candidates, reach, local);
+        shares[local] = real(measured);
+        workgroupBarrier();
+        if local == 0u {
+            account(candidates, displaced * NODES_TOGETHER);
+        }
     }
 }

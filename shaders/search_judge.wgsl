@@ -1,6 +1,8 @@
 // What a trial led to is judged, the state is balanced, and what to do next is decided (twins:
 // src/contact/equilibrium/energy.rs and tangent.rs).
 
+const OWN_PAIRS: u32 = JUDGED_PAIRS;
+
 // Judges a trial whose rows are there.
 fn judge(local: u32) {
     let trial = 1u - own;

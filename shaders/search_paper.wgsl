@@ -1,6 +1,8 @@
 // A pass of the paper's four-step iteration, section 2.1 (twin, with the steps: src/contact/equilibrium/paper.rs). One
 // workgroup a configuration. The trial, whose rows search_detect has found, is all there is of a state.
 
+const OWN_PAIRS: u32 = STEPPED_PAIRS;
+
 // Vectors: forces of this pass, of the one before, and of an earlier one that later ones are compared with, where a
 // repetition is a cycle; and of step 2 what is wanted, xbar - n0, and the forces that do so.
 const FORCES: u32 = 1u;

@@ -16,6 +16,11 @@
 @group(0) @binding(7) var<storage, read_write> words: array<u32>;
 @group(0) @binding(8) var<storage, read_write> reals: array<real>;
 
+// Adds to what the search took; for one invocation.
+fn tally(what: u32, amount: u32) {
+    set_word(what, word(what) + amount);
+}
+
 fn proxy_position(node: u32) -> vec3<real> {
     let at = 3u * (member * parameters.proxy_nodes + node);
     return vec3<real>(placed[at], placed[at + 1u], placed[at + 2u]);

@@ -2,6 +2,8 @@
 // (twins: src/contact/equilibrium/newton.rs, woodbury.rs and tangent.rs). Phases stand in the order in which they
 // mostly follow each other: software rasterisers pass through the code of those that are not wanted.
 
+const OWN_PAIRS: u32 = STEPPED_PAIRS;
+
 // --- One damped Newton step ---
 
 fn begin_step(local: u32) {
@@ -91,6 +93,7 @@ fn factorise(local: u32) {
     sync();
     invert(taken, local);
     if local == 0u {
+        tally(ELIMINATIONS, taken * taken * taken);
         set_word(IS_FIRST, 1u);
         go_to(select(PRECONDITION, RESPOND, word(PURPOSE) == FOR_TANGENT), FACTORISE);
     }
@@ -270,6 +273,7 @@ fn iterate(local: u32) {
     sync();
     if local == 0u {
         set_word(LEFT, word(LEFT) - 1u);
+        tally(SOLVE_ITERATIONS, 1u);
         if is_convex {
             go_to(PRODUCT, ITERATE);
         } else {

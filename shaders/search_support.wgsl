@@ -64,6 +64,9 @@ fn multiply(vector: u32, product: u32, local: u32) {
         let parts = responses(vector, places_from(slot));
         put_four(product, slot, parts);
     }
+    if local == 0u {
+        tally(OWN_PAIRS, slots * slots);
+    }
 }
 
 // Places of four slots that an invocation takes together; behind the last slot any.

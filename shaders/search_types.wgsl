@@ -110,7 +110,19 @@ const TOUCHES: u32 = 18u;
 const IS_DOUBTFUL: u32 = 19u;
 // Whether the linear solve is at its beginning.
 const IS_FIRST: u32 = 20u;
-const HEADER: u32 = 21u;
+// What the search took in all its rounds, which benchmarks read: trials, proxy nodes that could touch, facets measured,
+// surface nodes displaced, pairs of these with nodes that carry force, iterations of linear solves, pairs of nodes that
+// carry force in products with C, of search_judge and of search_step, and steps of eliminations.
+const TRIALS: u32 = 21u;
+const CANDIDATES: u32 = 22u;
+const FACETS: u32 = 23u;
+const DISPLACED: u32 = 24u;
+const DISPLACED_PAIRS: u32 = 25u;
+const SOLVE_ITERATIONS: u32 = 26u;
+const JUDGED_PAIRS: u32 = 27u;
+const STEPPED_PAIRS: u32 = 28u;
+const ELIMINATIONS: u32 = 29u;
+const HEADER: u32 = 30u;
 
 // Phases: what a search has to do next. It waits for rows where it is PLACED; up to TANGENT search_judge has it, and
 // beyond search_step.

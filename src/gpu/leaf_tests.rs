@@ -120,6 +120,7 @@ static LEAF_SHADER: [Shader; 2] = shaders::in_both(Shader {
         shaders::FACET,
         shaders::DEFORMED_FACET,
         shaders::DEPTH_ROWS,
+        "const OWN_PAIRS: u32 = STEPPED_PAIRS;\n",
         shaders::SEARCH_SUPPORT,
         LEAF,
     ],

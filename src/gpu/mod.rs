@@ -54,5 +54,5 @@ pub use frame::{FrameCost, FrameError, FrameMethod, FrameUpdate};
 pub use pipeline::BatchCapacity;
 pub(crate) use shaders::GPU_LEAST_DIVISOR;
 pub use solver::GpuSolver;
-pub use timing::KernelTime;
+pub use timing::{KernelTime, SearchCounts};
 pub use unpack::GPU_SETTLED_RESIDUAL;

@@ -279,6 +279,11 @@ impl SearchLane {
                 found.presses = precision.decode(&bytes);
             }
             self.touches_each = total as f64 / count.max(1) as f64;
+            if let Some(stopwatch) = &context.stopwatch {
+                let (before, each) = (2 * self.room + 1, search.model.parameters.words as usize);
+                let words = self.words.read(context, before + count * each)?;
+                stopwatch.count(&words[before..], each);
+            }
             return Ok(found);
         }
     }

@@ -7,7 +7,10 @@ use super::{
     context::{Context, GpuError},
     kernel::Dispatch,
 };
-use std::sync::{Mutex, PoisonError};
+use std::{
+    ops::Range,
+    sync::{Mutex, PoisonError},
+};
 
 /// Time of one kernel, all its dispatches together.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,10 +28,58 @@ pub struct KernelTime {
     pub bytes: u64,
 }
 
+/// What the search took for the configurations in contact, in all rounds: see `shaders/search_types.wgsl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SearchCounts {
+    /// Configurations.
+    pub configurations: u64,
+    /// Trials: rounds of a configuration.
+    pub trials: u64,
+    /// Proxy nodes that could touch.
+    pub candidates: u64,
+    /// Facets that were measured.
+    pub facets: u64,
+    /// Surface nodes displaced.
+    pub displaced: u64,
+    /// Pairs of these with nodes that carry force.
+    pub displaced_pairs: u64,
+    /// Iterations of linear solves.
+    pub iterations: u64,
+    /// Pairs of nodes that carry force, in products with C: where a state is judged, and where a step is made.
+    pub judged_pairs: u64,
+    /// The same where a step is made.
+    pub stepped_pairs: u64,
+    /// Steps of the eliminations that invert matrices.
+    pub eliminations: u64,
+}
+
+/// The first of the words of a workspace that count, and how many there are.
+pub(super) const COUNTED: Range<usize> = 21..30;
+
+impl SearchCounts {
+    /// Adds the words of one configuration that count.
+    fn add(&mut self, words: [u32; COUNTED.end - COUNTED.start]) {
+        let sums = [
+            &mut self.trials,
+            &mut self.candidates,
+            &mut self.facets,
+            &mut self.displaced,
+            &mut self.displaced_pairs,
+            &mut self.iterations,
+            &mut self.judged_pairs,
+            &mut self.stepped_pairs,
+            &mut self.eliminations,
+        ];
+        sums.into_iter().zip(words).for_each(|(sum, word)| *sum += u64::from(word));
+        self.configurations += 1;
+    }
+}
+
 /// A device's clock, and what it has stamped so far.
 #[derive(Default)]
 pub(super) struct Stopwatch {
     stamped: Mutex<Vec<Stamped>>,
+    counts: Mutex<SearchCounts>,
 }
 
 /// The timed dispatches of one submission.
@@ -43,6 +94,13 @@ struct Stamped {
 const STAMP: u64 = wgpu::QUERY_SIZE as u64;
 
 impl Stopwatch {
+    /// Adds what a search took, from the words of the workspaces, `each` of every configuration.
+    pub fn count(&self, words: &[u32], each: usize) {
+        let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
+        let counted = words.chunks_exact(each).filter_map(|words| words.get(COUNTED)?.try_into().ok());
+        counted.for_each(|words| counts.add(words));
+    }
+
     /// Records `dispatches`, in order, a pass each.
     pub fn record<'a>(
         &self,
@@ -97,6 +155,13 @@ impl Stopwatch {
 }
 
 impl Context {
+    /// Returns what searches took since the last call; zeros where kernels are not timed.
+    #[must_use]
+    pub fn search_counts(&self) -> SearchCounts {
+        let Some(stopwatch) = &self.stopwatch else { return SearchCounts::default() };
+        std::mem::take(&mut *stopwatch.counts.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
     /// Returns the time of every kernel since the last call, in the order in which they first ran; nothing where
     /// kernels are not timed. Waits for the device.
     ///
@@ -174,7 +239,8 @@ mod tests {
             let times = context.kernel_times().unwrap();
             plausible(&times, begin.elapsed().as_secs_f64());
             assert_eq!(context.kernel_times().unwrap(), [], "told twice");
-            (equilibria.into_iter().map(|e| (e.status, e.torque, e.energy)).collect::<Vec<_>>(), times)
+            let results = equilibria.into_iter().map(|e| (e.status, e.torque, e.energy)).collect::<Vec<_>>();
+            (results, times, context.search_counts())
         });
         assert_eq!(timed.0, plain.0, "results depend on the clock");
         assert_eq!(plain.1, []);
@@ -195,9 +261,15 @@ mod tests {
                 "search_results gather",
             ]
         );
+        let touching = timed.0.iter().filter(|(status, ..)| *status != crate::contact::Status::Free).count() as u64;
+        let counts = timed.2;
+        assert_eq!(plain.2, SearchCounts::default());
+        assert_eq!(counts.configurations, touching);
+        assert!(counts.trials > 2 * touching && counts.facets > counts.candidates / 2 && counts.candidates > touching);
+        assert!(counts.displaced_pairs > counts.displaced && counts.stepped_pairs > counts.judged_pairs, "{counts:?}");
+        assert!(counts.iterations > touching && counts.eliminations >= counts.iterations / 8, "{counts:?}");
         // One workgroup a configuration, and for each of its nodes the place is written, then read and written.
         let [kinematics, detection, _, _, _, search, ..] = &timed.1[..] else { panic!("{names:?}") };
-        let touching = timed.0.iter().filter(|(status, ..)| *status != crate::contact::Status::Free).count() as u64;
         assert!(search.workgroups >= touching && touching > 50, "{} for {touching}", search.workgroups);
         let places = (16 * chain.nodes.len() * configurations.len()) as u64;
         assert!(kinematics.bytes > places && kinematics.bytes < 2 * places);
