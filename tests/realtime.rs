@@ -21,7 +21,7 @@ use haptize::{
         graphics::Graphics,
         haptic::{Haptics, Inputs},
         live::{Live, LiveEnds},
-        realtime::{self, Ends, HapticLoop},
+        realtime::{self, Ends, HapticLoop, Options},
         recording::Recording,
         session::{Driver, Plan},
         setup::{Setup, labels},
@@ -37,7 +37,7 @@ use haptize::{
     },
 };
 use std::{
-    sync::{Arc, atomic::AtomicBool},
+    sync::Arc,
     time::{Duration, Instant},
 };
 use synthetic::{grid, half_space};
@@ -152,7 +152,7 @@ fn a_session_against_the_clock_does_every_tick_that_it_does_not_report_and_repla
     let haptics = build(&data);
     let mut hand = hand(3);
     let plan = Plan::new(labels(&data.grid), haptics.period(), 0.4, 0);
-    let (trace, timing) = realtime::run(&haptics, &mut hand, None, &plan, &AtomicBool::new(false)).unwrap();
+    let (trace, timing) = realtime::run(&haptics, &mut hand, None, &plan, Options::default()).unwrap();
     let done = trace.ticks.len() as u64 + timing.unrecorded;
     // The last tick may leave out deadlines beyond the end of the plan.
     assert!(done + timing.missed_deadlines >= 400, "{done} ticks, {timing:?}");
@@ -420,6 +420,6 @@ fn a_slow_frame_rate_does_not_hold_up_the_end_of_a_session() {
     let mut hand = setup.hand(Motion::through(&setup.scene.motion.press, 3).unwrap()).unwrap();
     let plan = setup.plan(&data, 0.1, 0);
     let began = Instant::now();
-    realtime::run(&setup.haptics, &mut hand, Some(&mut graphics), &plan, &AtomicBool::new(false)).unwrap();
+    realtime::run(&setup.haptics, &mut hand, Some(&mut graphics), &plan, Options::default()).unwrap();
     assert!(began.elapsed().as_secs() < 10, "{:?}", began.elapsed());
 }

@@ -1,13 +1,13 @@
 //! `haptize play SCENE --on-demand FILE`: contact that is solved while it is felt, and kept.
 
-use super::{Failure, interrupt, tell};
+use super::{Failure, interrupt, played::tell_fault, tell};
 use crate::{
     device::Device,
     render::{
         graphics::Graphics,
         haptic::Haptics,
         on_demand::{self, OnDemand},
-        realtime,
+        realtime::{self, Options},
         session::Plan,
         timing::Timing,
         trace::Trace,
@@ -136,8 +136,8 @@ impl Exploring {
         let start = *haptics.start(&device.read(0.0).position)?.proxy();
         let (live, exploration) = self.on_demand.begin(&start)?;
         let begun = self.began.elapsed().as_secs_f64();
-        let stop = interrupt::stop_flag();
-        let played = realtime::run_live(haptics, device, graphics, plan, stop, Some(live));
+        let options = Options { stop: interrupt::stop_flag(), live: Some(live), on_fault: tell_fault };
+        let played = realtime::run(haptics, device, graphics, plan, options);
         let done = exploration.end()?;
         interrupt::over();
         let (trace, timing) = played?;

@@ -7,14 +7,15 @@ use super::{
     on_demand::{self, Explored, Exploring},
     output::{self, Earlier, Folder, Kind as FileKind},
     playback_report::PlaybackReport,
-    played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, unwritten, write},
+    played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, tell_fault, unwritten, write},
     tell,
 };
 use crate::{
     dataset::{self, Dataset, replace_file},
     device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, attach, open},
     render::{
-        mcap, realtime,
+        mcap,
+        realtime::{self, Options},
         recording::Recording,
         setup::{Setup, border_stiffness, labels},
         trace::Summary,
@@ -307,9 +308,15 @@ fn drive(setup: &Setup, dataset: &Dataset, address: &Address, motion: Motion, ho
         Some(exploring) => {
             exploring.play(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan).map(Played::on_demand)
         }
-        None => realtime::run(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, stop)
-            .map(|(trace, timing)| Played { trace: trace.into(), timing: Some(timing), explored: None })
-            .map_err(Failure::from),
+        None => realtime::run(
+            &setup.haptics,
+            device.as_mut(),
+            graphics.as_mut(),
+            &plan,
+            Options { stop, on_fault: tell_fault, ..Options::default() },
+        )
+        .map(|(trace, timing)| Played { trace: trace.into(), timing: Some(timing), explored: None })
+        .map_err(Failure::from),
     };
     // Motors off before anything is drawn or written.
     drop(device);

@@ -5,7 +5,8 @@ use crate::{
     dataset::{Dataset, discard_unfinished, replace_file},
     device::Device,
     render::{
-        realtime,
+        flags::Fault,
+        realtime::{self, Options},
         session::{self, SessionError},
         setup::Setup,
         steal::Steal,
@@ -17,7 +18,7 @@ use crate::{
 use std::{
     fmt::{self, Write},
     path::{Path, PathBuf},
-    sync::{Arc, atomic::AtomicBool},
+    sync::Arc,
 };
 
 /// Files beside [`report::FIGURES`].
@@ -48,6 +49,11 @@ impl Played {
     }
 }
 
+/// Says at once that the torque went to zero, and why: whoever holds the device feels nothing any more.
+pub fn tell_fault(time: f64, fault: Fault) {
+    tell(format_args!("haptize: at {time:.4} s the torque went to zero: {fault}; play again to clear it"));
+}
+
 /// Plays for `seconds` what `device` does.
 pub fn play(
     setup: &Setup,
@@ -59,7 +65,13 @@ pub fn play(
     let mut graphics = setup.graphics(dataset)?;
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
     if against_the_clock {
-        let (trace, timing) = realtime::run(&setup.haptics, device, graphics.as_mut(), &plan, &AtomicBool::new(false))?;
+        let (trace, timing) = realtime::run(
+            &setup.haptics,
+            device,
+            graphics.as_mut(),
+            &plan,
+            Options { on_fault: tell_fault, ..Options::default() },
+        )?;
         return Ok(Played { trace: trace.into(), timing: Some(timing), explored: None });
     }
     let played: Result<Trace, SessionError> = session::run(&setup.haptics, device, graphics.as_mut(), &plan);

@@ -7,6 +7,7 @@
 
 use super::{
     clock,
+    flags::Fault,
     graphics::Graphics,
     haptic::Haptics,
     live::Live,
@@ -234,8 +235,26 @@ impl<'session> HapticLoop<'session> {
     }
 }
 
-/// Runs a session against the clock, as long as `plan` says, until `stop` is raised or the device stops for good.
-/// Graphics, where there is any, runs in a thread of its own.
+/// What a session against the clock is run with. By default nothing ends it early, its dataset does not change, and
+/// nobody is told of a fault before the end.
+pub struct Options<'a> {
+    /// Ends the session when it is raised.
+    pub stop: &'a AtomicBool,
+    /// Contact that is solved meanwhile.
+    pub live: Option<Live>,
+    /// Called with the time [s] of the first fault, soon after it; not in the real-time thread.
+    pub on_fault: fn(f64, Fault),
+}
+
+impl Default for Options<'_> {
+    fn default() -> Self {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Self { stop: &NEVER, live: None, on_fault: |_, _| {} }
+    }
+}
+
+/// Runs a session against the clock, as long as `plan` says, until `options.stop` is raised or the device stops for
+/// good. Graphics, where there is any, runs in a thread of its own.
 ///
 /// # Errors
 /// When the device reports no position, or the system gives no threads or memory.
@@ -244,23 +263,9 @@ pub fn run(
     device: &mut dyn Device,
     graphics: Option<&mut Graphics<'_>>,
     plan: &Plan,
-    stop: &AtomicBool,
+    options: Options<'_>,
 ) -> Result<(Trace, Timing), SessionError> {
-    run_live(haptics, device, graphics, plan, stop, None)
-}
-
-/// The same over contact that is solved meanwhile, if it is `live`.
-///
-/// # Errors
-/// As for [`run`].
-pub fn run_live(
-    haptics: &Haptics,
-    device: &mut dyn Device,
-    graphics: Option<&mut Graphics<'_>>,
-    plan: &Plan,
-    stop: &AtomicBool,
-    live: Option<Live>,
-) -> Result<(Trace, Timing), SessionError> {
+    let Options { stop, live, on_fault } = options;
     let scheduler = device.scheduler();
     let (body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device)?;
     let mut body = body.with_live(live);
@@ -290,10 +295,16 @@ pub fn run_live(
                 return Err(resources(error));
             }
         };
+        let mut faulted = false;
         let mut observer = StealObserver::new(clock::now(), clock::stolen(), clock::counter_rate());
         loop {
             let last = feeling.is_finished();
             while let Ok(tick) = ticks.pop() {
+                if let Some(fault) = tick.fault
+                    && !std::mem::replace(&mut faulted, true)
+                {
+                    on_fault(tick.time, fault);
+                }
                 recorded.push(tick);
             }
             while let Ok(tick) = late.pop() {

@@ -8,9 +8,11 @@ use haptize::{
     dataset::JointLabel,
     device::{Device, Halt},
     proxy::Chain,
-    render::{realtime, session::Plan},
+    render::{
+        realtime::{self, Options},
+        session::Plan,
+    },
 };
-use std::sync::atomic::AtomicBool;
 
 /// Length of each session, unless HAPTIZE_SECONDS gives another [s].
 const SECONDS: f64 = 0.25;
@@ -21,7 +23,7 @@ fn row(name: &str, device: &mut dyn Device, joints: usize) {
     let seconds = std::env::var("HAPTIZE_SECONDS").map_or(SECONDS, |seconds| seconds.parse().unwrap());
     let plan = Plan::new(labels, crate::felt::PERIOD, seconds, 0);
     let haptics = half_space_loop(joints);
-    let (trace, timing) = realtime::run(&haptics, device, None, &plan, &AtomicBool::new(false)).unwrap();
+    let (trace, timing) = realtime::run(&haptics, device, None, &plan, Options::default()).unwrap();
     let (period, late) = (timing.interval, timing.lateness);
     let steal = timing.steal.unwrap_or_default();
     println!(

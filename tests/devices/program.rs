@@ -5,8 +5,10 @@ use haptize::scan::{RowStatus, ScanLog};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use std::{
+    io::{BufRead, BufReader},
     path::Path,
     process::{Command, Output},
+    time::{Duration, Instant},
 };
 
 /// A finger of one joint above a ball, at eight angles.
@@ -104,6 +106,27 @@ fn play_drives_a_device_and_records_its_clamps_and_stops() {
     assert!(report["seconds"].as_f64().unwrap() < 0.9, "the session ends with the device");
 }
 
+#[test]
+fn a_hand_that_loses_its_torque_is_told_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(path.join("finger.toml"), FINGER).unwrap();
+    assert_eq!(haptize(path, &["bake", "finger.toml", "-o", "f.haptize", "--backend", "cpu"]).status.code(), Some(0));
+    let mut play = Command::new(env!("CARGO_BIN_EXE_haptize"))
+        .args(["play", "f.haptize", "--device", "simulated:silent@0.3-0.4", "--seconds", "60", "-o", "felt"])
+        .current_dir(path)
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(play.stderr.take().unwrap()).lines().map_while(Result::ok);
+    let told = lines.take_while(|line| !line.contains("the torque went to zero")).count();
+    let runs = play.try_wait().unwrap().is_none();
+    let _ = play.kill();
+    play.wait().unwrap();
+    assert!(runs, "told at the end only, after {told} other lines");
+}
+
 /// The Touch's arm without weight, and a plan of 3 x 4 x 2 configurations around those of the stand-in, half of them
 /// behind its wall.
 const PLAN: &str = r#"name = "plan"
@@ -166,11 +189,12 @@ fn a_whole_plan_is_scanned_with_a_touch_by_the_command_line() {
         command.env("STAND_IN_FREE", "1").output().unwrap()
     };
     let mut output = scan(&[]);
-    // Where other programs held the scan up, its user continues it.
-    for _ in 0..10 {
-        if json(&output)["error"].as_str().is_some_and(|error| error.contains("busy") || error.contains("5 ms")) {
-            output = scan(&["--resume"]);
-        }
+    // Where other programs, or those of the machine's owner, held the scan up, its user continues it.
+    let begin = Instant::now();
+    while json(&output)["error"].as_str().is_some_and(|error| error.contains("busy") || error.contains("5 ms"))
+        && begin.elapsed() < LONGEST_UNREST
+    {
+        output = scan(&["--resume"]);
     }
     let report = json(&output);
     assert_eq!(output.status.code(), Some(0), "{report} {}", String::from_utf8_lossy(&output.stderr));
@@ -193,6 +217,10 @@ fn a_whole_plan_is_scanned_with_a_touch_by_the_command_line() {
     let gridized = haptize(path, &["gridize", "plan.csv", "--step", "0.03,0.05,0.04", "--json"]);
     assert_eq!(gridized.status.code(), Some(0), "{}", String::from_utf8_lossy(&gridized.stderr));
 }
+
+/// How long a machine may go on holding up what is tried again [s]: virtual machines of one owner share processors.
+#[cfg(unix)]
+const LONGEST_UNREST: Duration = Duration::from_secs(120);
 
 /// Two slides above a ball, led by the two joints of a 2DIY.
 #[cfg(unix)]
@@ -227,7 +255,7 @@ offset = [-0.29365, -0.021817]
 
 /// The torque that a firmware was sent with each command, and when.
 #[cfg(unix)]
-type Sent = std::sync::Arc<std::sync::Mutex<Vec<(std::time::Instant, f64)>>>;
+type Sent = std::sync::Arc<std::sync::Mutex<Vec<(Instant, f64)>>>;
 
 /// A firmware that keeps what it was sent.
 #[cfg(unix)]
@@ -240,7 +268,7 @@ struct Watched {
 impl crate::emulator::Firmware for Watched {
     fn take(&mut self, bytes: &[u8], angles: &haptize::JointVector) -> Vec<Vec<u8>> {
         let replies = self.firmware.take(bytes, angles);
-        let sent = (std::time::Instant::now(), self.firmware.torque().norm());
+        let sent = (Instant::now(), self.firmware.torque().norm());
         self.sent.lock().unwrap().extend(replies.iter().map(|_| sent));
         replies
     }
@@ -255,14 +283,11 @@ impl crate::emulator::Firmware for Watched {
 }
 
 /// Plays in `folder` with an emulated 2DIY, sends `signal` once it is pushed, and returns with how many commands it was
-/// still pushed afterwards.
+/// still pushed afterwards; nothing where the loop faulted first, as it does when the machine holds one of the two
+/// processes up for 10 ms.
 #[cfg(unix)]
-fn pushed_after(folder: &Path, signal: Signal) -> usize {
-    use std::{
-        os::unix::process::CommandExt,
-        process::Stdio,
-        time::{Duration, Instant},
-    };
+fn pushed_after(folder: &Path, signal: Signal) -> Option<usize> {
+    use std::{os::unix::process::CommandExt, process::Stdio};
     let middle = haptize::JointVector::from_slice(&[168.25_f64.to_radians(), 12.5_f64.to_radians()]);
     let sent = Sent::default();
     let firmware = Watched { firmware: crate::emulator::TwoDiyFirmware::default(), sent: sent.clone() };
@@ -283,13 +308,12 @@ fn pushed_after(folder: &Path, signal: Signal) -> usize {
             })
         };
         let mut play = play.spawn().unwrap();
-        let patience = Instant::now() + Duration::from_secs(60);
-        while !sent.lock().unwrap().last().is_some_and(|(_, torque)| *torque > 0.02) {
-            let goes_on = play.try_wait().unwrap().is_none() && Instant::now() < patience;
-            if !goes_on {
-                let _ = play.kill();
-                panic!("no torque: {}", String::from_utf8_lossy(&play.wait_with_output().unwrap().stderr));
-            }
+        // Less than the session lasts, and many times what the hand takes to the contact.
+        let patience = Instant::now() + Duration::from_secs(10);
+        while !sent.lock().unwrap().last().is_some_and(|(_, torque)| *torque > 0.02)
+            && play.try_wait().unwrap().is_none()
+            && Instant::now() < patience
+        {
             std::thread::sleep(Duration::from_millis(1));
         }
         let signalled = Instant::now();
@@ -297,8 +321,12 @@ fn pushed_after(folder: &Path, signal: Signal) -> usize {
         (play.wait_with_output().unwrap(), signalled)
     });
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{told}");
     let report = json(&output);
+    if !report["fault"].is_null() {
+        assert!(told.contains("the torque went to zero"), "{told}");
+        return None;
+    }
+    assert_eq!(output.status.code(), Some(0), "{told}");
     assert!(report["seconds"].as_f64().unwrap() < 50.0 && report["device"]["tally"]["stopped"].is_null(), "{report}");
     for file in report["files"].as_array().unwrap() {
         assert!(folder.join(file.as_str().unwrap()).is_file(), "{file}");
@@ -310,10 +338,11 @@ fn pushed_after(folder: &Path, signal: Signal) -> usize {
     let after: Vec<f64> = sent.iter().filter(|(at, _)| *at > signalled).map(|(_, torque)| *torque).collect();
     let pushed = after.iter().position(|torque| *torque == 0.0).expect("zero torque is sent");
     assert!(after[pushed..].iter().all(|torque| *torque == 0.0), "{after:?}");
-    pushed
+    Some(pushed)
 }
 
-/// Of some sessions the one counts in which nobody held up the thread that hears signals: the machine may be busy.
+/// Of some sessions the one counts in which nobody held up the loop, nor the thread that hears signals: the machine may
+/// be busy.
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_the_torque_within_two_ticks_and_the_session_keeps_its_files() {
@@ -322,9 +351,9 @@ fn a_signal_ends_the_torque_within_two_ticks_and_the_session_keeps_its_files() {
     std::fs::write(path.join("s.toml"), SLIDES).unwrap();
     assert_eq!(haptize(path, &["bake", "s.toml", "-o", "s.haptize", "--backend", "cpu"]).status.code(), Some(0));
     for signal in [Signal::INT, Signal::TERM] {
-        let mut ticks = Vec::new();
-        while ticks.len() < 10 && !ticks.iter().any(|ticks| *ticks <= 2) {
-            ticks.push(pushed_after(path, signal));
+        let (mut ticks, begin) = (Vec::new(), Instant::now());
+        while begin.elapsed() < LONGEST_UNREST && !ticks.iter().any(|ticks| *ticks <= 2) {
+            ticks.extend(pushed_after(path, signal));
         }
         eprintln!("signal {signal:?}: torque for {ticks:?} more commands");
         assert!(ticks.iter().any(|ticks| *ticks <= 2), "signal {signal:?}: torque for {ticks:?} more commands");

@@ -13,17 +13,14 @@ use haptize::{
         with_scheduler,
     },
     proxy::Chain,
-    render::{realtime, session::Plan},
+    render::{
+        realtime::{self, Options},
+        session::Plan,
+    },
     scene::DeviceSpec,
 };
 use libloading::Library;
-use std::{
-    path::PathBuf,
-    process::Command,
-    sync::{OnceLock, atomic::AtomicBool},
-    thread,
-    time::Duration,
-};
+use std::{path::PathBuf, process::Command, sync::OnceLock, thread, time::Duration};
 use tempfile::TempDir;
 
 /// Builds the stand-in `name` once; each test loads a copy of its own, with a state of its own.
@@ -257,7 +254,7 @@ fn the_scheduler_s_thread_runs_the_loop() {
     let haptics = half_space_loop(3);
     let mut device = session(&library);
     assert!(device.scheduler().is_some());
-    let (trace, _) = realtime::run(&haptics, &mut device, None, &plan(1.0), &AtomicBool::new(false)).unwrap();
+    let (trace, _) = realtime::run(&haptics, &mut device, None, &plan(1.0), Options::default()).unwrap();
     assert!(trace.ticks.len() > 100, "{} ticks", trace.ticks.len());
     let halts: Vec<_> = trace.ticks.iter().filter_map(|tick| tick.applied.halt).collect();
     assert!(halts.is_empty(), "no illegal frame, no error: {halts:?}");
@@ -283,7 +280,7 @@ fn a_scheduler_that_hangs_or_fails_ends_the_session() {
                 thread::sleep(Duration::from_millis(300));
                 library.set(code, 0);
             });
-            realtime::run(&haptics, &mut device, None, &plan(30.0), &AtomicBool::new(false)).unwrap()
+            realtime::run(&haptics, &mut device, None, &plan(30.0), Options::default()).unwrap()
         });
         assert!(trace.ticks.last().unwrap().time < within);
         if code == 2 {
