@@ -9,7 +9,7 @@ use haptize::{
     dataset::{Axis, Contacts, Dataset, Grid, JointLabel, Provenance, Surface},
     device::Applied,
     object::Object,
-    proxy::{Chain, Joint, Node as ProxyNode},
+    proxy::{Chain, Node as ProxyNode},
     render::{
         accounts::Accounts,
         flags::Flags,
@@ -21,7 +21,7 @@ use haptize::{
         self,
         canvas::{Anchor, Canvas, TextStyle, Weight},
     },
-    scene::{GroundNodes, GroundSpec, JointKind, Material, ObjectSpec, Shape, SpringKind, SpringSpec},
+    scene::{GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, Shape, SpringKind, SpringSpec},
 };
 use resvg::{
     tiny_skia::Rect,
@@ -48,7 +48,7 @@ fn sphere() -> Object {
 /// An arm whose first joint turns about the vertical and whose others bend downwards, nodes along the last two links.
 fn arm(joints: usize) -> Chain {
     let length = 0.3 / (joints.max(2) - 1) as f64;
-    let joint = |number: usize| Joint {
+    let joint = |number: usize| JointSpec {
         name: ["base", "shoulder", "elbow", "wrist", "hand", "finger"][number].to_owned(),
         kind: JointKind::Revolute,
         origin: match number {
@@ -62,6 +62,7 @@ fn arm(joints: usize) -> Chain {
         centre_of_mass: DVec3::ZERO,
         inertia: DMat3::from_diagonal(DVec3::splat(1e-4)),
         rotor_inertia: 1e-4,
+        nodes: Vec::new(),
     };
     let node = |link: usize, k: usize| ProxyNode {
         link,

@@ -59,6 +59,23 @@ have_rust() {
     cargo fmt --version && cargo clippy --version || rustup component add rustfmt clippy
 }
 
+# Every test, two programs at a time: some wait, for a device's clock or for a kernel to be compiled, while others compute.
+# The longest come first.
+tests() {
+    local list threads
+    list=$(cargo test --locked --workspace --quiet --no-run --message-format json-render-diagnostics) || return 1
+    threads=$((($(nproc) + 1) / 2))
+    sed -n 's/.*"manifest_path":"\([^"]*\)\/Cargo.toml".*"profile":{[^}]*"test":true}.*"executable":"\([^"]*\)".*/\1 \2/p' <<<"$list" |
+        sort -k 2 | awk '/\/(gpu|reliability|haptize)-/ { print; next } { rest = rest $0 "\n" } END { printf "%s", rest }' |
+        RUST_TEST_THREADS=$threads xargs -L 1 -P 2 bash -c '
+            cd "$1" || exit 1
+            printed=$("$2" --quiet 2>&1)
+            code=$?
+            printf "\n== %s\n%s\n" "$(basename "${2%-*}")" "$printed"
+            exit $code' tests
+    [ "${PIPESTATUS[*]}" = '0 0 0 0' ] && cargo test --locked --workspace --quiet --doc
+}
+
 # The demo as on a fresh machine: no Vulkan driver, no display, an empty folder. It is the program that the tests have built,
 # which saves compiling every dependency once more.
 demo() {
@@ -80,7 +97,7 @@ export VK_DRIVER_FILES VK_ICD_FILENAMES=$VK_DRIVER_FILES
 step 'formatting' cargo fmt --all --check
 step 'lints' cargo clippy --locked --workspace --all-targets --quiet -- -D warnings
 # The bindings are tested in the same build, so that what they share is compiled once.
-step 'tests' cargo test --locked --workspace --quiet --no-fail-fast
+step 'tests' tests
 step 'Python package' bash python/tests/run.sh
 step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --no-deps --quiet
 step 'documentation as a site' bash docs/site/build.sh

@@ -7,8 +7,8 @@ use crate::{
     dataset::{self, Dataset},
     field::TorqueField,
     object::Object,
-    proxy::{Chain, Joint},
-    scene::{Algorithm, AxisSpec, GRID_STEP_SLACK, GridSpec, Scene},
+    proxy::Chain,
+    scene::{Algorithm, AxisSpec, GRID_STEP_SLACK, GridSpec, JointSpec, Scene},
     sweep::{Inspection, build_object},
 };
 use clap::ValueEnum;
@@ -202,7 +202,7 @@ fn describe(text: &mut String, inspection: &Inspection, chain: &Chain) -> fmt::R
 
 /// Writes joint efforts, each with its unit.
 fn efforts(values: &[f64], chain: &Chain) -> String {
-    let one = |(value, joint): (&f64, &Joint)| format!("{} {value:.5} {}", joint.name, joint.kind.effort_unit());
+    let one = |(value, joint): (&f64, &JointSpec)| format!("{} {value:.5} {}", joint.name, joint.kind.effort_unit());
     values.iter().zip(&chain.joints).map(one).collect::<Vec<_>>().join(", ")
 }
 

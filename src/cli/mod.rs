@@ -58,7 +58,10 @@ mod watch;
 
 pub use memory::Remembering;
 
-use crate::sweep::{OTHER_ADAPTER, remedied};
+use crate::{
+    render::flags::Fault,
+    sweep::{OTHER_ADAPTER, remedied},
+};
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::{
     error::Error,
@@ -256,6 +259,11 @@ fn print_error(message: &str) {
 /// Prints a line on standard error. It may be closed or full: then there is nobody to tell, and the work goes on.
 fn tell(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(io::stderr(), "{}", printable(&line.to_string()));
+}
+
+/// Says at once that the torque went to zero, and why: whoever holds the device feels nothing any more.
+fn tell_fault(time: f64, fault: Fault) {
+    tell(format_args!("haptize: at {time:.4} s the torque went to zero: {fault}; play again to clear it"));
 }
 
 /// Returns `text` with its control characters spelt as `\u001b`: names and texts of files must not command a terminal.

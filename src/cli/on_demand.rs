@@ -1,6 +1,6 @@
 //! `haptize play SCENE --on-demand FILE`: contact that is solved while it is felt, and kept.
 
-use super::{Failure, interrupt, played::tell_fault, tell};
+use super::{Failure, interrupt, tell, tell_fault};
 use crate::{
     device::Device,
     render::{

@@ -7,8 +7,8 @@ use super::{
     on_demand::{self, Explored, Exploring},
     output::{self, Earlier, Folder, Kind as FileKind},
     playback_report::PlaybackReport,
-    played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, tell_fault, unwritten, write},
-    tell,
+    played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, unwritten, write},
+    tell, tell_fault,
 };
 use crate::{
     dataset::{self, Dataset, replace_file},

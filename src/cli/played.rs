@@ -1,11 +1,10 @@
 //! A session that was played: its files, and what there is to say about it.
 
-use super::{Failure, interrupt, on_demand::Explored, tell};
+use super::{Failure, interrupt, on_demand::Explored, tell, tell_fault};
 use crate::{
     dataset::{Dataset, discard_unfinished, replace_file},
     device::Device,
     render::{
-        flags::Fault,
         realtime::{self, Options},
         session::{self, SessionError},
         setup::Setup,
@@ -47,11 +46,6 @@ impl Played {
     pub fn on_demand((trace, timing, explored): (Trace, Timing, Explored)) -> Self {
         Self { trace: trace.into(), timing: Some(timing), explored: Some(explored) }
     }
-}
-
-/// Says at once that the torque went to zero, and why: whoever holds the device feels nothing any more.
-pub fn tell_fault(time: f64, fault: Fault) {
-    tell(format_args!("haptize: at {time:.4} s the torque went to zero: {fault}; play again to clear it"));
 }
 
 /// Plays for `seconds` what `device` does.

@@ -13,8 +13,8 @@
 mod deformation;
 
 use super::geometry::RestSurface;
-use super::geometry::closest_point::Closest;
 use super::geometry::facet::Facet;
+use super::geometry::nearest::Closest;
 use super::law::depth::{Carriers, Contact, measure};
 use super::model::{Model, MotionBound};
 use deformation::Deformation;

@@ -1,12 +1,8 @@
 //! The data of object and proxy that contact needs, computed once and shared by all threads.
 
-use super::{
-    geometry::{RestSurface, smooth::SmoothSurface},
-    reach,
-};
-use crate::JointVector;
+use super::geometry::{RestSurface, smooth::SmoothSurface};
 use crate::contact::geometry::LENGTH_ROUNDING;
-use crate::object::{Compliance, Object, ObjectError};
+use crate::object::{Compliance, Object};
 use crate::proxy::Chain;
 use crate::scene::ContactSpec;
 use std::sync::Arc;
@@ -65,31 +61,15 @@ impl<'a> Model<'a> {
         Self::with_compliance(object, chain, contact, Compliance::new(object))
     }
 
-    /// The same for contact at or near `configurations`: of an object with more than [`Model::WHOLE`] surface nodes,
-    /// only the compliance of those within the proxy's reach is formed. A configuration that reaches farther is flagged
-    /// [`super::Status::Overflow`].
-    ///
-    /// # Errors
-    /// When the compliance would not fit in memory.
-    pub fn reaching(
-        object: &'a Object,
-        chain: &'a Chain,
-        contact: ContactSpec,
-        configurations: &[JointVector],
-    ) -> Result<Self, ObjectError> {
-        if object.surface_nodes <= Self::WHOLE {
-            return Ok(Self::new(object, chain, contact));
-        }
-        let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
-        let nodes = reach::reached(&model, configurations);
-        model.take_compliance(Compliance::on(object, nodes)?);
-        Ok(model)
-    }
-
     /// Surface nodes up to which all of the compliance is formed: at most 0.3 GB, in some seconds.
     pub const WHOLE: usize = 2048;
 
-    fn with_compliance(object: &'a Object, chain: &'a Chain, contact: ContactSpec, compliance: Compliance) -> Self {
+    pub(super) fn with_compliance(
+        object: &'a Object,
+        chain: &'a Chain,
+        contact: ContactSpec,
+        compliance: Compliance,
+    ) -> Self {
         let mut model = Self {
             object,
             chain,
@@ -119,7 +99,7 @@ impl<'a> Model<'a> {
         (self.max_nodal_compliance, self.mobility) = max_nodal_compliance(&self.compliance);
         self.bulge_mobility =
             self.surface.smooth.as_ref().map_or(0.0, |smooth| bulge_mobility(smooth, &self.compliance));
-        self.covered_leaves = Arc::new(reach::covered_leaves(&self.surface, &self.compliance));
+        self.covered_leaves = Arc::new(covered_leaves(&self.surface, &self.compliance));
         self.set_stiffness(self.contact.stiffness);
     }
 
@@ -185,4 +165,10 @@ fn max_nodal_compliance(compliance: &Compliance) -> (f64, f64) {
         max_nodal_compliance,
         if compliance.rows_per_node == 1 { max_nodal_compliance / 3.0 } else { max_nodal_compliance },
     )
+}
+
+/// Returns whether `compliance` covers all nodes of the facets of each leaf of the tree of `surface`.
+fn covered_leaves(surface: &RestSurface<'_>, compliance: &Compliance) -> Vec<bool> {
+    let covered = |t: &u32| surface.carriers(*t).0.iter().all(|&node| compliance.place(node).is_some());
+    surface.bounds.leaves.iter().map(|leaf| leaf.triangles.iter().all(covered)).collect()
 }

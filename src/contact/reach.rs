@@ -7,11 +7,12 @@
 //! need more are found and flagged.
 
 use super::detection::Detection;
-use super::geometry::RestSurface;
 use super::model::Model;
 use super::{Equilibrium, Proximity};
 use crate::JointVector;
-use crate::object::Compliance;
+use crate::object::{Compliance, Object, ObjectError};
+use crate::proxy::Chain;
+use crate::scene::ContactSpec;
 use rayon::prelude::*;
 
 /// How far the surface of an object is expected to move, in depths of the deepest proxy node below it at rest [1]: in
@@ -22,8 +23,31 @@ const EXPECTED_MOTION: f64 = 2.0;
 /// Configurations that one thread takes at a time.
 const SHARE: usize = 256;
 
+impl<'a> Model<'a> {
+    /// The same for contact at or near `configurations`: of an object with more than [`Model::WHOLE`] surface nodes,
+    /// only the compliance of those within the proxy's reach is formed. A configuration that reaches farther is flagged
+    /// [`super::Status::Overflow`].
+    ///
+    /// # Errors
+    /// When the compliance would not fit in memory.
+    pub fn reaching(
+        object: &'a Object,
+        chain: &'a Chain,
+        contact: ContactSpec,
+        configurations: &[JointVector],
+    ) -> Result<Self, ObjectError> {
+        if object.surface_nodes <= Self::WHOLE {
+            return Ok(Self::new(object, chain, contact));
+        }
+        let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
+        let nodes = reached(&model, configurations);
+        model.take_compliance(Compliance::on(object, nodes)?);
+        Ok(model)
+    }
+}
+
 /// Surface nodes of `model` that the proxy reaches in `configurations`, ascending.
-pub(super) fn reached(model: &Model<'_>, configurations: &[JointVector]) -> Vec<u32> {
+fn reached(model: &Model<'_>, configurations: &[JointVector]) -> Vec<u32> {
     let marked = configurations
         .par_chunks(SHARE)
         .map_init(
@@ -68,12 +92,6 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
             squared
         });
     }
-}
-
-/// Returns whether `compliance` covers all nodes of the facets of each leaf of the tree of `surface`.
-pub(super) fn covered_leaves(surface: &RestSurface<'_>, compliance: &Compliance) -> Vec<bool> {
-    let covered = |t: &u32| surface.carriers(*t).0.iter().all(|&node| compliance.place(node).is_some());
-    surface.bounds.leaves.iter().map(|leaf| leaf.triangles.iter().all(covered)).collect()
 }
 
 /// Whether the compliance covers all that the result depends on, where no point of the surface has moved by more than

@@ -3,10 +3,7 @@
 //! Lengths fit the grid, contact rows are ordered and within, statuses are known, every number is finite. Checked in an
 //! order in which no check relies on one that comes later, and without allocating, so that hostile counts cost nothing.
 
-use super::{
-    Column, Contacts, Dataset, Solid, Surface,
-    file::{CONTACTS, TOUCHES},
-};
+use super::{CONTACTS, Column, Contacts, Dataset, Solid, Surface, TOUCHES};
 use crate::{JointMatrix, contact::Status};
 
 /// `Err` says what is wrong.

@@ -33,7 +33,8 @@
 //! of this crate never do that, they rename; the haptic loop reads through [`Dataset::load`], which copies.
 
 use super::{
-    BUFFER, Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, Target, check, replace_file, store,
+    BUFFER, CONTACTS, Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, TOUCHES, Target, check,
+    replace_file, store,
 };
 use crate::JointMatrix;
 use bytemuck::Pod;
@@ -94,11 +95,6 @@ struct Metadata {
     #[serde(skip_serializing_if = "Option::is_none")]
     store: Option<String>,
 }
-
-/// Tensors of the contact forces on the object.
-pub(crate) const CONTACTS: [&str; 3] = ["contact_offsets", "contact_nodes", "contact_forces"];
-/// Tensors of those on the proxy.
-pub(crate) const TOUCHES: [&str; 3] = ["touch_offsets", "touch_nodes", "touch_forces"];
 
 /// A number type that a tensor may hold.
 pub(crate) trait Element: Pod {

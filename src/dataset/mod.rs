@@ -27,8 +27,8 @@ pub use column::Column;
 pub use error::Error;
 pub use export::Format;
 pub(crate) use file::{
-    CONTACTS, Contents as TensorContents, Heading, Kind, PIECE_BUFFER, TOUCHES, Tensor, check_place, may_be_dataset,
-    surface_tensors, write_container, write_file,
+    Contents as TensorContents, Heading, Kind, PIECE_BUFFER, Tensor, check_place, may_be_dataset, surface_tensors,
+    write_container, write_file,
 };
 pub use grid::{Axis, Grid, JointLabel};
 pub use summary::{Refinement, StatusCounts, Summary};
@@ -82,6 +82,11 @@ pub struct Contacts {
     /// Three numbers a contact [N].
     pub forces: Column<f32>,
 }
+
+/// Tensors of the contact forces on the object.
+pub(crate) const CONTACTS: [&str; 3] = ["contact_offsets", "contact_nodes", "contact_forces"];
+/// Tensors of those on the proxy.
+pub(crate) const TOUCHES: [&str; 3] = ["touch_offsets", "touch_nodes", "touch_forces"];
 
 /// The object's geometry at rest: its surface, and what is inside where the scene's mesh is one of tetrahedra.
 #[derive(Clone)]

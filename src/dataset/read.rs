@@ -1,8 +1,8 @@
 //! Dataset files, read: mapped or copied, checked as a whole, and cut into columns where they lie.
 
 use super::{
-    Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, check,
-    file::{CHECKSUM, CONTACTS, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, TOUCHES, digits},
+    CONTACTS, Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, TOUCHES, check,
+    file::{CHECKSUM, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, digits},
     store,
 };
 use crate::{

@@ -6,8 +6,9 @@
 
 use super::{
     adapter::{AdapterChoice, AdapterSummary, asked_for, instance, qualified},
-    kernel::Kernel,
-    timing::Stopwatch,
+    dispatch::Dispatch,
+    error::GpuError,
+    timing::{KernelTime, SearchCounts, Stopwatch},
 };
 use std::{
     collections::HashMap,
@@ -24,90 +25,6 @@ const WAIT_LIMIT: Duration = Duration::from_secs(120);
 
 /// Longest wait for what a device that refuses something still does.
 const LAST_WORK: Duration = Duration::from_secs(1);
-
-/// Why the GPU could not do it.
-#[derive(Debug, thiserror::Error)]
-pub enum GpuError {
-    /// No adapter of the kind asked for.
-    #[error(
-        "no {wanted} Vulkan, Metal or DX12 adapter; found: {found}. Install your GPU's Vulkan driver (or Mesa's \
-         software Vulkan, package mesa-vulkan-drivers, for --backend gpu without a GPU), or use --backend cpu"
-    )]
-    NoAdapter {
-        /// `hardware` or `usable`.
-        wanted: &'static str,
-        /// Adapters that were there, or `none`.
-        found: String,
-    },
-    /// The one adapter that was asked for is not among those of this machine.
-    #[error("the adapter {wanted} does not answer; found: {found}. Choose one of these, or the CPU")]
-    NotThere {
-        /// The adapter that was asked for.
-        wanted: String,
-        /// Adapters that were there, or `none`.
-        found: String,
-    },
-    /// The adapter refuses a device with WebGPU's default limits.
-    #[error("adapter {adapter} gives no device: {reason}. Update its driver, or use --backend cpu")]
-    NoDevice {
-        /// The adapter's name.
-        adapter: String,
-        /// wgpu's reason.
-        reason: String,
-    },
-    /// The device was lost: driver reset, removal, or a dispatch that ran too long.
-    #[error("the GPU was lost: {0}. Use --backend cpu, or update the driver")]
-    Lost(String),
-    /// Device memory is exhausted.
-    #[error("the GPU is out of memory: {0}. Use a smaller object, close other programs, or use --backend cpu")]
-    OutOfMemory(String),
-    /// wgpu or naga refuses a shader, pipeline or command: a defect of this crate or of the driver.
-    #[error("the GPU refused a command: {0}. Please report this with the output of `haptize doctor`")]
-    Refused(String),
-    /// A submission did not end in time.
-    #[error("the GPU did not answer within {0:?}. Use --backend cpu, or update the driver")]
-    TimedOut(Duration),
-    /// The object does not fit the device's limits.
-    #[error("{what} needs {needed} bytes, the GPU binds at most {limit}. Use --backend cpu for this scene")]
-    TooLarge {
-        /// Which buffer.
-        what: &'static str,
-        /// Its size [B].
-        needed: u64,
-        /// The limit [B].
-        limit: u64,
-    },
-    /// Only a part of a large object's compliance is formed, beyond which nobody would see the paper's iteration
-    /// go.
-    #[error(
-        "the GPU takes objects of at most {limit} surface nodes, not {nodes}, by the paper's iteration. Use --backend \
-         cpu for this scene"
-    )]
-    TooManyNodes {
-        /// Nodes on the surface.
-        nodes: usize,
-        /// Nodes that are taken.
-        limit: usize,
-    },
-    /// The adapter cannot say how long a kernel takes.
-    #[error(
-        "adapter {0} does not stamp the time of its commands (TIMESTAMP_QUERY): its kernels cannot be timed one by one"
-    )]
-    NoClock(String),
-    /// The kernels do not do this.
-    #[error("the GPU does not solve contact with {0}. Use --backend cpu, or leave `{0}` out of [contact]")]
-    Unsupported(&'static str),
-    /// Outputs that no invocation wrote: a dispatch was cut short.
-    #[error(
-        "the GPU left {count} of {total} results unwritten. Use --backend cpu, and report this with `haptize doctor`"
-    )]
-    NeverWritten {
-        /// Results still poisoned.
-        count: usize,
-        /// Results asked for.
-        total: usize,
-    },
-}
 
 /// First message of each kind of failure that arrives by callback.
 #[derive(Default)]
@@ -127,8 +44,8 @@ pub struct Context {
     failures: Arc<Mutex<Failures>>,
     /// Where kernels are timed.
     pub(super) stopwatch: Option<Stopwatch>,
-    /// Kernels that have been compiled, by shader, entry point and override constants.
-    pub(super) kernels: Mutex<HashMap<String, Kernel>>,
+    /// Pipelines that have been compiled, by shader, entry point and override constants.
+    pub(super) pipelines: Mutex<HashMap<String, (wgpu::ComputePipeline, wgpu::BindGroupLayout)>>,
 }
 
 fn lock(failures: &Mutex<Failures>) -> MutexGuard<'_, Failures> {
@@ -235,7 +152,7 @@ impl Context {
             adapter: summary,
             failures,
             stopwatch: timed.then(Stopwatch::default),
-            kernels: Mutex::default(),
+            pipelines: Mutex::default(),
         })
     }
 
@@ -336,15 +253,36 @@ impl Context {
         self.check()?;
         refused.map_or(Ok(made), |error| Err(error.into()))
     }
-}
 
-impl From<wgpu::Error> for GpuError {
-    fn from(error: wgpu::Error) -> Self {
-        match error {
-            wgpu::Error::OutOfMemory { source } => Self::OutOfMemory(source.to_string()),
-            wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. } => {
-                Self::Refused(description)
-            }
+    /// Records `dispatches`, in order: in one pass, unless they are timed.
+    pub(super) fn record<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        dispatches: impl IntoIterator<Item = Dispatch<'a>>,
+    ) {
+        if let Some(stopwatch) = &self.stopwatch {
+            return stopwatch.record(&self.device, encoder, dispatches);
         }
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        dispatches.into_iter().for_each(|dispatch| dispatch.record(&mut pass));
+    }
+
+    /// Returns what searches took since the last call; zeros where kernels are not timed.
+    #[must_use]
+    pub fn search_counts(&self) -> SearchCounts {
+        self.stopwatch.as_ref().map_or_else(SearchCounts::default, Stopwatch::take_counts)
+    }
+
+    /// Returns the time of every kernel since the last call, in the order in which they first ran; nothing where
+    /// kernels are not timed. Waits for the device.
+    ///
+    /// # Errors
+    /// When the device has failed.
+    pub fn kernel_times(&self) -> Result<Vec<KernelTime>, GpuError> {
+        let Some(stopwatch) = &self.stopwatch else { return Ok(Vec::new()) };
+        // Later than all that was recorded.
+        let last = self.queue.submit([]);
+        let period = 1e-9 * f64::from(self.queue.get_timestamp_period());
+        stopwatch.take_times(period, |ticks| self.map(ticks, ticks.size(), &last))
     }
 }

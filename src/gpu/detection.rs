@@ -4,8 +4,11 @@
 //! measured in f64, so that contact or not is what the CPU says; where shaders have no f64 it is known to a band.
 
 use super::{
-    context::{Context, GpuError},
-    kernel::{Dispatch, Kernel, Staging, StorageBuffer},
+    buffer::{Staging, StorageBuffer},
+    context::Context,
+    dispatch::Dispatch,
+    error::GpuError,
+    kernel::Kernel,
     layout::Parameters,
     model::DeviceModel,
     shaders::{self, Shader},
@@ -40,7 +43,7 @@ impl BoundKernel {
     }
 
     fn dispatch(&self, invocations: u32, bytes: u64) -> Dispatch<'_> {
-        Dispatch { kernel: &self.kernel, bound: &self.bound, workgroups: invocations.div_ceil(self.workgroup), bytes }
+        self.kernel.dispatch(&self.bound, invocations.div_ceil(self.workgroup), bytes)
     }
 }
 

@@ -3,8 +3,9 @@
 
 use super::{
     adapter::AdapterChoice,
+    buffer::StorageBuffer,
     context::Context,
-    kernel::{Dispatch, Kernel, StorageBuffer},
+    kernel::Kernel,
     layout::Parameters,
     precision::Precision,
     shaders::{self, Shader},
@@ -86,7 +87,7 @@ fn ask(context: &Context, precision: Precision, questions: &[f64]) -> Vec<f64> {
         kernel.bind(context, &[("parameters", &parameters), ("questions", &input), ("answers", &output)]).unwrap();
     let mut encoder = context.device.create_command_encoder(&Default::default());
     let workgroups = (count as u32).div_ceil(32);
-    context.record(&mut encoder, [Dispatch { kernel: &kernel, bound: &bound, workgroups, bytes: 0 }]);
+    context.record(&mut encoder, [kernel.dispatch(&bound, workgroups, 0)]);
     context.wait(&context.queue.submit([encoder.finish()])).unwrap();
     precision.decode(&output.read::<u8>(context, bytes).unwrap())
 }

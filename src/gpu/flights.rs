@@ -5,7 +5,7 @@
 //! host turns to the results each device has a search ahead of it, if there is any.
 
 use super::{
-    context::GpuError,
+    error::GpuError,
     stages::{Detected, Found, Stages},
 };
 use crate::{

@@ -11,10 +11,8 @@
 //! scene does not name is not there.
 
 use super::{
-    context::{Context, GpuError},
-    kernel::{Dispatch, Kernel, StorageBuffer},
-    layout::FrameParameters,
-    shaders,
+    buffer::StorageBuffer, context::Context, dispatch::Dispatch, error::GpuError, kernel::Kernel,
+    layout::FrameParameters, shaders,
 };
 use crate::memory::{self, Shortage};
 use crate::object::{Compliance, Factor, FactorError, Object, Stiffening, Stiffness, settled};
@@ -93,7 +91,7 @@ struct FramePass {
 impl FramePass {
     fn dispatch(&self) -> Dispatch<'_> {
         let Self { kernel, bound, workgroups, bytes } = self;
-        Dispatch { kernel, bound, workgroups: *workgroups, bytes: *bytes }
+        kernel.dispatch(bound, *workgroups, *bytes)
     }
 }
 

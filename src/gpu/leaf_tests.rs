@@ -2,8 +2,10 @@
 
 use super::{
     adapter::AdapterChoice,
-    context::{Context, GpuError},
-    kernel::{Dispatch, Kernel, StorageBuffer},
+    buffer::StorageBuffer,
+    context::Context,
+    error::GpuError,
+    kernel::Kernel,
     layout::{Parameters, SearchParameters},
     model::{DeviceModel, joints_and_nodes},
     pipeline::BatchCapacity,
@@ -183,7 +185,7 @@ fn ask(precision: Precision, questions: &[Question]) -> Vec<Answer> {
 fn run(context: &Context, kernel: &Kernel, buffers: &[(&str, &StorageBuffer)], workgroups: u32) {
     let bound = kernel.bind(context, buffers).unwrap();
     let mut encoder = context.device.create_command_encoder(&Default::default());
-    context.record(&mut encoder, [Dispatch { kernel, bound: &bound, workgroups, bytes: 0 }]);
+    context.record(&mut encoder, [kernel.dispatch(&bound, workgroups, 0)]);
     let submission = context.queue.submit([encoder.finish()]);
     context.wait(&submission).unwrap();
 }
@@ -325,7 +327,7 @@ fn proxy_nodes_are_placed_to_rounding() {
 /// Proxy nodes relative to the object's centre, three coordinates each [m].
 fn place(precision: Precision, model: &Model<'_>, poses: &[Vec<f64>]) -> Vec<f64> {
     let chain = model.chain;
-    let motion = |(q, joint): (&f64, &crate::proxy::Joint)| match joint.kind {
+    let motion = |(q, joint): (&f64, &crate::scene::JointSpec)| match joint.kind {
         JointKind::Revolute => [q.cos(), q.sin()],
         JointKind::Prismatic => [*q, 0.0],
     };

@@ -17,7 +17,8 @@
 //! | `solver` | the backend of a sweep: what is made of results, retries |
 //! | `unpack` | from what the kernels wrote to equilibria, settled in f64 by the CPU's search |
 //! | `frame` | the object's nodes, one passive step a frame |
-//! | `kernel` | one compute pipeline with its bindings and dispatches; buffers, poison, read-back |
+//! | `kernel`, `dispatch` | one compute pipeline with its bindings; its dispatches |
+//! | `buffer` | buffers of the device, and how the host reads them |
 //! | `timing` | how long each kernel takes, where that is asked for |
 //!
 //! A shader in `shaders/` and its CPU twin share names and order of statements. Where the device has f64, contact or
@@ -26,8 +27,11 @@
 //! what they find in f64.
 
 mod adapter;
+mod buffer;
 mod context;
 mod detection;
+mod dispatch;
+mod error;
 #[cfg(test)]
 mod facet_tests;
 mod flights;
@@ -48,7 +52,8 @@ mod timing;
 mod unpack;
 
 pub use adapter::{ADAPTER_VARIABLE, AdapterChoice, AdapterSummary, adapters, named_adapters};
-pub use context::{Context, GpuError};
+pub use context::Context;
+pub use error::GpuError;
 pub use flights::HostTime;
 pub use frame::{FrameCost, FrameError, FrameMethod, FrameUpdate};
 pub use pipeline::BatchCapacity;

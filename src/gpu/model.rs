@@ -4,8 +4,9 @@
 //! origin.
 
 use super::{
-    context::{Context, GpuError},
-    kernel::StorageBuffer,
+    buffer::StorageBuffer,
+    context::Context,
+    error::GpuError,
     layout::Parameters,
     precision::Precision,
     shaders::{CLUSTER, GROUP},

@@ -1,8 +1,9 @@
 //! The stages on a device: their kernels, their buffers, and the submissions they make up.
 
 use super::{
-    context::{Context, GpuError},
+    context::Context,
     detection::Detection,
+    error::GpuError,
     model::DeviceModel,
     precision::Precision,
     search::{Search, SearchLane},

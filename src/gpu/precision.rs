@@ -1,7 +1,5 @@
 //! The numbers that a stage computes in: f64 where the device has it, or f32.
 
-use super::shaders::Shader;
-
 /// Numbers of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
@@ -21,10 +19,10 @@ impl Precision {
         }
     }
 
-    /// The shader of the two that computes in it.
+    /// The one of the two, of which the second is for f64, that computes in it.
     #[must_use]
-    pub const fn of(self, shaders: &[Shader; 2]) -> &Shader {
-        &shaders[self as usize]
+    pub const fn of<T>(self, both: &[T; 2]) -> &T {
+        &both[self as usize]
     }
 
     /// The bytes of `numbers`; in f32 each is rounded.

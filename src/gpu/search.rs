@@ -5,9 +5,11 @@
 //! unfinished. A submission makes some rounds; the host asks for more while some are unfinished.
 
 use super::{
-    context::{Context, GpuError},
+    buffer::{Staging, StorageBuffer},
+    context::Context,
     detection::Detection,
-    kernel::{Dispatch, Kernel, Staging, StorageBuffer},
+    error::GpuError,
+    kernel::Kernel,
     layout::SearchParameters,
     model::DeviceModel,
     search_model::SearchModel,
@@ -205,12 +207,8 @@ impl SearchLane {
         self.staged = self.staged.min(count * STAGED_TOUCHES.min(parameters.contacts as usize));
         let mut encoder = context.device.create_command_encoder(&Default::default());
         self.words.clear(&mut encoder, 4 * (2 * self.room as u64 + 1 + count as u64 * u64::from(parameters.words)));
-        let arm = Dispatch {
-            kernel: &search.arm,
-            bound: &self.arm,
-            workgroups: configurations.div_ceil(PER_CONFIGURATION),
-            bytes: 64 * u64::from(configurations * parameters.joints),
-        };
+        let bytes = 64 * u64::from(configurations * parameters.joints);
+        let arm = search.arm.dispatch(&self.arm, configurations.div_ceil(PER_CONFIGURATION), bytes);
         context.record(&mut encoder, [arm]);
         self.record_rounds(context, search, &mut encoder, count, FIRST_ROUNDS);
         self.record_results(context, search, &mut encoder, count);
@@ -231,7 +229,7 @@ impl SearchLane {
         let round = search.round.iter().zip(&self.round).enumerate().map(|(k, (kernel, bound))| {
             let (workgroups, bytes) =
                 if k < last { (count, search.object_bytes()) } else { (1, 16 * u64::from(count)) };
-            Dispatch { kernel, bound, workgroups, bytes }
+            kernel.dispatch(bound, workgroups, bytes)
         });
         context.record(encoder, std::iter::repeat_n(round, rounds).flatten());
     }
@@ -240,9 +238,10 @@ impl SearchLane {
     fn record_results(&self, context: &Context, search: &Search, encoder: &mut wgpu::CommandEncoder, count: usize) {
         let rows = count as u32 * search.model.parameters.contacts;
         let each = search.result_bytes(count, self.staged);
-        let dispatch = |kernel, bound, workgroups| Dispatch { kernel, bound, workgroups, bytes: each.iter().sum() };
-        let gather = dispatch(&search.gather, &self.gather, rows.div_ceil(PER_CONFIGURATION));
-        context.record(encoder, [dispatch(&search.count, &self.count, 1), gather]);
+        let bytes = each.iter().sum();
+        let count_up = search.count.dispatch(&self.count, 1, bytes);
+        let gather = search.gather.dispatch(&self.gather, rows.div_ceil(PER_CONFIGURATION), bytes);
+        context.record(encoder, [count_up, gather]);
         self.staging.copy_from(encoder, 0, (&self.words, 8 * self.room as u64), 4);
         self.staging.copy_from(encoder, 4, (&self.starts, 4 * count as u64), 4);
         let mut place = HEAD_BYTES;

@@ -2,8 +2,9 @@
 //! workspaces.
 
 use super::{
-    context::{Context, GpuError},
-    kernel::StorageBuffer,
+    buffer::StorageBuffer,
+    context::Context,
+    error::GpuError,
     layout::SearchParameters,
     model::{DeviceModel, bounding_spheres, controls, culling_slack, extent, mesh, stiffness},
     precision::Precision,

@@ -10,7 +10,8 @@
 
 use super::{
     adapter::AdapterSummary,
-    context::{Context, GpuError},
+    context::Context,
+    error::GpuError,
     flights::{HostTime, Landed, PacedDevice, Queue, fly},
     pipeline::{BatchCapacity, Pipeline},
     precision::Precision,

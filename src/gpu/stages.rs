@@ -1,6 +1,6 @@
 //! The stages of a batch, whoever does them: a device, or what stands for one and returns stored results at once.
 
-use super::{context::GpuError, precision::Precision};
+use super::{error::GpuError, precision::Precision};
 use crate::JointVector;
 use std::ops::Range;
 

@@ -3,10 +3,7 @@
 //! A timed dispatch has a pass of its own, whose begin and end the device stamps; what it has stamped is read when it
 //! is asked for. On any other context nothing of this exists: dispatches that follow each other share one pass.
 
-use super::{
-    context::{Context, GpuError},
-    kernel::Dispatch,
-};
+use super::{dispatch::Dispatch, error::GpuError};
 use std::{
     ops::Range,
     sync::{Mutex, PoisonError},
@@ -101,6 +98,38 @@ impl Stopwatch {
         counted.for_each(|words| counts.add(words));
     }
 
+    /// What was counted since the last call.
+    pub fn take_counts(&self) -> SearchCounts {
+        std::mem::take(&mut *self.counts.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// The time of every kernel since the last call, in the order in which they first ran. A tick of the clock takes
+    /// `period` [s]; `map` waits for the stamps and gives the host a view of them.
+    pub fn take_times(
+        &self,
+        period: f64,
+        map: impl Fn(&wgpu::Buffer) -> Result<wgpu::BufferView, GpuError>,
+    ) -> Result<Vec<KernelTime>, GpuError> {
+        let stamped = std::mem::take(&mut *self.stamped.lock().unwrap_or_else(PoisonError::into_inner));
+        let mut times: Vec<KernelTime> = Vec::new();
+        for Stamped { kernels, ticks } in stamped {
+            let view = map(&ticks)?;
+            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&view);
+            for (kernel, stamps) in kernels.into_iter().zip(ticks.chunks_exact(2)) {
+                let known = times.iter().position(|time| time.name == kernel.name).unwrap_or_else(|| {
+                    times.push(KernelTime { dispatches: 0, workgroups: 0, bytes: 0, ..kernel.clone() });
+                    times.len() - 1
+                });
+                let time = &mut times[known];
+                time.dispatches += kernel.dispatches;
+                time.workgroups += kernel.workgroups;
+                time.bytes += kernel.bytes;
+                time.seconds += period * stamps[1].saturating_sub(stamps[0]) as f64;
+            }
+        }
+        Ok(times)
+    }
+
     /// Records `dispatches`, in order, a pass each.
     pub fn record<'a>(
         &self,
@@ -144,7 +173,7 @@ impl Stopwatch {
         encoder.resolve_query_set(&query_set, 0..count, &resolved, 0);
         encoder.copy_buffer_to_buffer(&resolved, 0, &ticks, 0, bytes);
         let kernels = dispatches.iter().map(|dispatch| KernelTime {
-            name: dispatch.kernel.name.clone(),
+            name: dispatch.name.to_owned(),
             dispatches: 1,
             workgroups: dispatch.workgroups.into(),
             seconds: 0.0,
@@ -154,51 +183,12 @@ impl Stopwatch {
     }
 }
 
-impl Context {
-    /// Returns what searches took since the last call; zeros where kernels are not timed.
-    #[must_use]
-    pub fn search_counts(&self) -> SearchCounts {
-        let Some(stopwatch) = &self.stopwatch else { return SearchCounts::default() };
-        std::mem::take(&mut *stopwatch.counts.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    /// Returns the time of every kernel since the last call, in the order in which they first ran; nothing where
-    /// kernels are not timed. Waits for the device.
-    ///
-    /// # Errors
-    /// When the device has failed.
-    pub fn kernel_times(&self) -> Result<Vec<KernelTime>, GpuError> {
-        let Some(stopwatch) = &self.stopwatch else { return Ok(Vec::new()) };
-        let stamped = std::mem::take(&mut *stopwatch.stamped.lock().unwrap_or_else(PoisonError::into_inner));
-        let period = 1e-9 * f64::from(self.queue.get_timestamp_period());
-        // Later than all that was recorded.
-        let last = self.queue.submit([]);
-        let mut times: Vec<KernelTime> = Vec::new();
-        for Stamped { kernels, ticks } in stamped {
-            let view = self.map(&ticks, ticks.size(), &last)?;
-            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&view);
-            for (kernel, stamps) in kernels.into_iter().zip(ticks.chunks_exact(2)) {
-                let known = times.iter().position(|time| time.name == kernel.name).unwrap_or_else(|| {
-                    times.push(KernelTime { dispatches: 0, workgroups: 0, bytes: 0, ..kernel.clone() });
-                    times.len() - 1
-                });
-                let time = &mut times[known];
-                time.dispatches += kernel.dispatches;
-                time.workgroups += kernel.workgroups;
-                time.bytes += kernel.bytes;
-                time.seconds += period * stamps[1].saturating_sub(stamps[0]) as f64;
-            }
-        }
-        Ok(times)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
         contact::Model,
-        gpu::{AdapterChoice, BatchCapacity, FrameMethod, FrameUpdate, GpuSolver},
+        gpu::{AdapterChoice, BatchCapacity, Context, FrameMethod, FrameUpdate, GpuSolver},
         object::Object,
         proxy::Chain,
         scene::{GraphicsEffects, Scene},

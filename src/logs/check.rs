@@ -47,39 +47,42 @@ fn is_positive(x: f64) -> bool {
     x.is_finite() && x > 0.0
 }
 
-/// Refuses the first value that cannot be.
-pub(super) fn check(mapping: &Mapping) -> Result<(), Refusal> {
-    let Mapping { table, time, joints, filter, torque } = mapping;
-    let count = joints.len();
-    let within = (1..=MAX_JOINTS).contains(&count);
-    refuse(!within, "joint", format!("{count} [[joint]] tables; 1 to {MAX_JOINTS} are needed"))?;
-    let same = "table.delimiter and table.decimal are the same character; tables with comma decimals mostly use `;`";
-    refuse(table.delimiter == table.decimal, "table.decimal", same)?;
-    refuse(![',', '.'].contains(&table.decimal), "table.decimal", "table.decimal must be `.` or `,`")?;
-    refuse(time.column.is_some() == time.period.is_some(), "time", "[time] needs either a column or a period")?;
-    refuse(!is_positive(time.scale), "time.scale", "time.scale must be a positive number of seconds")?;
-    let period = time.period.unwrap_or(1.0);
-    refuse(!is_positive(period), "time.period", "time.period must be a positive number of seconds")?;
-    let parted = time.gap > 0.0;
-    refuse(!parted, "time.gap", "time.gap must be a positive number of seconds")?;
-    for (number, joint) in joints.iter().enumerate() {
-        check_joint(&joints[..number], number, joint)?;
+impl Mapping {
+    /// Refuses the first value that cannot be.
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        let Self { table, time, joints, filter, torque } = self;
+        let count = joints.len();
+        let within = (1..=MAX_JOINTS).contains(&count);
+        refuse(!within, "joint", format!("{count} [[joint]] tables; 1 to {MAX_JOINTS} are needed"))?;
+        let same =
+            "table.delimiter and table.decimal are the same character; tables with comma decimals mostly use `;`";
+        refuse(table.delimiter == table.decimal, "table.decimal", same)?;
+        refuse(![',', '.'].contains(&table.decimal), "table.decimal", "table.decimal must be `.` or `,`")?;
+        refuse(time.column.is_some() == time.period.is_some(), "time", "[time] needs either a column or a period")?;
+        refuse(!is_positive(time.scale), "time.scale", "time.scale must be a positive number of seconds")?;
+        let period = time.period.unwrap_or(1.0);
+        refuse(!is_positive(period), "time.period", "time.period must be a positive number of seconds")?;
+        let parted = time.gap > 0.0;
+        refuse(!parted, "time.gap", "time.gap must be a positive number of seconds")?;
+        for (number, joint) in joints.iter().enumerate() {
+            check_joint(&joints[..number], number, joint)?;
+        }
+        check_columns(self)?;
+        refuse(filter.decimate == 0, "filter.decimate", "filter.decimate must be 1 or more")?;
+        let rows = (1..=10_000).contains(&filter.speed_rows);
+        refuse(!rows, "filter.speed_rows", "filter.speed_rows must lie between 1 and 10000")?;
+        let outliers = filter.outliers.unwrap_or(1.0);
+        refuse(!is_positive(outliers), "filter.outliers", "filter.outliers must be a positive number")?;
+        let still = torque.still.is_finite() && torque.still >= 0.0;
+        refuse(!still, "torque.still", "torque.still must be zero or more")?;
+        if let Some(lead) = &torque.lead {
+            let known = joints.iter().any(|joint| joint.name == *lead);
+            refuse(!known, "torque.lead", format!("torque.lead: no joint `{lead}`"))?;
+        }
+        let cells = torque.cell.len() == count && torque.cell.iter().all(|&side| is_positive(side));
+        let message = format!("torque.cell must hold {count} positive numbers, one a joint, to average rows");
+        refuse(torque.keep != Keep::All && !cells, "torque.cell", message)
     }
-    check_columns(mapping)?;
-    refuse(filter.decimate == 0, "filter.decimate", "filter.decimate must be 1 or more")?;
-    let rows = (1..=10_000).contains(&filter.speed_rows);
-    refuse(!rows, "filter.speed_rows", "filter.speed_rows must lie between 1 and 10000")?;
-    let outliers = filter.outliers.unwrap_or(1.0);
-    refuse(!is_positive(outliers), "filter.outliers", "filter.outliers must be a positive number")?;
-    let still = torque.still.is_finite() && torque.still >= 0.0;
-    refuse(!still, "torque.still", "torque.still must be zero or more")?;
-    if let Some(lead) = &torque.lead {
-        let known = joints.iter().any(|joint| joint.name == *lead);
-        refuse(!known, "torque.lead", format!("torque.lead: no joint `{lead}`"))?;
-    }
-    let cells = torque.cell.len() == count && torque.cell.iter().all(|&side| is_positive(side));
-    let message = format!("torque.cell must hold {count} positive numbers, one a joint, to average rows");
-    refuse(torque.keep != Keep::All && !cells, "torque.cell", message)
 }
 
 /// Checks joint `number` against those before it.

@@ -1,7 +1,6 @@
 //! Which columns of a log are what: a small TOML file, so that any table of joint positions and torques becomes a
 //! dataset without code. `datasets/instrument.toml` is an example with every key explained.
 
-use super::check::check;
 use crate::{
     dataset::JointLabel,
     scene::{self, Diagnostic},
@@ -236,7 +235,7 @@ impl Mapping {
             |place, message: &str| MappingError::Invalid(Box::new(Diagnostic::new(path, text, place, message)));
         let mapping: Self =
             toml::from_str(text).map_err(|error| invalid(error.span().unwrap_or(0..0), error.message()))?;
-        check(&mapping).map_err(|refusal| invalid(refusal.place(text), &refusal.message))?;
+        mapping.check().map_err(|refusal| invalid(refusal.place(text), &refusal.message))?;
         Ok(mapping)
     }
 

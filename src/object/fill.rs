@@ -11,7 +11,7 @@
 //! curved surface to the order of the cubes' size, and a wall thinner than a cube only by its volume.
 
 use super::ObjectError;
-use super::elasticity::Solid;
+use super::solid::Solid;
 use crate::scene::GRID_LINE;
 use glam::{DVec3, IVec3};
 use std::collections::HashMap;

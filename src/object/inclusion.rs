@@ -6,7 +6,7 @@
 //! stiff by the order of its share of cut cells.
 
 use super::ObjectError;
-use super::elasticity::{Solid, volume};
+use super::solid::{Solid, volume};
 use crate::scene::{ElasticSpec, InclusionPlace, InclusionSpec};
 use glam::DVec3;
 

@@ -20,6 +20,7 @@ mod ordering;
 mod refine;
 mod settled;
 mod skin;
+mod solid;
 mod sphere;
 mod springs;
 mod stiffening;
@@ -43,9 +44,9 @@ use crate::{
     memory,
     scene::{ElasticSpec, Material, ObjectSpec, Shape},
 };
-use elasticity::Solid;
 use glam::{DMat3, DVec3};
 use skin::Laplacian;
+use solid::Solid;
 
 /// A deformable object at rest.
 ///

@@ -1,39 +1,16 @@
 //! The chain and its forward kinematics.
 
 use crate::JointVector;
-use crate::scene::{JointKind, ProxyNodeSpec, ProxySpec};
+use crate::scene::{JointSpec, ProxyNodeSpec, ProxySpec};
 use glam::{DMat3, DVec3};
 
 /// A serial chain.
 #[derive(Clone, Debug)]
 pub struct Chain {
     /// From the base outwards.
-    pub joints: Vec<Joint>,
+    pub joints: Vec<JointSpec>,
     /// Contact nodes of all links, link by link.
     pub nodes: Vec<Node>,
-}
-
-/// One joint and the link that it moves.
-#[derive(Clone, Debug)]
-pub struct Joint {
-    /// As the scene names it.
-    pub name: String,
-    /// Turning or sliding.
-    pub kind: JointKind,
-    /// In the parent link's frame [m].
-    pub origin: DVec3,
-    /// Unit vector in the joint's frame.
-    pub axis: DVec3,
-    /// Least and greatest joint coordinate [rad or m].
-    pub limits: [f64; 2],
-    /// Mass of the link [kg].
-    pub mass: f64,
-    /// In the link's frame [m].
-    pub centre_of_mass: DVec3,
-    /// Inertia about the centre of mass, along the link frame's axes [kg m^2].
-    pub inertia: DMat3,
-    /// Reflected inertia of the actuator [kg m^2 or kg].
-    pub rotor_inertia: f64,
 }
 
 /// A contact node x_i.
@@ -66,17 +43,6 @@ impl Chain {
     /// The chain of a validated scene.
     #[must_use]
     pub fn new(spec: &ProxySpec) -> Self {
-        let joints = spec.joints.iter().map(|joint| Joint {
-            name: joint.name.clone(),
-            kind: joint.kind,
-            origin: joint.origin,
-            axis: joint.axis.normalize_or(DVec3::Z),
-            limits: joint.limits,
-            mass: joint.mass,
-            centre_of_mass: joint.centre_of_mass,
-            inertia: joint.inertia,
-            rotor_inertia: joint.rotor_inertia,
-        });
         let nodes = spec.joints.iter().enumerate().flat_map(|(link, joint)| {
             let node = move |node: &ProxyNodeSpec| Node {
                 link,
@@ -86,7 +52,7 @@ impl Chain {
             };
             joint.nodes.iter().map(node)
         });
-        Self { joints: joints.collect(), nodes: nodes.collect() }
+        Self { joints: spec.joints.clone(), nodes: nodes.collect() }
     }
 
     /// Number of joints d.
@@ -131,6 +97,7 @@ impl Chain {
 mod tests {
     use super::super::random;
     use super::*;
+    use crate::scene::JointKind;
 
     #[test]
     fn a_pose_is_reused_without_leaving_a_trace() {
@@ -162,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_planar_arm_reaches_where_trigonometry_says() {
-        let joint = |x: f64| Joint {
+        let joint = |x: f64| JointSpec {
             name: String::new(),
             kind: JointKind::Revolute,
             origin: DVec3::new(x, 0.0, 0.0),
@@ -172,6 +139,7 @@ mod tests {
             centre_of_mass: DVec3::ZERO,
             inertia: DMat3::ZERO,
             rotor_inertia: 1.0,
+            nodes: Vec::new(),
         };
         let tip = Node { link: 1, position: DVec3::new(0.3, 0.0, 0.0), radius: 0.0, length: 0.0 };
         let chain = Chain { joints: vec![joint(0.0), joint(0.5)], nodes: vec![tip] };

@@ -15,7 +15,7 @@ mod links;
 #[cfg(test)]
 mod random;
 
-pub use chain::{Chain, Joint, Node, Pose};
+pub use chain::{Chain, Node, Pose};
 pub use drawn::{Triangles, block, cylinder, shape_frame, shape_triangles, sphere};
 pub use dynamics::Dynamics;
 pub use inertia::{JointMatrix, cholesky, solve_positive, solve_transposed};

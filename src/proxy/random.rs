@@ -1,9 +1,9 @@
 //! Random chains for this room's tests: 1 to 6 joints, both kinds mixed, the same in every run.
 
-use super::{Chain, Joint, Node};
+use super::{Chain, Node};
 use crate::JointVector;
 use crate::random::Random;
-use crate::scene::JointKind;
+use crate::scene::{JointKind, JointSpec};
 use glam::DMat3;
 
 /// Sixty chains, each with a configuration and a rate.
@@ -11,7 +11,7 @@ pub fn chains() -> impl Iterator<Item = (Chain, JointVector, JointVector)> {
     (0..60).map(|seed: u64| {
         let mut random = Random::new(seed * 7919 + 1);
         let count = 1 + seed as usize % 6;
-        let joints = (0..count).map(|index| Joint {
+        let joints = (0..count).map(|index| JointSpec {
             name: format!("q{index}"),
             kind: if random.between(-1.0, 1.0) < 0.3 { JointKind::Prismatic } else { JointKind::Revolute },
             origin: 0.2 * random.vector(),
@@ -25,8 +25,9 @@ pub fn chains() -> impl Iterator<Item = (Chain, JointVector, JointVector)> {
                 1e-3 * root * root.transpose()
             },
             rotor_inertia: 1e-3 * (1.1 + random.between(-1.0, 1.0)),
+            nodes: Vec::new(),
         });
-        let joints: Vec<Joint> = joints.collect();
+        let joints: Vec<JointSpec> = joints.collect();
         let nodes =
             (0..3 * count).map(|k| Node { link: k / 3, position: 0.2 * random.vector(), radius: 0.0, length: 0.0 });
         let nodes = nodes.collect();

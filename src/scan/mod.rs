@@ -24,8 +24,8 @@ pub use trajectory::Trajectory;
 use crate::{
     JointVector,
     dataset::JointLabel,
-    proxy::{Chain, Joint, Pose},
-    scene::{PlanSpec, ScanSpec},
+    proxy::{Chain, Pose},
+    scene::{JointSpec, PlanSpec, ScanSpec},
 };
 use glam::DVec3;
 use std::{
@@ -119,7 +119,7 @@ struct Driver<'a> {
 /// Names and units of a chain's joints.
 #[must_use]
 pub fn labels(chain: &Chain) -> Vec<JointLabel> {
-    let label = |joint: &Joint| JointLabel { name: joint.name.clone(), unit: joint.kind.unit().to_owned() };
+    let label = |joint: &JointSpec| JointLabel { name: joint.name.clone(), unit: joint.kind.unit().to_owned() };
     chain.joints.iter().map(label).collect()
 }
 

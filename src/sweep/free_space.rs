@@ -22,8 +22,8 @@ use crate::{
     JointVector, MAX_JOINTS,
     contact::{Model, Proximity},
     dataset::{Axis, Grid},
-    proxy::{Chain, Joint},
-    scene::JointKind,
+    proxy::Chain,
+    scene::{JointKind, JointSpec},
 };
 use rayon::prelude::*;
 use std::{
@@ -235,7 +235,7 @@ impl JacobianBounds {
         for bound in &bounds {
             greatest.iter_mut().zip(bound.iter()).for_each(|(greatest, r)| *greatest = greatest.max(*r));
         }
-        let slide = |(joint, range): (&Joint, &[f64; 2])| match joint.kind {
+        let slide = |(joint, range): (&JointSpec, &[f64; 2])| match joint.kind {
             JointKind::Revolute => joint.origin.length(),
             JointKind::Prismatic => joint.origin.length() + range[0].abs().max(range[1].abs()),
         };

@@ -27,6 +27,7 @@ pub(crate) mod reference;
 pub mod refine;
 mod report;
 mod shard;
+mod sharded;
 pub(crate) mod spacing;
 mod table;
 mod tally;

@@ -8,15 +8,9 @@
 //! A shard's file is a part (`part.rs`) of its points. It is called `.part` until it is whole, so that whoever finds
 //! the name without it finds all of its points.
 
-use super::{Backend, Run, Sweep, SweepError, SweepReport, chunks::Begun, merge::Contents, part::Part};
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
-use std::{
-    fmt, fs,
-    ops::Range,
-    path::{Path, PathBuf},
-    str::FromStr,
-};
+use std::{fmt, ops::Range, str::FromStr};
 
 /// Stretches of a shard where the grid has points enough [1]: the points in contact then differ from shard to shard by
 /// about a tenth.
@@ -24,9 +18,6 @@ const STRETCHES: usize = 64;
 
 /// Fewest points of a stretch [1]: enough for the threads of a machine to share them.
 const SHORTEST: usize = 64;
-
-/// Seed of the sample of points.
-const SEED: u64 = 0x2545_f491_4f6c_dd1d;
 
 /// Most shards of a sweep [1]: more than any cluster has tasks.
 const MOST: usize = 1_000_000;
@@ -82,7 +73,7 @@ impl Shard {
     }
 
     /// The shard, of as many as this one is of, that has the point `point`.
-    fn having(self, point: usize, points: usize) -> usize {
+    pub(super) fn having(self, point: usize, points: usize) -> usize {
         let stretch = point / self.stretch(points);
         (stretch % self.count + self.count - self.turn(stretch / self.count)) % self.count
     }
@@ -127,74 +118,6 @@ pub fn ranges(numbers: &[usize]) -> String {
         [] => String::new(),
     });
     runs.collect::<Vec<_>>().join(",")
-}
-
-impl Sweep<'_> {
-    /// Number of points that are not skipped, of each of `count` shards, and a random sample of at most `most` of these
-    /// points.
-    pub(super) fn solved_of_shards(&self, count: usize, most: usize) -> Result<(Vec<usize>, Vec<usize>), SweepError> {
-        let (points, any) = (self.grid.points(), Shard { index: 0, count });
-        let (mut solved, mut done) = (vec![0; count], 0);
-        let (mut sample, mut met, mut random) = (Vec::new(), 0_usize, Random::new(SEED));
-        let free_space = self.free_space();
-        while done < points {
-            let slab = free_space.as_ref().map_or(0..points, |free_space| free_space.slab(done));
-            let gaps = free_space.as_ref().map(|free_space| self.gaps(free_space, slab.clone())).transpose()?;
-            for point in slab.clone().filter(|&point| gaps.as_ref().is_none_or(|gaps| gaps.gap(point).is_none())) {
-                solved[any.having(point, points)] += 1;
-                // Each of the points so far is as likely to be in the sample as any other (Vitter 1985, algorithm R).
-                met += 1;
-                let place = random.between(0.0, met as f64) as usize;
-                if sample.len() < most {
-                    sample.push(point);
-                } else if let Some(kept) = sample.get_mut(place) {
-                    *kept = point;
-                }
-            }
-            done = slab.end;
-        }
-        Ok((solved, sample))
-    }
-
-    /// Solves the points of `shard` into a file in `folder`, which is made where it is missing, and returns its path.
-    /// Continues an interrupted run; a whole file is left as it is, and `None` returned with it.
-    ///
-    /// # Errors
-    /// Any [`SweepError`]; the part then keeps what is done.
-    pub fn bake_shard<B: Backend>(
-        &mut self,
-        backend: &mut B,
-        folder: &Path,
-        shard: Shard,
-        mut run: Run<'_>,
-    ) -> Result<(PathBuf, Option<SweepReport>), SweepError> {
-        self.shard = shard;
-        let mut binding = self.binding();
-        let failed = |source| SweepError::Folder { path: folder.into(), source };
-        fs::create_dir_all(folder).map_err(failed)?;
-        let file = folder.join(binding.file_name());
-        let part_path = Self::part_of(&file);
-        if file.exists() {
-            if Contents::read(&file)?.is_whole_of(&binding)? {
-                return Ok((file, None));
-            }
-            // Damaged: what is whole of it is kept, unless it is being solved again already.
-            let removed = if part_path.exists() { fs::remove_file(&file) } else { fs::rename(&file, &part_path) };
-            removed.map_err(failed)?;
-        }
-        let (mut part, tally) = Part::open(&part_path, true, &mut binding)?;
-        // Whoever held the lock before may just have finished: what was opened is then the whole file, or a new one
-        // that nobody needs.
-        if file.exists() {
-            let _ = fs::remove_file(&part_path);
-            return Ok((file, None));
-        }
-        let footprint = self.footprint(run.chunk, false);
-        let begun = Begun { tally, provenance: binding.provenance };
-        let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
-        part.finish(&file)?;
-        Ok((file, Some(self.report(solved).0)))
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The end of the scene file: what is drawn of the links.
 
-use super::text::{entry, heading, number, vector};
+use super::toml::{entry, heading, number, vector};
 use crate::scene::{LinkForm, LinkShape, ProxySpec};
 use glam::{DQuat, DVec3, EulerRot};
 use std::fmt::Write;

@@ -1,7 +1,11 @@
 //! The scene file of an arm, as a person would have written it.
 
 use super::{Arm, ArmJoint, ContactNodes, Robot, UrdfError};
-use super::{practice::Practice, shape};
+use super::{
+    practice::Practice,
+    shape,
+    toml::{coarse, comment, entry, heading, list, number, significant, vector},
+};
 use crate::proxy::Chain;
 use crate::scene::{JointKind, JointSpec, LinkShape, ProxyNodeSpec, ProxySpec, Scene};
 use glam::DVec3;
@@ -248,74 +252,4 @@ fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, practice: &Pra
     entry(text, "stiffness", &scaled(1.0), "N m/rad or N/m")?;
     entry(text, "damping", &scaled(0.02), "N m s/rad or N s/m")?;
     entry(text, "inertia", &scaled(1e-4), "kg m^2 or kg")
-}
-
-/// Writes a heading as wide as those of the scenes that ship.
-pub(super) fn heading(text: &mut String, title: &str) -> std::fmt::Result {
-    writeln!(text, "\n# ---- {title} {}\n", "-".repeat(112_usize.saturating_sub(title.len())))
-}
-
-/// Writes a key with its value and a comment.
-pub(super) fn entry(text: &mut String, key: &str, value: &str, meaning: &str) -> std::fmt::Result {
-    let assignment = format!("{key} = {value}");
-    if meaning.is_empty() {
-        writeln!(text, "{assignment}")
-    } else {
-        writeln!(text, "{assignment:<40}# {}", comment(meaning))
-    }
-}
-
-/// Returns text that stays within a comment.
-fn comment(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
-}
-
-fn list<T>(values: &[T], each: impl FnMut(&T) -> String) -> String {
-    format!("[{}]", values.iter().map(each).collect::<Vec<_>>().join(", "))
-}
-
-pub(super) fn vector(v: DVec3, decimals: usize) -> String {
-    list(&v.to_array(), |x| number(*x, decimals))
-}
-
-/// Returns `x` with at most `decimals` decimals, and at least one.
-pub(super) fn number(x: f64, decimals: usize) -> String {
-    let text = format!("{x:.decimals$}");
-    let trimmed = text.trim_end_matches('0');
-    match trimmed.strip_suffix('.').unwrap_or(trimmed) {
-        "-0" | "0" => "0.0".to_owned(),
-        whole if !whole.contains('.') => format!("{whole}.0"),
-        fraction => fraction.to_owned(),
-    }
-}
-
-/// Returns `x` to six significant digits.
-fn significant(x: f64) -> String {
-    plain(&format!("{x:.5e}"))
-}
-
-/// Returns `x` to three significant digits.
-fn coarse(x: f64) -> String {
-    plain(&format!("{x:.2e}"))
-}
-
-/// Returns a number in scientific notation as one reads it more easily.
-fn plain(scientific: &str) -> String {
-    let x: f64 = scientific.parse().unwrap_or_default();
-    if x == 0.0 || (1e-4..1e6).contains(&x.abs()) { format!("{x:?}") } else { format!("{x:e}") }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_short_and_have_a_point() {
-        assert_eq!(
-            [0.0, -0.0, 1.0, 0.25, -1e-12, 0.392_25].map(|x| number(x, 9)),
-            ["0.0", "0.0", "1.0", "0.25", "0.0", "0.39225"]
-        );
-        assert_eq!([0.0, 1234.56789, 1.2e-7, 0.01].map(significant), ["0.0", "1234.57", "1.2e-7", "0.01"]);
-        assert_eq!([2.345_678, 1e7].map(coarse), ["2.35", "1e7"]);
-    }
 }

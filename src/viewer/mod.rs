@@ -62,7 +62,7 @@ pub use eframe::egui_wgpu::RenderState;
 pub use feel::TickSource;
 pub use lead::DeviceChoice;
 pub use offscreen::{Picture, render_state, screenshot};
-pub use theme::{LEAST_WINDOW, apply as dress};
+pub use theme::LEAST_WINDOW;
 pub use window::open;
 
 use crate::{
@@ -70,6 +70,12 @@ use crate::{
     memory,
     sweep::{OTHER_ADAPTER, remedied},
 };
+
+/// Gives `ctx` the window's type, spacing and colours.
+pub fn dress(ctx: &eframe::egui::Context) {
+    theme::apply(ctx);
+    palette::apply(ctx);
+}
 
 /// The viewer cannot go on.
 #[derive(Debug, thiserror::Error)]

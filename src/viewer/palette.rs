@@ -2,7 +2,7 @@
 
 use super::theme::{HAIRLINE, ROUNDING, SHADOW_BLUR, SHADOW_DROP};
 use crate::report::colour::{self, Colour};
-use eframe::egui::{Color32, CornerRadius, Shadow, Stroke, Visuals, style::HandleShape};
+use eframe::egui::{self, Color32, CornerRadius, Shadow, Stroke, Theme, Visuals, style::HandleShape};
 
 /// Strength of lines that only help to read others, over their colour's own [1].
 pub const FAINT: f32 = 0.45;
@@ -104,8 +104,14 @@ pub fn ring(palette: &Palette, outside: bool) -> [(f32, Color32); 3] {
     [(7.0, colour), (5.0, palette.stage), (2.5, colour)]
 }
 
+/// Gives `ctx` both sets of colours.
+pub fn apply(ctx: &egui::Context) {
+    ctx.set_visuals_of(Theme::Light, light());
+    ctx.set_visuals_of(Theme::Dark, dark());
+}
+
 /// egui's own colours on light ground.
-pub fn light() -> Visuals {
+fn light() -> Visuals {
     let ink = egui_colour(colour::INK);
     let mut visuals = Visuals::light();
     dress(&mut visuals, ink, egui_colour(colour::SOFT_INK), Color32::WHITE, Color32::from_rgb(0xfa, 0xfb, 0xfc));
@@ -133,7 +139,7 @@ pub fn light() -> Visuals {
 }
 
 /// egui's own colours on dark ground.
-pub fn dark() -> Visuals {
+fn dark() -> Visuals {
     let ink = egui_colour(Colour::hex(0xe3_e7_ed));
     let mut visuals = Visuals::dark();
     let (ground, panel) = (Color32::from_rgb(0x14, 0x17, 0x1c), Color32::from_rgb(0x1d, 0x21, 0x28));

@@ -1,8 +1,7 @@
 //! Sizes and type of the window: one scale of distances, few widths. Everything is in points unless it says otherwise.
 //! Colours are in `palette.rs`.
 
-use super::palette;
-use eframe::egui::{self, FontFamily, FontId, Margin, Rangef, RichText, TextStyle, Theme, vec2};
+use eframe::egui::{self, FontFamily, FontId, Margin, Rangef, RichText, TextStyle, vec2};
 use egui_plot::{AxisHints, GridInput, GridMark};
 
 // --- Distances ---
@@ -221,10 +220,8 @@ pub fn mark_number(mark: GridMark, _: &std::ops::RangeInclusive<f64>) -> String 
     format!("{:.decimals$}", mark.value + 0.0)
 }
 
-/// Gives `ctx` type, spacing and both sets of colours.
+/// Gives `ctx` type and spacing.
 pub fn apply(ctx: &egui::Context) {
-    ctx.set_visuals_of(Theme::Light, palette::light());
-    ctx.set_visuals_of(Theme::Dark, palette::dark());
     ctx.all_styles_mut(|style| {
         let font = |size| FontId::new(size, FontFamily::Proportional);
         style.text_styles.insert(TextStyle::Heading, font(HEADING));

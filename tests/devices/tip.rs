@@ -12,14 +12,14 @@ use haptize::{
         Applied, Coordinates, Device, Guard, Limits, LinearMap, Motion, Reading, Simulated, SimulatedHand, TipDevice,
         Watchdog,
     },
-    proxy::{Chain, Joint, Node},
-    scene::{DeviceSpec, HandSpec, JointKind, Waypoint},
+    proxy::{Chain, Node},
+    scene::{DeviceSpec, HandSpec, JointKind, JointSpec, Waypoint},
 };
 use std::sync::{Arc, Mutex};
 
 /// An arm of three joints: yaw and two pitches, its tip at (0.3, 0, 0) where all are zero.
 pub fn arm() -> Chain {
-    let joint = |x: f64, axis: DVec3| Joint {
+    let joint = |x: f64, axis: DVec3| JointSpec {
         name: String::new(),
         kind: JointKind::Revolute,
         origin: DVec3::new(x, 0.0, 0.0),
@@ -29,6 +29,7 @@ pub fn arm() -> Chain {
         centre_of_mass: DVec3::ZERO,
         inertia: DMat3::ZERO,
         rotor_inertia: 1e-3,
+        nodes: Vec::new(),
     };
     let tip = Node { link: 2, position: DVec3::new(0.15, 0.0, 0.0), radius: 0.0, length: 0.0 };
     Chain { joints: vec![joint(0.0, DVec3::Z), joint(0.0, DVec3::Y), joint(0.15, DVec3::Y)], nodes: vec![tip] }

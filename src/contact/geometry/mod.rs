@@ -4,6 +4,7 @@ pub mod bounding_volumes;
 pub mod closest_point;
 mod distance_bounds;
 pub mod facet;
+pub mod nearest;
 pub mod normals;
 pub mod packet;
 pub mod quartic;

@@ -1,9 +1,10 @@
 //! The surface at rest: what of its geometry is computed once and shared by all threads.
 
 use super::bounding_volumes::BoundingVolumes;
-use super::closest_point::{Closest, ClosestPoint, Feature};
+use super::closest_point::{ClosestPoint, Feature};
 use super::distance_bounds::DistanceBounds;
 use super::facet::Facet;
+use super::nearest::Closest;
 use super::normals;
 use super::smooth::{Shape, SmoothSurface, across};
 use crate::object::{Object, Topology};

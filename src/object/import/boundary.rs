@@ -1,6 +1,6 @@
 //! The surface of tetrahedra: their faces that no other tetrahedron shares.
 
-use crate::object::{Body, elasticity::volume};
+use crate::object::{Body, solid::volume};
 use glam::DVec3;
 use std::collections::HashMap;
 

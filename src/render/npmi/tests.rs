@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::{
-    proxy::{Chain, Joint},
+    proxy::Chain,
     random::Random,
-    scene::JointKind,
+    scene::{JointKind, JointSpec},
 };
 use glam::{DMat3, DVec3};
 
@@ -211,7 +211,7 @@ fn impossible_proxies_are_refused() {
 
 /// An arm of `count` links whose inertia varies strongly with its posture.
 fn arm(count: usize, limits: [f64; 2]) -> Chain {
-    let joint = |k: usize| Joint {
+    let joint = |k: usize| JointSpec {
         name: format!("q{k}"),
         kind: if k == 4 { JointKind::Prismatic } else { JointKind::Revolute },
         origin: DVec3::new(if k == 0 { 0.0 } else { 0.3 }, 0.02 * k as f64, 0.0),
@@ -221,6 +221,7 @@ fn arm(count: usize, limits: [f64; 2]) -> Chain {
         centre_of_mass: DVec3::new(0.15, 0.01, 0.02),
         inertia: DMat3::from_diagonal(DVec3::new(1e-4, 2e-3, 2e-3)),
         rotor_inertia: 1e-4,
+        nodes: Vec::new(),
     };
     Chain { joints: (0..count).map(joint).collect(), nodes: Vec::new() }
 }

@@ -14,7 +14,8 @@
 //!
 //! *Marking.* Cells of any level are refined that contribute most to the squared error, as few as are expected to leave
 //! no more than the aim. (Doerfler 1996, A convergent adaptive algorithm for Poisson's equation, whose bulk is a fixed
-//! share; here it follows from the aim.) The store is measured again, until it keeps the aim.
+//! share; here it follows from the aim.) Cells in which no error is expected wait until no others are left. The store is
+//! measured again, until it keeps the aim.
 
 use super::{
     node::{self, Scale, Solved},
@@ -306,7 +307,12 @@ impl Filling<'_> {
             let refinable = (a.level == last).cmp(&(b.level == last));
             refinable.then(b.square.total_cmp(&a.square)).then((a.level, a.low).cmp(&(b.level, b.low)))
         });
-        let refinable = self.leaves.partition_point(|leaf| leaf.level < last);
+        let mut refinable = self.leaves.partition_point(|leaf| leaf.level < last);
+        // Leaves in which nothing is expected wait until no others are left: most of them lie in free space.
+        let erring = self.leaves[..refinable].partition_point(|leaf| leaf.square > 0.0);
+        if erring > 0 {
+            refinable = erring;
+        }
         // In bulk a refined cell adds as many nodes as it has halves.
         let halves = 2.0_f64.powi(self.book.space.joints() as i32);
         let there: usize = self.nodes.iter().map(BTreeSet::len).sum();
