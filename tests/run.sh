@@ -59,21 +59,28 @@ have_rust() {
     cargo fmt --version && cargo clippy --version || rustup component add rustfmt clippy
 }
 
-# Every test, two programs at a time: some wait, for a device's clock or for a kernel to be compiled, while others compute.
-# The longest come first.
+# Runs the test programs that it reads, "FOLDER:PROGRAM" a line, so many at a time.
+run_programs() {
+    tr '\n' '\0' | xargs -0 -n 1 -P "$1" bash -c '
+        cd "${1%%:*}" || exit 1
+        printed=$("${1#*:}" --quiet 2>&1)
+        code=$?
+        printf "\n== %s\n%s\n" "$(basename "${1%-*}")" "$printed"
+        exit $code' tests
+}
+
+# Every test. Two programs at a time, since some wait, for a kernel to be compiled or for a process that they kill, while
+# others compute; the longest come first. Those that live by the clock have the machine to themselves.
 tests() {
-    local list threads
-    list=$(cargo test --locked --workspace --quiet --no-run --message-format json-render-diagnostics) || return 1
-    threads=$((($(nproc) + 1) / 2))
-    sed -n 's/.*"manifest_path":"\([^"]*\)\/Cargo.toml".*"profile":{[^}]*"test":true}.*"executable":"\([^"]*\)".*/\1 \2/p' <<<"$list" |
-        sort -k 2 | awk '/\/(gpu|reliability|haptize)-/ { print; next } { rest = rest $0 "\n" } END { printf "%s", rest }' |
-        RUST_TEST_THREADS=$threads xargs -L 1 -P 2 bash -c '
-            cd "$1" || exit 1
-            printed=$("$2" --quiet 2>&1)
-            code=$?
-            printf "\n== %s\n%s\n" "$(basename "${2%-*}")" "$printed"
-            exit $code' tests
-    [ "${PIPESTATUS[*]}" = '0 0 0 0' ] && cargo test --locked --workspace --quiet --doc
+    local messages programs failed=0
+    messages=$(cargo test --locked --workspace --quiet --no-run --message-format json-render-diagnostics) || return 1
+    programs=$(sed -n 's/.*"manifest_path":"\([^"]*\)\/Cargo.toml".*"profile":{[^}]*"test":true}.*"executable":"\([^"]*\)".*/\1:\2/p' <<<"$messages")
+    local clock='/(devices|realtime)-[0-9a-f]*$' long='/(gpu|reliability|viewer|haptize)-[0-9a-f]*$'
+    { grep -E "$long" <<<"$programs"; grep -Ev "$long|$clock" <<<"$programs"; } |
+        RUST_TEST_THREADS=$(($(nproc) / 2 + 1)) run_programs 2 || failed=1
+    grep -E "$clock" <<<"$programs" | run_programs 1 || failed=1
+    cargo test --locked --workspace --quiet --doc || failed=1
+    return $failed
 }
 
 # The demo as on a fresh machine: no Vulkan driver, no display, an empty folder. It is the program that the tests have built,
