@@ -6,6 +6,7 @@
 
 use super::{
     adapter::{AdapterChoice, AdapterSummary, asked_for, instance, qualified},
+    compiled::Compiled,
     dispatch::Dispatch,
     error::GpuError,
     timing::{KernelTime, SearchCounts, Stopwatch},
@@ -45,7 +46,7 @@ pub struct Context {
     /// Where kernels are timed.
     pub(super) stopwatch: Option<Stopwatch>,
     /// Pipelines that have been compiled, by shader, entry point and override constants.
-    pub(super) pipelines: Mutex<HashMap<String, (wgpu::ComputePipeline, wgpu::BindGroupLayout)>>,
+    pub(super) compiled: Mutex<HashMap<String, Compiled>>,
 }
 
 fn lock(failures: &Mutex<Failures>) -> MutexGuard<'_, Failures> {
@@ -152,7 +153,7 @@ impl Context {
             adapter: summary,
             failures,
             stopwatch: timed.then(Stopwatch::default),
-            pipelines: Mutex::default(),
+            compiled: Mutex::default(),
         })
     }
 

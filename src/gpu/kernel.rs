@@ -5,64 +5,19 @@
 
 use super::{
     buffer::StorageBuffer,
+    compiled::{Binding, Compiled},
     context::Context,
     dispatch::Dispatch,
     error::GpuError,
-    shaders::{self, Shader},
+    shaders::Shader,
 };
 use std::sync::PoisonError;
-
-/// A binding of a kernel, as the shader declares it.
-#[derive(Clone, Debug)]
-struct Binding {
-    number: u32,
-    name: String,
-    ty: wgpu::BufferBindingType,
-    /// Least size of the buffer: that of the struct, or of one element [B].
-    least: u64,
-}
-
-impl Binding {
-    /// Those that the entry point of `shader` uses.
-    fn of(shader: &Shader) -> Result<Vec<Self>, GpuError> {
-        let module = shaders::parse(shader).map_err(GpuError::Refused)?;
-        let info = shaders::validate(shader, &module).map_err(GpuError::Refused)?;
-        let entry = module.entry_points.iter().position(|point| point.name == shader.entry);
-        let entry = entry.ok_or_else(|| GpuError::Refused(format!("{} has no {}", shader.name, shader.entry)))?;
-        let used = info.get_entry_point(entry);
-        let binding = |(handle, global): (naga::Handle<naga::GlobalVariable>, &naga::GlobalVariable)| {
-            let number = global.binding.as_ref().filter(|_| !used[handle].is_empty())?.binding;
-            let ty = match global.space {
-                naga::AddressSpace::Storage { access } => {
-                    let read_only = !access.contains(naga::StorageAccess::STORE);
-                    wgpu::BufferBindingType::Storage { read_only }
-                }
-                _ => wgpu::BufferBindingType::Uniform,
-            };
-            let least = module.types[global.ty].inner.size(module.to_ctx()).into();
-            Some(Self { number, name: global.name.clone().unwrap_or_default(), ty, least })
-        };
-        Ok(module.global_variables.iter().filter_map(binding).collect())
-    }
-
-    fn layout(&self) -> wgpu::BindGroupLayoutEntry {
-        let min_binding_size = std::num::NonZeroU64::new(self.least);
-        wgpu::BindGroupLayoutEntry {
-            binding: self.number,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer { ty: self.ty, has_dynamic_offset: false, min_binding_size },
-            count: None,
-        }
-    }
-}
 
 /// A compute pipeline.
 pub struct Kernel {
     /// The shader's, and that of its entry point where it has several.
     name: String,
-    pipeline: wgpu::ComputePipeline,
-    layout: wgpu::BindGroupLayout,
-    bindings: Vec<Binding>,
+    compiled: Compiled,
 }
 
 impl Kernel {
@@ -76,24 +31,17 @@ impl Kernel {
             entry => format!("{} {entry}", shader.name),
         };
         // The lock is held meanwhile, so that of two threads that want one kernel the second gets the first's.
-        let mut compiled = context.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut compiled = context.compiled.lock().unwrap_or_else(PoisonError::into_inner);
         let key = format!("{name} {:?} {overrides:?}", shader.precision);
-        let bindings = Binding::of(shader)?;
-        let (pipeline, layout) = match compiled.get(&key) {
-            Some(pipeline) => pipeline.clone(),
-            None => {
-                compiled.entry(key).insert_entry(Self::compile(context, shader, overrides, &bindings)?).get().clone()
-            }
+        let compiled = match compiled.get(&key) {
+            Some(compiled) => compiled.clone(),
+            None => compiled.entry(key).insert_entry(Self::compile(context, shader, overrides)?).get().clone(),
         };
-        Ok(Self { name, pipeline, layout, bindings })
+        Ok(Self { name, compiled })
     }
 
-    fn compile(
-        context: &Context,
-        shader: &Shader,
-        overrides: &[(&str, f64)],
-        bindings: &[Binding],
-    ) -> Result<(wgpu::ComputePipeline, wgpu::BindGroupLayout), GpuError> {
+    fn compile(context: &Context, shader: &Shader, overrides: &[(&str, f64)]) -> Result<Compiled, GpuError> {
+        let bindings = Binding::of(shader)?;
         context.scoped(|device| {
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(shader.name),
@@ -117,7 +65,7 @@ impl Kernel {
                 compilation_options: wgpu::PipelineCompilationOptions { constants: overrides, ..Default::default() },
                 cache: None,
             });
-            (pipeline, layout)
+            Compiled { pipeline, layout, bindings }
         })
     }
 
@@ -133,11 +81,11 @@ impl Kernel {
             })?;
             Ok(wgpu::BindGroupEntry { binding: binding.number, resource: buffer.raw.as_entire_binding() })
         };
-        let entries = self.bindings.iter().map(entry).collect::<Result<Vec<_>, GpuError>>()?;
+        let entries = self.compiled.bindings.iter().map(entry).collect::<Result<Vec<_>, GpuError>>()?;
         context.scoped(|device| {
             device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: None,
-                layout: &self.layout,
+                layout: &self.compiled.layout,
                 entries: &entries,
             })
         })
@@ -147,6 +95,6 @@ impl Kernel {
     /// [`Dispatch`].
     #[must_use]
     pub fn dispatch<'a>(&'a self, bound: &'a wgpu::BindGroup, workgroups: u32, bytes: u64) -> Dispatch<'a> {
-        Dispatch { name: &self.name, pipeline: &self.pipeline, bound, workgroups, bytes }
+        Dispatch { name: &self.name, pipeline: &self.compiled.pipeline, bound, workgroups, bytes }
     }
 }

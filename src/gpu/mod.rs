@@ -17,7 +17,7 @@
 //! | `solver` | the backend of a sweep: what is made of results, retries |
 //! | `unpack` | from what the kernels wrote to equilibria, settled in f64 by the CPU's search |
 //! | `frame` | the object's nodes, one passive step a frame |
-//! | `kernel`, `dispatch` | one compute pipeline with its bindings; its dispatches |
+//! | `kernel`, `compiled`, `dispatch` | one compute pipeline with its bindings; its dispatches |
 //! | `buffer` | buffers of the device, and how the host reads them |
 //! | `timing` | how long each kernel takes, where that is asked for |
 //!
@@ -28,6 +28,7 @@
 
 mod adapter;
 mod buffer;
+mod compiled;
 mod context;
 mod detection;
 mod dispatch;

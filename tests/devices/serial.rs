@@ -8,7 +8,7 @@ use crate::{
 use haptize::{
     JointVector,
     device::{
-        Device, Guard, Halt, Hardware, JointDevice, LinearMap,
+        Device, Guard, Halt, Hardware, JointDevice, LONGEST_AGE, LinearMap,
         serial::{Protocol, Reply, TwoDiy, Version, WoodenHaptics},
     },
 };
@@ -193,6 +193,22 @@ fn a_line_that_misbehaves_never_leaves_a_two_diy_under_torque() {
 #[test]
 fn a_line_that_misbehaves_never_leaves_a_wooden_haptics_under_torque() {
     check_line(wooden, &wooden_middle());
+}
+
+#[test]
+fn lost_replies_make_a_line_stale_but_not_for_good() {
+    let emulator = Emulator::new(TwoDiyFirmware::default(), pressing(2, &middle()));
+    let (mut emulator, mut device) = emulator.while_opening(|path| patiently(|| TwoDiy::open(path, Version::V3)));
+    // A device that is not driven asks by itself.
+    let ages = (0..600).map(|tick| {
+        let age = device.read(PERIOD).unwrap().age;
+        emulator.fault = if tick < 100 && tick % 10 == 9 { Fault::Mute } else { Fault::None };
+        emulator.step(PERIOD);
+        age
+    });
+    let ages: Vec<f64> = ages.collect();
+    assert!(ages[..200].iter().any(|age| *age > LONGEST_AGE), "{ages:?}");
+    assert!(ages[400..].iter().all(|age| *age <= 2.0 * PERIOD + 1e-12), "{:?}", &ages[400..]);
 }
 
 #[test]

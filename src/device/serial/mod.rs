@@ -3,8 +3,9 @@
 //! A device answers each command with what it measured. A new request waits for the reply to the last, for `PATIENCE`
 //! ticks at most; the first command of zero never waits. Replies come in the order of requests and carry no number:
 //! each is taken for that to the oldest request without one. A measurement's age counts from that request, so that a
-//! line that loses replies looks older than it is, never younger; after some losses it is stale for good. Positions
-//! that no hand could have reached since the last one are no positions: such lines have no check sum.
+//! line that loses replies looks older than it is, never younger. Where that makes it stale, nothing is asked for
+//! `LATEST_REPLY`: a reply that has not come by then is lost, and not late. Positions that no hand could have reached
+//! since the last one are no positions: such lines have no check sum.
 
 #[cfg(unix)]
 mod port;
@@ -33,6 +34,10 @@ const FASTEST: f64 = 100.0;
 
 /// Time without a valid reply after which the device is given up [s]: long enough for a USB hub to reset.
 const LONGEST_SILENCE: f64 = 0.1;
+
+/// Time without requests after which a reply is lost and not late [s]: many times what a USB line delays, and short of
+/// [`LONGEST_SILENCE`].
+const LATEST_REPLY: f64 = 0.05;
 
 /// Longest message of any protocol [bytes].
 const LONGEST: usize = 128;
@@ -217,6 +222,14 @@ impl<P: Protocol> SerialDevice<P> {
 
     /// Sends the command of `torque`, unless the last request still waits for its reply.
     fn ask(&mut self, torque: &JointVector) -> Result<Command, Halt> {
+        let rests = !self.pushes && !is_torque(torque) && self.unsent_range.is_empty();
+        if rests && self.unanswered > 1 && self.latest.age > LONGEST_AGE {
+            if self.asked[self.unanswered - 1] <= LATEST_REPLY {
+                return Ok(Command::Kept);
+            }
+            self.port.clear();
+            (self.length, self.unanswered, self.waits) = (0, 0, false);
+        }
         let urgent = self.pushes && !is_torque(torque);
         if self.waits && !urgent {
             self.waited += 1;
