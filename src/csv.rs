@@ -50,6 +50,11 @@ impl<W: Write> Table<W> {
         self.row_is_empty = true;
         self.out.write_all(b"\n")
     }
+
+    /// Flushes the output.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.out.flush()
+    }
 }
 
 /// Returns `text` as one field (RFC 4180).

@@ -27,4 +27,4 @@ echo 'void __sanitizer_cov_8bit_counters_init(char *first, char *end) { (void)fi
     cc -x c -c -o "$place/no_counters.o" -
 export HAPTIZE_FUZZ_LINK=$place/no_counters.o
 export RUSTC_WORKSPACE_WRAPPER=$PWD/tests/fuzz.sh
-HAPTIZE_FUZZ=$executions cargo test --locked --workspace -p haptize --test reliability -- fuzz --nocapture --test-threads 1
+HAPTIZE_FUZZ=$executions cargo test --locked --workspace -p haptize --features viewer --test reliability -- fuzz --nocapture --test-threads 1

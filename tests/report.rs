@@ -24,7 +24,7 @@ use haptize::{
     scene::{GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, Shape, SpringKind, SpringSpec},
 };
 use resvg::{
-    tiny_skia::Rect,
+    tiny_skia::{Pixmap, Rect, Transform},
     usvg::{Group, Node, Options, Tree},
 };
 use std::{path::PathBuf, sync::Arc, time::Duration};
@@ -347,6 +347,39 @@ fn clips_of_equal_names_are_equal_rectangles() {
         }
     }
     assert!(known.len() > 5, "{known:?}");
+}
+
+/// Mean difference between the pixels of `canvas` and those that an independent renderer makes of its SVG, beside the
+/// mean distance of either from white.
+fn difference(canvas: &Canvas, svg: &str) -> f64 {
+    let own = canvas.pixels(2.0).unwrap();
+    let mut other = Pixmap::new(own.width as u32, own.height as u32).unwrap();
+    resvg::render(&parsed(svg), Transform::from_scale(2.0, 2.0), &mut other.as_mut());
+    let (mut difference, mut ink) = (0.0, 0.0);
+    for (own, other) in own.pixels.iter().zip(other.pixels()) {
+        for (&own, other) in own.iter().zip([other.red(), other.green(), other.blue()]) {
+            difference += f64::from(own.abs_diff(other));
+            ink += f64::from(255 - own.max(other));
+        }
+    }
+    difference / ink
+}
+
+/// What [`difference`] may be: both renderers round the edges of glyphs and lines in their own way. A text that is left
+/// out or moved by a point makes more.
+const ALIKE: f64 = 0.02;
+
+#[test]
+fn svg_and_png_show_the_same() {
+    let trace = recording(&arm(3), &sphere(), 1000);
+    let canvas = report::press::press(&trace);
+    let svg = canvas.svg();
+    let found = difference(&canvas, &svg);
+    assert!(found < ALIKE, "{found}");
+    let title = svg.find("<text").unwrap();
+    let end = title + svg[title..].find("</text>").unwrap() + "</text>".len();
+    let without = difference(&canvas, &(svg[..title].to_owned() + &svg[end..]));
+    assert!(without > ALIKE, "{without}");
 }
 
 #[test]

@@ -73,13 +73,13 @@ run_programs() {
 # others compute; the longest come first. Those that live by the clock have the machine to themselves.
 tests() {
     local messages programs failed=0
-    messages=$(cargo test --locked --workspace --quiet --no-run --message-format json-render-diagnostics) || return 1
+    messages=$(cargo test --locked --workspace --features viewer --quiet --no-run --message-format json-render-diagnostics) || return 1
     programs=$(sed -n 's/.*"manifest_path":"\([^"]*\)\/Cargo.toml".*"profile":{[^}]*"test":true}.*"executable":"\([^"]*\)".*/\1:\2/p' <<<"$messages")
     local clock='/(devices|realtime)-[0-9a-f]*$' long='/(gpu|reliability|viewer|haptize)-[0-9a-f]*$'
     { grep -E "$long" <<<"$programs"; grep -Ev "$long|$clock" <<<"$programs"; } |
         RUST_TEST_THREADS=$(($(nproc) / 2 + 1)) run_programs 2 || failed=1
     grep -E "$clock" <<<"$programs" | run_programs 1 || failed=1
-    cargo test --locked --workspace --quiet --doc || failed=1
+    cargo test --locked --workspace --features viewer --quiet --doc || failed=1
     return $failed
 }
 
@@ -102,11 +102,12 @@ VK_DRIVER_FILES=$(lavapipe)
 export VK_DRIVER_FILES VK_ICD_FILENAMES=$VK_DRIVER_FILES
 
 step 'formatting' cargo fmt --all --check
-step 'lints' cargo clippy --locked --workspace --all-targets --quiet -- -D warnings
+step 'lints' cargo clippy --locked --workspace --all-targets --features viewer --quiet -- -D warnings
+step 'lints, without the window' cargo clippy --locked --quiet -- -D warnings
 # The bindings are tested in the same build, so that what they share is compiled once.
 step 'tests' tests
 step 'Python package' bash python/tests/run.sh
-step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --no-deps --quiet
+step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --features viewer --no-deps --quiet
 step 'documentation as a site' bash docs/site/build.sh
 step 'demo' demo
 # Last, because it leaves a library and a program in which every block is counted.

@@ -4,7 +4,7 @@
 #   bash docs/figures/screenshots.sh
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-HAPTIZE=${HAPTIZE:-cargo run --quiet --release --}
+HAPTIZE=${HAPTIZE:-cargo run --quiet --release --features viewer --}
 $HAPTIZE view --motion press --time 2.2 --screenshot docs/figures/view-light.png
 $HAPTIZE view --motion scrape --time 2.4 --dark --screenshot docs/figures/view-dark.png
 # The arm of docs/robots.md, with its links' shapes.

@@ -41,7 +41,7 @@ fi
 features() {
     cargo tree --locked --prefix none -f '{p} [{f}]' "$@" | sed 's/ (\*)$//' | sort -u
 }
-twice=$(comm -13 <(features --workspace -e all) <(features -p haptize-python -e normal,build))
+twice=$(comm -13 <(features --workspace --features viewer -e all) <(features -p haptize-python --features haptize/viewer -e normal,build))
 if [ -n "$twice" ]; then
     echo 'these would be compiled twice, and the engine with them: ask in python/Cargo.toml for the features that the workspace has of them'
     echo '(cargo tree --workspace -e all -f "{p} [{f}]")'
@@ -49,8 +49,8 @@ if [ -n "$twice" ]; then
     exit 1
 fi
 
-# The profile of the tests, so that what they have compiled is used.
-"$place/build/bin/maturin" build --quiet --locked --profile dev --compatibility linux --auditwheel skip --compression-method stored --out "$place"
+# The profile and the features of the tests, so that what they have compiled is used.
+"$place/build/bin/maturin" build --quiet --locked --profile dev --features haptize/viewer --compatibility linux --auditwheel skip --compression-method stored --out "$place"
 wheel=$(ls "$place"/haptize-*.whl)
 echo "built $(basename "$wheel")"
 

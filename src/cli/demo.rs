@@ -5,7 +5,13 @@
 //! clock, which shows what a tick costs on this one and how punctual it is.
 
 use super::{Failure, Report, motion, output::Folder, played, tell, watch};
-use crate::{dataset::Dataset, render::setup::Setup, report, scene::Scene, sweep::BackendChoice};
+use crate::{
+    dataset::Dataset,
+    render::{realtime::Options, setup::Setup},
+    report,
+    scene::Scene,
+    sweep::BackendChoice,
+};
 use std::{
     fmt::Write,
     path::{Path, PathBuf},
@@ -41,11 +47,16 @@ pub fn run() -> Result<Report, Failure> {
     let setup = Setup::new(&dataset)?;
     let motion = motion::named(&setup, &dataset, "press", None)?;
     let seconds = motion.duration();
-    let mut played = played::play(&setup, &dataset, &mut setup.hand(motion.clone())?, seconds, false)?;
-    played.timing = played::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, true)?.timing;
+    let (mut played, ticks) = played::traced(&dataset, folder, |on_tick| {
+        played::play(&setup, &dataset, &mut setup.hand(motion.clone())?, seconds, on_tick)
+    })?;
+    let (mut hand, mut graphics) = (setup.hand(motion)?, setup.graphics(&dataset)?);
+    let plan = setup.plan(&dataset, seconds, 0);
+    let timed = played::play_timed(&setup.haptics, &mut hand, graphics.as_mut(), &plan, Options::default())?;
+    played.timing = timed.timing;
 
     tell(format_args!("drawing ..."));
-    let mut files = vec![file.clone()];
+    let mut files = vec![file.clone(), ticks?];
     files.extend(played::write(&setup, &dataset, &played, folder)?);
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
 

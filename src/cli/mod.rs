@@ -59,7 +59,7 @@ mod watch;
 pub use memory::Remembering;
 
 use crate::{
-    render::flags::Fault,
+    render::trace::Tick,
     sweep::{OTHER_ADAPTER, remedied},
 };
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -261,9 +261,19 @@ fn tell(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(io::stderr(), "{}", printable(&line.to_string()));
 }
 
-/// Says at once that the torque went to zero, and why: whoever holds the device feels nothing any more.
-fn tell_fault(time: f64, fault: Fault) {
-    tell(format_args!("haptize: at {time:.4} s the torque went to zero: {fault}; play again to clear it"));
+/// Returns what hands ticks on to `next` and says at the first fault that the torque went to zero, and why: whoever holds
+/// the device feels nothing any more.
+fn telling_faults(next: &mut dyn FnMut(&Tick)) -> impl FnMut(&Tick) {
+    let mut is_told = false;
+    move |tick| {
+        if let Some(fault) = tick.fault
+            && !std::mem::replace(&mut is_told, true)
+        {
+            let time = tick.time;
+            tell(format_args!("haptize: at {time:.4} s the torque went to zero: {fault}; play again to clear it"));
+        }
+        next(tick);
+    }
 }
 
 /// Returns `text` with its control characters spelt as `\u001b`: names and texts of files must not command a terminal.

@@ -1,16 +1,19 @@
 //! `haptize play SCENE --on-demand FILE`: contact that is solved while it is felt, and kept.
 
-use super::{Failure, interrupt, tell, tell_fault};
+use super::{
+    Failure, interrupt,
+    played::{Played, play_timed},
+    tell,
+};
 use crate::{
     device::Device,
     render::{
         graphics::Graphics,
         haptic::Haptics,
         on_demand::{self, OnDemand},
-        realtime::{self, Options},
+        realtime::Options,
         session::Plan,
-        timing::Timing,
-        trace::Trace,
+        trace::Tick,
     },
     store::space::MAX_LEVELS,
 };
@@ -125,26 +128,27 @@ impl Exploring {
         }
     }
 
-    /// Plays `device` against the clock while contact is solved where it goes.
+    /// Plays `device` against the clock while contact is solved where it goes. Hands over each tick soon after it.
     pub fn play(
         &self,
         haptics: &Haptics,
         device: &mut dyn Device,
         graphics: Option<&mut Graphics<'_>>,
         plan: &Plan,
-    ) -> Result<(Trace, Timing, Explored), Failure> {
+        on_tick: &mut dyn FnMut(&Tick),
+    ) -> Result<Played, Failure> {
         let start = *haptics.start(&device.read(0.0).position)?.proxy();
         let (live, exploration) = self.on_demand.begin(&start)?;
         let begun = self.began.elapsed().as_secs_f64();
-        let options = Options { stop: interrupt::stop_flag(), live: Some(live), on_fault: tell_fault };
-        let played = realtime::run(haptics, device, graphics, plan, options);
+        let options = Options { stop: interrupt::stop_flag(), live: Some(live), on_tick: Some(on_tick) };
+        let played = play_timed(haptics, device, graphics, plan, options);
         let done = exploration.end()?;
         interrupt::over();
-        let (trace, timing) = played?;
+        let played = played?;
         if done.full {
             tell(format_args!("haptize: note: the store is full with {} blocks: what is new is not kept", done.blocks));
         }
-        Ok((trace, timing, Explored { done, start: begun }))
+        Ok(Played { explored: Some(Explored { done, start: begun }), ..played })
     }
 }
 

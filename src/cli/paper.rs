@@ -184,7 +184,7 @@ fn felt(dataset: &Dataset, motion: &str) -> Result<(Setup, Arc<Trace>), Failure>
     let setup = Setup::new(dataset)?;
     let motion = motion::named(&setup, dataset, motion, None)?;
     let seconds = motion.duration();
-    let played = played::play(&setup, dataset, &mut setup.hand(motion)?, seconds, false)?;
+    let played = played::play(&setup, dataset, &mut setup.hand(motion)?, seconds, &mut |_| ())?;
     Ok((setup, played.trace))
 }
 

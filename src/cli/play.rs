@@ -7,18 +7,18 @@ use super::{
     on_demand::{self, Explored, Exploring},
     output::{self, Earlier, Folder, Kind as FileKind},
     playback_report::PlaybackReport,
-    played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, unwritten, write},
-    tell, tell_fault,
+    played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, play_timed, traced, unwritten, write},
+    tell,
 };
 use crate::{
     dataset::{self, Dataset, replace_file},
     device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, attach, open},
     render::{
         mcap,
-        realtime::{self, Options},
+        realtime::Options,
         recording::Recording,
         setup::{Setup, border_stiffness, labels},
-        trace::Summary,
+        trace::{Summary, Tick},
     },
     report,
     scene::Scene,
@@ -108,13 +108,22 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if let Some(advice) = &setup.advice {
         tell(format_args!("haptize: note: {advice}"));
     }
-    let (played, told) = match &arguments.replay {
-        Some(file) => replay(&setup, &dataset, file)?,
-        None => {
-            let session = || perform(&setup, &dataset, arguments, exploring.as_ref());
-            (exploring.as_ref().map_or_else(session, |exploring| exploring.keep(None, session))?, None)
+    let mut told = None;
+    let (played, ticks) = traced(&dataset, &folder, |on_tick| match &arguments.replay {
+        Some(file) => {
+            let (played, line) = replay(&setup, &dataset, file)?;
+            played.trace.ticks.iter().for_each(on_tick);
+            told = Some(line);
+            Ok(played)
         }
-    };
+        None => {
+            let mut session = || perform(&setup, &dataset, arguments, exploring.as_ref(), on_tick);
+            match &exploring {
+                Some(exploring) => exploring.keep(None, session),
+                None => session(),
+            }
+        }
+    })?;
     if let Some(exploring) = &exploring {
         // With what was solved meanwhile.
         dataset = exploring.on_demand.dataset();
@@ -128,6 +137,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         record(&played, arguments, file)?;
         files.push(file.clone());
     }
+    files.push(ticks?);
     files.extend(write(&setup, &dataset, &played, &folder)?);
     let mut felt = PlaybackReport::new(&arguments.dataset, &dataset, &setup, &played.trace);
     if let Some(path) = &arguments.beside {
@@ -248,12 +258,13 @@ fn describe_tally(text: &mut String, tally: &Tally) -> fmt::Result {
     Ok(())
 }
 
-/// The session that `arguments` ask for.
+/// The session that `arguments` ask for, which hands over its ticks.
 fn perform(
     setup: &Setup,
     dataset: &Dataset,
     arguments: &Arguments,
     exploring: Option<&Exploring>,
+    on_tick: &mut dyn FnMut(&Tick),
 ) -> Result<Played, Failure> {
     let motion = motion::named(setup, dataset, &arguments.motion, arguments.topic.as_deref())?;
     let seconds = arguments.seconds.unwrap_or_else(|| motion.duration());
@@ -262,17 +273,22 @@ fn perform(
     }
     if let Some(address) = &arguments.device {
         let how = How { seconds, hold_key: arguments.hold_key, exploring };
-        return drive(setup, dataset, address, motion, how);
+        return drive(setup, dataset, address, motion, how, on_tick);
     }
     let mut device: Box<dyn Device> =
         if arguments.exact { Box::new(Recorded::new(motion)) } else { Box::new(setup.hand(motion)?) };
+    if exploring.is_none() && !arguments.realtime {
+        return play(setup, dataset, device.as_mut(), seconds, on_tick);
+    }
+    let mut graphics = setup.graphics(dataset)?;
+    let plan = setup.plan(dataset, seconds, SNAPSHOTS);
+    let (device, graphics) = (device.as_mut(), graphics.as_mut());
     match exploring {
-        Some(exploring) => {
-            let mut graphics = setup.graphics(dataset)?;
-            let plan = setup.plan(dataset, seconds, SNAPSHOTS);
-            exploring.play(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan).map(Played::on_demand)
+        Some(exploring) => exploring.play(&setup.haptics, device, graphics, &plan, on_tick),
+        None => {
+            let options = Options { on_tick: Some(on_tick), ..Options::default() };
+            play_timed(&setup.haptics, device, graphics, &plan, options)
         }
-        None => play(setup, dataset, device.as_mut(), seconds, arguments.realtime),
     }
 }
 
@@ -285,7 +301,14 @@ struct How<'a> {
 }
 
 /// Feels the dataset with the device at `address`, until Ctrl-C at the latest. The simulated one is led along `motion`.
-fn drive(setup: &Setup, dataset: &Dataset, address: &Address, motion: Motion, how: How<'_>) -> Result<Played, Failure> {
+fn drive(
+    setup: &Setup,
+    dataset: &Dataset,
+    address: &Address,
+    motion: Motion,
+    how: How<'_>,
+    on_tick: &mut dyn FnMut(&Tick),
+) -> Result<Played, Failure> {
     let How { seconds, hold_key, exploring } = how;
     let hand = if address.kind == Kind::Simulated { Some(setup.hand(motion)?) } else { None };
     let (key, input) = Key::new();
@@ -302,30 +325,21 @@ fn drive(setup: &Setup, dataset: &Dataset, address: &Address, motion: Motion, ho
     let stop = interrupt::stop_flag();
     let mut graphics = setup.graphics(dataset)?;
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
-    // Last of all: the motors go on.
+    // Last of all: the motors go on. They go off before anything is drawn.
     let mut device = attach(guard, address, setup.chain.clone(), &setup.scene)?;
     let played = match exploring {
-        Some(exploring) => {
-            exploring.play(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan).map(Played::on_demand)
+        Some(exploring) => exploring.play(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, on_tick),
+        None => {
+            let options = Options { stop, on_tick: Some(on_tick), ..Options::default() };
+            play_timed(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, options)
         }
-        None => realtime::run(
-            &setup.haptics,
-            device.as_mut(),
-            graphics.as_mut(),
-            &plan,
-            Options { stop, on_fault: tell_fault, ..Options::default() },
-        )
-        .map(|(trace, timing)| Played { trace: trace.into(), timing: Some(timing), explored: None })
-        .map_err(Failure::from),
     };
-    // Motors off before anything is drawn or written.
-    drop(device);
     interrupt::over();
     played
 }
 
 /// Replays the session in `file`. Returns its trace, and a line that says that it matched.
-fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Option<String>), Failure> {
+fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, String), Failure> {
     let recording = Recording::read(file, setup.chain.joints.len())?;
     let mut graphics = setup.graphics(dataset)?;
     let trace = recording.replay(&setup.haptics, graphics.as_mut(), labels(&dataset.grid))?;
@@ -337,7 +351,7 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Opti
         );
     }
     let told = format!("{} ticks replayed, torque and proxy equal to the last bit\n", recording.ticks());
-    Ok((Played { trace: trace.into(), timing: None, explored: None }, Some(told)))
+    Ok((Played { trace: trace.into(), timing: None, explored: None }, told))
 }
 
 /// Returns where traces and figures go.

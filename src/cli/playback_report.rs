@@ -41,7 +41,7 @@ impl PlaybackReport {
     pub fn beside(&mut self, path: &Path, motion: Motion, seconds: f64) -> Result<(), Failure> {
         let dataset = Dataset::load(path)?;
         let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", path.display()))?;
-        let played = played::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, false)?;
+        let played = played::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, &mut |_| ())?;
         self.forces.extend(EndForce::new(&name(path, &dataset), &setup.chain, &played.trace));
         if self.forces.len() < 2 {
             return Err(format!(

@@ -1,16 +1,18 @@
 //! A session that was played: its files, and what there is to say about it.
 
-use super::{Failure, interrupt, on_demand::Explored, tell, tell_fault};
+use super::{Failure, interrupt, on_demand::Explored, tell, telling_faults};
 use crate::{
-    dataset::{Dataset, discard_unfinished, replace_file},
+    dataset::{Dataset, Replacement, discard_unfinished, replace_file},
     device::Device,
     render::{
+        graphics::Graphics,
+        haptic::Haptics,
         realtime::{self, Options},
-        session::{self, SessionError},
-        setup::Setup,
+        session::{self, Plan},
+        setup::{Setup, labels},
         steal::Steal,
         timing::{Percentiles, Timing},
-        trace::{Summary, Trace},
+        trace::{Summary, Tick, TickTable, Trace},
     },
     report,
 };
@@ -21,7 +23,10 @@ use std::{
 };
 
 /// Files beside [`report::FIGURES`].
-pub const FILES: [&str; 4] = ["trace.csv", "frames.csv", "jitter.svg", "jitter.png"];
+pub const FILES: [&str; 4] = [TICKS, "frames.csv", "jitter.svg", "jitter.png"];
+
+/// File of the ticks.
+const TICKS: &str = "trace.csv";
 
 /// Shapes of the object that are kept.
 pub const SNAPSHOTS: usize = 60;
@@ -41,44 +46,63 @@ pub struct Played {
     pub explored: Option<Explored>,
 }
 
-impl Played {
-    /// A session against the clock, in which contact was solved meanwhile.
-    pub fn on_demand((trace, timing, explored): (Trace, Timing, Explored)) -> Self {
-        Self { trace: trace.into(), timing: Some(timing), explored: Some(explored) }
-    }
-}
-
-/// Plays for `seconds` what `device` does.
+/// Plays for `seconds` what `device` does, as fast as it goes, and hands over the ticks.
 pub fn play(
     setup: &Setup,
     dataset: &Dataset,
     device: &mut dyn Device,
     seconds: f64,
-    against_the_clock: bool,
+    on_tick: &mut dyn FnMut(&Tick),
 ) -> Result<Played, Failure> {
     let mut graphics = setup.graphics(dataset)?;
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
-    if against_the_clock {
-        let (trace, timing) = realtime::run(
-            &setup.haptics,
-            device,
-            graphics.as_mut(),
-            &plan,
-            Options { on_fault: tell_fault, ..Options::default() },
-        )?;
-        return Ok(Played { trace: trace.into(), timing: Some(timing), explored: None });
-    }
-    let played: Result<Trace, SessionError> = session::run(&setup.haptics, device, graphics.as_mut(), &plan);
-    Ok(Played { trace: played?.into(), timing: None, explored: None })
+    let trace = session::run(&setup.haptics, device, graphics.as_mut(), &plan)?;
+    trace.ticks.iter().for_each(on_tick);
+    Ok(Played { trace: trace.into(), timing: None, explored: None })
 }
 
-/// Writes traces and figures of `played` into `folder`, and returns their paths.
-pub fn write(setup: &Setup, dataset: &Arc<Dataset>, played: &Played, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+/// Plays as `plan` says what `device` does, against the clock.
+pub fn play_timed(
+    haptics: &Haptics,
+    device: &mut dyn Device,
+    graphics: Option<&mut Graphics<'_>>,
+    plan: &Plan,
+    options: Options<'_>,
+) -> Result<Played, Failure> {
+    let (mut nobody, Options { stop, live, on_tick }) = (|_: &Tick| (), options);
+    let mut on_tick = telling_faults(on_tick.unwrap_or(&mut nobody));
+    let options = Options { stop, live, on_tick: Some(&mut on_tick) };
+    let (trace, timing) = realtime::run(haptics, device, graphics, plan, options)?;
+    Ok(Played { trace: trace.into(), timing: Some(timing), explored: None })
+}
+
+/// Runs `session`, which hands over its ticks, and writes them to `trace.csv` in `folder` as they come: however long the
+/// session, little is left to be written when a signal ends it. Returns the file, or why it cannot be written, beside
+/// what was played.
+pub fn traced(
+    dataset: &Dataset,
+    folder: &Path,
+    session: impl FnOnce(&mut dyn FnMut(&Tick)) -> Result<Played, Failure>,
+) -> Result<(Played, Result<PathBuf, String>), Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| format!("cannot make the folder {}: {error}; give another by -o", folder.display()))?;
-    let ticks = folder.join("trace.csv");
-    replace_file(&ticks, |out| played.trace.write_ticks(out)).map_err(|error| unwritten(&ticks, error))?;
-    let mut files = vec![ticks];
+    let file = folder.join(TICKS);
+    let unwritten = |error| unwritten(&file, error);
+    let growing = Replacement::begin(&file).map_err(unwritten)?;
+    let mut table = TickTable::new(&labels(&dataset.grid), growing.writer()).map_err(unwritten)?;
+    let mut written = Ok(());
+    let played = session(&mut |tick| {
+        if written.is_ok() {
+            written = table.add(tick);
+        }
+    })?;
+    let written = written.and_then(|()| table.finish()).and_then(|()| growing.finish());
+    Ok((played, written.map(|()| file.clone()).map_err(unwritten)))
+}
+
+/// Writes shapes and figures of `played` into `folder`, and returns their paths.
+pub fn write(setup: &Setup, dataset: &Arc<Dataset>, played: &Played, folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let mut files = Vec::new();
     if !played.trace.frames.is_empty() {
         let frames = folder.join("frames.csv");
         replace_file(&frames, |out| played.trace.write_frames(out)).map_err(|error| unwritten(&frames, error))?;

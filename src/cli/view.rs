@@ -139,5 +139,6 @@ fn explore(
 /// Says how to get the viewer.
 #[cfg(not(feature = "viewer"))]
 pub fn run(_: &Arguments) -> Result<Report, Failure> {
-    Err("this haptize was built without its viewer: build it with default features (cargo install --path .)".into())
+    Err("this haptize was built without its window: build it with one (cargo install --path . --features viewer)"
+        .into())
 }

@@ -109,34 +109,67 @@ pub fn replace_file<'a>(
     target: impl Into<Target<'a>>,
     write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
 ) -> io::Result<()> {
-    let Target { path, growing } = target.into();
-    let path = &resolved(path)?;
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let temporary = match growing {
-        Some(growing) => {
-            clear(growing)?;
-            NamedTempFile::from_parts(File::create_new(growing)?, TempPath::try_from_path(growing)?)
-        }
-        None => {
-            remove_abandoned(folder);
-            locked_in(folder)?
-        }
-    };
-    let _unfinished = Unfinished::begin(temporary.path());
-    let mut writer = BufWriter::with_capacity(BUFFER, temporary.as_file());
+    let replacement = Replacement::begin(target)?;
+    let mut writer = replacement.writer();
     write(&mut writer)?;
     writer.flush()?;
     drop(writer);
-    temporary.as_file().sync_all()?;
-    temporary.persist(path).map_err(|error| error.error)?;
-    // The new name is to survive a power cut, too. The file is in its place by now, so that a folder that may not be
-    // read or cannot be flushed is no failure: the system then flushes it in its own time.
-    #[cfg(unix)]
-    let _ = File::open(folder).and_then(|folder| folder.sync_all());
-    Ok(())
+    replacement.finish()
+}
+
+/// A file that is being written and has not taken its name yet. Dropped, it leaves nothing.
+pub struct Replacement {
+    path: PathBuf,
+    _unfinished: Unfinished,
+    temporary: NamedTempFile,
+}
+
+impl Replacement {
+    /// Makes the temporary file of `target`.
+    ///
+    /// # Errors
+    /// Those of the system, here and below.
+    pub fn begin<'a>(target: impl Into<Target<'a>>) -> io::Result<Self> {
+        let Target { path, growing } = target.into();
+        let path = resolved(path)?;
+        let temporary = match growing {
+            Some(growing) => {
+                clear(growing)?;
+                NamedTempFile::from_parts(File::create_new(growing)?, TempPath::try_from_path(growing)?)
+            }
+            None => {
+                let folder = folder(&path);
+                remove_abandoned(folder);
+                locked_in(folder)?
+            }
+        };
+        Ok(Self { _unfinished: Unfinished::begin(temporary.path()), path, temporary })
+    }
+
+    /// A way to write to it; to be flushed before the end.
+    #[must_use]
+    pub fn writer(&self) -> BufWriter<&File> {
+        BufWriter::with_capacity(BUFFER, self.temporary.as_file())
+    }
+
+    /// Lets it take its name.
+    pub fn finish(self) -> io::Result<()> {
+        self.temporary.as_file().sync_all()?;
+        self.temporary.persist(&self.path).map_err(|error| error.error)?;
+        // The new name is to survive a power cut, too. The file is in its place by now, so that a folder that may not be
+        // read or cannot be flushed is no failure: the system then flushes it in its own time.
+        #[cfg(unix)]
+        let _ = File::open(folder(&self.path)).and_then(|folder| folder.sync_all());
+        Ok(())
+    }
+}
+
+/// The folder of the file at `path`.
+fn folder(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
 }
 
 /// How names of temporary files begin and end.

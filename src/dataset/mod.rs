@@ -22,7 +22,7 @@ mod surface;
 
 pub use accuracy::{InterpolationError, MeasuredError};
 pub(crate) use atomic::BUFFER;
-pub use atomic::{Target, discard_unfinished, replace_file, resolved};
+pub use atomic::{Replacement, Target, discard_unfinished, replace_file, resolved};
 pub use column::Column;
 pub use error::Error;
 pub use export::Format;

@@ -58,7 +58,7 @@ pub use error::GpuError;
 pub use flights::HostTime;
 pub use frame::{FrameCost, FrameError, FrameMethod, FrameUpdate};
 pub use pipeline::BatchCapacity;
-pub(crate) use shaders::GPU_LEAST_DIVISOR;
+pub use shaders::GPU_LEAST_DIVISOR;
 pub use solver::GpuSolver;
 pub use timing::{KernelTime, SearchCounts};
 pub use unpack::GPU_SETTLED_RESIDUAL;

@@ -7,7 +7,6 @@
 
 use super::{
     clock,
-    flags::Fault,
     graphics::Graphics,
     haptic::Haptics,
     live::Live,
@@ -236,20 +235,21 @@ impl<'session> HapticLoop<'session> {
 }
 
 /// What a session against the clock is run with. By default nothing ends it early, its dataset does not change, and
-/// nobody is told of a fault before the end.
+/// nobody looks at its ticks before the end.
 pub struct Options<'a> {
     /// Ends the session when it is raised.
     pub stop: &'a AtomicBool,
     /// Contact that is solved meanwhile.
     pub live: Option<Live>,
-    /// Called with the time [s] of the first fault, soon after it; not in the real-time thread.
-    pub on_fault: fn(f64, Fault),
+    /// Called with each tick soon after it, in the order of time; not in the real-time thread. Up to sixteen seconds of
+    /// ticks wait for a call that takes long.
+    pub on_tick: Option<&'a mut dyn FnMut(&Tick)>,
 }
 
 impl Default for Options<'_> {
     fn default() -> Self {
         static NEVER: AtomicBool = AtomicBool::new(false);
-        Self { stop: &NEVER, live: None, on_fault: |_, _| {} }
+        Self { stop: &NEVER, live: None, on_tick: None }
     }
 }
 
@@ -265,7 +265,7 @@ pub fn run(
     plan: &Plan,
     options: Options<'_>,
 ) -> Result<(Trace, Timing), SessionError> {
-    let Options { stop, live, on_fault } = options;
+    let Options { stop, live, mut on_tick } = options;
     let scheduler = device.scheduler();
     let (body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device)?;
     let mut body = body.with_live(live);
@@ -295,15 +295,12 @@ pub fn run(
                 return Err(resources(error));
             }
         };
-        let mut faulted = false;
         let mut observer = StealObserver::new(clock::now(), clock::stolen(), clock::counter_rate());
         loop {
             let last = feeling.is_finished();
             while let Ok(tick) = ticks.pop() {
-                if let Some(fault) = tick.fault
-                    && !std::mem::replace(&mut faulted, true)
-                {
-                    on_fault(tick.time, fault);
+                if let Some(on_tick) = &mut on_tick {
+                    on_tick(&tick);
                 }
                 recorded.push(tick);
             }

@@ -169,39 +169,14 @@ impl Trace {
         s
     }
 
-    /// Writes all ticks as CSV: one header line with units, then one row a tick, with every energy account
-    /// ([`Accounts::named`]); a field is empty where nothing is known. Numbers are printed so that reading them gives
-    /// the same bits.
+    /// Writes all ticks as CSV ([`TickTable`]).
     ///
     /// # Errors
     /// Those of `out`.
     pub fn write_ticks(&self, out: &mut impl Write) -> io::Result<()> {
-        let mut table = Table::new(out);
-        table.field("time [s]")?;
-        for what in ["hand", "device", "proxy"] {
-            table.fields(self.joints.iter().map(|joint| joint.heading(what)))?;
-        }
-        for what in ["device torque", "held torque", "contact torque"] {
-            table.fields(self.joints.iter().map(|joint| joint.effort_heading(what)))?;
-        }
-        table.fields(["contact index", "contact", "contact nodes", "flags", "fault", "clamps", "halt"])?;
-        table.fields(Accounts::default().named().map(|(name, _)| format!("{name} [J]")))?;
-        table.end()?;
-        for tick in &self.ticks {
-            table.field(tick.time)?;
-            let torques = [&tick.device_torque, &tick.applied.torque, &tick.contact_torque];
-            for vector in [&tick.hand, &tick.device, &tick.proxy].into_iter().chain(torques) {
-                table.fields(vector.iter())?;
-            }
-            table.field(tick.index)?.field(u8::from(tick.contact))?.field(tick.contact_nodes)?;
-            table.field(tick.flags.bits())?.optional(tick.fault)?;
-            table.field(tick.applied.clamps.bits())?.optional(tick.applied.halt)?;
-            for (_, account) in tick.accounts.named() {
-                table.optional(account)?;
-            }
-            table.end()?;
-        }
-        Ok(())
+        let mut table = TickTable::new(&self.joints, out)?;
+        self.ticks.iter().try_for_each(|tick| table.add(tick))?;
+        table.finish()
     }
 
     /// Writes all frames as CSV: time, node, position.
@@ -217,6 +192,53 @@ impl Trace {
             }
         }
         Ok(())
+    }
+}
+
+/// Ticks as CSV: one header line with units, then one row a tick, with every energy account ([`Accounts::named`]); a
+/// field is empty where nothing is known. Numbers are printed so that reading them gives the same bits.
+pub struct TickTable<W>(Table<W>);
+
+impl<W: Write> TickTable<W> {
+    /// Writes the header.
+    ///
+    /// # Errors
+    /// Those of `out`, here and below.
+    pub fn new(joints: &[JointLabel], out: W) -> io::Result<Self> {
+        let mut table = Table::new(out);
+        table.field("time [s]")?;
+        for what in ["hand", "device", "proxy"] {
+            table.fields(joints.iter().map(|joint| joint.heading(what)))?;
+        }
+        for what in ["device torque", "held torque", "contact torque"] {
+            table.fields(joints.iter().map(|joint| joint.effort_heading(what)))?;
+        }
+        table.fields(["contact index", "contact", "contact nodes", "flags", "fault", "clamps", "halt"])?;
+        table.fields(Accounts::default().named().map(|(name, _)| format!("{name} [J]")))?;
+        table.end()?;
+        Ok(Self(table))
+    }
+
+    /// Writes a row.
+    pub fn add(&mut self, tick: &Tick) -> io::Result<()> {
+        let table = &mut self.0;
+        table.field(tick.time)?;
+        let torques = [&tick.device_torque, &tick.applied.torque, &tick.contact_torque];
+        for vector in [&tick.hand, &tick.device, &tick.proxy].into_iter().chain(torques) {
+            table.fields(vector.iter())?;
+        }
+        table.field(tick.index)?.field(u8::from(tick.contact))?.field(tick.contact_nodes)?;
+        table.field(tick.flags.bits())?.optional(tick.fault)?;
+        table.field(tick.applied.clamps.bits())?.optional(tick.applied.halt)?;
+        for (_, account) in tick.accounts.named() {
+            table.optional(account)?;
+        }
+        table.end()
+    }
+
+    /// Hands everything on to where `out` leads.
+    pub fn finish(self) -> io::Result<()> {
+        self.0.finish()
     }
 }
 

@@ -1,11 +1,9 @@
 //! The one typeface of all figures, shipped with the crate: Roboto (Apache-2.0, `fonts/LICENSE-Roboto.txt`), cut down
 //! to Latin, Greek and mathematical signs, 20 kB a weight, so that a machine without any font draws the same bytes.
 
-use skrifa::{
-    FontRef, MetadataProvider,
-    instance::{LocationRef, Size},
-};
-use std::sync::Arc;
+use base64::{Engine, engine::general_purpose::STANDARD};
+use tiny_skia::PathBuilder;
+use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
 const REGULAR: &[u8] = include_bytes!("fonts/Roboto-Regular.ttf");
 const MEDIUM: &[u8] = include_bytes!("fonts/Roboto-Medium.ttf");
@@ -39,27 +37,82 @@ impl Weight {
     }
 }
 
-/// Width of `text` at `size`, in the sheet's units; kerning is left out (it only narrows).
-pub(super) fn width(text: &str, size: f64, weight: Weight) -> f64 {
-    // The fonts are part of the program; were they unreadable, half an em a character keeps layouts usable.
-    let Ok(font) = FontRef::new(weight.bytes()) else {
-        return text.chars().count() as f64 * size / 2.0;
-    };
-    let characters = font.charmap();
-    let metrics = font.glyph_metrics(Size::new(size as f32), LocationRef::default());
-    text.chars()
-        .map(|character| characters.map(character).and_then(|glyph| metrics.advance_width(glyph)))
-        .map(|advance| advance.map_or(size / 2.0, f64::from))
-        .sum()
+/// The font of `weight`. None where it is unreadable, which a test rules out.
+fn face(weight: Weight) -> Option<Face<'static>> {
+    Face::parse(weight.bytes(), 0).ok()
 }
 
-/// The fonts for the rasteriser.
-pub(super) fn database() -> Arc<resvg::usvg::fontdb::Database> {
-    let mut database = resvg::usvg::fontdb::Database::new();
-    database.load_font_data(REGULAR.to_vec());
-    database.load_font_data(MEDIUM.to_vec());
-    database.set_sans_serif_family(FAMILY);
-    Arc::new(database)
+/// Units of the sheet in a unit of `face` at `size`.
+fn scale(face: &Face<'_>, size: f64) -> f64 {
+    size / f64::from(face.units_per_em())
+}
+
+/// Distance from a glyph to the next, in units of `face`; half an em where the font says nothing. Kerning is left out,
+/// here as in the SVG.
+fn advance(face: &Face<'_>, glyph: Option<GlyphId>) -> f64 {
+    let advance = glyph.and_then(|glyph| face.glyph_hor_advance(glyph));
+    f64::from(advance.unwrap_or(face.units_per_em() / 2))
+}
+
+/// Width of `text` at `size`, in the sheet's units.
+pub(super) fn width(text: &str, size: f64, weight: Weight) -> f64 {
+    let Some(face) = face(weight) else { return text.chars().count() as f64 * size / 2.0 };
+    text.chars().map(|character| advance(&face, face.glyph_index(character))).sum::<f64>() * scale(&face, size)
+}
+
+/// Outline of `text` at `size`, its base line from the origin to the right; none where nothing is to be seen.
+pub(super) fn outline(text: &str, size: f64, weight: Weight) -> Option<tiny_skia::Path> {
+    let face = face(weight)?;
+    let scale = scale(&face, size) as f32;
+    let mut pen = Pen { path: PathBuilder::new(), scale, x: 0.0 };
+    for character in text.chars() {
+        let glyph = face.glyph_index(character);
+        if let Some(glyph) = glyph {
+            face.outline_glyph(glyph, &mut pen);
+        }
+        pen.x += advance(&face, glyph) as f32;
+    }
+    pen.path.finish()
+}
+
+/// Draws glyphs side by side: from units of the font, y up, to those of the sheet, y down.
+struct Pen {
+    path: PathBuilder,
+    scale: f32,
+    /// Origin of the glyph [units of the font].
+    x: f32,
+}
+
+impl Pen {
+    fn at(&self, x: f32, y: f32) -> (f32, f32) {
+        ((self.x + x) * self.scale, -y * self.scale)
+    }
+}
+
+impl OutlineBuilder for Pen {
+    fn move_to(&mut self, x: f32, y: f32) {
+        let (x, y) = self.at(x, y);
+        self.path.move_to(x, y);
+    }
+
+    fn line_to(&mut self, x: f32, y: f32) {
+        let (x, y) = self.at(x, y);
+        self.path.line_to(x, y);
+    }
+
+    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
+        let ((x1, y1), (x, y)) = (self.at(x1, y1), self.at(x, y));
+        self.path.quad_to(x1, y1, x, y);
+    }
+
+    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
+        let ((x1, y1), (x2, y2), (x, y)) = (self.at(x1, y1), self.at(x2, y2), self.at(x, y));
+        self.path.cubic_to(x1, y1, x2, y2, x, y);
+    }
+
+    fn close(&mut self) {
+        self.path.close();
+    }
 }
 
 /// `@font-face` rules with the fonts inside, so that an SVG looks the same wherever it is opened.
@@ -69,24 +122,10 @@ pub(super) fn style_sheet() -> String {
             format!(
                 "@font-face{{font-family:{FAMILY};font-weight:{};src:url(data:font/ttf;base64,{}) format('truetype')}}",
                 weight.css(),
-                base64(weight.bytes())
+                STANDARD.encode(weight.bytes())
             )
         })
         .concat()
-}
-
-/// Standard alphabet, padded (RFC 4648, section 4).
-fn base64(bytes: &[u8]) -> String {
-    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let word = chunk.iter().fold(0_u32, |word, &byte| word << 8 | u32::from(byte)) << (8 * (3 - chunk.len()));
-        for position in 0..4 {
-            let digit = (word >> (18 - 6 * position)) as usize & 63;
-            text.push(if position <= chunk.len() { char::from(ALPHABET[digit]) } else { '=' });
-        }
-    }
-    text
 }
 
 #[cfg(test)]
@@ -94,19 +133,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn base64_agrees_with_the_standards_examples() {
-        for (plain, coded) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
-            assert_eq!(base64(plain.as_bytes()), coded);
-        }
-    }
-
-    #[test]
     fn both_weights_hold_every_character_that_figures_use() {
         for weight in [Weight::Regular, Weight::Medium] {
-            let characters = FontRef::new(weight.bytes()).unwrap().charmap();
+            let face = face(weight).unwrap();
             let used = (' '..='~').chain("τθψ₁₂₃₄₅₆−·×–°‖µ≥⁰²³⁴⁵⁶⁷⁸⁹¹⁻Δ…".chars());
             for character in used {
-                assert!(characters.map(character).is_some(), "{weight:?} lacks {character:?}");
+                assert!(face.glyph_index(character).is_some(), "{weight:?} lacks {character:?}");
             }
         }
     }

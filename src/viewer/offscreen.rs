@@ -5,12 +5,12 @@ use super::{Start, TickSource, ViewError, Viewer, dress, pixels, theme};
 use crate::{
     dataset::replace_file,
     gpu::{AdapterChoice, Context, GpuError},
+    report::canvas::write_png,
 };
 use eframe::{
     egui::{self, Pos2, Rect, Theme, vec2},
     egui_wgpu::{RenderState, Renderer, RendererOptions, ScreenDescriptor},
 };
-use image::ImageEncoder;
 use std::{
     io,
     path::{Path, PathBuf},
@@ -99,10 +99,8 @@ pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), V
         output.append(egui.run_ui(input, |ui| viewer.ui(ui)));
     }
     let (size, bytes) = paint(&context, &render, &egui, output, picture)?;
-    let written = replace_file(path, |file| {
-        let encoder = image::codecs::png::PngEncoder::new(file);
-        encoder.write_image(&bytes, size[0], size[1], image::ExtendedColorType::Rgba8).map_err(io::Error::other)
-    });
+    let written =
+        replace_file(path, |file| write_png(file, size, png::ColorType::Rgba, &bytes).map_err(io::Error::other));
     written.map_err(|error| ViewError::Write { path: path.to_owned(), reason: error.to_string() })
 }
 
