@@ -106,6 +106,18 @@ fn wait_for_loop(child: &Child) {
     std::thread::sleep(Duration::from_secs(1));
 }
 
+/// Waits until rows of the trace are on their way to the disk: of a session of any length little is left for the end.
+fn wait_for_rows(folder: &Path) {
+    let begun = Instant::now();
+    let is_growing = |entry: std::fs::DirEntry| {
+        entry.file_name().to_string_lossy().ends_with(".tmp") && entry.metadata().is_ok_and(|file| file.len() > 0)
+    };
+    while !std::fs::read_dir(folder).is_ok_and(|all| all.flatten().any(is_growing)) {
+        assert!(begun.elapsed() < Duration::from_secs(60), "nothing is written to {} meanwhile", folder.display());
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
 /// A signal ends a session as its time does: what was explored and the trace are kept. Each figure is there, or told to
 /// be left out, for want of time.
 #[test]
@@ -114,7 +126,11 @@ fn a_session_on_demand_ends_within_a_second_of_a_signal_and_keeps_what_it_has() 
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/organ.toml").display().to_string();
     for signal in listened() {
         let play = ["play", &scene, "--on-demand", "x.haptize", "--seconds", "60", "-o", "p", "--json"];
-        let (output, took) = interrupted_after(folder.path(), &play, wait_for_loop, signal);
+        let wait = |child: &Child| {
+            wait_for_loop(child);
+            wait_for_rows(&folder.path().join("p"));
+        };
+        let (output, took) = interrupted_after(folder.path(), &play, wait, signal);
         assert!(took < LONGEST, "{signal}: went on for {took:?}");
         let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         // A machine too busy for the loop gives it a fault.
