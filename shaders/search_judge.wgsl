@@ -313,30 +313,21 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let is_there = resume(unfold(group, groups), local);
-    if local == 0u && phase == PLACED {
-        // The trial's rows are there now.
-        phase = JUDGE;
+    if !resume(unfold(group, groups), JUDGE, local) {
+        return;
     }
-    workgroupBarrier();
-    if phase != DONE {
-        if is_next(JUDGE) { judge(local); }
-        loop {
-            if is_next(STAGE) { begin_stage(local); }
-            if is_next(BALANCE) { balance(local); }
-            if !is_next(DECIDE) {
-                break;
-            }
-            workgroupBarrier();
-            if local == 0u {
-                go_to(decide(), DECIDE);
-            }
+    if is_next(JUDGE) { judge(local); }
+    loop {
+        if is_next(STAGE) { begin_stage(local); }
+        if is_next(BALANCE) { balance(local); }
+        if !is_next(DECIDE) {
+            break;
         }
-        if is_next(PROBE) { probe(local); }
-        if is_next(TANGENT) { load(local); }
         sync();
+        if local == 0u {
+            go_to(decide(), DECIDE);
+        }
     }
-    if local == 0u && is_there {
-        set_word(PHASE, phase);
-    }
+    if is_next(PROBE) { probe(local); }
+    if is_next(TANGENT) { load(local); }
 }

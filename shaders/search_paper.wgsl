@@ -166,10 +166,10 @@ fn tie(local: u32) {
         set_scalar(STOP, max(PAPER_INNER_TOLERANCE * PAPER_INNER_TOLERANCE * square, LEAST_DIVISOR));
         set_word(LEFT, 3u * INNER_ITERATIONS_PER_UNKNOWN * slots);
         set_word(ITERATIONS, word(ITERATIONS) + 1u);
-        go_on(after_iteration(square), 16u + 3u * ties + (ties / WORKGROUP + 1u) * parameters.surface_nodes);
+        advance(after_iteration(square), 16u + 3u * ties + (ties / WORKGROUP + 1u) * parameters.surface_nodes);
         if word(OVERFLOW) != 0u {
             set_word(STATUS, STATUS_OVERFLOW);
-            phase = DONE;
+            set_word(PHASE, DONE);
         }
     }
 }
@@ -208,7 +208,7 @@ fn iterate(local: u32) {
     }
     if local == 0u {
         set_word(LEFT, word(LEFT) - 1u);
-        go_on(after_iteration(square), (slots / WORKGROUP + 1u) * (slots / 2u + 16u) + 2u * WORKGROUP);
+        advance(after_iteration(square), (slots / WORKGROUP + 1u) * (slots / 2u + 16u) + 2u * WORKGROUP);
     }
 }
 
@@ -337,7 +337,7 @@ fn project(local: u32) {
         let is_over = is_lost || number >= parameters.max_iterations || (!is_first && square.y == 0.0);
         set_scalar(MOVED, parameters.mobility * root(sum.y) * (1.0 + LENGTH_ROUNDING));
         set_word(STATUS, select(STATUS_UNCONVERGED, STATUS_CONTACT, is_converged));
-        go_on(select(PLACED, ACCOUNT, is_converged || is_over), 1u);
+        advance(select(PLACED, ACCOUNT, is_converged || is_over), 1u);
     }
 }
 
@@ -357,14 +357,8 @@ fn account(local: u32) {
     }
     if local == 0u {
         set_word(TOUCHES, ties);
-        phase = DONE;
+        set_word(PHASE, DONE);
     }
-}
-
-// Sets what is next, after so many passes through loops; for one invocation.
-fn go_on(next: u32, passes: u32) {
-    phase = next;
-    spent += passes;
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -373,12 +367,9 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let is_there = resume(unfold(group, groups), local);
-    if local == 0u && phase == PLACED {
-        // The ties' rows are there now.
-        phase = TIE;
+    if !resume(unfold(group, groups), TIE, local) {
+        return;
     }
-    workgroupBarrier();
     if is_next(TIE) { tie(local); }
     loop {
         if !is_next(ITERATE) {
@@ -388,9 +379,4 @@ fn main(
     }
     if is_next(PROJECT) { project(local); }
     if is_next(ACCOUNT) { account(local); }
-    sync();
-    workgroupBarrier();
-    if local == 0u && is_there {
-        set_word(PHASE, phase);
-    }
 }

@@ -569,8 +569,14 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let is_there = resume(unfold(group, groups), local);
-    while phase > TANGENT && phase != DONE && spent < LOOP_BUDGET {
+    if !resume(unfold(group, groups), PLACED, local) {
+        return;
+    }
+    loop {
+        sync();
+        if word(PHASE) <= TANGENT || word(PHASE) == DONE || word(SPENT) >= LOOP_BUDGET {
+            break;
+        }
         if is_next(STEP) { begin_step(local); }
         if is_next(GO_ON) { go_on(local); }
         if is_next(FACTORISE) { factorise(local); }
@@ -590,10 +596,5 @@ fn main(
         if is_next(NUDGE) { nudge(local); }
         if is_next(PLACE) { place(local); }
         if is_next(ACCOUNT) { account(local); }
-        sync();
-        workgroupBarrier();
-    }
-    if local == 0u && is_there {
-        set_word(PHASE, phase);
     }
 }

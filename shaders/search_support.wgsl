@@ -10,9 +10,6 @@ override WORKGROUP: u32 = 32u;
 // Passes through loops that an invocation may make in one dispatch: llvmpipe stops all loops after 65,535.
 const LOOP_BUDGET: u32 = 30000u;
 
-// What the search has to do now, and what it has done.
-var<workgroup> phase: u32;
-var<workgroup> spent: u32;
 var<workgroup> sums: array<vec3<real>, WORKGROUP>;
 
 // Of the state: which half is its own, where its rows begin, how many there are, and slots in use.
@@ -257,28 +254,34 @@ fn passes_of(now: u32) -> u32 {
 
 // Sets what the search has to do after phase `now`; for one invocation.
 fn go_to(next: u32, now: u32) {
-    phase = next;
-    spent += passes_of(now);
+    advance(next, passes_of(now));
+}
+
+// Sets it, after so many passes through loops; for one invocation.
+fn advance(next: u32, passes: u32) {
+    set_word(PHASE, next);
+    set_word(SPENT, word(SPENT) + passes);
 }
 
 // Whether `now` is what the search has to do, and may do in this dispatch; for all invocations together. Nothing but a
 // phase, behind its first barrier, may change what is looked at here.
 fn is_next(now: u32) -> bool {
     sync();
-    workgroupBarrier();
     look_up();
-    return phase == now && spent < LOOP_BUDGET;
+    return word(PHASE) == now && word(SPENT) < LOOP_BUDGET;
 }
 
-// Takes up a search in the phase in which it was left; for all invocations together.
-fn resume(index: u32, local: u32) -> bool {
-    let is_there = take_up(index);
+// Takes up a search in the phase in which it was left, or in `first` where another stage has placed its trial; for all
+// invocations together. False where there is none.
+fn resume(index: u32, first: u32, local: u32) -> bool {
+    if !take_up(index) {
+        return false;
+    }
     if local == 0u {
-        phase = DONE;
-        if is_there {
-            phase = word(PHASE);
+        set_word(SPENT, 0u);
+        if word(PHASE) == PLACED {
+            set_word(PHASE, first);
         }
     }
-    workgroupBarrier();
-    return is_there;
+    return true;
 }

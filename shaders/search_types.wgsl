@@ -122,7 +122,9 @@ const SOLVE_ITERATIONS: u32 = 26u;
 const JUDGED_PAIRS: u32 = 27u;
 const STEPPED_PAIRS: u32 = 28u;
 const ELIMINATIONS: u32 = 29u;
-const HEADER: u32 = 30u;
+// Passes through loops in this dispatch.
+const SPENT: u32 = 30u;
+const HEADER: u32 = 31u;
 
 // Phases: what a search has to do next. It waits for rows where it is PLACED; up to TANGENT search_judge has it, and
 // beyond search_step.

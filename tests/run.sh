@@ -27,6 +27,24 @@ step() {
     fi
 }
 
+# beside NAME COMMAND...: the same while the steps that follow run. `joined` waits for it and shows what it printed.
+beside() {
+    local name=$1 begin=$SECONDS
+    shift
+    {
+        "$@" >"$aside/printed" 2>&1
+        echo "$? $((SECONDS - begin))" >"$aside/ended"
+    } &
+    joined() {
+        local code seconds
+        wait
+        read -r code seconds <"$aside/ended"
+        step "$name, beside others ($seconds s)" eval "cat '$aside/printed'; [ $code = 0 ]"
+    }
+}
+aside=$(mktemp -d)
+trap 'rm -rf "$aside"' EXIT
+
 # The file by which the Vulkan loader finds lavapipe; nothing where it is not installed.
 lavapipe() {
     find /usr/share/vulkan/icd.d /usr/local/share/vulkan/icd.d /etc/vulkan/icd.d -name 'lvp_icd*.json' 2>/dev/null | head -n 1
@@ -106,12 +124,14 @@ step 'lints' cargo clippy --locked --workspace --all-targets --features viewer -
 step 'lints, without the window' cargo clippy --locked --quiet -- -D warnings
 # The bindings are tested in the same build, so that what they share is compiled once.
 step 'tests' tests
-step 'Python package' bash python/tests/run.sh
+# It waits for downloads, and tests with one thread.
+beside 'Python package' bash python/tests/run.sh
 step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --features viewer --no-deps --quiet
 step 'documentation as a site' bash docs/site/build.sh
 step 'demo' demo
 # Last, because it leaves a library and a program in which every block is counted.
 step 'fuzzing, guided by coverage' bash tests/fuzz.sh
+joined
 
 printf '\n== summary (%d s)\n' "$SECONDS"
 printf '%s\n' "${summary[@]}"

@@ -170,7 +170,7 @@ fn longest_edge(model: &contact::Model<'_>) -> f64 {
 
 /// Words of a workspace: see `shaders/search_types.wgsl`.
 pub(super) fn words(p: &SearchParameters) -> u32 {
-    const HEADER: u32 = 30;
+    const HEADER: u32 = 31;
     const ROW_WORDS: u32 = 4;
     HEADER
         + 3 * p.proxy_nodes

@@ -161,6 +161,12 @@ impl BoundingVolumes {
         self.volume.map_or(f64::MAX, |volume| volume.distance_squared(x))
     }
 
+    /// Middle and radius of the ball around the whole surface [m].
+    #[must_use]
+    pub fn ball(&self) -> (DVec3, f64) {
+        self.volume.map_or((DVec3::ZERO, f64::INFINITY), |volume| volume.ball())
+    }
+
     /// Returns the margin [m^2] by which a squared lower bound must exceed a squared distance to rule a triangle out,
     /// for a point `x`.
     #[must_use]

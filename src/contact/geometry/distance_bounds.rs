@@ -128,9 +128,12 @@ fn cube(surface: &RestSurface, c: DVec3, half: f64, slack: f64, near: Option<u32
             let turn = if size < distance { (g - away / distance).length() + SQRT_2 * size / distance } else { 2.0 };
             leaf.volume.distance_squared(c).sqrt() - reach * turn.min(2.0) < least
         };
-        // |g - g_t|_1 is at most sqrt(3) |g - g_t|, and that at most 2.
-        let radius = s + 2.0 * reach;
-        surface.bounds.walk(c, radius * radius, |leaf| {
+        // |g - g_t|_1 is at most sqrt(3) |g - g_t|, and that at most 2; from outside the ball around all triangles both
+        // directions are within a cone of half the angle asin(size / distance).
+        let (middle, size) = surface.bounds.ball();
+        let turn = (2.0 * size / c.distance(middle)).min(2.0);
+        let bound = |least: f64| (least + reach * turn).powi(2);
+        surface.bounds.walk(c, bound(least), |leaf| {
             let leaf = &surface.bounds.leaves[leaf];
             if matters(leaf, least) {
                 for &t in &leaf.triangles {
@@ -139,7 +142,7 @@ fn cube(surface: &RestSurface, c: DVec3, half: f64, slack: f64, near: Option<u32
                     least = least.min(distance - half * (g - offset / distance).abs().element_sum());
                 }
             }
-            radius * radius
+            bound(least)
         });
         (least, gradient)
     } else if s < -reach - slack {
