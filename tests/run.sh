@@ -29,18 +29,19 @@ step() {
 
 # beside NAME COMMAND...: the same while the steps that follow run. `joined` waits for it and shows what it printed.
 beside() {
-    local name=$1 begin=$SECONDS
+    local begin=$SECONDS
+    aside_name=$1
     shift
     {
         "$@" >"$aside/printed" 2>&1
         echo "$? $((SECONDS - begin))" >"$aside/ended"
     } &
-    joined() {
-        local code seconds
-        wait
-        read -r code seconds <"$aside/ended"
-        step "$name, beside others ($seconds s)" eval "cat '$aside/printed'; [ $code = 0 ]"
-    }
+}
+joined() {
+    local code seconds
+    wait
+    read -r code seconds <"$aside/ended"
+    step "$aside_name, beside others ($seconds s)" eval "cat '$aside/printed'; [ $code = 0 ]"
 }
 aside=$(mktemp -d)
 trap 'rm -rf "$aside"' EXIT

@@ -261,8 +261,8 @@ fn tell(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(io::stderr(), "{}", printable(&line.to_string()));
 }
 
-/// Returns what hands ticks on to `next` and says at the first fault that the torque went to zero, and why: whoever holds
-/// the device feels nothing any more.
+/// Returns what hands ticks on to `next` and says at the first fault that the torque went to zero, and why: whoever
+/// holds the device feels nothing any more.
 fn telling_faults(next: &mut dyn FnMut(&Tick)) -> impl FnMut(&Tick) {
     let mut is_told = false;
     move |tick| {

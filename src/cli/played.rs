@@ -76,9 +76,9 @@ pub fn play_timed(
     Ok(Played { trace: trace.into(), timing: Some(timing), explored: None })
 }
 
-/// Runs `session`, which hands over its ticks, and writes them to `trace.csv` in `folder` as they come: however long the
-/// session, little is left to be written when a signal ends it. Returns the file, or why it cannot be written, beside
-/// what was played.
+/// Runs `session`, which hands over its ticks, and writes them to `trace.csv` in `folder` as they come: however long
+/// the session, little is left to be written when a signal ends it. Returns the file, or why it cannot be written,
+/// beside what was played.
 pub fn traced(
     dataset: &Dataset,
     folder: &Path,

@@ -156,8 +156,8 @@ impl Replacement {
     pub fn finish(self) -> io::Result<()> {
         self.temporary.as_file().sync_all()?;
         self.temporary.persist(&self.path).map_err(|error| error.error)?;
-        // The new name is to survive a power cut, too. The file is in its place by now, so that a folder that may not be
-        // read or cannot be flushed is no failure: the system then flushes it in its own time.
+        // The new name is to survive a power cut, too. The file is in its place by now, so that a folder that may not
+        // be read or cannot be flushed is no failure: the system then flushes it in its own time.
         #[cfg(unix)]
         let _ = File::open(folder(&self.path)).and_then(|folder| folder.sync_all());
         Ok(())

@@ -81,8 +81,8 @@ fn parts(store: &Store, added: Vec<Vec<f64>>) -> Vec<Bernstein> {
     vec![Bernstein::hermite(joints, numbers)]
 }
 
-/// Returns the greatest bound within the `cell`, a level and its first corner, in which the levels up to this one sum up
-/// to `whole`: where a finer level adds something, with it.
+/// Returns the greatest bound within the `cell`, a level and its first corner, in which the levels up to this one sum
+/// up to `whole`: where a finer level adds something, with it.
 fn within(store: &Store, slopes: &JointVector, cell: (u32, Place), whole: &[Bernstein]) -> Stiffness {
     let (space, joints) = (store.space(), slopes.len());
     let (level, low) = cell;

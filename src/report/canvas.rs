@@ -264,9 +264,15 @@ impl Mark {
                 }
             }
             Self::Clipped { area, marks } => {
-                let Some(mut inside) = Mask::new(sheet.width(), sheet.height()) else { return };
                 let Some(path) = Shape::Rectangle(*area).path() else { return };
-                inside.fill_path(&path, FillRule::Winding, true, scale);
+                let Some(mut inside) = mask.cloned().or_else(|| Mask::new(sheet.width(), sheet.height())) else {
+                    return;
+                };
+                if mask.is_some() {
+                    inside.intersect_path(&path, FillRule::Winding, true, scale);
+                } else {
+                    inside.fill_path(&path, FillRule::Winding, true, scale);
+                }
                 marks.iter().for_each(|mark| mark.draw(sheet, scale, Some(&inside)));
             }
         }
@@ -321,12 +327,13 @@ impl std::fmt::Display for Mark {
                 };
                 write!(
                     f,
-                    r#"<text x="{}" y="{}" font-size="{}" font-weight="{}" fill="{}" text-anchor="{anchor}">{}</text>"#,
+                    r#"<text x="{}" y="{}" font-size="{}" font-weight="{}" fill="{}"{} text-anchor="{anchor}">{}</text>"#,
                     Number(*x),
                     Number(*y),
                     Number(style.size),
                     style.weight.css(),
                     style.colour,
+                    Opacity(style.colour),
                     Escaped(text)
                 )
             }

@@ -14,8 +14,8 @@
 //!
 //! *Marking.* Cells of any level are refined that contribute most to the squared error, as few as are expected to leave
 //! no more than the aim. (Doerfler 1996, A convergent adaptive algorithm for Poisson's equation, whose bulk is a fixed
-//! share; here it follows from the aim.) Cells in which no error is expected wait until no others are left. The store is
-//! measured again, until it keeps the aim.
+//! share; here it follows from the aim.) Cells in which no error is expected wait until no others are left. The store
+//! is measured again, until it keeps the aim.
 
 use super::{
     node::{self, Scale, Solved},
