@@ -349,8 +349,8 @@ fn clips_of_equal_names_are_equal_rectangles() {
     assert!(known.len() > 5, "{known:?}");
 }
 
-/// Mean difference between the pixels of `canvas` and those that an independent renderer makes of its SVG, beside the
-/// mean distance of either from white.
+/// Mean difference between the pixels of `canvas` and those that a renderer of SVG makes of its text, relative to the
+/// mean distance from white of the one that is farther from it.
 fn difference(canvas: &Canvas, svg: &str) -> f64 {
     let own = canvas.pixels(2.0).unwrap();
     let mut other = Pixmap::new(own.width as u32, own.height as u32).unwrap();
@@ -365,8 +365,8 @@ fn difference(canvas: &Canvas, svg: &str) -> f64 {
     difference / ink
 }
 
-/// What [`difference`] may be: both renderers round the edges of glyphs and lines in their own way. A text that is left
-/// out or moved by a point makes more.
+/// What [`difference`] may be: the SVG gives coordinates to a hundredth of a point, so that edges differ by shades. One
+/// title that is left out makes more.
 const ALIKE: f64 = 0.02;
 
 #[test]

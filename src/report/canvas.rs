@@ -388,14 +388,14 @@ impl Picture {
     pub fn png(&self) -> Result<Vec<u8>, ReportError> {
         let [width, height] = [self.width as u32, self.height as u32];
         let mut bytes = Vec::new();
-        write_png(&mut bytes, [width, height], png::ColorType::Rgb, self.pixels.as_flattened())
+        encode_png(&mut bytes, [width, height], png::ColorType::Rgb, self.pixels.as_flattened())
             .map_err(|error| ReportError::Rasterise { width, height, reason: error.to_string() })?;
         Ok(bytes)
     }
 }
 
 /// Writes `pixels`, rows from the top, as a PNG file with a byte a channel.
-pub(crate) fn write_png(
+pub(crate) fn encode_png(
     out: impl std::io::Write,
     [width, height]: [u32; 2],
     channels: png::ColorType,

@@ -5,7 +5,7 @@ use super::{Start, TickSource, ViewError, Viewer, dress, pixels, theme};
 use crate::{
     dataset::replace_file,
     gpu::{AdapterChoice, Context, GpuError},
-    report::canvas::write_png,
+    report::canvas::encode_png,
 };
 use eframe::{
     egui::{self, Pos2, Rect, Theme, vec2},
@@ -100,7 +100,7 @@ pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), V
     }
     let (size, bytes) = paint(&context, &render, &egui, output, picture)?;
     let written =
-        replace_file(path, |file| write_png(file, size, png::ColorType::Rgba, &bytes).map_err(io::Error::other));
+        replace_file(path, |file| encode_png(file, size, png::ColorType::Rgba, &bytes).map_err(io::Error::other));
     written.map_err(|error| ViewError::Write { path: path.to_owned(), reason: error.to_string() })
 }
 

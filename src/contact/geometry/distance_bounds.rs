@@ -129,9 +129,9 @@ fn cube(surface: &RestSurface, c: DVec3, half: f64, slack: f64, near: Option<u32
             leaf.volume.distance_squared(c).sqrt() - reach * turn.min(2.0) < least
         };
         // |g - g_t|_1 is at most sqrt(3) |g - g_t|, and that at most 2; from outside the ball around all triangles both
-        // directions are within a cone of half the angle asin(size / distance).
+        // directions are within a cone of half the angle asin(size / distance). The direction g is rounded to f32.
         let (middle, size) = surface.bounds.ball();
-        let turn = (2.0 * size / c.distance(middle)).min(2.0);
+        let turn = (2.0 * size / c.distance(middle)).min(2.0) + f64::from(f32::EPSILON);
         let bound = |least: f64| (least + reach * turn).powi(2);
         surface.bounds.walk(c, bound(least), |leaf| {
             let leaf = &surface.bounds.leaves[leaf];
