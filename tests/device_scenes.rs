@@ -99,15 +99,21 @@ fn the_pantograph_feels_its_scene() {
     feels("two_diy.toml", 0.123);
 }
 
+/// The dataset of `scene`, converged everywhere.
+fn baked(scene: &Scene) -> Dataset {
+    let stop = AtomicBool::new(false);
+    let progress = &mut |_| ();
+    let bake =
+        Bake { scene, backend: BackendChoice::Cpu, measured: Some(0), aim: None, date: "", stop: &stop, progress };
+    let (dataset, report) = bake.in_memory().unwrap();
+    assert_eq!((report.unconverged, report.overflowed), (0, 0), "{}: {report:?}", scene.name);
+    dataset
+}
+
 /// The scene is baked, and pressed and scraped by a device of at most `most` [N m].
 fn feels(name: &str, most: f64) {
     let scene = Scene::load(shipped(name)).unwrap();
-    let stop = AtomicBool::new(false);
-    let progress = &mut |_| ();
-    let backend = BackendChoice::Cpu;
-    let bake = Bake { scene: &scene, backend, measured: Some(0), aim: None, date: "", stop: &stop, progress };
-    let (dataset, report) = bake.in_memory().unwrap();
-    assert_eq!((report.unconverged, report.overflowed), (0, 0), "{name}: {report:?}");
+    let dataset = baked(&scene);
     let setup = Setup::new(&dataset).unwrap();
     assert!(setup.exceeded.is_empty(), "{name}: {:?}", setup.exceeded);
     for motion in [&setup.scene.motion.press, &setup.scene.motion.scrape] {
@@ -121,17 +127,44 @@ fn feels(name: &str, most: f64) {
         assert!(felt.max_device_torque > 0.05 * most && felt.max_device_torque <= most, "{name}: {felt:?}");
         assert!(felt.max_relative_account_residual < 1e-10, "{name}: {felt:?}");
     }
-    anywhere_within_the_limits(&scene, &dataset, &setup);
 }
 
-/// The hand goes anywhere within the device's limits, far beyond what is haptized: the proxy enters the object nowhere
-/// that was not solved, and a hand in the object is pushed back wherever it is.
-fn anywhere_within_the_limits(scene: &Scene, dataset: &Dataset, setup: &Setup) {
+#[test]
+fn a_woodenhaptics_beyond_a_smaller_grid_is_free_or_held() {
+    beyond_a_grid(
+        "woodenhaptics.toml",
+        &["-0.04, stop = 0.14, count = 10", "0.2, stop = 0.42, count = 13", "0.93, stop = 1.13, count = 11"],
+    );
+}
+
+#[test]
+fn a_touch_beyond_a_smaller_grid_is_free_or_held() {
+    beyond_a_grid(
+        "touch.toml",
+        &["-0.052, stop = 0.182, count = 10", "0.0, stop = 0.3, count = 13", "-0.23, stop = 0.25, count = 13"],
+    );
+}
+
+#[test]
+fn a_pantograph_beyond_a_smaller_grid_is_free_or_held() {
+    beyond_a_grid("two_diy.toml", &["2.16, stop = 2.72, count = 29", "-1.94, stop = -1.52, count = 22"]);
+}
+
+/// The scene with the axes `grid`, which leave out much of what the joints' limits allow. The hand goes anywhere within
+/// the limits: the proxy enters the object nowhere that was not solved, and a hand in the object is pushed back wherever
+/// it is.
+fn beyond_a_grid(name: &str, grid: &[&str]) {
     /// Depth from which a hand must feel something [m]: well beyond a cell's error of where contact begins.
     const DEEP: f64 = 0.004;
+    let text = std::fs::read_to_string(shipped(name)).unwrap();
+    let (before, after) = text.split_once("axes = [\n").unwrap();
+    let axes: String = grid.iter().map(|axis| format!("{{ start = {axis} }}, ")).collect();
+    let text = format!("{before}axes = [{axes}]\n{}", after.split_once("\n]\n").unwrap().1);
+    let scene = &Scene::parse(&text, name).unwrap();
+    let dataset = &baked(scene);
+    let setup = &Setup::new(dataset).unwrap();
     let object = setup.object.as_ref().unwrap();
     let model = Model::new(object, &setup.chain, scene.contact);
-    let name = &scene.name;
     let mut proximity = Proximity::new(&model);
     let mut gap = |q: &JointVector| {
         proximity.place(q);
@@ -144,10 +177,16 @@ fn anywhere_within_the_limits(scene: &Scene, dataset: &Dataset, setup: &Setup) {
     };
     let (mut free, mut held) = (0, 0);
     for _ in 0..12 {
-        let limits = setup.chain.joints.iter().map(|joint| joint.limits);
         let at: Vec<Waypoint> = (0..5)
             .map(|k| {
-                let q: Vec<f64> = limits.clone().map(&mut between).collect();
+                let anywhere = setup.chain.joints.iter().map(|joint| joint.limits);
+                // Every other waypoint is in the grid or beside it, where the object is.
+                let near = scene.grid.axes.iter().zip(anywhere.clone()).map(|(axis, [low, high])| {
+                    let width = (axis.count - 1) as f64 * axis.step;
+                    [low.max(axis.start - 0.5 * width), high.min(axis.start + 1.5 * width)]
+                });
+                let ranges: Vec<_> = if k % 2 == 0 { anywhere.collect() } else { near.collect() };
+                let q: Vec<f64> = ranges.into_iter().map(&mut between).collect();
                 Waypoint { time: 0.8 * f64::from(k), q: JointVector::from_slice(&q) }
             })
             .collect();

@@ -48,7 +48,7 @@ int main(int count, char **arguments)
         HaptizedTool tool(arguments[1]);
         const std::shared_ptr<Remembering> device = std::make_shared<Remembering>();
         // The press of the scene: from 12 mm above the ball, 9 mm into it.
-        const double above[3] = {0.0, 0.499, -0.2133}, pressed[3] = {0.0, 0.3743, -0.1438};
+        const double above[3] = {0.0, 0.2055, -0.0247}, pressed[3] = {0.0, 0.0803, 0.0821};
         const int ticks = 1500;
         chai3d::cVector3d force(0.0, 0.0, 0.0);
         for (int tick = 0; tick <= ticks; tick++) {

@@ -11,17 +11,22 @@ use crate::{JointVector, random::Random};
 use serde::Serialize;
 use std::time::Instant;
 
-/// Number of points that are solved at once.
-const PORTION: usize = 64;
+/// Number of points that are solved first. Each further portion has as many as all before it, so that what a portion
+/// takes to begin counts for little where many points are free.
+const FIRST_PORTION: usize = 64;
 
-/// Maximum number of portions: the fraction in contact is then known to some hundredths.
-const PORTIONS: usize = 8;
+/// Number of points that are sampled where time allows: the fraction in contact is then known to some hundredths.
+const SAMPLE: usize = 8 * FIRST_PORTION;
 
-/// Time after which no further portion is solved [s]: expensive contact is sampled less.
+/// Fraction of a large grid that is sampled where time allows.
+const SHARE: usize = 32;
+
+/// Time that the sample takes at most, if the next portion costs what those before it did [s]: expensive contact is
+/// sampled less.
 const LONGEST: f64 = 0.5;
 
 /// Grids with fewer points are not sampled: they are done as soon.
-const FEWEST_POINTS: usize = 2 * PORTION * PORTIONS;
+const FEWEST_POINTS: usize = 2 * SAMPLE;
 
 /// Seed of the sample.
 const SEED: u64 = 0x2545_f491_4f6c_dd1d;
@@ -56,9 +61,11 @@ impl Sweep<'_> {
         }
         let mut random = Random::new(SEED);
         let (mut sampled, mut touching, mut contacts, mut touches) = (0, 0, 0, 0);
+        let wanted = SAMPLE.max(points / SHARE);
         let start = Instant::now();
-        while sampled < PORTION * PORTIONS && start.elapsed().as_secs_f64() < LONGEST {
-            let drawn = (0..PORTION).map(|_| (random.between(0.0, points as f64) as usize).min(points - 1));
+        while sampled < wanted && 2.0 * start.elapsed().as_secs_f64() < LONGEST {
+            let portion = sampled.max(FIRST_PORTION);
+            let drawn = (0..portion).map(|_| (random.between(0.0, points as f64) as usize).min(points - 1));
             let drawn: Vec<JointVector> = drawn.map(|point| self.grid.configuration(point)).collect();
             sampled += drawn.len();
             for equilibrium in backend.solve(&drawn)? {
