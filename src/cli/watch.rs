@@ -110,10 +110,11 @@ fn announce(progress: &Progress) {
     let Some(Forecast { contact_fraction, seconds, sampled, .. }) = forecast else { return };
     let time = seconds.map(|seconds| seconds * points.saturating_sub(*done) as f64 / *points as f64);
     let time = time.map_or(String::new(), |seconds| format!(", solved in about {}", duration(seconds)));
+    let percent = 100.0 * contact_fraction;
+    let digits = if percent < 1.0 { 2 } else { 0 };
     tell(format_args!(
-        "haptize: predicted from {sampled} of them: {:.0} % in contact{time}; finding lower equilibria and measuring \
-         accuracy come on top",
-        100.0 * contact_fraction
+        "haptize: predicted from {sampled} of them: {percent:.digits$} % in contact{time}; finding lower equilibria and \
+         measuring accuracy come on top"
     ));
 }
 

@@ -1,32 +1,31 @@
 //! The time that a sweep is going to take, from a sample of its points.
 //!
-//! Points of the grid are drawn at random and solved by the sweep's own backend. The fraction of them in contact, the
-//! number of contact forces and the time per point follow.
+//! Points of the grid are drawn at random. Those that are not free with their neighbours are solved by the sweep's own
+//! backend. The fraction in contact, the number of contact forces and the time per point follow.
 
 use super::{
     Backend, Sweep,
     columns::{Columns, Shape},
 };
-use crate::{JointVector, random::Random};
+use crate::random::Random;
 use serde::Serialize;
 use std::time::Instant;
 
-/// Number of points that are solved first. Each further portion has as many as all before it, so that what a portion
-/// takes to begin counts for little where many points are free.
-const FIRST_PORTION: usize = 64;
+/// Number of points that are solved at once.
+const PORTION: usize = 64;
 
-/// Number of points that are sampled where time allows: the fraction in contact is then known to some hundredths.
-const SAMPLE: usize = 8 * FIRST_PORTION;
+/// Maximum number of portions: where most points are to be solved, the fraction in contact is then known to some
+/// hundredths.
+const PORTIONS: usize = 8;
 
-/// Fraction of a large grid that is sampled where time allows.
-const SHARE: usize = 32;
+/// Maximum number of points that are drawn: where little is in contact, its fraction is known better, too.
+const DRAWN: usize = 16 * PORTION * PORTIONS;
 
-/// Time that the sample takes at most, if the next portion costs what those before it did [s]: expensive contact is
-/// sampled less.
+/// Time after which no further portion is solved [s]: expensive contact is sampled less.
 const LONGEST: f64 = 0.5;
 
 /// Grids with fewer points are not sampled: they are done as soon.
-const FEWEST_POINTS: usize = 2 * SAMPLE;
+const FEWEST_POINTS: usize = 2 * PORTION * PORTIONS;
 
 /// Seed of the sample.
 const SEED: u64 = 0x2545_f491_4f6c_dd1d;
@@ -60,22 +59,34 @@ impl Sweep<'_> {
             return Ok(());
         }
         let mut random = Random::new(SEED);
+        let free_space = self.free_space();
+        let mut free_space = free_space.as_ref().map(|free_space| (free_space, free_space.proximity()));
         let (mut sampled, mut touching, mut contacts, mut touches) = (0, 0, 0, 0);
-        let wanted = SAMPLE.max(points / SHARE);
-        let start = Instant::now();
-        while sampled < wanted && 2.0 * start.elapsed().as_secs_f64() < LONGEST {
-            let portion = sampled.max(FIRST_PORTION);
-            let drawn = (0..portion).map(|_| (random.between(0.0, points as f64) as usize).min(points - 1));
-            let drawn: Vec<JointVector> = drawn.map(|point| self.grid.configuration(point)).collect();
-            sampled += drawn.len();
-            for equilibrium in backend.solve(&drawn)? {
+        let (mut solving, start) = (0.0, Instant::now());
+        for _ in 0..PORTIONS {
+            let mut portion = Vec::new();
+            while portion.len() < PORTION && sampled < DRAWN && start.elapsed().as_secs_f64() < LONGEST {
+                let point = (random.between(0.0, points as f64) as usize).min(points - 1);
+                let is_free =
+                    free_space.as_mut().is_some_and(|(space, proximity)| space.is_surrounded(proximity, point));
+                if !is_free {
+                    portion.push(self.grid.configuration(point));
+                }
+                sampled += 1;
+            }
+            if portion.is_empty() {
+                break;
+            }
+            let begin = Instant::now();
+            for equilibrium in backend.solve(&portion)? {
                 touching += usize::from(equilibrium.status.is_in_contact());
                 contacts += equilibrium.forces.len();
                 touches += equilibrium.touches.len();
             }
+            solving += begin.elapsed().as_secs_f64();
         }
         let per_sample = points as f64 / sampled.max(1) as f64;
-        let seconds = per_sample * start.elapsed().as_secs_f64();
+        let seconds = per_sample * solving;
         let bytes = |shape: Shape| {
             let [contacts, touches] = [(contacts, shape.with_forces), (touches, shape.with_touches)]
                 .map(|(rows, is_stored)| if is_stored { (per_sample * rows as f64).round() as usize } else { 0 });

@@ -74,6 +74,18 @@ struct Block {
 /// A place on or between grid points, in steps from the first along each axis.
 type Place = [f64; MAX_JOINTS];
 
+/// The arm in the middle of a block.
+struct Placed {
+    centre: JointVector,
+    /// Half-widths of the block with its margin [rad or m].
+    wide: JointVector,
+    /// Clearance of the node that is nearest to the object, and what rounding may add to it [m].
+    least: f64,
+    rounding: f64,
+    /// Whether the block is proven free.
+    is_free: bool,
+}
+
 /// State of a block.
 enum Found {
     /// It is skipped.
@@ -140,10 +152,9 @@ impl<'a> FreeSpace<'a> {
                 blocks.extend(block.halves(self.grid, &self.jacobians));
             }
         }
-        shares.par_iter().for_each_init(
-            || Proximity::new(self.model),
-            |proximity, block| self.search(proximity, *block, None, &gaps),
-        );
+        shares
+            .par_iter()
+            .for_each_init(|| self.proximity(), |proximity, block| self.search(proximity, *block, None, &gaps));
         Ok(gaps)
     }
 }
@@ -267,8 +278,36 @@ impl FreeSpace<'_> {
         }
     }
 
+    /// The clearances of the arm, by which it looks.
+    pub(super) fn proximity(&self) -> Proximity<'_> {
+        Proximity::new(self.model)
+    }
+
+    /// Whether the points next to `point`, and so itself, are proven free as a block: a sweep does not solve most of
+    /// such points.
+    pub(super) fn is_surrounded(&self, proximity: &mut Proximity<'_>, point: usize) -> bool {
+        let (mut low, mut high) = ([0; MAX_JOINTS], [1; MAX_JOINTS]);
+        let mut rest = point;
+        for (j, axis) in self.grid.axes.iter().enumerate().rev() {
+            let index = rest % axis.count;
+            (low[j], high[j]) = (index.saturating_sub(1), (index + 2).min(axis.count));
+            rest /= axis.count;
+        }
+        self.place(proximity, &Block { low, high }).is_free
+    }
+
     /// Skips `block` if it is proven free.
     fn skip_whole(&self, proximity: &mut Proximity<'_>, block: Block, gaps: &FreeGaps) -> Found {
+        let Placed { centre, wide, least, rounding, is_free } = self.place(proximity, &block);
+        if is_free {
+            self.skip(block, &centre, least - rounding, &self.slopes(proximity, &wide), gaps);
+            return Found::Free;
+        }
+        if least < 0.0 && proximity.gap(&centre) < 0.0 { Found::Touching(block.middle()) } else { Found::Unknown }
+    }
+
+    /// Places the arm in the middle of `block`.
+    fn place(&self, proximity: &mut Proximity<'_>, block: &Block) -> Placed {
         let joints = self.grid.joints();
         let (mut centre, mut wide) = (JointVector::zeros(joints), JointVector::zeros(joints));
         for (j, axis) in self.grid.axes.iter().enumerate() {
@@ -280,11 +319,8 @@ impl FreeSpace<'_> {
         let rounding = FREE_SPACE_ROUNDING * (self.jacobians.length + self.model.surface.extent);
         let stays = |(i, clearance): (usize, f64)| clearance - self.motion(proximity, i, &wide) > rounding;
         let least = proximity.clearances().nth(nearest).unwrap_or(f64::INFINITY);
-        if stays((nearest, least)) && proximity.clearances().enumerate().all(stays) {
-            self.skip(block, &centre, least - rounding, &self.slopes(proximity, &wide), gaps);
-            return Found::Free;
-        }
-        if least < 0.0 && proximity.gap(&centre) < 0.0 { Found::Touching(block.middle()) } else { Found::Unknown }
+        let is_free = stays((nearest, least)) && proximity.clearances().enumerate().all(stays);
+        Placed { centre, wide, least, rounding, is_free }
     }
 
     /// Returns how far a node moves at most, within the block of half-widths `wide` around the configuration placed
