@@ -1,9 +1,20 @@
 // The facet that is closest to a point, and the surface's pseudonormal there (twins: src/contact/detection.rs and
 // src/contact/geometry/rest.rs).
 //
-// Facets are searched group by group of clusters, past those whose bounding sphere at rest leaves no room for the
-// closest one; ties go to the lower number. The stage declares `parameters`, `mesh`, `facet_in_order`, `form` and
-// `is_beyond`.
+// Facets are searched from left to right of the tree of bounding spheres at rest, past nodes whose sphere leaves no
+// room for the closest one; ties go to the lower number. The stage declares `parameters`, `mesh`, `facet_in_order`,
+// `form` and `is_beyond`.
+
+// The current facet.
+var<private> formed: u32;
+
+// Takes `facet` for the current one, relative to the x of the search.
+fn take(facet: u32, x: vec3<real>) {
+    if formed != facet {
+        form(facet, x);
+        formed = facet;
+    }
+}
 
 struct Closest {
     distance: real,
@@ -20,31 +31,27 @@ fn closest_facet(x: vec3<real>, within: real, moved: real, likely: u32) -> Close
     var best = Closest();
     best.distance = within;
     best.facet = ABSENT;
-    var entry = 0u;
+    formed = ABSENT;
+    var node = 1u;
     var facet = likely;
     loop {
         // The next facet that may be closer.
-        while facet == ABSENT && entry < parameters.triangles {
-            let reach = best.distance + moved;
-            if entry % (GROUP * CLUSTER) == 0u
-                && distance_to_sphere(parameters.clusters + entry / (GROUP * CLUSTER), x) > reach {
-                entry += GROUP * CLUSTER;
+        while facet == ABSENT && node != 0u {
+            let has_room = distance_to_sphere(node, x) <= best.distance + moved;
+            if has_room && node < parameters.leaves {
+                node = 2u * node;
                 continue;
             }
-            if entry % CLUSTER == 0u && distance_to_sphere(entry / CLUSTER, x) > reach {
-                entry += CLUSTER;
-                continue;
+            if has_room {
+                facet = facet_in_order(node - parameters.leaves);
             }
-            entry += 1u;
-            if distance_to_sphere(parameters.clusters + parameters.groups + entry - 1u, x) <= reach {
-                facet = facet_in_order(entry - 1u);
-            }
+            node = behind(node);
         }
         if facet == ABSENT {
             break;
         }
         if facet != best.facet && !is_beyond(facet, x, best.distance) {
-            form(facet, x);
+            take(facet, x);
             let point = closest_on_facet();
             measured += 1u;
             let away = length(jet_at(point.weights).point);
@@ -57,7 +64,7 @@ fn closest_facet(x: vec3<real>, within: real, moved: real, likely: u32) -> Close
     return best;
 }
 
-// Pseudonormal at a point of a facet, outward, not of length one.
+// Pseudonormal at a point of a facet, outward, not of length one. The facet is the current one afterwards.
 fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<real>) -> vec3<real> {
     var first = 0u;
     var last = 1u;
@@ -70,11 +77,15 @@ fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<real>) -> vec3<real> {
         last = 2u;
     }
     var sum = vec3<real>(0.0);
-    for (var entry = first; entry < last; entry += 1u) {
-        // One loop for all features: a facet formed at each of three places would triple the program.
+    for (var entry = first; entry <= last; entry += 1u) {
+        // One loop for all features: a facet formed at each of four places would quadruple the program.
         var face = facet;
         var there = point.weights;
         var k = 0u;
+        if entry == last {
+            take(facet, x);
+            break;
+        }
         if point.feature < FEATURE_EDGE {
             face = around(entry);
             k = place_of_corner(face, node);
@@ -86,7 +97,7 @@ fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<real>) -> vec3<real> {
             there = dot(point.weights, one_hot((edge + 1u) % 3u)) * one_hot(back)
                 + dot(point.weights, one_hot(edge)) * one_hot((back + 1u) % 3u);
         }
-        form(face, x);
+        take(face, x);
         let jet = jet_at(there);
         sum += select(real(1.0), angle_at(jet, k), point.feature < FEATURE_EDGE) * normal_of(jet);
     }

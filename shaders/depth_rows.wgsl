@@ -93,31 +93,38 @@ fn raised(w: vec3<real>, by: vec3<real>) -> array<real, 15> {
 // Writes three numbers for each node of a facet: what it weighs if its control points count as `counts`, or of a flat
 // one its corners as `corners`.
 fn spread(at: u32, facet: u32, counts: array<array<real, 15>, 3>, corners: array<vec3<real>, 3>) {
+    var shape = REGULAR;
+    if SMOOTH {
+        shape = shape_of(facet);
+    }
     for (var j = 0u; j < parameters.carriers; j += 1u) {
         var weights = vec3<real>(dot(corners[0], one_hot(j)), dot(corners[1], one_hot(j)), dot(corners[2], one_hot(j)));
         if SMOOTH {
-            let mask = at_mask(facet, j);
+            let m = at_mask(shape, j);
+            let m_0 = surface[m];
+            let m_1 = surface[m + 1u];
+            let m_2 = surface[m + 2u];
+            let m_3 = surface[m + 3u];
             weights = vec3<real>(0.0);
-            weights += surface[mask + 0u] * vec3<real>(counts[0][0], counts[1][0], counts[2][0]);
-            weights += surface[mask + 1u] * vec3<real>(counts[0][1], counts[1][1], counts[2][1]);
-            weights += surface[mask + 2u] * vec3<real>(counts[0][2], counts[1][2], counts[2][2]);
-            weights += surface[mask + 3u] * vec3<real>(counts[0][3], counts[1][3], counts[2][3]);
-            weights += surface[mask + 4u] * vec3<real>(counts[0][4], counts[1][4], counts[2][4]);
-            weights += surface[mask + 5u] * vec3<real>(counts[0][5], counts[1][5], counts[2][5]);
-            weights += surface[mask + 6u] * vec3<real>(counts[0][6], counts[1][6], counts[2][6]);
-            weights += surface[mask + 7u] * vec3<real>(counts[0][7], counts[1][7], counts[2][7]);
-            weights += surface[mask + 8u] * vec3<real>(counts[0][8], counts[1][8], counts[2][8]);
-            weights += surface[mask + 9u] * vec3<real>(counts[0][9], counts[1][9], counts[2][9]);
-            weights += surface[mask + 10u] * vec3<real>(counts[0][10], counts[1][10], counts[2][10]);
-            weights += surface[mask + 11u] * vec3<real>(counts[0][11], counts[1][11], counts[2][11]);
-            weights += surface[mask + 12u] * vec3<real>(counts[0][12], counts[1][12], counts[2][12]);
-            weights += surface[mask + 13u] * vec3<real>(counts[0][13], counts[1][13], counts[2][13]);
-            weights += surface[mask + 14u] * vec3<real>(counts[0][14], counts[1][14], counts[2][14]);
+            weights += m_0.x * vec3<real>(counts[0][0], counts[1][0], counts[2][0]);
+            weights += m_0.y * vec3<real>(counts[0][1], counts[1][1], counts[2][1]);
+            weights += m_0.z * vec3<real>(counts[0][2], counts[1][2], counts[2][2]);
+            weights += m_0.w * vec3<real>(counts[0][3], counts[1][3], counts[2][3]);
+            weights += m_1.x * vec3<real>(counts[0][4], counts[1][4], counts[2][4]);
+            weights += m_1.y * vec3<real>(counts[0][5], counts[1][5], counts[2][5]);
+            weights += m_1.z * vec3<real>(counts[0][6], counts[1][6], counts[2][6]);
+            weights += m_1.w * vec3<real>(counts[0][7], counts[1][7], counts[2][7]);
+            weights += m_2.x * vec3<real>(counts[0][8], counts[1][8], counts[2][8]);
+            weights += m_2.y * vec3<real>(counts[0][9], counts[1][9], counts[2][9]);
+            weights += m_2.z * vec3<real>(counts[0][10], counts[1][10], counts[2][10]);
+            weights += m_2.w * vec3<real>(counts[0][11], counts[1][11], counts[2][11]);
+            weights += m_3.x * vec3<real>(counts[0][12], counts[1][12], counts[2][12]);
+            weights += m_3.y * vec3<real>(counts[0][13], counts[1][13], counts[2][13]);
+            weights += m_3.z * vec3<real>(counts[0][14], counts[1][14], counts[2][14]);
         }
-        let first = reals_base + at + j;
-        reals[first] = weights.x;
-        reals[first + parameters.carriers] = weights.y;
-        reals[first + 2u * parameters.carriers] = weights.z;
+        set_scalar(at + j, weights.x);
+        set_scalar(at + parameters.carriers + j, weights.y);
+        set_scalar(at + 2u * parameters.carriers + j, weights.z);
     }
 }
 

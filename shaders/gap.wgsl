@@ -1,21 +1,18 @@
 // Smallest signed distance of a configuration's proxy nodes to the surface at rest, less their radii (twin:
 // src/contact/geometry/rest.rs): one invocation a configuration. Below zero there is contact.
 //
-// Of the gaps that f32 found, to flat triangles, those that may be the smallest are measured again. Facets are searched
-// group by group of clusters, past those whose bounding sphere leaves no room for the closest one; ties go to the lower
-// number.
+// Of the gaps that f32 found, to flat triangles, those that may be the smallest are measured again.
 
 override WORKGROUP: u32 = 32u;
 // Whether facets are of degree four.
 override SMOOTH: bool = false;
 
 @group(0) @binding(0) var<uniform> parameters: Parameters;
-// One behind the other: the bounding spheres (centre, radius) of the clusters of facets, of the groups of clusters, and
-// of the facets in the order of the clusters; the radius of each proxy node; the control points of the facets.
-@group(0) @binding(1) var<storage, read> surface: array<real>;
+// Bounding spheres of the facets (bounding_spheres.wgsl); then each proxy node's radius in x; then the control points
+// of the facets.
+@group(0) @binding(1) var<storage, read> surface: array<vec4<real>>;
 @group(0) @binding(2) var<storage, read> mesh: array<u32>;
-// All facets, CLUSTER of them side by side in each cluster.
-@group(0) @binding(3) var<storage, read> clusters: array<u32>;
+@group(0) @binding(3) var<storage, read> order: array<u32>;
 // Proxy nodes in f32; w is the gap of each.
 @group(0) @binding(4) var<storage, read> positions: array<vec4<f32>>;
 // The same in the numbers of this stage, three coordinates each.
@@ -24,17 +21,15 @@ override SMOOTH: bool = false;
 
 // Where the radii of the proxy nodes begin.
 fn radii() -> u32 {
-    return 4u * (parameters.clusters + parameters.groups + parameters.triangles);
+    return 2u * parameters.leaves;
 }
 
 fn control(facet: u32, k: u32, x: vec3<real>) -> vec3<real> {
-    let at = radii() + parameters.proxy_nodes + 3u * (facet * select(3u, 15u, SMOOTH) + k);
-    return vec3<real>(surface[at], surface[at + 1u], surface[at + 2u]) - x;
+    return surface[radii() + parameters.proxy_nodes + facet * select(3u, 15u, SMOOTH) + k].xyz - x;
 }
 
-// The facet in place `entry` of the clusters.
-fn facet_in_order(entry: u32) -> u32 {
-    return clusters[entry];
+fn facet_in_order(place: u32) -> u32 {
+    return order[place];
 }
 
 // Takes `facet` for the current one.
@@ -90,13 +85,12 @@ fn main(
         }
         let at = 3u * (first + node);
         let x = vec3<real>(placed[at], placed[at + 1u], placed[at + 2u]);
-        let radius = surface[radii() + node];
+        let radius = surface[radii() + node].x;
         let closest = closest_facet(x, abs(known + radius) + 2.0 * real(parameters.gap_band), real(0.0), ABSENT);
         if closest.facet == ABSENT {
             continue;
         }
         let direction = pseudonormal(closest.facet, closest.point, x);
-        form(closest.facet, x);
         let inside = dot(jet_at(closest.point.weights).point, direction) > 0.0;
         gap = min(gap, select(closest.distance, -closest.distance, inside) - radius);
     }

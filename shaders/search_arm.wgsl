@@ -9,16 +9,10 @@ override WORKGROUP: u32 = 64u;
 @group(0) @binding(2) var<storage, read> motions: array<vec2<real>>;
 @group(0) @binding(3) var<storage, read> list: array<u32>;
 @group(0) @binding(4) var<storage, read_write> words: array<u32>;
-@group(0) @binding(5) var<storage, read_write> reals: array<real>;
+@group(0) @binding(5) var<storage, read_write> reals: array<vec4<real>>;
 
 fn chain_vector(at: u32) -> vec3<real> {
     return vec3<real>(chain[at], chain[at + 1u], chain[at + 2u]);
-}
-
-fn write_vector(at: u32, value: vec3<real>) {
-    reals[at] = value.x;
-    reals[at + 1u] = value.y;
-    reals[at + 2u] = value.z;
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -33,13 +27,12 @@ fn main(
     }
     words[place] = place;
     words[2u * parameters.room] = parameters.configurations;
-    let member = list[1u + place];
-    let base = place * parameters.reals;
+    take_place(place);
     // At rest nothing has moved.
-    reals[base + MOVED] = 0.0;
-    reals[base + BULGE] = parameters.bulge;
-    reals[base + TRIAL_ELASTIC] = 0.0;
-    reals[base + STIFFNESS] = parameters.first_kc;
+    set_scalar(MOVED, real(0.0));
+    set_scalar(BULGE, parameters.bulge);
+    set_scalar(TRIAL_ELASTIC, real(0.0));
+    set_scalar(STIFFNESS, parameters.first_kc);
     // Columns of the link's rotation, and its origin.
     var x = vec3<real>(1.0, 0.0, 0.0);
     var y = vec3<real>(0.0, 1.0, 0.0);
@@ -52,10 +45,9 @@ fn main(
         let motion = motions[member * parameters.joints + k];
         origin += o.x * x + o.y * y + o.z * z;
         let axis = a.x * x + a.y * y + a.z * z;
-        let at = base + SCALARS + 7u * k;
-        write_vector(at, origin);
-        write_vector(at + 3u, axis);
-        reals[at + 6u] = kind;
+        set_vector(at_joint(k), origin);
+        set_scalar(at_joint(k) + SLIDES, kind);
+        set_vector(at_joint(k) + AXIS, axis);
         if kind == 0.0 {
             x = turn(axis, motion, x);
             y = turn(axis, motion, y);

@@ -56,14 +56,13 @@ fn list_groups(candidates: u32, local: u32) -> u32 {
         let group = first + local;
         var matters = false;
         if group < groups {
-            let sphere = parameters.at_spheres + 4u * group;
-            let centre = surface_vector(sphere);
-            let reach = surface[sphere + 3u] + widened;
+            let sphere = surface[parameters.at_spheres + group];
+            let reach = sphere.w + widened;
             // The paper ties nodes wherever they are.
             matters = PAPER;
             for (var entry = 0u; entry < candidates && !matters; entry += 1u) {
                 let node = word(at_candidate(entry));
-                matters = distance(proxy_position(node), centre) <= abs(rest_distance(node)) + reach;
+                matters = distance(proxy_position(node), sphere.xyz) <= abs(rest_distance(node)) + reach;
             }
         }
         let entry = place_in_list(matters, local);
@@ -120,8 +119,7 @@ fn closest_to(node: u32, x: vec3<real>) -> Closest {
     // The last one is a start as good as any, but far from x it may not have been displaced.
     var likely = word(at_last(node)) - 1u;
     if likely != ABSENT {
-        let corners = surface_vector(parameters.at_rest + 3u * carrier(likely, 0u));
-        likely = select(ABSENT, likely, distance(x, corners) <= within + moved);
+        likely = select(ABSENT, likely, distance(x, at_rest(carrier(likely, 0u))) <= within + moved);
     }
     return closest_facet(x, min(within, matters), moved, likely);
 }
@@ -144,7 +142,6 @@ fn write_rows(candidates: u32, reach: real, local: u32) {
             if closest.facet != ABSENT {
                 set_word(at_last(node), closest.facet + 1u);
                 outward = pseudonormal(closest.facet, closest.point, x);
-                form(closest.facet, x);
                 let is_inside = dot(jet_at(closest.point.weights).point, outward) >= 0.0;
                 let depth = proxy_radius(node) + select(-closest.distance, closest.distance, is_inside);
                 is_row = depth > 0.0 || word(at_watched(node)) != 0u || (FROZEN && depth >= -reach);

@@ -288,9 +288,9 @@ fn load(local: u32) {
                     let node = word(row_words(row));
                     let at = numbers(row);
                     let force = scalar(at + MULTIPLIER) * vector_at(at + NORMAL);
-                    let turn = cross(vector_at(at_joint(l) + 3u), jacobian(node, k));
+                    let turn = cross(vector_at(at_joint(l) + AXIS), jacobian(node, k));
                     sum.x += dot(vector_at(at_reaction(row)), jacobian(node, l))
-                        + select(dot(force, turn), real(0.0), scalar(at_joint(l) + 6u) != 0.0);
+                        + select(dot(force, turn), real(0.0), scalar(at_joint(l) + SLIDES) != 0.0);
                 }
             }
             sum = add_up(sum, local);

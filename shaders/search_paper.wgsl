@@ -37,7 +37,7 @@ fn at_tied_slot(k: u32, j: u32) -> u32 {
 
 // From node j to the tie's target, x_i or the deepest point of a node with a radius [m]; after step 3 the force f_j^i.
 fn at_pull(k: u32, j: u32) -> u32 {
-    return at_reaction(k) + 3u * j;
+    return at_reaction(k) + 4u * j;
 }
 
 fn copy_tie(source: u32, destination: u32) {
@@ -96,7 +96,7 @@ fn tie_nodes(local: u32) -> u32 {
             set_word(at_tie(k), node);
             for (var j = 0u; j < 3u; j += 1u) {
                 set_word(at_tie(k) + 1u + j, nodes[j]);
-                set_vector(at_pull(k, j), point - surface_vector(parameters.at_rest + 3u * nodes[j]));
+                set_vector(at_pull(k, j), point - at_rest(nodes[j]));
             }
         }
     }
@@ -216,7 +216,7 @@ fn iterate(local: u32) {
 
 // Outward unit normal of the surface at `node`: normals around it weighted by area.
 fn vertex_normal(node: u32) -> vec3<real> {
-    let x = surface_vector(parameters.at_rest + 3u * node);
+    let x = at_rest(node);
     var sum = vec3<real>(0.0);
     for (var entry = around_start(node); entry < around_start(node + 1u); entry += 1u) {
         let triangle = around(entry);

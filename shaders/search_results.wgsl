@@ -5,7 +5,7 @@ override GATHER_WORKGROUP: u32 = 64u;
 @group(0) @binding(0) var<uniform> parameters: SearchParameters;
 @group(0) @binding(1) var<storage, read> list: array<u32>;
 @group(0) @binding(2) var<storage, read_write> words: array<u32>;
-@group(0) @binding(3) var<storage, read_write> reals: array<real>;
+@group(0) @binding(3) var<storage, read_write> reals: array<vec4<real>>;
 // Where the touches of each configuration begin; behind the last, where they end.
 @group(0) @binding(4) var<storage, read_write> starts: array<u32>;
 // Four words a configuration: status, iterations, touches, and two bits: whether there is a tangent, and whether the
@@ -78,8 +78,8 @@ fn gather(
             let tie = at_row(0u, row);
             let touch = starts[place] + row;
             touches[touch] = vec4<u32>(word(tie), word(tie + 1u), word(tie + 2u), word(tie + 3u));
-            for (var k = 0u; k < 9u; k += 1u) {
-                presses[9u * touch + k] = scalar(at_reaction(row) + k);
+            for (var k = 0u; k < 3u; k += 1u) {
+                write_press(9u * touch + 3u * k, vector_at(at_reaction(row) + 4u * k));
             }
         }
         return;

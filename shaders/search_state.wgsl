@@ -1,8 +1,9 @@
 // What the stages of the search work on: their bindings, proxy and object.
 
 @group(0) @binding(0) var<uniform> parameters: SearchParameters;
-// Bounding spheres (closest_facet.wgsl); radius, and share of the stiffness, of each proxy node; the parts named above.
-@group(0) @binding(1) var<storage, read> surface: array<real>;
+// Bounding spheres (bounding_spheres.wgsl); radius, and share of the stiffness, of each proxy node; nodes at rest; the
+// parts named above.
+@group(0) @binding(1) var<storage, read> surface: array<vec4<real>>;
 @group(0) @binding(2) var<storage, read> mesh: array<u32>;
 // C over the places that it covers, row-major: 3 x 3 numbers for each pair, or one [m/N].
 @group(0) @binding(3) var<storage, read> compliance: array<real>;
@@ -14,7 +15,7 @@
 @group(0) @binding(6) var<storage, read> list: array<u32>;
 // Places in the section of unfinished configurations, room for as many, their number, then the words of each workspace.
 @group(0) @binding(7) var<storage, read_write> words: array<u32>;
-@group(0) @binding(8) var<storage, read_write> reals: array<real>;
+@group(0) @binding(8) var<storage, read_write> reals: array<vec4<real>>;
 
 // Adds to what the search took; for one invocation.
 fn tally(what: u32, amount: u32) {
@@ -28,11 +29,11 @@ fn proxy_position(node: u32) -> vec3<real> {
 
 // Radius of a proxy node, its share of the stiffness, and the link that it hangs on.
 fn proxy_radius(node: u32) -> real {
-    return surface[at_proxy() + node];
+    return surface[at_proxy() + node].x;
 }
 
 fn proxy_share(node: u32) -> real {
-    return surface[at_proxy() + parameters.proxy_nodes + node];
+    return surface[at_proxy() + node].y;
 }
 
 fn proxy_link(node: u32) -> u32 {
@@ -40,7 +41,7 @@ fn proxy_link(node: u32) -> u32 {
 }
 
 fn at_proxy() -> u32 {
-    return 4u * (parameters.clusters + parameters.groups + parameters.triangles);
+    return 2u * parameters.leaves;
 }
 
 // Signed distance of a proxy node to the flat triangles at rest, known to gap_band.
@@ -48,8 +49,9 @@ fn rest_distance(node: u32) -> real {
     return real(positions[member * parameters.proxy_nodes + node].w) + proxy_radius(node);
 }
 
-fn surface_vector(at: u32) -> vec3<real> {
-    return vec3<real>(surface[at], surface[at + 1u], surface[at + 2u]);
+// Position at rest of the surface node in `place`.
+fn at_rest(place: u32) -> vec3<real> {
+    return surface[at_proxy() + parameters.proxy_nodes + place].xyz;
 }
 
 // Displacements of the nodes in four places by a vector of forces on the support: their rows of C times the vector.

@@ -545,20 +545,17 @@ fn is_covered(node: u32, moved: real) -> bool {
     let x = proxy_position(node);
     let reach = abs(rest_distance(node)) + parameters.gap_band + 2.0 * moved;
     // A compliance that covers all nodes covers all facets.
-    var entry = select(0u, parameters.triangles, parameters.covered == parameters.surface_nodes);
-    while entry < parameters.triangles {
-        if entry % (GROUP * CLUSTER) == 0u
-            && distance_to_sphere(parameters.clusters + entry / (GROUP * CLUSTER), x) > reach {
-            entry += GROUP * CLUSTER;
-        } else if entry % CLUSTER == 0u && distance_to_sphere(entry / CLUSTER, x) > reach {
-            entry += CLUSTER;
-        } else {
-            if distance_to_sphere(parameters.clusters + parameters.groups + entry, x) <= reach
-                && mesh[parameters.at_covered + mesh[parameters.at_order + entry]] == 0u {
-                return false;
-            }
-            entry += 1u;
+    var tree = select(1u, 0u, parameters.covered == parameters.surface_nodes);
+    while tree != 0u {
+        let is_near = distance_to_sphere(tree, x) <= reach;
+        if is_near && tree < parameters.leaves {
+            tree = 2u * tree;
+            continue;
         }
+        if is_near && mesh[parameters.at_covered + mesh[parameters.at_order + tree - parameters.leaves]] == 0u {
+            return false;
+        }
+        tree = behind(tree);
     }
     return true;
 }

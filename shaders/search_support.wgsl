@@ -177,8 +177,8 @@ fn stretched_and_bent(at: u32, push: real, v: Variation) -> Variation {
 fn set_reaction(row: u32, reaction: Variation) {
     let at = at_reaction(row);
     set_vector(at, reaction.point);
-    set_vector(at + 3u, reaction.tangent_0);
-    set_vector(at + 6u, reaction.tangent_1);
+    set_vector(at + 4u, reaction.tangent_0);
+    set_vector(at + 8u, reaction.tangent_1);
 }
 
 // Sum of what the rows' reactions press on the node in `slot`.
@@ -191,8 +191,8 @@ fn gather(slot: u32) -> vec3<real> {
         let j = (entry - 1u) & ((1u << NODE_BITS) - 1u);
         let weights = numbers(row) + NODE_WEIGHTS + j;
         let reaction = at_reaction(row);
-        sum += scalar(weights) * vector_at(reaction) + scalar(weights + carriers) * vector_at(reaction + 3u)
-            + scalar(weights + 2u * carriers) * vector_at(reaction + 6u);
+        sum += scalar(weights) * vector_at(reaction) + scalar(weights + carriers) * vector_at(reaction + 4u)
+            + scalar(weights + 2u * carriers) * vector_at(reaction + 8u);
         entry = word(row_words(row) + ROW_WORDS + 2u * carriers + j);
     }
     return sum;
@@ -228,8 +228,8 @@ fn jacobian(node: u32, joint: u32) -> vec3<real> {
         return vec3<real>(0.0);
     }
     let at = at_joint(joint);
-    let axis = vector_at(at + 3u);
-    return select(cross(axis, proxy_position(node) - vector_at(at)), axis, scalar(at + 6u) != 0.0);
+    let axis = vector_at(at + AXIS);
+    return select(cross(axis, proxy_position(node) - vector_at(at)), axis, scalar(at + SLIDES) != 0.0);
 }
 
 // What follows an equilibrium; for one invocation.

@@ -13,9 +13,8 @@ struct SearchParameters {
     proxy_nodes: u32,
     surface_nodes: u32,
     triangles: u32,
-    // Clusters of triangles, and groups of clusters.
-    clusters: u32,
-    groups: u32,
+    // Leaves of the tree of bounding spheres.
+    leaves: u32,
     // Surface nodes that the compliance covers.
     covered: u32,
     // Most rows, slots of the support, and nodes of a facet.
@@ -30,13 +29,11 @@ struct SearchParameters {
     room: u32,
     // Whether the tangent is wanted.
     with_tangent: u32,
-    // Where parts of `surface` begin: nodes at rest, their offsets to the control net, masks of control points, spheres
-    // of groups of nodes.
-    at_rest: u32,
-    at_offsets: u32,
+    // Where parts of `surface` begin: control net at rest, masks of control points, spheres of groups of nodes.
+    at_net: u32,
     at_masks: u32,
     at_spheres: u32,
-    // Where parts of `mesh` begin: facets in the order of the clusters, places of each facet's nodes, its shape,
+    // Where parts of `mesh` begin: facets in the order of the leaves, places of each facet's nodes, its shape,
     // whether the compliance covers it, and places of nodes in an order in which neighbours are near each other.
     at_order: u32,
     at_carriers: u32,
@@ -218,7 +215,11 @@ fn at_head(slot: u32) -> u32 {
     return at_taken(parameters.contacts) + slot;
 }
 
-// --- Reals of a workspace ---
+// --- Reals of a workspace: each vector begins at a multiple of four ---
+
+fn to_four(count: u32) -> u32 {
+    return (count + 3u) / 4u * 4u;
+}
 
 const ENERGY: u32 = 0u;
 const ELASTIC: u32 = 1u;
@@ -250,10 +251,13 @@ const DESCENT: u32 = 18u;
 const DECREASE: u32 = 19u;
 const SCALARS: u32 = 20u;
 
-// Of each joint a point of its axis, the axis, and zero where it turns, one where it slides.
+// Of each joint a point of its axis; zero where it turns, one where it slides; and the axis.
 fn at_joint(joint: u32) -> u32 {
-    return SCALARS + 7u * joint;
+    return SCALARS + 8u * joint;
 }
+
+const SLIDES: u32 = 3u;
+const AXIS: u32 = 4u;
 
 // Force over kc that the last step predicts for each proxy node.
 fn at_predicted(node: u32) -> u32 {
@@ -262,7 +266,7 @@ fn at_predicted(node: u32) -> u32 {
 
 // Displacement of each covered node.
 fn at_displacement(place: u32) -> u32 {
-    return at_predicted(parameters.proxy_nodes) + 3u * place;
+    return at_predicted(to_four(parameters.proxy_nodes)) + 4u * place;
 }
 
 // Parts of a row: see src/contact/law/depth.rs. Behind them the weights of its nodes, and the slopes of these by either
@@ -274,12 +278,12 @@ const MULTIPLIER: u32 = 5u;
 const DISTANCE: u32 = 6u;
 const INVERSE_DISTANCE: u32 = 7u;
 const ALONG: u32 = 8u;
-const TANGENT_0: u32 = 11u;
-const TANGENT_1: u32 = 14u;
-const BENDING: u32 = 17u;
-const TURNING: u32 = 20u;
-const CORNERS: u32 = 23u;
-const NODE_WEIGHTS: u32 = 26u;
+const TANGENT_0: u32 = 12u;
+const TANGENT_1: u32 = 16u;
+const BENDING: u32 = 20u;
+const TURNING: u32 = 24u;
+const CORNERS: u32 = 28u;
+const NODE_WEIGHTS: u32 = 32u;
 
 fn at_numbers(half: u32, row: u32) -> u32 {
     return at_displacement(parameters.covered)
@@ -292,7 +296,7 @@ fn at_force(row: u32) -> u32 {
 }
 
 fn at_reaction(row: u32) -> u32 {
-    return at_force(parameters.contacts) + 9u * row;
+    return at_force(to_four(parameters.contacts)) + 12u * row;
 }
 
 fn at_push(row: u32) -> u32 {
@@ -310,7 +314,8 @@ fn at_inverse(row: u32, column: u32) -> u32 {
 }
 
 fn at_column(entry: u32, slot: u32) -> u32 {
-    return at_inverse(parameters.contacts, 0u) + (entry * parameters.support + slot) * select(3u, 1u, ISOTROPIC);
+    return to_four(at_inverse(parameters.contacts, 0u))
+        + (entry * parameters.support + slot) * select(4u, 1u, ISOTROPIC);
 }
 
 // Vectors on the support, behind the forces of state and trial.
@@ -334,7 +339,7 @@ const HESSIAN_DIRECTION: u32 = 15u;
 const VECTORS: u32 = 16u;
 
 fn at_entry_of(vector: u32, slot: u32) -> u32 {
-    return at_column(parameters.contacts, 0u) + 3u * (vector * parameters.support + slot);
+    return to_four(at_column(parameters.contacts, 0u)) + 4u * (vector * parameters.support + slot);
 }
 
 // The load of each joint's motion, and the response to it; the tangent, row by row; the torque.

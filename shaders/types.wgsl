@@ -10,9 +10,8 @@ struct Parameters {
     proxy_nodes: u32,
     surface_nodes: u32,
     triangles: u32,
-    // Clusters of triangles, and groups of clusters.
-    clusters: u32,
-    groups: u32,
+    // Leaves of the tree of bounding spheres.
+    leaves: u32,
     // Gaps in f32 are known to this [m].
     gap_band: f32,
 }

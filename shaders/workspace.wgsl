@@ -1,5 +1,5 @@
 // The workspace of a configuration. The stage declares `words` and `reals` of all of them, and the `list` of
-// configurations in contact.
+// configurations in contact. Reals are stored four by four, so that a vector, with which four begin, is read at once.
 
 var<private> words_base: u32;
 var<private> reals_base: u32;
@@ -31,21 +31,20 @@ fn set_word(at: u32, value: u32) {
 }
 
 fn scalar(at: u32) -> real {
-    return reals[reals_base + at];
+    let number = reals_base + at;
+    return reals[number / 4u][number % 4u];
 }
 
 fn set_scalar(at: u32, value: real) {
-    reals[reals_base + at] = value;
+    let number = reals_base + at;
+    reals[number / 4u][number % 4u] = value;
 }
 
 fn vector_at(at: u32) -> vec3<real> {
-    let first = reals_base + at;
-    return vec3<real>(reals[first], reals[first + 1u], reals[first + 2u]);
+    return reals[(reals_base + at) / 4u].xyz;
 }
 
+// The scalar behind the vector becomes zero.
 fn set_vector(at: u32, value: vec3<real>) {
-    let first = reals_base + at;
-    reals[first] = value.x;
-    reals[first + 1u] = value.y;
-    reals[first + 2u] = value.z;
+    reals[(reals_base + at) / 4u] = vec4<real>(value, 0.0);
 }

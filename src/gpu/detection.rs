@@ -80,7 +80,7 @@ impl Detection {
         device: &DeviceModel,
         chunk: usize,
     ) -> Result<Self, GpuError> {
-        let DeviceModel { precision, parameters, chain, rest, mesh, clusters, surface, .. } = device;
+        let DeviceModel { precision, parameters, chain, rest, mesh, order, surface, .. } = device;
         let (chunk, size) = (chunk as u64, precision.size() as u64);
         let nodes = chunk * u64::from(parameters.proxy_nodes);
         let buffer = |what, bytes| StorageBuffer::new(context, what, bytes);
@@ -98,10 +98,9 @@ impl Detection {
             ("motions", &buffers.motions),
             ("placed", &buffers.placed),
             ("positions", &buffers.positions),
-            ("rest", rest),
             ("surface", surface),
             ("mesh", mesh),
-            ("clusters", clusters),
+            ("order", order),
             ("gaps", &buffers.gaps),
             ("list", &buffers.list),
         ];
@@ -109,10 +108,11 @@ impl Detection {
         let kernel = |shader, workgroup, overrides: &[(&str, f64)]| {
             BoundKernel::new(context, (shader, workgroup), overrides, &bindings)
         };
+        let flat = bindings.map(|(name, buffer)| (name, if name == "surface" { rest } else { buffer }));
         let in_step = ("WORKGROUP", f64::from(IN_STEP));
         Ok(Self {
             kinematics: kernel(precision.of(&shaders::KINEMATICS), WORKGROUP, &[])?,
-            distances: kernel(&shaders::DETECTION, WORKGROUP, &[])?,
+            distances: BoundKernel::new(context, (&shaders::DETECTION, WORKGROUP), &[], &flat)?,
             smallest: kernel(precision.of(&shaders::GAP), IN_STEP, &[in_step, smooth])?,
             compaction: kernel(precision.of(&shaders::COMPACTION), WORKGROUP, &[])?,
             parameters: *parameters,

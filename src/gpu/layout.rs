@@ -14,8 +14,7 @@ pub struct Parameters {
     pub proxy_nodes: u32,
     pub surface_nodes: u32,
     pub triangles: u32,
-    pub clusters: u32,
-    pub groups: u32,
+    pub leaves: u32,
     pub gap_band: f32,
 }
 
@@ -29,8 +28,7 @@ pub struct SearchParameters {
     pub proxy_nodes: u32,
     pub surface_nodes: u32,
     pub triangles: u32,
-    pub clusters: u32,
-    pub groups: u32,
+    pub leaves: u32,
     pub covered: u32,
     pub contacts: u32,
     pub support: u32,
@@ -40,8 +38,7 @@ pub struct SearchParameters {
     pub words: u32,
     pub room: u32,
     pub with_tangent: u32,
-    pub at_rest: u32,
-    pub at_offsets: u32,
+    pub at_net: u32,
     pub at_masks: u32,
     pub at_spheres: u32,
     pub at_order: u32,
@@ -118,16 +115,15 @@ mod tests {
     #[test]
     fn every_shared_struct_is_laid_out_as_in_wgsl() {
         let expected = [
-            layout!(Parameters: configurations, joints, proxy_nodes, surface_nodes, triangles, clusters, groups,
-                gap_band),
+            layout!(Parameters: configurations, joints, proxy_nodes, surface_nodes, triangles, leaves, gap_band),
             layout!(FrameParameters: nodes, period, odd, groups),
         ];
         compare(&expected, &reflect(Precision::Single));
         compare(&expected[..1], &reflect(Precision::Double));
         let (name, mut members, size) = layout!(
-            SearchParameters: configurations, joints, proxy_nodes, surface_nodes, triangles, clusters, groups,
-            covered, contacts, support, carriers, max_iterations, reals, words, room, with_tangent, at_rest,
-            at_offsets, at_masks, at_spheres, at_order, at_carriers, at_shapes, at_covered, at_places, at_links,
+            SearchParameters: configurations, joints, proxy_nodes, surface_nodes, triangles, leaves,
+            covered, contacts, support, carriers, max_iterations, reals, words, room, with_tangent,
+            at_net, at_masks, at_spheres, at_order, at_carriers, at_shapes, at_covered, at_places, at_links,
             gap_band, first_kc, kc, tolerance, mobility, bulge_mobility, bulge, least_scale, least_distance,
             softest
         );

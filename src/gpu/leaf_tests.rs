@@ -161,7 +161,7 @@ fn ask(precision: Precision, questions: &[Question]) -> Vec<Answer> {
     let buffers = [
         ("parameters", &uniform),
         // Radius and share of the proxy node.
-        ("surface", &of("surface", &[0.0, 1.0])),
+        ("surface", &of("surface", &[0.0, 1.0, 0.0, 0.0])),
         ("mesh", &StorageBuffer::from_slice(&context, "mesh", &[0, 1, 2, u32::MAX]).unwrap()),
         ("list", &room("list", 4 * (count + 1))),
         ("words", &room("words", 4 * (2 * count + 1 + count * parameters.words as usize))),

@@ -4,12 +4,8 @@
 //! origin.
 
 use super::{
-    buffer::StorageBuffer,
-    context::Context,
-    error::GpuError,
-    layout::Parameters,
-    precision::Precision,
-    shaders::{CLUSTER, GROUP},
+    buffer::StorageBuffer, context::Context, error::GpuError, layout::Parameters, precision::Precision,
+    shaders::GPU_FAR_AWAY,
 };
 use crate::{
     contact::{self, geometry::bounding_volumes::CULLING_SLACK},
@@ -45,7 +41,8 @@ pub struct DeviceModel {
     /// The flat triangles in f32: see `shaders/detection.wgsl`.
     pub(super) rest: StorageBuffer,
     pub(super) mesh: StorageBuffer,
-    pub(super) clusters: StorageBuffer,
+    /// The facets in the order of the tree of bounding spheres.
+    pub(super) order: StorageBuffer,
     /// The contact surface: see `shaders/gap.wgsl`.
     pub(super) surface: StorageBuffer,
     /// Whether its facets are bent.
@@ -79,8 +76,7 @@ impl DeviceModel {
             + GPU_GAP_BAND_PER_JOINT * chain.joints.len() as f64 * reach(chain, model.surface.centre);
         // A smooth surface stands off the flat triangles.
         let gap_band = model.surface.bulge + rounding;
-        let order: Vec<u32> = model.surface.bounds.order().collect();
-        let clusters = order.len().div_ceil(CLUSTER) as u32;
+        let order = leaves(model);
         let numbers = |what, numbers: &[f64]| StorageBuffer::from_slice(context, what, &precision.encode(numbers));
         Ok(Self {
             precision,
@@ -90,15 +86,14 @@ impl DeviceModel {
                 proxy_nodes: chain.nodes.len() as u32,
                 surface_nodes: object.surface_nodes as u32,
                 triangles: object.triangles.len() as u32,
-                clusters,
-                groups: clusters.div_ceil(GROUP as u32),
+                leaves: order.len() as u32,
                 gap_band: (gap_band as f32).next_up(),
             },
             chain: numbers("chain", &joints_and_nodes(model))?,
-            rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, &order, extent))?,
+            rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, extent))?,
             mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(model))?,
-            clusters: StorageBuffer::from_slice(context, "clusters", &order)?,
-            surface: numbers("contact surface", &surface(model, precision))?,
+            order: StorageBuffer::from_slice(context, "order of the facets", &order)?,
+            surface: numbers("contact surface", surface(model, precision).as_flattened())?,
             is_smooth: model.surface.smooth.is_some(),
             gap_band,
             open_band: if precision == Precision::Double { 0.0 } else { rounding },
@@ -108,7 +103,7 @@ impl DeviceModel {
     /// Size of what the proxy is tested against for contact at rest: of the flat triangles, and of the contact surface
     /// [B].
     pub(super) fn surface_bytes(&self) -> [u64; 2] {
-        [self.rest.size() + self.mesh.size() + self.clusters.size(), self.surface.size()]
+        [self.rest.size() + self.mesh.size() + self.order.size(), self.surface.size()]
     }
 }
 
@@ -125,8 +120,8 @@ pub(super) fn culling_slack(model: &contact::Model<'_>, precision: Precision) ->
     }
 }
 
-fn padded(v: DVec3) -> [f32; 4] {
-    [v.x as f32, v.y as f32, v.z as f32, 0.0]
+pub(super) fn padded(v: DVec3) -> [f64; 4] {
+    [v.x, v.y, v.z, 0.0]
 }
 
 /// Distance from the object's centre that no proxy node ever exceeds [m].
@@ -147,26 +142,13 @@ fn reach(chain: &proxy::Chain, centre: DVec3) -> f64 {
     chain.nodes.iter().map(tip).fold(0.0, f64::max)
 }
 
-/// Surface nodes, bounding spheres of the triangles, radii of the proxy nodes, bounding spheres of the clusters of
-/// triangles and of the groups of clusters, one behind the other.
-fn rest(model: &contact::Model<'_>, clusters: &[u32], extent: f64) -> Vec<[f32; 4]> {
-    let around = |nodes: &[u32]| {
-        let corners = nodes.iter().map(|&j| model.surface.positions[j as usize]);
-        let centre = corners.clone().sum::<DVec3>() / nodes.len() as f64;
-        let radius = corners.map(|c| c.distance(centre)).fold(0.0, f64::max);
-        let [x, y, z, _] = padded(centre);
-        [x, y, z, (radius + GPU_BOUND_SLACK * extent) as f32]
-    };
-    let triangles = &model.object.triangles;
-    let cluster = |numbers: &[u32]| {
-        let nodes: Vec<u32> = numbers.iter().flat_map(|&t| triangles[t as usize]).collect();
-        around(&nodes)
-    };
-    let nodes = model.surface.positions.iter().map(|&n| padded(n));
-    let spheres = triangles.iter().map(|nodes| around(nodes));
-    let radii = model.chain.nodes.iter().map(|node| [node.radius as f32, 0.0, 0.0, 0.0]);
-    let together = [CLUSTER, GROUP * CLUSTER].into_iter().flat_map(|count| clusters.chunks(count).map(cluster));
-    nodes.chain(spheres).chain(radii).chain(together).collect()
+/// Bounding spheres of the flat triangles, radii of the proxy nodes and surface nodes: see `shaders/detection.wgsl`.
+fn rest(model: &contact::Model<'_>, extent: f64) -> Vec<[f32; 4]> {
+    let corners = |t: u32| model.object.triangles[t as usize].map(|j| model.surface.positions[j as usize]).to_vec();
+    let mut numbers = tree(model, corners, GPU_BOUND_SLACK * extent);
+    numbers.extend(model.chain.nodes.iter().map(|node| [node.radius, 0.0, 0.0, 0.0]));
+    numbers.extend(model.surface.positions.iter().map(|&node| padded(node)));
+    numbers.into_iter().map(|row| row.map(|number| number as f32)).collect()
 }
 
 /// Corners, neighbours, and lists around nodes: see `shaders/mesh.wgsl`.
@@ -202,31 +184,44 @@ pub(super) fn controls(model: &contact::Model<'_>, t: u32) -> Vec<DVec3> {
     facet.net.map_or_else(|| facet.corners.to_vec(), |net| net.to_vec())
 }
 
-/// Spheres around the facets, `together` of them in their order, widened by `slack` [m]: centre and radius.
-fn spheres(model: &contact::Model<'_>, together: usize, slack: f64) -> Vec<[f64; 4]> {
-    let sphere = |facets: &[u32]| {
-        // No point of a facet lies outside its control points.
-        let points: Vec<DVec3> = facets.iter().flat_map(|&t| controls(model, t)).collect();
+/// The facets in an order in which neighbours are near each other, the last one as often as makes a power of two.
+pub(super) fn leaves(model: &contact::Model<'_>) -> Vec<u32> {
+    let mut order: Vec<u32> = model.surface.bounds.order().collect();
+    order.resize(order.len().next_power_of_two(), order.last().copied().unwrap_or(0));
+    order
+}
+
+/// Spheres around the `points` of the facets, none of which lies outside these, widened by `slack` [m]: centre and
+/// radius of each node of the tree of `shaders/bounding_spheres.wgsl`.
+fn tree(model: &contact::Model<'_>, points: impl Fn(u32) -> Vec<DVec3>, slack: f64) -> Vec<[f64; 4]> {
+    let order: Vec<u32> = model.surface.bounds.order().collect();
+    let leaves = order.len().next_power_of_two();
+    let nowhere = [0.0, 0.0, 0.0, -f64::from(GPU_FAR_AWAY)];
+    let sphere = |node: usize| {
+        let level = node.ilog2();
+        let under = leaves >> level;
+        let facets = order.iter().skip((node - (1 << level)) * under).take(under);
+        let points: Vec<DVec3> = facets.flat_map(|&t| points(t)).collect();
+        if points.is_empty() {
+            return nowhere;
+        }
         let centre = points.iter().sum::<DVec3>() / points.len() as f64;
         let radius = points.iter().map(|point| point.distance(centre)).fold(0.0, f64::max);
         [centre.x, centre.y, centre.z, radius + slack]
     };
-    let order: Vec<u32> = model.surface.bounds.order().collect();
-    order.chunks(together).map(sphere).collect()
+    std::iter::once(nowhere).chain((1..2 * leaves).map(sphere)).collect()
 }
 
-/// The spheres of the clusters of facets, of the groups of clusters, and of the facets in the order of the clusters:
-/// see `shaders/bounding_spheres.wgsl`.
-pub(super) fn bounding_spheres(model: &contact::Model<'_>, precision: Precision) -> Vec<f64> {
-    let slack = culling_slack(model, precision);
-    [CLUSTER, GROUP * CLUSTER, 1].into_iter().flat_map(|together| spheres(model, together, slack)).flatten().collect()
+/// The tree of the contact surface.
+pub(super) fn bounding_spheres(model: &contact::Model<'_>, precision: Precision) -> Vec<[f64; 4]> {
+    tree(model, |t| controls(model, t), culling_slack(model, precision))
 }
 
 /// Bounding spheres, radii of proxy nodes and control points: see `shaders/gap.wgsl`.
-fn surface(model: &contact::Model<'_>, precision: Precision) -> Vec<f64> {
+fn surface(model: &contact::Model<'_>, precision: Precision) -> Vec<[f64; 4]> {
     let mut numbers = bounding_spheres(model, precision);
-    numbers.extend(model.chain.nodes.iter().map(|node| node.radius));
+    numbers.extend(model.chain.nodes.iter().map(|node| [node.radius, 0.0, 0.0, 0.0]));
     let facets = 0..model.object.triangles.len() as u32;
-    numbers.extend(facets.flat_map(|t| controls(model, t)).flat_map(|point| point.to_array()));
+    numbers.extend(facets.flat_map(|t| controls(model, t)).map(padded));
     numbers
 }

@@ -6,9 +6,9 @@ use super::{
     context::Context,
     error::GpuError,
     layout::SearchParameters,
-    model::{DeviceModel, bounding_spheres, controls, culling_slack, extent, mesh, stiffness},
+    model::{DeviceModel, bounding_spheres, controls, culling_slack, extent, leaves, mesh, padded, stiffness},
     precision::Precision,
-    shaders::{CLUSTER, GROUP, NODES_TOGETHER},
+    shaders::NODES_TOGETHER,
 };
 use crate::{
     contact::{self, law::depth::MINIMUM_CURVATURE_RADIUS},
@@ -101,7 +101,7 @@ impl SearchModel {
             precision,
             algorithm: model.contact.algorithm,
             parameters,
-            surface: numbers("surface for the search", &parts.surface)?,
+            surface: numbers("surface for the search", parts.surface.as_flattened())?,
             mesh: StorageBuffer::from_slice(context, "mesh for the search", &parts.mesh)?,
             // Rounded one by one: each keeps 24 bits in f32, whatever the condition number of K.
             compliance: numbers("compliance", &model.compliance.entries)?,
@@ -185,25 +185,26 @@ pub(super) fn words(p: &SearchParameters) -> u32 {
 /// Reals of a workspace: see there.
 pub(super) fn reals(p: &SearchParameters, is_isotropic: bool) -> u32 {
     const SCALARS: u32 = 20;
-    const ROW_REALS: u32 = 26;
+    const ROW_REALS: u32 = 32;
     const VECTORS: u32 = 16;
-    SCALARS
-        + 7 * p.joints
-        + p.proxy_nodes
-        + 3 * p.covered
+    let to_four = |count: u32| count.next_multiple_of(4);
+    let before_columns = SCALARS
+        + 8 * p.joints
+        + to_four(p.proxy_nodes)
+        + 4 * p.covered
         + 2 * p.contacts * (ROW_REALS + 3 * p.carriers)
-        + (1 + 9 + 1 + 1) * p.contacts
-        + p.contacts * p.contacts
-        + if is_isotropic { 1 } else { 3 } * p.contacts * p.support
-        + 3 * (VECTORS + 2 * p.joints) * p.support
-        + p.joints * p.joints
-        + p.joints
+        + to_four(p.contacts)
+        + (12 + 1 + 1) * p.contacts
+        + p.contacts * p.contacts;
+    let columns = if is_isotropic { 1 } else { 4 } * p.contacts * p.support;
+    let vectors = 4 * (VECTORS + 2 * p.joints) * p.support;
+    to_four(to_four(to_four(before_columns) + columns) + vectors + p.joints * p.joints + p.joints)
 }
 
 /// The contents of the buffers, and where their parts begin.
 struct Parts {
     parameters: SearchParameters,
-    surface: Vec<f64>,
+    surface: Vec<[f64; 4]>,
     mesh: Vec<u32>,
 }
 
@@ -216,32 +217,36 @@ impl Parts {
         let order: Vec<u32> = surface.bounds.order().collect();
         let numbering = Numbering::new(model, &order);
         let carriers = most.next_multiple_of(4);
-        let clusters = order.len().div_ceil(CLUSTER) as u32;
         let mut parameters = SearchParameters {
             surface_nodes: object.surface_nodes as u32,
             triangles,
-            clusters,
-            groups: clusters.div_ceil(GROUP as u32),
+            leaves: leaves(model).len() as u32,
             covered: model.compliance.nodes.len() as u32,
             carriers: carriers as u32,
             ..bytemuck::Zeroable::zeroed()
         };
+        let at = |node: u32| surface.positions[node as usize];
         let mut numbers = bounding_spheres(model, precision);
-        numbers.extend(model.chain.nodes.iter().map(|node| node.radius));
-        numbers.extend(&model.shares);
-        parameters.at_rest = numbers.len() as u32;
-        numbers.extend(numbering.nodes.iter().flat_map(|&node| surface.positions[node as usize].to_array()));
-        parameters.at_offsets = numbers.len() as u32;
+        numbers
+            .extend(model.chain.nodes.iter().zip(&model.shares).map(|(node, share)| [node.radius, *share, 0.0, 0.0]));
+        numbers.extend(numbering.nodes.iter().map(|&node| padded(at(node))));
+        parameters.at_net = numbers.len() as u32;
         if let Some(smooth) = &surface.smooth {
-            numbers.extend(numbering.nodes.iter().flat_map(|&node| smooth.offset(node).to_array()));
+            numbers.extend(numbering.nodes.iter().map(|&node| padded(at(node) + smooth.offset(node))));
             parameters.at_masks = numbers.len() as u32;
-            numbers.extend(smooth.shapes().iter().flat_map(|shape| (0..carriers).flat_map(|j| shape.mask_of(j))));
+            for shape in smooth.shapes() {
+                for mask in (0..carriers).map(|j| shape.mask_of(j)) {
+                    numbers.extend(
+                        mask.chunks(4).map(|part| std::array::from_fn(|k| part.get(k).copied().unwrap_or(0.0))),
+                    );
+                }
+            }
         }
         parameters.at_spheres = numbers.len() as u32;
-        numbers.extend(numbering.spheres(model, culling_slack(model, precision)).into_iter().flatten());
+        numbers.extend(numbering.spheres(model, culling_slack(model, precision)));
         let mut mesh = mesh(model);
         parameters.at_order = mesh.len() as u32;
-        mesh.extend(&order);
+        mesh.extend(leaves(model));
         parameters.at_carriers = mesh.len() as u32;
         for t in facets.clone() {
             let places = surface.carriers(t).0.iter().map(|&node| numbering.places[node as usize]);

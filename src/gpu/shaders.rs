@@ -14,7 +14,7 @@ use crate::contact::{
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
 /// Stands for "no distance yet" in f32 kernels [m]: above any distance in a scene, and its square is still finite.
-const GPU_FAR_AWAY: f32 = 1e18;
+pub(super) const GPU_FAR_AWAY: f32 = 1e18;
 
 /// Least divisor in f32 kernels: a hundred times the least normal number (1.2e-38), below which a device may flush to
 /// zero. Squared edge lengths stay above it down to 1e-18 m.
@@ -73,7 +73,6 @@ const DISPATCH: &str = include_str!("../../shaders/dispatch.wgsl");
 pub(super) const TYPES: &str = include_str!("../../shaders/types.wgsl");
 pub(super) const CLOSEST_POINT: &str = include_str!("../../shaders/closest_point.wgsl");
 pub(super) const MESH: &str = include_str!("../../shaders/mesh.wgsl");
-const SURFACE: &str = include_str!("../../shaders/surface.wgsl");
 pub(super) const FACET: &str = include_str!("../../shaders/facet.wgsl");
 const ROTATION: &str = include_str!("../../shaders/rotation.wgsl");
 const BOUNDING_SPHERES: &str = include_str!("../../shaders/bounding_spheres.wgsl");
@@ -100,7 +99,7 @@ pub static KINEMATICS: [Shader; 2] =
 pub static DETECTION: Shader = stage(
     "detection",
     "main",
-    &[TYPES, CLOSEST_POINT, MESH, SURFACE, include_str!("../../shaders/detection.wgsl")],
+    &[TYPES, CLOSEST_POINT, MESH, FACET, BOUNDING_SPHERES, CLOSEST_FACET, include_str!("../../shaders/detection.wgsl")],
     &[&[]],
 );
 
@@ -114,12 +113,6 @@ pub static GAP: [Shader; 2] = in_both(stage(
 
 /// List of the configurations in contact.
 pub static COMPACTION: [Shader; 2] = in_both(stage("compaction", "main", &[TYPES, PREFIX_SUM, COMPACT], &[&[]]));
-
-/// Triangles that share a bounding sphere in searches for the closest one.
-pub(super) const CLUSTER: usize = 8;
-
-/// Clusters in a group of them, for searches in f64.
-pub(super) const GROUP: usize = 8;
 
 /// Object nodes that the search displaces together.
 pub(super) const NODES_TOGETHER: usize = 64;
@@ -138,7 +131,7 @@ const PAPER: &[(&str, f64)] = &[("PAPER", 1.0)];
 pub static SEARCH_ARM: [Shader; 2] = in_both(stage(
     "search_arm",
     "main",
-    &[SEARCH_TYPES, ROTATION, include_str!("../../shaders/search_arm.wgsl")],
+    &[SEARCH_TYPES, WORKSPACE, ROTATION, include_str!("../../shaders/search_arm.wgsl")],
     &[&[]],
 ));
 
@@ -299,8 +292,6 @@ fn constants(precision: Precision) -> String {
         ("FACET_ITERATIONS", facet::FACET_ITERATIONS),
         ("DAMPING_ATTEMPTS", newton::DAMPING_ATTEMPTS as usize),
         ("NUDGE_HALVINGS", energy::NUDGE_HALVINGS as usize),
-        ("CLUSTER", CLUSTER),
-        ("GROUP", GROUP),
         ("NODES_TOGETHER", NODES_TOGETHER),
     ] {
         text.push_str(&format!("const {name}: u32 = {count}u;\n"));

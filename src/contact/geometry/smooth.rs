@@ -55,6 +55,9 @@ pub struct Shape {
 }
 
 impl Shape {
+    /// The number of that whose corners all have six neighbours, in any surface.
+    pub const REGULAR: u32 = 0;
+
     /// That of a facet whose corners have so many neighbours; zero stands for a corner that is kept.
     #[must_use]
     pub fn new(neighbours: [usize; 3]) -> Self {
@@ -181,12 +184,12 @@ impl SmoothSurface {
         let mut surface = Self {
             nodes: Vec::new(),
             starts: vec![0],
-            shapes: Vec::new(),
+            shapes: vec![Shape::new([6; 3])],
             shape: Vec::new(),
             offsets: offsets(positions, triangles, topology),
             at_rest: Vec::new(),
         };
-        let mut known = HashMap::new();
+        let mut known = HashMap::from([([6; 3], Shape::REGULAR)]);
         for t in 0..triangles.len() {
             surface.nodes.extend(&triangles[t]);
             surface.nodes.extend((0..3).map(|k| {
