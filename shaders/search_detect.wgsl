@@ -1,8 +1,10 @@
 // Where the trial's forces leave the surface, and the rows that this makes: contacts, and near misses of proxy nodes
 // that have touched (twin: src/contact/detection.rs). One workgroup a configuration.
 //
-// A facet matters to a proxy node whose distance to the surface at rest is d only where it is within d + m of it, with
-// m the most that a point of the surface has moved; at rest, within d + 2 m. Only nodes of such facets are displaced.
+// A facet matters to a proxy node only where it is no farther than the surface is known to be: d + m, with d its
+// distance at rest and m the most that a point of the surface has moved, or the distance of a corner of the facet that
+// was closest last, where that is now. At rest it was no farther than m beyond. Only the nodes of such facets are
+// displaced.
 
 override WORKGROUP: u32 = 32u;
 
@@ -47,9 +49,55 @@ fn list_candidates(reach: real, local: u32) -> u32 {
     return listed;
 }
 
+// Farthest that the surface can be from proxy node `node` where it is now.
+fn farthest(node: u32) -> real {
+    return abs(rest_distance(node)) + parameters.gap_band + scalar(MOVED);
+}
+
+// Place of a corner of the facet that was closest last to the proxy node in this place of the list, or ABSENT.
+fn known_corner(entry: u32, candidates: u32) -> u32 {
+    if entry >= candidates {
+        return ABSENT;
+    }
+    let last = word(at_last(word(at_candidate(entry))));
+    if last == 0u {
+        return ABSENT;
+    }
+    return carrier(last - 1u, 0u);
+}
+
+// Notes how far from the proxy node in this place of the list facets at rest matter, with the corner in `place`
+// displaced by `displacement`.
+fn note_reach(entry: u32, candidates: u32, place: u32, displacement: vec3<real>) {
+    if entry >= candidates {
+        return;
+    }
+    let node = word(at_candidate(entry));
+    var reach = farthest(node);
+    if place != ABSENT {
+        let moved = select(displacement, vec3<real>(0.0), place >= parameters.covered);
+        reach = min(reach, distance(proxy_position(node), at_rest(place) + moved) + scalar(BULGE));
+    }
+    set_scalar(at_reach(node), reach + scalar(MOVED) + parameters.gap_band);
+}
+
+fn bound_reaches(candidates: u32, local: u32) {
+    for (var first = local; first < candidates; first += 4u * WORKGROUP) {
+        let entries = vec4<u32>(first, first + WORKGROUP, first + 2u * WORKGROUP, first + 3u * WORKGROUP);
+        let places = vec4<u32>(known_corner(entries.x, candidates), known_corner(entries.y, candidates),
+            known_corner(entries.z, candidates), known_corner(entries.w, candidates));
+        let is_covered = places < vec4<u32>(parameters.covered);
+        let moved = responses(1u - word(HALF), select(vec4<u32>(0u), places, is_covered));
+        note_reach(entries.x, candidates, places.x, moved[0]);
+        note_reach(entries.y, candidates, places.y, moved[1]);
+        note_reach(entries.z, candidates, places.z, moved[2]);
+        note_reach(entries.w, candidates, places.w, moved[3]);
+    }
+    sync();
+}
+
 // Lists the groups of covered nodes that matter to one of `candidates` proxy nodes; returns how many there are.
 fn list_groups(candidates: u32, local: u32) -> u32 {
-    let widened = 2.0 * (scalar(MOVED) + parameters.gap_band);
     let groups = (parameters.covered + NODES_TOGETHER - 1u) / NODES_TOGETHER;
     begin_list(0u, local);
     for (var first = 0u; first < groups; first += WORKGROUP) {
@@ -57,12 +105,11 @@ fn list_groups(candidates: u32, local: u32) -> u32 {
         var matters = false;
         if group < groups {
             let sphere = surface[parameters.at_spheres + group];
-            let reach = sphere.w + widened;
             // The paper ties nodes wherever they are.
             matters = PAPER;
             for (var entry = 0u; entry < candidates && !matters; entry += 1u) {
                 let node = word(at_candidate(entry));
-                matters = distance(proxy_position(node), sphere.xyz) <= abs(rest_distance(node)) + reach;
+                matters = distance(proxy_position(node), sphere.xyz) <= scalar(at_reach(node)) + sphere.w;
             }
         }
         let entry = place_in_list(matters, local);
@@ -113,13 +160,13 @@ fn closest_to(node: u32, x: vec3<real>) -> Closest {
     let rest = rest_distance(node);
     // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than
     // that.
-    let within = abs(rest) + band + moved;
+    let within = farthest(node);
     let is_followed = FROZEN || rest <= band || word(at_watched(node)) != 0u;
     let matters = select(max(proxy_radius(node), moved - rest + band), within, is_followed);
     // The last one is a start as good as any, but far from x it may not have been displaced.
     var likely = word(at_last(node)) - 1u;
     if likely != ABSENT {
-        likely = select(ABSENT, likely, distance(x, at_rest(carrier(likely, 0u))) <= within + moved);
+        likely = select(ABSENT, likely, distance(x, at_rest(carrier(likely, 0u))) <= scalar(at_reach(node)));
     }
     return closest_facet(x, min(within, matters), moved, likely);
 }
@@ -193,13 +240,14 @@ fn main(
             reach = frozen_reach(local);
         }
         let candidates = list_candidates(reach, local);
+        bound_reaches(candidates, local);
         let displaced = list_groups(candidates, local);
         displace(displaced, local);
         write_rows(candidates, reach, local);
         shares[local] = real(measured);
         workgroupBarrier();
         if local == 0u {
-            account(candidates, displaced * NODES_TOGETHER);
+            account(candidates, candidates + displaced * NODES_TOGETHER);
         }
     }
 }

@@ -264,9 +264,14 @@ fn at_predicted(node: u32) -> u32 {
     return at_joint(parameters.joints) + node;
 }
 
+// How far from each proxy node facets at rest matter.
+fn at_reach(node: u32) -> u32 {
+    return at_predicted(parameters.proxy_nodes) + node;
+}
+
 // Displacement of each covered node.
 fn at_displacement(place: u32) -> u32 {
-    return at_predicted(to_four(parameters.proxy_nodes)) + 4u * place;
+    return to_four(at_reach(parameters.proxy_nodes)) + 4u * place;
 }
 
 // Parts of a row: see src/contact/law/depth.rs. Behind them the weights of its nodes, and the slopes of these by either

@@ -190,7 +190,7 @@ pub(super) fn reals(p: &SearchParameters, is_isotropic: bool) -> u32 {
     let to_four = |count: u32| count.next_multiple_of(4);
     let before_columns = SCALARS
         + 8 * p.joints
-        + to_four(p.proxy_nodes)
+        + to_four(2 * p.proxy_nodes)
         + 4 * p.covered
         + 2 * p.contacts * (ROW_REALS + 3 * p.carriers)
         + to_four(p.contacts)
