@@ -49,10 +49,10 @@ const COPIED: u64 = 64 << 20;
 const COPIES: usize = 16;
 
 /// Operations in f64 [1], and bytes from the cache [B], of what the search counts. A pair of nodes: a number of C times
-/// three of a force, added up. A bent facet: 2,200 for its control points and 1,600 for the point closest to the proxy
-/// node, from a dozen nodes, their masks and their displacements. A step of an elimination: a product, subtracted.
+/// three of a force, added up. A bent facet: 400 for its control points, if it is regular, and 1,600 for the point closest
+/// to the proxy node, from a dozen nodes and their displacements. A step of an elimination: a product, subtracted.
 const PAIR: [f64; 2] = [6.0, 8.0];
-const FACET: [f64; 2] = [3_800.0, 800.0];
+const FACET: [f64; 2] = [2_000.0, 800.0];
 const ELIMINATION: [f64; 2] = [2.0, 16.0];
 
 /// Operations in f64 [1/s] and bytes from the second-level cache [B/s] of an H200, by its data sheet and as measured.

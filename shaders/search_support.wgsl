@@ -267,8 +267,11 @@ fn advance(next: u32, passes: u32) {
 // phase, behind its first barrier, may change what is looked at here.
 fn is_next(now: u32) -> bool {
     sync();
-    look_up();
-    return word(PHASE) == now && word(SPENT) < LOOP_BUDGET;
+    let is_now = word(PHASE) == now && word(SPENT) < LOOP_BUDGET;
+    if is_now {
+        look_up();
+    }
+    return is_now;
 }
 
 // Takes up a search in the phase in which it was left, or in `first` where another stage has placed its trial; for all
