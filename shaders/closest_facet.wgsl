@@ -1,9 +1,7 @@
-// The facet that is closest to a point, and the surface's pseudonormal there (twins: src/contact/detection.rs and
+// The closest facet of the surface, and the pseudonormal there (twins: src/contact/detection.rs and
 // src/contact/geometry/rest.rs).
 //
-// Facets are searched from left to right of the tree of bounding spheres at rest, past nodes whose sphere leaves no
-// room for the closest one; ties go to the lower number. The stage declares `parameters`, `mesh`, `facet_in_order`,
-// `form` and `is_beyond`.
+// The stage declares `mesh`, and `form(facet, x)`.
 
 // The current facet.
 var<private> formed: u32;
@@ -22,46 +20,14 @@ struct Closest {
     point: ClosestPoint,
 }
 
-// Facets that this invocation has measured.
-var<private> measured: u32;
+// Nothing yet, and nothing farther than `within`.
+fn none_within(within: real) -> Closest {
+    return Closest(within, ABSENT, ClosestPoint(vec3<real>(0.0), FEATURE_FACE));
+}
 
-// The facet closest to x, if there is one no farther than `within`; facet `likely`, where there is one, is tried first.
-// No facet has left its place at rest by more than `moved`.
-fn closest_facet(x: vec3<real>, within: real, moved: real, likely: u32) -> Closest {
-    var best = Closest();
-    best.distance = within;
-    best.facet = ABSENT;
-    formed = ABSENT;
-    var node = 1u;
-    var facet = likely;
-    loop {
-        // The next facet that may be closer.
-        while facet == ABSENT && node != 0u {
-            let has_room = distance_to_sphere(node, x) <= best.distance + moved;
-            if has_room && node < parameters.leaves {
-                node = 2u * node;
-                continue;
-            }
-            if has_room {
-                facet = facet_in_order(node - parameters.leaves);
-            }
-            node = behind(node);
-        }
-        if facet == ABSENT {
-            break;
-        }
-        if facet != best.facet && !is_beyond(facet, x, best.distance) {
-            take(facet, x);
-            let point = closest_on_facet();
-            measured += 1u;
-            let away = length(jet_at(point.weights).point);
-            if away < best.distance || (away == best.distance && facet < best.facet) {
-                best = Closest(away, facet, point);
-            }
-        }
-        facet = ABSENT;
-    }
-    return best;
+// Whether a facet at this distance is closer; ties go to the lower number.
+fn is_closer(distance: real, facet: u32, best: Closest) -> bool {
+    return distance < best.distance || (distance == best.distance && facet < best.facet);
 }
 
 // Pseudonormal at a point of a facet, outward, not of length one. The facet is the current one afterwards.

@@ -119,14 +119,14 @@ fn form_regular(facet: u32, x: vec3<real>) {
     net[14] = 12.0 * c + 2.0 * (a + b + bc + c_0 + c_1 + ca);
 }
 
-// Whether it is known without forming the facet that it is farther than `distance` from x: by its flat triangle.
-fn is_beyond(facet: u32, x: vec3<real>, distance: real) -> bool {
-    if !SMOOTH {
-        return false;
-    }
-    let a = node_from(carrier(facet, 0u), x);
-    let b = node_from(carrier(facet, 1u), x);
-    let c = node_from(carrier(facet, 2u), x);
-    let w = closest_point(vec3<real>(0.0), a, b, c).weights;
-    return length(blend(w, a, b, c)) > distance + scalar(BULGE);
+// Corners of a facet.
+fn triangle_of(facet: u32) -> mat3x3<real> {
+    let origin = vec3<real>(0.0);
+    return mat3x3<real>(node_from(carrier(facet, 0u), origin), node_from(carrier(facet, 1u), origin),
+        node_from(carrier(facet, 2u), origin));
+}
+
+// By how much facets stand off their triangles, at most.
+fn bulge() -> real {
+    return scalar(BULGE);
 }

@@ -32,9 +32,40 @@ fn form(facet: u32, x: vec3<f32>) {
     net[14] = node_from(corner(facet, 2u), x);
 }
 
-// Whether it is known without forming the facet that it is farther than `distance` from x.
-fn is_beyond(facet: u32, x: vec3<f32>, distance: f32) -> bool {
-    return false;
+// The facet closest to x; facet `likely` is tried first. Facets are searched from left to right of the tree of bounding
+// spheres, past nodes whose sphere leaves no room for the closest one.
+fn closest_facet(x: vec3<real>, likely: u32) -> Closest {
+    var best = none_within(FAR_AWAY);
+    formed = ABSENT;
+    var node = 1u;
+    var facet = likely;
+    loop {
+        // The next facet that may be closer.
+        while facet == ABSENT && node != 0u {
+            let has_room = distance_to_sphere(node, x) <= best.distance;
+            if has_room && node < parameters.leaves {
+                node = 2u * node;
+                continue;
+            }
+            if has_room {
+                facet = facet_in_order(node - parameters.leaves);
+            }
+            node = behind(node);
+        }
+        if facet == ABSENT {
+            break;
+        }
+        if facet != best.facet {
+            take(facet, x);
+            let point = closest_on_facet();
+            let away = length(jet_at(point.weights).point);
+            if is_closer(away, facet, best) {
+                best = Closest(away, facet, point);
+            }
+        }
+        facet = ABSENT;
+    }
+    return best;
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -48,7 +79,7 @@ fn main(
         return;
     }
     let x = positions[index].xyz;
-    let closest = closest_facet(x, FAR_AWAY, 0.0, facet_in_order(leaf_near(x) - parameters.leaves));
+    let closest = closest_facet(x, facet_in_order(leaf_near(x) - parameters.leaves));
     var gap = closest.distance;
     if closest.facet != ABSENT {
         let direction = pseudonormal(closest.facet, closest.point, x);

@@ -1,5 +1,5 @@
 // Smallest signed distance of a configuration's proxy nodes to the surface at rest, less their radii (twin:
-// src/contact/geometry/rest.rs): one invocation a configuration. Below zero there is contact.
+// src/contact/geometry/rest.rs): one workgroup a configuration. Below zero there is contact.
 //
 // Of the gaps that f32 found, to flat triangles, those that may be the smallest are measured again.
 
@@ -56,9 +56,29 @@ fn form(facet: u32, x: vec3<real>) {
     net[14] = control(facet, 14u, x);
 }
 
-// Whether it is known without forming the facet that it is farther than `distance` from x.
-fn is_beyond(facet: u32, x: vec3<real>, distance: real) -> bool {
-    return false;
+// Corners of a facet.
+fn triangle_of(facet: u32) -> mat3x3<real> {
+    let origin = vec3<real>(0.0);
+    return mat3x3<real>(control(facet, 0u, origin), control(facet, 10u, origin), control(facet, 14u, origin));
+}
+
+// By how much facets stand off their triangles, at most.
+fn bulge() -> real {
+    return real(parameters.gap_band);
+}
+
+var<workgroup> least: array<real, WORKGROUP>;
+
+// Least of one number from each invocation, in every one.
+fn least_of(number: real, local: u32) -> real {
+    least[local] = number;
+    workgroupBarrier();
+    var all = least[0];
+    for (var k = 1u; k < WORKGROUP; k += 1u) {
+        all = min(all, least[k]);
+    }
+    workgroupBarrier();
+    return all;
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -67,32 +87,39 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let configuration = unfold(group, groups) * WORKGROUP + local;
+    let configuration = unfold(group, groups);
     if configuration >= parameters.configurations {
         return;
     }
     let first = configuration * parameters.proxy_nodes;
-    var least = FAR_AWAY;
-    for (var node = 0u; node < parameters.proxy_nodes; node += 1u) {
-        least = min(least, real(positions[first + node].w));
+    let band = 2.0 * real(parameters.gap_band);
+    var known = FAR_AWAY;
+    for (var node = local; node < parameters.proxy_nodes; node += WORKGROUP) {
+        known = min(known, real(positions[first + node].w));
     }
-    least += 2.0 * real(parameters.gap_band);
+    known = least_of(known, local);
     var gap = FAR_AWAY;
-    for (var node = 0u; node < parameters.proxy_nodes; node += 1u) {
-        let known = real(positions[first + node].w);
-        if known > least {
-            continue;
+    for (var run = 0u; run < parameters.proxy_nodes; run += WORKGROUP) {
+        let node = run + local;
+        var x = vec3<real>(0.0);
+        var radius = real(0.0);
+        var within = -FAR_AWAY;
+        if node < parameters.proxy_nodes {
+            let flat = real(positions[first + node].w);
+            let at = 3u * (first + node);
+            x = vec3<real>(placed[at], placed[at + 1u], placed[at + 2u]);
+            radius = surface[radii() + node].x;
+            within = select(-FAR_AWAY, abs(flat + radius) + band, flat <= known + band);
         }
-        let at = 3u * (first + node);
-        let x = vec3<real>(placed[at], placed[at + 1u], placed[at + 2u]);
-        let radius = surface[radii() + node].x;
-        let closest = closest_facet(x, abs(known + radius) + 2.0 * real(parameters.gap_band), real(0.0), ABSENT);
-        if closest.facet == ABSENT {
-            continue;
+        let closest = closest_facets(x, within, real(0.0), ABSENT, local);
+        if closest.facet != ABSENT {
+            let direction = pseudonormal(closest.facet, closest.point, x);
+            let is_inside = dot(jet_at(closest.point.weights).point, direction) > 0.0;
+            gap = min(gap, select(closest.distance, -closest.distance, is_inside) - radius);
         }
-        let direction = pseudonormal(closest.facet, closest.point, x);
-        let inside = dot(jet_at(closest.point.weights).point, direction) > 0.0;
-        gap = min(gap, select(closest.distance, -closest.distance, inside) - radius);
     }
-    gaps[configuration] = gap;
+    gap = least_of(gap, local);
+    if local == 0u {
+        gaps[configuration] = gap;
+    }
 }

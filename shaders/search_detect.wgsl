@@ -153,22 +153,25 @@ fn displace(groups: u32, local: u32) {
     sync();
 }
 
-// The facet closest to proxy node `node` at x, if it is near enough to matter.
-fn closest_to(node: u32, x: vec3<real>) -> Closest {
+// Within what distance of proxy node `node` the closest facet matters.
+fn matters_within(node: u32) -> real {
     let band = parameters.gap_band;
-    let moved = scalar(MOVED);
     let rest = rest_distance(node);
     // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than
     // that.
-    let within = farthest(node);
     let is_followed = FROZEN || rest <= band || word(at_watched(node)) != 0u;
-    let matters = select(max(proxy_radius(node), moved - rest + band), within, is_followed);
-    // The last one is a start as good as any, but far from x it may not have been displaced.
-    var likely = word(at_last(node)) - 1u;
-    if likely != ABSENT {
-        likely = select(ABSENT, likely, distance(x, at_rest(carrier(likely, 0u))) <= scalar(at_reach(node)));
+    let over = max(proxy_radius(node), scalar(MOVED) - rest + band);
+    return select(min(farthest(node), over), farthest(node), is_followed);
+}
+
+// The facet that was closest last to proxy node `node`, at x: a start as good as any, unless it is so far from x that it
+// may not have been displaced.
+fn likely_for(node: u32, x: vec3<real>) -> u32 {
+    let last = word(at_last(node)) - 1u;
+    if last == ABSENT {
+        return ABSENT;
     }
-    return closest_facet(x, min(within, matters), moved, likely);
+    return select(ABSENT, last, distance(x, at_rest(carrier(last, 0u))) <= scalar(at_reach(node)));
 }
 
 // Writes the rows of `candidates` proxy nodes: of those that touch or have touched or, where geometry is frozen, have a
@@ -180,21 +183,24 @@ fn write_rows(candidates: u32, reach: real, local: u32) {
         var is_row = false;
         var node = 0u;
         var x = vec3<real>(0.0);
-        var closest = Closest();
-        var outward = vec3<real>(0.0);
+        var within = -FAR_AWAY;
+        var likely = ABSENT;
         if first + local < candidates {
             node = word(at_candidate(first + local));
             x = proxy_position(node);
-            closest = closest_to(node, x);
-            if closest.facet != ABSENT {
-                set_word(at_last(node), closest.facet + 1u);
-                outward = pseudonormal(closest.facet, closest.point, x);
-                let is_inside = dot(jet_at(closest.point.weights).point, outward) >= 0.0;
-                let depth = proxy_radius(node) + select(-closest.distance, closest.distance, is_inside);
-                is_row = depth > 0.0 || word(at_watched(node)) != 0u || (FROZEN && depth >= -reach);
-                if depth > 0.0 {
-                    set_word(at_watched(node), 1u);
-                }
+            within = matters_within(node);
+            likely = likely_for(node, x);
+        }
+        let closest = closest_facets(x, within, scalar(MOVED), likely, local);
+        var outward = vec3<real>(0.0);
+        if closest.facet != ABSENT {
+            set_word(at_last(node), closest.facet + 1u);
+            outward = pseudonormal(closest.facet, closest.point, x);
+            let is_inside = dot(jet_at(closest.point.weights).point, outward) >= 0.0;
+            let depth = proxy_radius(node) + select(-closest.distance, closest.distance, is_inside);
+            is_row = depth > 0.0 || word(at_watched(node)) != 0u || (FROZEN && depth >= -reach);
+            if depth > 0.0 {
+                set_word(at_watched(node), 1u);
             }
         }
         let row = place_in_list(is_row, local);

@@ -73,7 +73,16 @@ pub struct AdapterSummary {
     pub double: bool,
 }
 
+/// Invocations that a GPU runs in step, and a software rasteriser.
+const HARDWARE_LANES: u32 = 32;
+const SOFTWARE_LANES: u32 = 8;
+
 impl AdapterSummary {
+    /// Invocations of a workgroup that has one configuration.
+    pub(super) fn lanes(&self) -> u32 {
+        if self.hardware { HARDWARE_LANES } else { SOFTWARE_LANES }
+    }
+
     fn of(adapter: &wgpu::Adapter) -> Self {
         let info = adapter.get_info();
         let kind = match info.device_type {

@@ -19,14 +19,11 @@ use crate::{JointVector, contact, scene::JointKind};
 /// Invocations of a workgroup of the stages with one invocation a node or configuration; the shaders' default.
 const WORKGROUP: u32 = 64;
 
-/// Most invocations of a workgroup of the gaps to the contact surface: as many as GPUs run in step, since more would
-/// only wait for the slowest.
-const IN_STEP: u32 = 32;
-
 /// A kernel and what it is bound to.
 struct BoundKernel {
     kernel: Kernel,
     bound: wgpu::BindGroup,
+    /// How many it is for that a workgroup takes.
     workgroup: u32,
 }
 
@@ -42,8 +39,8 @@ impl BoundKernel {
         Ok(Self { kernel, bound, workgroup })
     }
 
-    fn dispatch(&self, invocations: u32, bytes: u64) -> Dispatch<'_> {
-        self.kernel.dispatch(&self.bound, invocations.div_ceil(self.workgroup), bytes)
+    fn dispatch(&self, count: u32, bytes: u64) -> Dispatch<'_> {
+        self.kernel.dispatch(&self.bound, count.div_ceil(self.workgroup), bytes)
     }
 }
 
@@ -109,11 +106,11 @@ impl Detection {
             BoundKernel::new(context, (shader, workgroup), overrides, &bindings)
         };
         let flat = bindings.map(|(name, buffer)| (name, if name == "surface" { rest } else { buffer }));
-        let in_step = ("WORKGROUP", f64::from(IN_STEP));
+        let lanes = ("WORKGROUP", f64::from(context.adapter().lanes()));
         Ok(Self {
             kinematics: kernel(precision.of(&shaders::KINEMATICS), WORKGROUP, &[])?,
             distances: BoundKernel::new(context, (&shaders::DETECTION, WORKGROUP), &[], &flat)?,
-            smallest: kernel(precision.of(&shaders::GAP), IN_STEP, &[in_step, smooth])?,
+            smallest: kernel(precision.of(&shaders::GAP), 1, &[lanes, smooth])?,
             compaction: kernel(precision.of(&shaders::COMPACTION), WORKGROUP, &[])?,
             parameters: *parameters,
             trust: Trust { band: device.open_band, precision: *precision },

@@ -18,10 +18,6 @@ use super::{
 };
 use crate::scene::Algorithm;
 
-/// Invocations of a workgroup that searches: as many as GPUs run in step, and as a software rasteriser does.
-const HARDWARE_LANES: u32 = 32;
-const SOFTWARE_LANES: u32 = 8;
-
 /// Invocations of a workgroup of the other stages; the shaders' defaults.
 const PER_CONFIGURATION: u32 = 64;
 
@@ -78,8 +74,7 @@ pub(super) struct SearchLane {
 impl Search {
     /// Compiles the kernels for `model`.
     pub fn new(context: &Context, model: SearchModel) -> Result<Self, GpuError> {
-        let lanes = if context.adapter().hardware { HARDWARE_LANES } else { SOFTWARE_LANES };
-        let lanes = ("WORKGROUP", f64::from(lanes));
+        let lanes = ("WORKGROUP", f64::from(context.adapter().lanes()));
         let flag = |name, is_set| (name, f64::from(u8::from(is_set)));
         let smooth = flag("SMOOTH", model.is_smooth);
         let law = [

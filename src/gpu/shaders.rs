@@ -77,6 +77,7 @@ pub(super) const FACET: &str = include_str!("../../shaders/facet.wgsl");
 const ROTATION: &str = include_str!("../../shaders/rotation.wgsl");
 const BOUNDING_SPHERES: &str = include_str!("../../shaders/bounding_spheres.wgsl");
 const CLOSEST_FACET: &str = include_str!("../../shaders/closest_facet.wgsl");
+const SHARED_SEARCH: &str = include_str!("../../shaders/shared_search.wgsl");
 pub(super) const DEPTH_ROWS: &str = include_str!("../../shaders/depth_rows.wgsl");
 pub(super) const DEFORMED_FACET: &str = include_str!("../../shaders/deformed_facet.wgsl");
 pub(super) const SEARCH_TYPES: &str = include_str!("../../shaders/search_types.wgsl");
@@ -107,7 +108,7 @@ pub static DETECTION: Shader = stage(
 pub static GAP: [Shader; 2] = in_both(stage(
     "gap",
     "main",
-    &[TYPES, CLOSEST_POINT, MESH, FACET, BOUNDING_SPHERES, CLOSEST_FACET, include_str!("../../shaders/gap.wgsl")],
+    &[TYPES, CLOSEST_POINT, MESH, FACET, CLOSEST_FACET, SHARED_SEARCH, include_str!("../../shaders/gap.wgsl")],
     &[&[], SMOOTH],
 ));
 
@@ -147,9 +148,9 @@ pub static SEARCH_DETECT: [Shader; 2] = in_both(stage(
         CLOSEST_POINT,
         MESH,
         FACET,
-        BOUNDING_SPHERES,
         DEFORMED_FACET,
         CLOSEST_FACET,
+        SHARED_SEARCH,
         DEPTH_ROWS,
         include_str!("../../shaders/search_detect.wgsl"),
     ],

@@ -1,0 +1,164 @@
+// The facets that are closest to points, one point an invocation, which a workgroup finds together: a search by each
+// invocation alone would have all wait for the longest one, and pass through the same spheres.
+//
+// Bounding spheres at rest leave, of the facets around any point, pairs of a point and a facet; flat triangles leave
+// fewer. These are measured as many at a time as there are invocations, whosever the point is. Which pairs are measured
+// depends on timing, the closest facet does not.
+//
+// The stage declares WORKGROUP, which is at most 32; `facet_in_order`; and for facets that are bent `triangle_of(facet)`,
+// the corners, and `bulge()`, by how much facets stand off their triangles.
+
+// Facets that share a sphere which is looked at before theirs.
+const CLUSTER: u32 = 32u;
+
+// What a chunk of facets may add to pairs that are fewer than a round.
+override PAIRS: u32 = WORKGROUP * (WORKGROUP + 1u);
+
+// Each invocation's point; w is the distance beyond which no facet matters to it, below zero where there is none.
+var<workgroup> points: array<vec4<real>, WORKGROUP>;
+// Its closest facet so far.
+var<workgroup> closest_so_far: array<u32, WORKGROUP>;
+// Invocations that have a point; and those whose point is near each of as many clusters: a bit for each.
+var<workgroup> with_point: atomic<u32>;
+var<workgroup> near: array<u32, WORKGROUP>;
+// Pairs that wait to be measured: the facet times WORKGROUP, plus the point's invocation.
+var<workgroup> pairs: array<u32, PAIRS>;
+var<workgroup> waiting: atomic<u32>;
+// Pairs that were measured: weights of the closest point, and its distance; its feature.
+var<workgroup> measurements: array<vec4<real>, WORKGROUP>;
+var<workgroup> features: array<u32, WORKGROUP>;
+
+// Pairs that this invocation has measured.
+var<private> measured: u32;
+
+// Of the points of `mask` those that may have a facet within a sphere at rest that is close enough.
+fn points_near(sphere: vec4<real>, mask: u32, moved: real) -> u32 {
+    var found = 0u;
+    for (var rest = mask; rest != 0u; rest &= rest - 1u) {
+        let point = points[firstTrailingBit(rest)];
+        let away = point.xyz - sphere.xyz;
+        let reach = point.w + moved + sphere.w;
+        if reach > 0.0 && dot(away, away) <= reach * reach {
+            found |= rest & (~rest + 1u);
+        }
+    }
+    return found;
+}
+
+// Adds the facet in place `leaf` of the order with the points of `mask` that it may be closest to.
+fn add_pairs(leaf: u32, mask: u32, moved: real) {
+    var rest = points_near(surface[parameters.leaves + leaf], mask, moved);
+    if rest == 0u {
+        return;
+    }
+    let facet = facet_in_order(leaf);
+    var corners = mat3x3<real>();
+    if SMOOTH {
+        corners = triangle_of(facet);
+    }
+    while rest != 0u {
+        let owner = firstTrailingBit(rest);
+        rest &= rest - 1u;
+        var may_be_closest = closest_so_far[owner] != facet;
+        if SMOOTH && may_be_closest {
+            let point = points[owner];
+            let weights = closest_point(point.xyz, corners[0], corners[1], corners[2]).weights;
+            may_be_closest = distance(corners * weights, point.xyz) <= point.w + bulge();
+        }
+        if may_be_closest {
+            pairs[atomicAdd(&waiting, 1u)] = facet * WORKGROUP + owner;
+        }
+    }
+}
+
+// Measures the pairs from `first` to `count`, at most one an invocation. Returns the closest facet to this one's point,
+// which was `best`.
+fn measure(first: u32, count: u32, best: Closest, local: u32) -> Closest {
+    if first + local < count {
+        let pair = pairs[first + local];
+        form(pair / WORKGROUP, points[pair % WORKGROUP].xyz);
+        let point = closest_on_facet();
+        measurements[local] = vec4<real>(point.weights, length(jet_at(point.weights).point));
+        features[local] = point.feature;
+        measured += 1u;
+    }
+    workgroupBarrier();
+    var closest = best;
+    for (var k = first; k < count; k += 1u) {
+        let facet = pairs[k] / WORKGROUP;
+        let found = measurements[k - first];
+        if pairs[k] % WORKGROUP == local && is_closer(found.w, facet, closest) {
+            closest = Closest(found.w, facet, ClosestPoint(found.xyz, features[k - first]));
+        }
+    }
+    points[local].w = closest.distance;
+    closest_so_far[local] = closest.facet;
+    return closest;
+}
+
+// The facet closest to x, if there is one no farther than `within`, which is below zero where there is no x. Facet
+// `likely`, where there is one, is measured first. No facet has left its place at rest by more than `moved`. For all
+// invocations together.
+fn closest_facets(x: vec3<real>, within: real, moved: real, likely: u32, local: u32) -> Closest {
+    workgroupBarrier();
+    points[local] = vec4<real>(x, select(within, -FAR_AWAY, within < 0.0));
+    closest_so_far[local] = ABSENT;
+    if local == 0u {
+        atomicStore(&with_point, 0u);
+        atomicStore(&waiting, 0u);
+    }
+    workgroupBarrier();
+    if within >= 0.0 {
+        atomicOr(&with_point, 1u << local);
+        if likely != ABSENT {
+            pairs[atomicAdd(&waiting, 1u)] = likely * WORKGROUP + local;
+        }
+    }
+    let clusters = max(parameters.leaves / CLUSTER, 1u);
+    let leaves = parameters.leaves / clusters;
+    var best = none_within(within);
+    // Pairs are measured once there are so many: those with likely facets at once.
+    var enough = 1u;
+    // Cluster, and first leaf of it, that come next; a run of WORKGROUP clusters is looked at together.
+    var cluster = 0u;
+    var leaf = 0u;
+    loop {
+        workgroupBarrier();
+        let count = atomicLoad(&waiting);
+        workgroupBarrier();
+        if count >= enough {
+            let first = max(count, WORKGROUP) - WORKGROUP;
+            best = measure(first, count, best, local);
+            if local == 0u {
+                atomicStore(&waiting, first);
+            }
+            continue;
+        }
+        if cluster >= clusters {
+            break;
+        }
+        if leaf == 0u && cluster % WORKGROUP == 0u {
+            let own = cluster + local;
+            near[local] = 0u;
+            if own < clusters {
+                near[local] = points_near(surface[clusters + own], atomicLoad(&with_point), moved);
+            }
+            workgroupBarrier();
+        }
+        let mask = near[cluster % WORKGROUP];
+        if mask != 0u && leaf + local < leaves {
+            add_pairs(cluster * leaves + leaf + local, mask, moved);
+        }
+        leaf += WORKGROUP;
+        if mask == 0u || leaf >= leaves {
+            leaf = 0u;
+            cluster += 1u;
+            while cluster % WORKGROUP != 0u && near[cluster % WORKGROUP] == 0u {
+                cluster += 1u;
+            }
+        }
+        enough = select(WORKGROUP, 1u, cluster >= clusters);
+    }
+    formed = ABSENT;
+    return best;
+}
