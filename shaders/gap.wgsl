@@ -111,7 +111,8 @@ fn main(
             radius = surface[radii() + node].x;
             within = select(-FAR_AWAY, abs(flat + radius) + band, flat <= known + band);
         }
-        let closest = closest_facets(x, within, real(0.0), ABSENT, local);
+        take_point(x, within, local);
+        let closest = closest_facet(real(0.0), ABSENT, local);
         if closest.facet != ABSENT {
             let direction = pseudonormal(closest.facet, closest.point, x);
             let is_inside = dot(jet_at(closest.point.weights).point, direction) > 0.0;

@@ -4,7 +4,7 @@
 // A facet matters to a proxy node only where it is no farther than the surface is known to be: d + m, with d its
 // distance at rest and m the most that a point of the surface has moved, or the distance of a corner of the facet that
 // was closest last, where that is now. At rest it was no farther than m beyond. Only the nodes of such facets are
-// displaced.
+// displaced, and for as many proxy nodes together as there are invocations.
 
 override WORKGROUP: u32 = 32u;
 
@@ -49,136 +49,119 @@ fn list_candidates(reach: real, local: u32) -> u32 {
     return listed;
 }
 
-// Farthest that the surface can be from proxy node `node` where it is now.
-fn farthest(node: u32) -> real {
-    return abs(rest_distance(node)) + parameters.gap_band + scalar(MOVED);
-}
-
-// Place of a corner of the facet that was closest last to the proxy node in this place of the list, or ABSENT.
-fn known_corner(entry: u32, candidates: u32) -> u32 {
-    if entry >= candidates {
-        return ABSENT;
-    }
-    let last = word(at_last(word(at_candidate(entry))));
+// Place of a corner of the facet that was closest last to proxy node `node`, or ABSENT.
+fn known_corner(node: u32) -> u32 {
+    let last = word(at_last(node));
     if last == 0u {
         return ABSENT;
     }
     return carrier(last - 1u, 0u);
 }
 
-// Notes how far from the proxy node in this place of the list facets at rest matter, with the corner in `place`
-// displaced by `displacement`.
-fn note_reach(entry: u32, candidates: u32, place: u32, displacement: vec3<real>) {
-    if entry >= candidates {
-        return;
+// Displacement of the node in `place` by the trial's forces.
+fn displacement_now(place: u32) -> vec3<real> {
+    var sum = vec3<real>(0.0);
+    if place < parameters.covered {
+        let slots = word(SLOTS);
+        for (var slot = 0u; slot < slots; slot += 1u) {
+            let force = vector_at(at_entry_of(1u - word(HALF), slot));
+            sum += moved_by(word(at_place(slot)), force, place);
+        }
     }
-    let node = word(at_candidate(entry));
-    var reach = farthest(node);
-    if place != ABSENT {
-        let moved = select(displacement, vec3<real>(0.0), place >= parameters.covered);
-        reach = min(reach, distance(proxy_position(node), at_rest(place) + moved) + scalar(BULGE));
-    }
-    set_scalar(at_reach(node), reach + scalar(MOVED) + parameters.gap_band);
+    return sum;
 }
 
-fn bound_reaches(candidates: u32, local: u32) {
-    for (var first = local; first < candidates; first += 4u * WORKGROUP) {
-        let entries = vec4<u32>(first, first + WORKGROUP, first + 2u * WORKGROUP, first + 3u * WORKGROUP);
-        let places = vec4<u32>(known_corner(entries.x, candidates), known_corner(entries.y, candidates),
-            known_corner(entries.z, candidates), known_corner(entries.w, candidates));
-        let is_covered = places < vec4<u32>(parameters.covered);
-        let moved = responses(1u - word(HALF), select(vec4<u32>(0u), places, is_covered));
-        note_reach(entries.x, candidates, places.x, moved[0]);
-        note_reach(entries.y, candidates, places.y, moved[1]);
-        note_reach(entries.z, candidates, places.z, moved[2]);
-        note_reach(entries.w, candidates, places.w, moved[3]);
+// Within what distance of proxy node `node`, at x, the closest facet is, or matters.
+fn matters_within(node: u32, x: vec3<real>) -> real {
+    let band = parameters.gap_band;
+    let moved = scalar(MOVED);
+    let rest = rest_distance(node);
+    var farthest = abs(rest) + band + moved;
+    let corner = known_corner(node);
+    if corner != ABSENT {
+        let now = at_rest(corner) + displacement_now(corner);
+        farthest = min(farthest, distance(x, now) + scalar(BULGE) + band);
+    }
+    // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than
+    // that.
+    let is_followed = FROZEN || rest <= band || word(at_watched(node)) != 0u;
+    return select(min(farthest, max(proxy_radius(node), moved - rest + band)), farthest, is_followed);
+}
+
+// The facet that was closest last to proxy node `node`, at x: a start as good as any, unless it is so far from x that it
+// may not have been displaced.
+fn likely_for(node: u32, x: vec3<real>, within: real) -> u32 {
+    let corner = known_corner(node);
+    if corner == ABSENT || distance(x, at_rest(corner)) > within + scalar(MOVED) {
+        return ABSENT;
+    }
+    return word(at_last(node)) - 1u;
+}
+
+// Whether what lay in a sphere at rest may matter to one of the points.
+fn matters(sphere: vec4<real>) -> bool {
+    return PAPER || points_near(sphere, atomicLoad(&with_point), scalar(MOVED)) != 0u;
+}
+
+// Lists the covered nodes that matter to the points; returns how many there are. The paper ties nodes wherever they
+// are.
+fn list_nodes(local: u32) -> u32 {
+    let all = parameters.groups;
+    begin_list(0u, local);
+    for (var first = 0u; first < all; first += WORKGROUP) {
+        let group = first + local;
+        let is_listed = group < all && matters(surface[parameters.at_spheres + min(group, all - 1u)]);
+        let entry = place_in_list(is_listed, local);
+        if is_listed {
+            set_word(at_group(entry), group);
+        }
     }
     sync();
-}
-
-// Lists the groups of covered nodes that matter to one of `candidates` proxy nodes; returns how many there are.
-fn list_groups(candidates: u32, local: u32) -> u32 {
-    let groups = (parameters.covered + NODES_TOGETHER - 1u) / NODES_TOGETHER;
+    let groups = listed;
+    passes += (all + groups * NODES_TOGETHER) / WORKGROUP * (1u + 2u * WORKGROUP);
     begin_list(0u, local);
-    for (var first = 0u; first < groups; first += WORKGROUP) {
-        let group = first + local;
-        var matters = false;
-        if group < groups {
-            let sphere = surface[parameters.at_spheres + group];
-            // The paper ties nodes wherever they are.
-            matters = PAPER;
-            for (var entry = 0u; entry < candidates && !matters; entry += 1u) {
-                let node = word(at_candidate(entry));
-                matters = distance(proxy_position(node), sphere.xyz) <= scalar(at_reach(node)) + sphere.w;
-            }
-        }
-        let entry = place_in_list(matters, local);
-        if matters {
-            set_word(at_group(entry), group);
+    for (var first = 0u; first < groups * NODES_TOGETHER; first += WORKGROUP) {
+        let index = min(first + local, groups * NODES_TOGETHER - 1u);
+        let place = word(at_group(index / NODES_TOGETHER)) * NODES_TOGETHER + index % NODES_TOGETHER;
+        let is_there = first + local == index && place < parameters.covered;
+        let is_listed = is_there && matters(sphere_of(min(place, parameters.covered - 1u)));
+        let entry = place_in_list(is_listed, local);
+        if is_listed {
+            set_word(at_near(entry), place);
         }
     }
     sync();
     return listed;
 }
 
-// Place of node `index` of the listed groups, or ABSENT behind the last.
-fn place_of(index: u32, groups: u32) -> u32 {
-    if index / NODES_TOGETHER >= groups {
-        return ABSENT;
-    }
-    let entry = word(at_group(index / NODES_TOGETHER)) * NODES_TOGETHER + index % NODES_TOGETHER;
-    if entry >= parameters.covered {
-        return ABSENT;
-    }
-    return mesh[parameters.at_places + entry];
-}
-
-fn displace_node(place: u32, displacement: vec3<real>) {
-    if place != ABSENT {
+fn displace_node(entry: u32, count: u32, place: u32, displacement: vec3<real>) {
+    if entry < count {
         set_vector(at_displacement(place), displacement);
     }
 }
 
-// Displaces the nodes of the listed groups.
-fn displace(groups: u32, local: u32) {
-    for (var first = local; first < groups * NODES_TOGETHER; first += 4u * WORKGROUP) {
-        let places = vec4<u32>(place_of(first, groups), place_of(first + WORKGROUP, groups),
-            place_of(first + 2u * WORKGROUP, groups), place_of(first + 3u * WORKGROUP, groups));
-        let moved = responses(1u - word(HALF), select(places, vec4<u32>(0u), places == vec4<u32>(ABSENT)));
-        displace_node(places.x, moved[0]);
-        displace_node(places.y, moved[1]);
-        displace_node(places.z, moved[2]);
-        displace_node(places.w, moved[3]);
+// Displaces the first `count` listed nodes.
+fn displace(count: u32, local: u32) {
+    for (var first = 0u; first < count; first += 4u * WORKGROUP) {
+        let entries = first + local + vec4<u32>(0u, 1u, 2u, 3u) * WORKGROUP;
+        let known = min(entries, vec4<u32>(count - 1u));
+        let places = vec4<u32>(word(at_near(known.x)), word(at_near(known.y)), word(at_near(known.z)),
+            word(at_near(known.w)));
+        let moved = responses(1u - word(HALF), places, local);
+        displace_node(entries.x, count, places.x, moved[0]);
+        displace_node(entries.y, count, places.y, moved[1]);
+        displace_node(entries.z, count, places.z, moved[2]);
+        displace_node(entries.w, count, places.w, moved[3]);
     }
     sync();
 }
 
-// Within what distance of proxy node `node` the closest facet matters.
-fn matters_within(node: u32) -> real {
-    let band = parameters.gap_band;
-    let rest = rest_distance(node);
-    // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than
-    // that.
-    let is_followed = FROZEN || rest <= band || word(at_watched(node)) != 0u;
-    let over = max(proxy_radius(node), scalar(MOVED) - rest + band);
-    return select(min(farthest(node), over), farthest(node), is_followed);
-}
-
-// The facet that was closest last to proxy node `node`, at x: a start as good as any, unless it is so far from x that it
-// may not have been displaced.
-fn likely_for(node: u32, x: vec3<real>) -> u32 {
-    let last = word(at_last(node)) - 1u;
-    if last == ABSENT {
-        return ABSENT;
-    }
-    return select(ABSENT, last, distance(x, at_rest(carrier(last, 0u))) <= scalar(at_reach(node)));
-}
-
 // Writes the rows of `candidates` proxy nodes: of those that touch or have touched or, where geometry is frozen, have a
-// gap no wider than `reach`.
-fn write_rows(candidates: u32, reach: real, local: u32) {
+// gap no wider than `reach`. Returns how many nodes were displaced for that.
+fn write_rows(candidates: u32, reach: real, local: u32) -> u32 {
     let half = 1u - word(HALF);
-    begin_list(0u, local);
+    var rows = 0u;
+    var displaced = 0u;
     for (var first = 0u; first < candidates; first += WORKGROUP) {
         var is_row = false;
         var node = 0u;
@@ -188,10 +171,15 @@ fn write_rows(candidates: u32, reach: real, local: u32) {
         if first + local < candidates {
             node = word(at_candidate(first + local));
             x = proxy_position(node);
-            within = matters_within(node);
-            likely = likely_for(node, x);
+            within = matters_within(node, x);
+            likely = likely_for(node, x, within);
         }
-        let closest = closest_facets(x, within, scalar(MOVED), likely, local);
+        take_point(x, within, local);
+        let near = list_nodes(local);
+        displace(near, local);
+        displaced += near;
+        passes += (1u + near / (4u * WORKGROUP)) * (word(SLOTS) + 2u);
+        let closest = closest_facet(scalar(MOVED), likely, local);
         var outward = vec3<real>(0.0);
         if closest.facet != ABSENT {
             set_word(at_last(node), closest.facet + 1u);
@@ -203,17 +191,21 @@ fn write_rows(candidates: u32, reach: real, local: u32) {
                 set_word(at_watched(node), 1u);
             }
         }
+        begin_list(rows, local);
         let row = place_in_list(is_row, local);
+        rows = listed;
         if is_row && row < parameters.contacts {
             write_row(half, row, node, x, closest.facet, closest.point, outward);
         }
     }
     if local == 0u {
-        set_word(ROWS + half, min(listed, parameters.contacts));
-        if listed > parameters.contacts {
+        set_word(ROWS + half, min(rows, parameters.contacts));
+        // Loops that are stopped find what is void.
+        if rows > parameters.contacts || passes > 2u * LOOP_BUDGET {
             set_word(OVERFLOW, 1u);
         }
     }
+    return displaced;
 }
 
 // Notes what this took; for one invocation.
@@ -246,14 +238,11 @@ fn main(
             reach = frozen_reach(local);
         }
         let candidates = list_candidates(reach, local);
-        bound_reaches(candidates, local);
-        let displaced = list_groups(candidates, local);
-        displace(displaced, local);
-        write_rows(candidates, reach, local);
+        let displaced = write_rows(candidates, reach, local);
         shares[local] = real(measured);
         workgroupBarrier();
         if local == 0u {
-            account(candidates, candidates + displaced * NODES_TOGETHER);
+            account(candidates, candidates + displaced);
         }
     }
 }

@@ -229,9 +229,9 @@ fn vertex_normal(node: u32) -> vec3<real> {
 // Displaces all nodes by the tied forces.
 fn displace_all(local: u32) {
     let last = parameters.covered - 1u;
-    for (var place = local; place < parameters.covered; place += 4u * WORKGROUP) {
-        let places = min(vec4<u32>(place) + vec4<u32>(0u, 1u, 2u, 3u) * WORKGROUP, vec4<u32>(last));
-        let moved = responses(TIED_FORCES, places);
+    for (var first = 0u; first < parameters.covered; first += 4u * WORKGROUP) {
+        let places = min(first + local + vec4<u32>(0u, 1u, 2u, 3u) * WORKGROUP, vec4<u32>(last));
+        let moved = responses(TIED_FORCES, places, local);
         for (var k = 0u; k < 4u; k += 1u) {
             set_vector(at_displacement(places[k]), moved[k]);
         }

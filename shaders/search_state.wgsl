@@ -1,5 +1,8 @@
 // What the stages of the search work on: their bindings, proxy and object.
 
+// Passes through loops after which an invocation goes on in another dispatch. llvmpipe stops all loops after 65,535.
+override LOOP_BUDGET: u32 = 30000u;
+
 @group(0) @binding(0) var<uniform> parameters: SearchParameters;
 // Bounding spheres (bounding_spheres.wgsl); radius, and share of the stiffness, of each proxy node; nodes at rest; the
 // parts named above.
@@ -49,22 +52,39 @@ fn rest_distance(node: u32) -> real {
     return real(positions[member * parameters.proxy_nodes + node].w) + proxy_radius(node);
 }
 
-// Position at rest of the surface node in `place`.
+// Position at rest of the surface node in `place`; and the sphere about it within which a point is to every facet that
+// hangs on the node as near as to the sphere of that facet.
 fn at_rest(place: u32) -> vec3<real> {
-    return surface[at_proxy() + parameters.proxy_nodes + place].xyz;
+    return sphere_of(place).xyz;
 }
 
-// Displacements of the nodes in four places by a vector of forces on the support: their rows of C times the vector.
-fn responses(vector: u32, places: vec4<u32>) -> array<vec3<real>, 4> {
+fn sphere_of(place: u32) -> vec4<real> {
+    return surface[at_proxy() + parameters.proxy_nodes + place];
+}
+
+// Some slots of the support, and the forces on them.
+var<workgroup> pressed: array<u32, WORKGROUP>;
+var<workgroup> pressing: array<vec3<real>, WORKGROUP>;
+
+// Displacements of the nodes in four places by a vector of forces on the support: their rows of C times the vector. For
+// all invocations together.
+fn responses(vector: u32, places: vec4<u32>, local: u32) -> array<vec3<real>, 4> {
     var u = array<vec3<real>, 4>();
     let slots = word(SLOTS);
-    for (var slot = 0u; slot < slots; slot += 1u) {
-        let other = word(at_place(slot));
-        let force = vector_at(at_entry_of(vector, slot));
-        u[0] += moved_by(other, force, places.x);
-        u[1] += moved_by(other, force, places.y);
-        u[2] += moved_by(other, force, places.z);
-        u[3] += moved_by(other, force, places.w);
+    for (var first = 0u; first < slots; first += WORKGROUP) {
+        let count = min(slots - first, WORKGROUP);
+        workgroupBarrier();
+        if local < count {
+            pressed[local] = word(at_place(first + local));
+            pressing[local] = vector_at(at_entry_of(vector, first + local));
+        }
+        workgroupBarrier();
+        for (var k = 0u; k < count; k += 1u) {
+            u[0] += moved_by(pressed[k], pressing[k], places.x);
+            u[1] += moved_by(pressed[k], pressing[k], places.y);
+            u[2] += moved_by(pressed[k], pressing[k], places.z);
+            u[3] += moved_by(pressed[k], pressing[k], places.w);
+        }
     }
     return u;
 }

@@ -7,9 +7,6 @@
 
 override WORKGROUP: u32 = 32u;
 
-// Passes through loops that an invocation may make in one dispatch: llvmpipe stops all loops after 65,535.
-const LOOP_BUDGET: u32 = 30000u;
-
 var<workgroup> sums: array<vec3<real>, WORKGROUP>;
 
 // Of the state: which half is its own, where its rows begin, how many there are, and slots in use.
@@ -57,8 +54,9 @@ fn put(vector: u32, slot: u32, value: vec3<real>) {
 
 // product = C vector on the support.
 fn multiply(vector: u32, product: u32, local: u32) {
-    for (var slot = local; slot < slots; slot += 4u * WORKGROUP) {
-        let parts = responses(vector, places_from(slot));
+    for (var first = 0u; first < slots; first += 4u * WORKGROUP) {
+        let slot = first + local;
+        let parts = responses(vector, places_from(slot), local);
         put_four(product, slot, parts);
     }
     if local == 0u {
@@ -69,12 +67,14 @@ fn multiply(vector: u32, product: u32, local: u32) {
 // Places of four slots that an invocation takes together; behind the last slot any.
 fn places_from(slot: u32) -> vec4<u32> {
     let last = slots - 1u;
-    return vec4<u32>(word(at_place(slot)), word(at_place(min(slot + WORKGROUP, last))),
+    return vec4<u32>(word(at_place(min(slot, last))), word(at_place(min(slot + WORKGROUP, last))),
         word(at_place(min(slot + 2u * WORKGROUP, last))), word(at_place(min(slot + 3u * WORKGROUP, last))));
 }
 
 fn put_four(vector: u32, slot: u32, values: array<vec3<real>, 4>) {
-    put(vector, slot, values[0]);
+    if slot < slots {
+        put(vector, slot, values[0]);
+    }
     if slot + WORKGROUP < slots {
         put(vector, slot + WORKGROUP, values[1]);
     }
@@ -243,7 +243,8 @@ fn passes_of(now: u32) -> u32 {
     let runs = slots / WORKGROUP + 1u;
     let rows = row_count / WORKGROUP + 1u;
     if now == FACTORISE {
-        return runs * row_count * parameters.carriers + rows * row_count * (parameters.carriers + row_count / 4u + 1u);
+        let pairs = (row_count * (row_count + slots) / WORKGROUP + 2u) * parameters.carriers;
+        return runs + pairs + row_count * (row_count * (row_count / 4u + 1u) / WORKGROUP + rows + 1u);
     }
     if now == ACCOUNT {
         return rows * (parameters.triangles / 4u + 8u * parameters.joints);

@@ -4,7 +4,8 @@
 // and goes on to the next trial (search_step). By the paper's iteration it makes one pass of that (search_detect,
 // search_paper).
 //
-// Surface nodes are numbered by place: those that the compliance covers come first.
+// Surface nodes are numbered by place: those that the compliance covers come first, neighbours near each other but for
+// the paper's iteration, whose nodes are numbered as the object's.
 
 struct SearchParameters {
     // Configurations of this dispatch.
@@ -15,8 +16,9 @@ struct SearchParameters {
     triangles: u32,
     // Leaves of the tree of bounding spheres.
     leaves: u32,
-    // Surface nodes that the compliance covers.
+    // Surface nodes that the compliance covers, and groups of NODES_TOGETHER of them.
     covered: u32,
+    groups: u32,
     // Most rows, slots of the support, and nodes of a facet.
     contacts: u32,
     support: u32,
@@ -34,12 +36,11 @@ struct SearchParameters {
     at_masks: u32,
     at_spheres: u32,
     // Where parts of `mesh` begin: facets in the order of the leaves, places of each facet's nodes, its shape,
-    // whether the compliance covers it, and places of nodes in an order in which neighbours are near each other.
+    // and whether the compliance covers it.
     at_order: u32,
     at_carriers: u32,
     at_shapes: u32,
     at_covered: u32,
-    at_places: u32,
     // And the link of each proxy node.
     at_links: u32,
     // Gaps in f32 are known to this [m].
@@ -184,9 +185,14 @@ fn at_group(entry: u32) -> u32 {
     return HEADER + 3u * parameters.proxy_nodes + entry;
 }
 
+// Places of nodes that matter to them.
+fn at_near(entry: u32) -> u32 {
+    return at_group(parameters.groups) + entry;
+}
+
 // Slot of a place, plus one; place of a slot.
 fn at_slot(place: u32) -> u32 {
-    return at_group((parameters.covered + NODES_TOGETHER - 1u) / NODES_TOGETHER) + place;
+    return at_near(parameters.covered) + place;
 }
 
 fn at_place(slot: u32) -> u32 {
@@ -264,14 +270,9 @@ fn at_predicted(node: u32) -> u32 {
     return at_joint(parameters.joints) + node;
 }
 
-// How far from each proxy node facets at rest matter.
-fn at_reach(node: u32) -> u32 {
-    return at_predicted(parameters.proxy_nodes) + node;
-}
-
 // Displacement of each covered node.
 fn at_displacement(place: u32) -> u32 {
-    return to_four(at_reach(parameters.proxy_nodes)) + 4u * place;
+    return to_four(at_predicted(parameters.proxy_nodes)) + 4u * place;
 }
 
 // Parts of a row: see src/contact/law/depth.rs. Behind them the weights of its nodes, and the slopes of these by either

@@ -31,7 +31,11 @@ var<workgroup> features: array<u32, WORKGROUP>;
 // Pairs that this invocation has measured.
 var<private> measured: u32;
 
-// Of the points of `mask` those that may have a facet within a sphere at rest that is close enough.
+// Passes through loops so far, at most.
+var<private> passes: u32;
+
+// Of the points of `mask` those to which something may matter that lay within a sphere at rest, and has left its place
+// by no more than `moved`.
 fn points_near(sphere: vec4<real>, mask: u32, moved: real) -> u32 {
     var found = 0u;
     for (var rest = mask; rest != 0u; rest &= rest - 1u) {
@@ -96,10 +100,12 @@ fn measure(first: u32, count: u32, best: Closest, local: u32) -> Closest {
     return closest;
 }
 
-// The facet closest to x, if there is one no farther than `within`, which is below zero where there is no x. Facet
-// `likely`, where there is one, is measured first. No facet has left its place at rest by more than `moved`. For all
-// invocations together.
-fn closest_facets(x: vec3<real>, within: real, moved: real, likely: u32, local: u32) -> Closest {
+// Passes through the loops that look for the point of a facet.
+const PASSES_TO_MEASURE: u32 = 3u * FACET_ITERATIONS + 3u;
+
+// Takes x for this invocation's point, to which nothing farther than `within` matters; that is below zero where there
+// is no point. For all invocations together.
+fn take_point(x: vec3<real>, within: real, local: u32) {
     workgroupBarrier();
     points[local] = vec4<real>(x, select(within, -FAR_AWAY, within < 0.0));
     closest_so_far[local] = ABSENT;
@@ -110,13 +116,19 @@ fn closest_facets(x: vec3<real>, within: real, moved: real, likely: u32, local: 
     workgroupBarrier();
     if within >= 0.0 {
         atomicOr(&with_point, 1u << local);
-        if likely != ABSENT {
-            pairs[atomicAdd(&waiting, 1u)] = likely * WORKGROUP + local;
-        }
     }
-    let clusters = max(parameters.leaves / CLUSTER, 1u);
-    let leaves = parameters.leaves / clusters;
-    var best = none_within(within);
+    workgroupBarrier();
+}
+
+// The facet closest to the point that was taken, if there is one that matters. Facet `likely`, where there is one, is
+// measured first. No facet has left its place at rest by more than `moved`. For all invocations together.
+fn closest_facet(moved: real, likely: u32, local: u32) -> Closest {
+    if likely != ABSENT {
+        pairs[atomicAdd(&waiting, 1u)] = likely * WORKGROUP + local;
+    }
+    let clusters = select(max(parameters.leaves / CLUSTER, 1u), 0u, atomicLoad(&with_point) == 0u);
+    let leaves = min(parameters.leaves, CLUSTER);
+    var best = none_within(points[local].w);
     // Pairs are measured once there are so many: those with likely facets at once.
     var enough = 1u;
     // Cluster, and first leaf of it, that come next; a run of WORKGROUP clusters is looked at together.
@@ -129,6 +141,7 @@ fn closest_facets(x: vec3<real>, within: real, moved: real, likely: u32, local: 
         if count >= enough {
             let first = max(count, WORKGROUP) - WORKGROUP;
             best = measure(first, count, best, local);
+            passes += 1u + WORKGROUP + PASSES_TO_MEASURE;
             if local == 0u {
                 atomicStore(&waiting, first);
             }
@@ -144,7 +157,9 @@ fn closest_facets(x: vec3<real>, within: real, moved: real, likely: u32, local: 
                 near[local] = points_near(surface[clusters + own], atomicLoad(&with_point), moved);
             }
             workgroupBarrier();
+            passes += WORKGROUP;
         }
+        passes += 1u + 2u * WORKGROUP;
         let mask = near[cluster % WORKGROUP];
         if mask != 0u && leaf + local < leaves {
             add_pairs(cluster * leaves + leaf + local, mask, moved);

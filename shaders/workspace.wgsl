@@ -40,6 +40,11 @@ fn set_scalar(at: u32, value: real) {
     reals[number / 4u][number % 4u] = value;
 }
 
+// Four that follow each other from a multiple of four on.
+fn four_at(at: u32) -> vec4<real> {
+    return reals[(reals_base + at) / 4u];
+}
+
 fn vector_at(at: u32) -> vec3<real> {
     return reals[(reals_base + at) / 4u].xyz;
 }

@@ -35,7 +35,7 @@ impl AdaptiveSize {
         Self { now: first.min(most), most }
     }
 
-    /// Steers towards [`DISPATCH_TARGET`] for one dispatch, at most by a factor of two up and four down, after `done`
+    /// Steers towards [`DISPATCH_TARGET`] for one dispatch, at most by a factor of four, after `done`
     /// configurations took `time`.
     pub fn adapt(&mut self, done: usize, time: Duration) {
         // A dispatch that was cut short by the end of the list says nothing about a full one.
@@ -43,7 +43,7 @@ impl AdaptiveSize {
             return;
         }
         let wanted = DISPATCH_TARGET.as_secs_f64() / time.as_secs_f64().max(1e-6) * done as f64;
-        let limits = (self.now as f64 / 4.0, self.now as f64 * 2.0);
+        let limits = (self.now as f64 / 4.0, self.now as f64 * 4.0);
         self.now = (wanted.clamp(limits.0, limits.1) as usize).clamp(1, self.most);
     }
 

@@ -30,6 +30,7 @@ pub struct SearchParameters {
     pub triangles: u32,
     pub leaves: u32,
     pub covered: u32,
+    pub groups: u32,
     pub contacts: u32,
     pub support: u32,
     pub carriers: u32,
@@ -45,7 +46,6 @@ pub struct SearchParameters {
     pub at_carriers: u32,
     pub at_shapes: u32,
     pub at_covered: u32,
-    pub at_places: u32,
     pub at_links: u32,
     pub gap_band: f64,
     pub first_kc: f64,
@@ -122,8 +122,8 @@ mod tests {
         compare(&expected[..1], &reflect(Precision::Double));
         let (name, mut members, size) = layout!(
             SearchParameters: configurations, joints, proxy_nodes, surface_nodes, triangles, leaves,
-            covered, contacts, support, carriers, max_iterations, reals, words, room, with_tangent,
-            at_net, at_masks, at_spheres, at_order, at_carriers, at_shapes, at_covered, at_places, at_links,
+            covered, groups, contacts, support, carriers, max_iterations, reals, words, room, with_tangent,
+            at_net, at_masks, at_spheres, at_order, at_carriers, at_shapes, at_covered, at_links,
             gap_band, first_kc, kc, tolerance, mobility, bulge_mobility, bulge, least_scale, least_distance,
             softest
         );

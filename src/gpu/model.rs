@@ -120,8 +120,16 @@ pub(super) fn culling_slack(model: &contact::Model<'_>, precision: Precision) ->
     }
 }
 
-pub(super) fn padded(v: DVec3) -> [f64; 4] {
-    [v.x, v.y, v.z, 0.0]
+/// Three coordinates, and a fourth number.
+pub(super) fn four(v: DVec3, fourth: f64) -> [f64; 4] {
+    [v.x, v.y, v.z, fourth]
+}
+
+/// A sphere around `points`, widened by `slack`: centre and radius [m].
+pub(super) fn sphere_around(points: &[DVec3], slack: f64) -> [f64; 4] {
+    let centre = points.iter().sum::<DVec3>() / points.len() as f64;
+    let radius = points.iter().map(|point| point.distance(centre)).fold(0.0, f64::max);
+    four(centre, radius + slack)
 }
 
 /// Distance from the object's centre that no proxy node ever exceeds [m].
@@ -147,7 +155,7 @@ fn rest(model: &contact::Model<'_>, extent: f64) -> Vec<[f32; 4]> {
     let corners = |t: u32| model.object.triangles[t as usize].map(|j| model.surface.positions[j as usize]).to_vec();
     let mut numbers = tree(model, corners, GPU_BOUND_SLACK * extent);
     numbers.extend(model.chain.nodes.iter().map(|node| [node.radius, 0.0, 0.0, 0.0]));
-    numbers.extend(model.surface.positions.iter().map(|&node| padded(node)));
+    numbers.extend(model.surface.positions.iter().map(|&node| four(node, 0.0)));
     numbers.into_iter().map(|row| row.map(|number| number as f32)).collect()
 }
 
@@ -202,12 +210,7 @@ fn tree(model: &contact::Model<'_>, points: impl Fn(u32) -> Vec<DVec3>, slack: f
         let under = leaves >> level;
         let facets = order.iter().skip((node - (1 << level)) * under).take(under);
         let points: Vec<DVec3> = facets.flat_map(|&t| points(t)).collect();
-        if points.is_empty() {
-            return nowhere;
-        }
-        let centre = points.iter().sum::<DVec3>() / points.len() as f64;
-        let radius = points.iter().map(|point| point.distance(centre)).fold(0.0, f64::max);
-        [centre.x, centre.y, centre.z, radius + slack]
+        if points.is_empty() { nowhere } else { sphere_around(&points, slack) }
     };
     std::iter::once(nowhere).chain((1..2 * leaves).map(sphere)).collect()
 }
@@ -222,6 +225,6 @@ fn surface(model: &contact::Model<'_>, precision: Precision) -> Vec<[f64; 4]> {
     let mut numbers = bounding_spheres(model, precision);
     numbers.extend(model.chain.nodes.iter().map(|node| [node.radius, 0.0, 0.0, 0.0]));
     let facets = 0..model.object.triangles.len() as u32;
-    numbers.extend(facets.flat_map(|t| controls(model, t)).map(padded));
+    numbers.extend(facets.flat_map(|t| controls(model, t)).map(|point| four(point, 0.0)));
     numbers
 }

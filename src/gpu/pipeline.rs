@@ -40,7 +40,7 @@ const HARDWARE_BUDGET: u64 = 128 << 20;
 const SOFTWARE_BUDGET: u64 = 16 << 20;
 
 /// The same for the workspaces of the search: some thousand configurations on a GPU, which fill it.
-const HARDWARE_WORKSPACES: u64 = 1 << 30;
+const HARDWARE_WORKSPACES: u64 = 2 << 30;
 const SOFTWARE_WORKSPACES: u64 = 64 << 20;
 
 impl BatchCapacity {

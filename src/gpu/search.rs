@@ -21,6 +21,11 @@ use crate::scene::Algorithm;
 /// Invocations of a workgroup of the other stages; the shaders' defaults.
 const PER_CONFIGURATION: u32 = 64;
 
+/// Passes through loops after which a search goes on in another dispatch: so that one lasts no longer than a tenth of a
+/// second on a GPU, of some hundred cycles a pass; and half of what llvmpipe allows, since a phase is not cut.
+const HARDWARE_LOOP_BUDGET: u32 = 1 << 20;
+const SOFTWARE_LOOP_BUDGET: u32 = 30_000;
+
 /// Rounds of the first submission: the sphere scene takes three steps and the trial at rest. Each submission that
 /// follows makes half as many as have been made.
 const FIRST_ROUNDS: usize = 4;
@@ -75,6 +80,8 @@ impl Search {
     /// Compiles the kernels for `model`.
     pub fn new(context: &Context, model: SearchModel) -> Result<Self, GpuError> {
         let lanes = ("WORKGROUP", f64::from(context.adapter().lanes()));
+        let budget = if context.adapter().hardware { HARDWARE_LOOP_BUDGET } else { SOFTWARE_LOOP_BUDGET };
+        let budget = ("LOOP_BUDGET", f64::from(budget));
         let flag = |name, is_set| (name, f64::from(u8::from(is_set)));
         let smooth = flag("SMOOTH", model.is_smooth);
         let law = [
@@ -85,14 +92,14 @@ impl Search {
         let kernel = |shaders: &[Shader; 2], overrides: &[(&str, f64)]| {
             Kernel::new(context, model.precision.of(shaders), &[&law, overrides].concat())
         };
-        let detect = kernel(&shaders::SEARCH_DETECT, &[smooth, lanes])?;
+        let detect = kernel(&shaders::SEARCH_DETECT, &[smooth, lanes, budget])?;
         let unfinished = kernel(&shaders::SEARCH_UNFINISHED, &[])?;
         let round = match model.algorithm {
             // Ties are found among all nodes: more invocations share these.
-            Algorithm::Paper => vec![detect, kernel(&shaders::SEARCH_PAPER, &[smooth])?, unfinished],
+            Algorithm::Paper => vec![detect, kernel(&shaders::SEARCH_PAPER, &[smooth, budget])?, unfinished],
             Algorithm::Energy | Algorithm::Linearised => {
-                let judge = kernel(&shaders::SEARCH_JUDGE, &[lanes])?;
-                vec![detect, judge, kernel(&shaders::SEARCH_STEP, &[lanes])?, unfinished]
+                let judge = kernel(&shaders::SEARCH_JUDGE, &[lanes, budget])?;
+                vec![detect, judge, kernel(&shaders::SEARCH_STEP, &[lanes, budget])?, unfinished]
             }
         };
         Ok(Self {

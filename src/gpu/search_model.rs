@@ -6,7 +6,9 @@ use super::{
     context::Context,
     error::GpuError,
     layout::SearchParameters,
-    model::{DeviceModel, bounding_spheres, controls, culling_slack, extent, leaves, mesh, padded, stiffness},
+    model::{
+        DeviceModel, bounding_spheres, controls, culling_slack, extent, four, leaves, mesh, sphere_around, stiffness,
+    },
     precision::Precision,
     shaders::NODES_TOGETHER,
 };
@@ -16,6 +18,7 @@ use crate::{
     scene::Algorithm,
 };
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Least relative residual that the f32 solver is asked for [1]: rounding of f32 (6e-8) grows over sums of about a
 /// hundred products to a few 1e-6, so 1e-5 is the least that can be distinguished from zero.
@@ -104,7 +107,7 @@ impl SearchModel {
             surface: numbers("surface for the search", parts.surface.as_flattened())?,
             mesh: StorageBuffer::from_slice(context, "mesh for the search", &parts.mesh)?,
             // Rounded one by one: each keeps 24 bits in f32, whatever the condition number of K.
-            compliance: numbers("compliance", &model.compliance.entries)?,
+            compliance: numbers("compliance", &parts.numbering.compliance(model))?,
             is_isotropic,
             is_smooth: device.is_smooth,
         })
@@ -174,8 +177,8 @@ pub(super) fn words(p: &SearchParameters) -> u32 {
     const ROW_WORDS: u32 = 4;
     HEADER
         + 3 * p.proxy_nodes
-        + p.covered.div_ceil(NODES_TOGETHER as u32)
-        + p.covered
+        + p.groups
+        + 2 * p.covered
         + p.support
         + 2 * p.contacts * (ROW_WORDS + 3 * p.carriers)
         + 2 * p.contacts
@@ -190,7 +193,7 @@ pub(super) fn reals(p: &SearchParameters, is_isotropic: bool) -> u32 {
     let to_four = |count: u32| count.next_multiple_of(4);
     let before_columns = SCALARS
         + 8 * p.joints
-        + to_four(2 * p.proxy_nodes)
+        + to_four(p.proxy_nodes)
         + 4 * p.covered
         + 2 * p.contacts * (ROW_REALS + 3 * p.carriers)
         + to_four(p.contacts)
@@ -206,6 +209,7 @@ struct Parts {
     parameters: SearchParameters,
     surface: Vec<[f64; 4]>,
     mesh: Vec<u32>,
+    numbering: Numbering,
 }
 
 impl Parts {
@@ -222,6 +226,7 @@ impl Parts {
             triangles,
             leaves: leaves(model).len() as u32,
             covered: model.compliance.nodes.len() as u32,
+            groups: model.compliance.nodes.len().div_ceil(NODES_TOGETHER) as u32,
             carriers: carriers as u32,
             ..bytemuck::Zeroable::zeroed()
         };
@@ -229,10 +234,11 @@ impl Parts {
         let mut numbers = bounding_spheres(model, precision);
         numbers
             .extend(model.chain.nodes.iter().zip(&model.shares).map(|(node, share)| [node.radius, *share, 0.0, 0.0]));
-        numbers.extend(numbering.nodes.iter().map(|&node| padded(at(node))));
+        let spheres = numbering.spheres(model, culling_slack(model, precision));
+        numbers.extend(&spheres);
         parameters.at_net = numbers.len() as u32;
         if let Some(smooth) = &surface.smooth {
-            numbers.extend(numbering.nodes.iter().map(|&node| padded(at(node) + smooth.offset(node))));
+            numbers.extend(numbering.nodes.iter().map(|&node| four(at(node) + smooth.offset(node), 0.0)));
             parameters.at_masks = numbers.len() as u32;
             for shape in smooth.shapes() {
                 for mask in (0..carriers).map(|j| shape.mask_of(j)) {
@@ -243,7 +249,7 @@ impl Parts {
             }
         }
         parameters.at_spheres = numbers.len() as u32;
-        numbers.extend(numbering.spheres(model, culling_slack(model, precision)));
+        numbers.extend(spheres[..parameters.covered as usize].chunks(NODES_TOGETHER).map(sphere_of));
         let mut mesh = mesh(model);
         parameters.at_order = mesh.len() as u32;
         mesh.extend(leaves(model));
@@ -259,69 +265,68 @@ impl Parts {
         parameters.at_covered = mesh.len() as u32;
         let is_covered = |&node: &u32| model.compliance.place(node).is_some();
         mesh.extend(facets.map(|t| u32::from(surface.carriers(t).0.iter().all(is_covered))));
-        parameters.at_places = mesh.len() as u32;
-        mesh.extend(&numbering.near);
         parameters.at_links = mesh.len() as u32;
         mesh.extend(model.chain.nodes.iter().map(|node| node.link as u32));
-        Self { parameters, surface: numbers, mesh }
+        Self { parameters, surface: numbers, mesh, numbering }
     }
 }
 
-/// Places of the surface nodes: those that the compliance covers come first, in its order.
+/// Places of the surface nodes: those that the compliance covers come first.
 struct Numbering {
     /// Place of each node, and node in each place.
     places: Vec<u32>,
     nodes: Vec<u32>,
-    /// Places of the covered nodes, neighbours near each other.
-    near: Vec<u32>,
 }
 
 impl Numbering {
-    /// With neighbours in the `order` of facets.
+    /// With covered nodes near each other that are so in the `order` of facets. The paper's iteration prefers nodes of
+    /// lower number: these are numbered as they are.
     fn new(model: &contact::Model<'_>, order: &[u32]) -> Self {
-        let mut nodes = model.compliance.nodes.clone();
+        let all = 0..model.object.surface_nodes as u32;
         let is_covered = |node: &u32| model.compliance.place(*node).is_some();
-        nodes.extend((0..model.object.surface_nodes as u32).filter(|node| !is_covered(node)));
-        let mut places = vec![0; nodes.len()];
-        (0..).zip(&nodes).for_each(|(place, &node)| places[node as usize] = place);
-        let mut is_listed = vec![false; nodes.len()];
-        let mut near = Vec::new();
+        let mut is_listed = vec![model.contact.algorithm == Algorithm::Paper; all.len()];
+        let mut nodes = if is_listed[0] { model.compliance.nodes.clone() } else { Vec::new() };
         for node in order.iter().flat_map(|&t| model.object.triangles[t as usize]) {
             if is_covered(&node) && !std::mem::replace(&mut is_listed[node as usize], true) {
-                near.push(places[node as usize]);
+                nodes.push(node);
             }
         }
-        Self { places, nodes, near }
+        nodes.extend(all.filter(|node| !is_covered(node)));
+        let mut places = vec![0; nodes.len()];
+        (0..).zip(&nodes).for_each(|(place, &node)| places[node as usize] = place);
+        Self { places, nodes }
     }
 
-    /// Spheres around all facets at rest that hang on a node of a group of covered ones, widened by `slack` [m]: centre
-    /// and radius.
+    /// The compliance with its rows and columns by place [m/N].
+    fn compliance(&self, model: &contact::Model<'_>) -> Vec<f64> {
+        let (compliance, each) = (&model.compliance, model.compliance.rows_per_node);
+        let from: Vec<usize> = self.nodes.iter().filter_map(|&node| compliance.place(node)).collect();
+        let columns: Vec<usize> = from.iter().flat_map(|&place| (each * place..).take(each)).collect();
+        let row = |row: &[f64]| columns.iter().map(|&column| row[column]).collect::<Vec<f64>>();
+        let rows =
+            |&place: &usize| compliance.rows(place).chunks(compliance.order()).flat_map(row).collect::<Vec<f64>>();
+        from.par_iter().flat_map_iter(rows).collect()
+    }
+
+    /// A sphere around each node, widened by `slack` [m]: any facet that hangs on the node is no nearer to a point, by its own
+    /// sphere, than this one is. Centre and radius, in order of place.
     fn spheres(&self, model: &contact::Model<'_>, slack: f64) -> Vec<[f64; 4]> {
-        let mut hanging = vec![Vec::new(); self.nodes.len()];
+        let at = |place: usize| model.surface.positions[self.nodes[place] as usize];
+        let mut radii = vec![0.0_f64; self.nodes.len()];
         for t in 0..model.object.triangles.len() as u32 {
+            let [x, y, z, radius] = sphere_around(&controls(model, t), slack);
             for &node in model.surface.carriers(t).0 {
-                hanging[self.places[node as usize] as usize].push(t);
+                let place = self.places[node as usize] as usize;
+                radii[place] = radii[place].max(at(place).distance(DVec3::new(x, y, z)) + radius + slack);
             }
         }
-        let sphere = |group: &[u32]| {
-            let facets = group.iter().flat_map(|&place| &hanging[place as usize]);
-            let points: Vec<DVec3> = facets.flat_map(|&t| controls(model, t)).collect();
-            let centre = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
-            let radius = points.iter().map(|point| point.distance(centre)).fold(0.0, f64::max);
-            // A facet is taken for near by its own sphere, which is no farther from its points than it is wide.
-            let width = 2.0 * radius_of_facets(model, group, &hanging);
-            [centre.x, centre.y, centre.z, radius + width + slack]
-        };
-        self.near.chunks(NODES_TOGETHER).map(sphere).collect()
+        (0..).zip(radii).map(|(place, radius)| four(at(place), radius)).collect()
     }
 }
 
-/// Greatest radius of a facet that hangs on a node of `group`, about the middle of its control points [m].
-fn radius_of_facets(model: &contact::Model<'_>, group: &[u32], hanging: &[Vec<u32>]) -> f64 {
-    let radius = |&t: &u32| {
-        let points = controls(model, t);
-        let centre = points.iter().sum::<DVec3>() / points.len() as f64;
-        points.iter().map(|point| point.distance(centre)).fold(0.0, f64::max)
-    };
-    group.iter().flat_map(|&place| &hanging[place as usize]).map(radius).fold(0.0, f64::max)
+/// A sphere around spheres.
+fn sphere_of(spheres: &[[f64; 4]]) -> [f64; 4] {
+    let at = |[x, y, z, _]: &[f64; 4]| DVec3::new(*x, *y, *z);
+    let centre = spheres.iter().map(at).sum::<DVec3>() / spheres.len() as f64;
+    four(centre, spheres.iter().map(|sphere| at(sphere).distance(centre) + sphere[3]).fold(0.0, f64::max))
 }

@@ -116,7 +116,7 @@ pub static GAP: [Shader; 2] = in_both(stage(
 pub static COMPACTION: [Shader; 2] = in_both(stage("compaction", "main", &[TYPES, PREFIX_SUM, COMPACT], &[&[]]));
 
 /// Object nodes that the search displaces together.
-pub(super) const NODES_TOGETHER: usize = 64;
+pub(super) const NODES_TOGETHER: usize = 32;
 
 /// Facets are of degree four.
 const SMOOTH: &[(&str, f64)] = &[("SMOOTH", 1.0)];
