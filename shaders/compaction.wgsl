@@ -7,7 +7,7 @@
 
 @compute @workgroup_size(WORKGROUP)
 fn main(@builtin(local_invocation_index) local: u32) {
-    let run = run_of(local);
+    let run = run_of(local, parameters.configurations);
     var count = 0u;
     for (var configuration = run.x; configuration < run.y; configuration += 1u) {
         count += select(0u, 1u, gaps[configuration] < 0.0);

@@ -86,22 +86,27 @@ fn form(facet: u32, x: vec3<real>) {
     }
 }
 
+// The twenty-fourth part of the point of the net that belongs to node j of a facet, less x.
+fn part_from(facet: u32, j: u32, x: vec3<real>) -> vec3<real> {
+    return control_from(carrier(facet, j), x) / 24.0;
+}
+
 // The same of a regular facet, whose masks are the same everywhere, in twenty-fourths.
 fn form_regular(facet: u32, x: vec3<real>) {
-    let a = control_from(carrier(facet, 0u), x) / 24.0;
-    let b = control_from(carrier(facet, 1u), x) / 24.0;
-    let c = control_from(carrier(facet, 2u), x) / 24.0;
+    let a = part_from(facet, 0u, x);
+    let b = part_from(facet, 1u, x);
+    let c = part_from(facet, 2u, x);
     // Across the edges.
-    let ab = control_from(carrier(facet, 3u), x) / 24.0;
-    let bc = control_from(carrier(facet, 4u), x) / 24.0;
-    let ca = control_from(carrier(facet, 5u), x) / 24.0;
+    let ab = part_from(facet, 3u, x);
+    let bc = part_from(facet, 4u, x);
+    let ca = part_from(facet, 5u, x);
     // The other neighbours of each corner, anticlockwise.
-    let a_0 = control_from(carrier(facet, 6u), x) / 24.0;
-    let a_1 = control_from(carrier(facet, 7u), x) / 24.0;
-    let b_0 = control_from(carrier(facet, 8u), x) / 24.0;
-    let b_1 = control_from(carrier(facet, 9u), x) / 24.0;
-    let c_0 = control_from(carrier(facet, 10u), x) / 24.0;
-    let c_1 = control_from(carrier(facet, 11u), x) / 24.0;
+    let a_0 = part_from(facet, 6u, x);
+    let a_1 = part_from(facet, 7u, x);
+    let b_0 = part_from(facet, 8u, x);
+    let b_1 = part_from(facet, 9u, x);
+    let c_0 = part_from(facet, 10u, x);
+    let c_1 = part_from(facet, 11u, x);
     net[0] = 12.0 * a + 2.0 * (b + c + ca + a_0 + a_1 + ab);
     net[1] = 12.0 * a + 4.0 * b + 3.0 * (c + ab) + ca + a_1;
     net[2] = 12.0 * a + 4.0 * c + 3.0 * (b + ca) + ab + a_0;

@@ -6,11 +6,11 @@ override WORKGROUP: u32 = 256u;
 // Numbers of all invocations up to each.
 var<workgroup> sums: array<u32, WORKGROUP>;
 
-// First configuration of the run of invocation `local`, and the one behind its last.
-fn run_of(local: u32) -> vec2<u32> {
-    let length = (parameters.configurations + WORKGROUP - 1u) / WORKGROUP;
-    let first = min(local * length, parameters.configurations);
-    return vec2<u32>(first, min(first + length, parameters.configurations));
+// First configuration of the run of invocation `local`, of `count` in all, and the one behind its last.
+fn run_of(local: u32, count: u32) -> vec2<u32> {
+    let length = (count + WORKGROUP - 1u) / WORKGROUP;
+    let first = min(local * length, count);
+    return vec2<u32>(first, min(first + length, count));
 }
 
 // Sum of the numbers of the invocations before `local`, whose own is `number`: by doubling strides.

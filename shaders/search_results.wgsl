@@ -21,7 +21,7 @@ override GATHER_WORKGROUP: u32 = 64u;
 // One workgroup over all configurations.
 @compute @workgroup_size(WORKGROUP)
 fn count(@builtin(local_invocation_index) local: u32) {
-    let run = run_of(local);
+    let run = run_of(local, parameters.configurations);
     var own = 0u;
     for (var place = run.x; place < run.y; place += 1u) {
         take_place(place);

@@ -5,13 +5,12 @@
 
 // Whether entry `index` of the list is a configuration that is not done.
 fn goes_on(index: u32) -> bool {
-    let phase = words[2u * parameters.room + 1u + words[index] * parameters.words + PHASE];
-    return index < words[2u * parameters.room] && phase != DONE;
+    return words[2u * parameters.room + 1u + words[index] * parameters.words + PHASE] != DONE;
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn main(@builtin(local_invocation_index) local: u32) {
-    let run = run_of(local);
+    let run = run_of(local, words[2u * parameters.room]);
     var own = 0u;
     for (var index = run.x; index < run.y; index += 1u) {
         own += select(0u, 1u, goes_on(index));

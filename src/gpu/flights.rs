@@ -35,8 +35,8 @@ impl AdaptiveSize {
         Self { now: first.min(most), most }
     }
 
-    /// Steers towards [`DISPATCH_TARGET`] for one dispatch, at most by a factor of four, after `done`
-    /// configurations took `time`.
+    /// Steers towards [`DISPATCH_TARGET`] for one dispatch, at most by a factor of four, after `done` configurations took
+    /// `time`.
     pub fn adapt(&mut self, done: usize, time: Duration) {
         // A dispatch that was cut short by the end of the list says nothing about a full one.
         if done < self.now && time < DISPATCH_TARGET {
@@ -529,11 +529,11 @@ mod tests {
     fn sizes_follow_the_time_of_a_dispatch() {
         let mut size = AdaptiveSize::new(64, 10_000);
         size.adapt(64, DISPATCH_TARGET / 100);
-        assert_eq!(size.now, 128, "no more than twice");
-        size.adapt(128, DISPATCH_TARGET * 100);
-        assert_eq!(size.now, 32, "no less than a quarter");
+        assert_eq!(size.now, 256, "no more than four times");
+        size.adapt(256, DISPATCH_TARGET * 100);
+        assert_eq!(size.now, 64, "no less than a quarter");
         size.adapt(10, DISPATCH_TARGET / 100);
-        assert_eq!(size.now, 32, "cut short");
+        assert_eq!(size.now, 64, "cut short");
         // As much as three dispatches should take.
         size.adapt(96, DISPATCH_TARGET * 3);
         assert_eq!(size.now, 32);
