@@ -330,3 +330,85 @@ fn sphere_of(spheres: &[[f64; 4]]) -> [f64; 4] {
     let centre = spheres.iter().map(at).sum::<DVec3>() / spheres.len() as f64;
     four(centre, spheres.iter().map(|sphere| at(sphere).distance(centre) + sphere[3]).fold(0.0, f64::max))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        contact::Model,
+        object::{Compliance, Object},
+        proxy::Chain,
+        random::Random,
+        scene::{ContactSpec, ContactSurface, Material, Scene, SpringKind, SpringSpec},
+    };
+
+    /// The sphere of the tests on a smooth surface, with its compliance on the nodes of the upper half.
+    fn with_model(algorithm: Algorithm, kind: SpringKind, check: impl FnOnce(&Model<'_>, &Numbering)) {
+        let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml")).unwrap();
+        scene.object.material = Material::Springs(SpringSpec { kind, stiffness: 150.0 });
+        let contact = ContactSpec { algorithm, surface: ContactSurface::Smooth, ..scene.contact };
+        let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+        let mut model = Model::new(&object, &chain, contact);
+        let nodes = (0..object.surface_nodes as u32).filter(|&node| model.surface.positions[node as usize].z > 0.0);
+        model.take_compliance(Compliance::on(&object, nodes.collect()).unwrap());
+        let numbering = Numbering::new(&model, &model.surface.bounds.order().collect::<Vec<u32>>());
+        check(&model, &numbering);
+    }
+
+    #[test]
+    fn compliance_is_numbered_as_its_nodes_are() {
+        for kind in [SpringKind::Isotropic, SpringKind::Axial] {
+            with_model(Algorithm::Energy, kind, |model, numbering| {
+                let (compliance, covered) = (&model.compliance, model.compliance.nodes.len());
+                let (each, renumbered) = (compliance.rows_per_node, numbering.compliance(model));
+                assert_ne!(renumbered, compliance.entries, "neighbours were not near each other");
+                let before = |row: usize| each * compliance.place(numbering.nodes[row / each]).unwrap() + row % each;
+                for (row, entries) in renumbered.chunks(compliance.order()).enumerate() {
+                    for (column, entry) in entries.iter().enumerate() {
+                        assert_eq!(*entry, compliance.entries[before(row) * compliance.order() + before(column)]);
+                    }
+                }
+                for (node, &place) in (0..).zip(&numbering.places) {
+                    assert_eq!(numbering.nodes[place as usize], node);
+                    assert_eq!((place as usize) < covered, compliance.place(node).is_some());
+                }
+            });
+        }
+        // The paper's iteration prefers nodes by their numbers.
+        with_model(Algorithm::Paper, SpringKind::Axial, |model, numbering| {
+            assert_eq!(numbering.compliance(model), model.compliance.entries);
+        });
+    }
+
+    #[test]
+    fn what_is_near_the_sphere_of_a_facet_is_near_those_of_its_nodes_and_of_their_groups() {
+        with_model(Algorithm::Energy, SpringKind::Isotropic, |model, numbering| {
+            let (mut random, mut near, mut missed) = (Random::new(5), 0, 0);
+            let spheres = numbering.spheres(model, 0.0);
+            let groups: Vec<[f64; 4]> = spheres.chunks(NODES_TOGETHER).map(sphere_of).collect();
+            // By how much a point is outside.
+            let beyond = |[x, y, z, radius]: [f64; 4], point: DVec3| point.distance(DVec3::new(x, y, z)) - radius;
+            for _ in 0..400 {
+                let (point, within) = (0.08 * random.vector(), random.between(0.0, 0.02));
+                for t in 0..model.object.triangles.len() as u32 {
+                    if beyond(sphere_around(&controls(model, t), 0.0), point) > within {
+                        continue;
+                    }
+                    near += 1;
+                    for &node in model.surface.carriers(t).0 {
+                        let place = numbering.places[node as usize] as usize;
+                        for sphere in [spheres[place], groups[place / NODES_TOGETHER]] {
+                            assert!(beyond(sphere, point) <= within + 1e-15, "{sphere:?}");
+                            let [x, y, z, radius] = sphere;
+                            missed += usize::from(beyond([x, y, z, 0.9 * radius], point) > within);
+                        }
+                    }
+                }
+            }
+            assert!(near > 1000 && missed > 0, "{near} were near, smaller spheres missed {missed}");
+            // And they leave something out.
+            let far = spheres.iter().filter(|sphere| beyond(**sphere, DVec3::new(0.0, 0.0, 0.05)) > 0.0).count();
+            assert!(far * 2 > spheres.len(), "{far} of {} are left out", spheres.len());
+        });
+    }
+}
