@@ -46,6 +46,7 @@ fn list_candidates(reach: real, local: u32) -> u32 {
         }
     }
     sync();
+    passes += (parameters.proxy_nodes / WORKGROUP + 1u) * (1u + WORKGROUP);
     return listed;
 }
 
@@ -88,8 +89,8 @@ fn matters_within(node: u32, x: vec3<real>) -> real {
     return select(min(farthest, max(proxy_radius(node), moved - rest + band)), farthest, is_followed);
 }
 
-// The facet that was closest last to proxy node `node`, at x: a start as good as any, unless it is so far from x that it
-// may not have been displaced.
+// The facet that was closest last to proxy node `node`, at x: a start as good as any, unless it is so far from x that
+// it may not have been displaced.
 fn likely_for(node: u32, x: vec3<real>, within: real) -> u32 {
     let corner = known_corner(node);
     if corner == ABSENT || distance(x, at_rest(corner)) > within + scalar(MOVED) {
@@ -118,7 +119,7 @@ fn list_nodes(local: u32) -> u32 {
     }
     sync();
     let groups = listed;
-    passes += (all + groups * NODES_TOGETHER) / WORKGROUP * (1u + 2u * WORKGROUP);
+    passes += ((all + groups * NODES_TOGETHER) / WORKGROUP + 2u) * (1u + 2u * WORKGROUP);
     begin_list(0u, local);
     for (var first = 0u; first < groups * NODES_TOGETHER; first += WORKGROUP) {
         let index = min(first + local, groups * NODES_TOGETHER - 1u);
@@ -178,7 +179,7 @@ fn write_rows(candidates: u32, reach: real, local: u32) -> u32 {
         let near = list_nodes(local);
         displace(near, local);
         displaced += near;
-        passes += (1u + near / (4u * WORKGROUP)) * (word(SLOTS) + 2u);
+        passes += (2u + near / (4u * WORKGROUP)) * (word(SLOTS) + 2u) + 6u * parameters.carriers + WORKGROUP;
         let closest = closest_facet(scalar(MOVED), likely, local);
         var outward = vec3<real>(0.0);
         if closest.facet != ABSENT {

@@ -77,8 +77,9 @@ fn write_column(a: u32, slot: u32) {
     if ISOTROPIC {
         var size = real(0.0);
         for (var j = 0u; j < parameters.carriers; j += 4u) {
-            size += dot(four_at(weights + j), vec4<real>(along_row(places + j, place), along_row(places + j + 1u, place),
-                along_row(places + j + 2u, place), along_row(places + j + 3u, place)));
+            let effects = vec4<real>(along_row(places + j, place), along_row(places + j + 1u, place),
+                along_row(places + j + 2u, place), along_row(places + j + 3u, place));
+            size += dot(four_at(weights + j), effects);
         }
         set_scalar(at_column(a, slot), size);
     } else {

@@ -5,8 +5,8 @@
 // fewer. These are measured as many at a time as there are invocations, whosever the point is. Which pairs are measured
 // depends on timing, the closest facet does not.
 //
-// The stage declares WORKGROUP, which is at most 32; `facet_in_order`; and for facets that are bent `triangle_of(facet)`,
-// the corners, and `bulge()`, by how much facets stand off their triangles.
+// The stage declares WORKGROUP, which is at most 32; `facet_in_order`; and for facets that are bent their corners,
+// `triangle_of(facet)`, and by how much they stand off their triangles, `bulge()`.
 
 // Facets that share a sphere which is looked at before theirs.
 const CLUSTER: u32 = 32u;
@@ -31,8 +31,9 @@ var<workgroup> features: array<u32, WORKGROUP>;
 // Pairs that this invocation has measured.
 var<private> measured: u32;
 
-// Passes through loops so far, at most.
+// Passes through loops so far, at most; those that look for the point of a facet.
 var<private> passes: u32;
+const PASSES_TO_MEASURE: u32 = 3u * FACET_ITERATIONS + 3u;
 
 // Of the points of `mask` those to which something may matter that lay within a sphere at rest, and has left its place
 // by no more than `moved`.
@@ -99,9 +100,6 @@ fn measure(first: u32, count: u32, best: Closest, local: u32) -> Closest {
     closest_so_far[local] = closest.facet;
     return closest;
 }
-
-// Passes through the loops that look for the point of a facet.
-const PASSES_TO_MEASURE: u32 = 3u * FACET_ITERATIONS + 3u;
 
 // Takes x for this invocation's point, to which nothing farther than `within` matters; that is below zero where there
 // is no point. For all invocations together.

@@ -35,8 +35,8 @@ impl AdaptiveSize {
         Self { now: first.min(most), most }
     }
 
-    /// Steers towards [`DISPATCH_TARGET`] for one dispatch, at most by a factor of four, after `done` configurations took
-    /// `time`.
+    /// Steers towards [`DISPATCH_TARGET`] for one dispatch, at most by a factor of four, after `done` configurations
+    /// took `time`.
     pub fn adapt(&mut self, done: usize, time: Duration) {
         // A dispatch that was cut short by the end of the list says nothing about a full one.
         if done < self.now && time < DISPATCH_TARGET {

@@ -308,8 +308,8 @@ impl Numbering {
         from.par_iter().flat_map_iter(rows).collect()
     }
 
-    /// A sphere around each node, widened by `slack` [m]: any facet that hangs on the node is no nearer to a point, by its own
-    /// sphere, than this one is. Centre and radius, in order of place.
+    /// A sphere around each node, widened by `slack` [m]: no facet that hangs on the node has a sphere that is nearer
+    /// to a point than this one is. Centre and radius, in order of place.
     fn spheres(&self, model: &contact::Model<'_>, slack: f64) -> Vec<[f64; 4]> {
         let at = |place: usize| model.surface.positions[self.nodes[place] as usize];
         let mut radii = vec![0.0_f64; self.nodes.len()];
