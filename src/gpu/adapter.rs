@@ -73,6 +73,9 @@ pub struct AdapterSummary {
     pub double: bool,
 }
 
+/// Kind of a GPU that is part of a processor.
+const INTEGRATED: &str = "integrated GPU";
+
 /// Invocations that a GPU runs in step, and a software rasteriser.
 const HARDWARE_LANES: u32 = 32;
 const SOFTWARE_LANES: u32 = 8;
@@ -83,11 +86,16 @@ impl AdapterSummary {
         if self.hardware { HARDWARE_LANES } else { SOFTWARE_LANES }
     }
 
+    /// Whether it has no memory but the host's.
+    pub(super) fn is_integrated(&self) -> bool {
+        self.kind == INTEGRATED
+    }
+
     fn of(adapter: &wgpu::Adapter) -> Self {
         let info = adapter.get_info();
         let kind = match info.device_type {
             wgpu::DeviceType::DiscreteGpu => "discrete GPU",
-            wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+            wgpu::DeviceType::IntegratedGpu => INTEGRATED,
             wgpu::DeviceType::VirtualGpu => "virtual GPU",
             wgpu::DeviceType::Cpu => "software",
             wgpu::DeviceType::Other => "unknown",

@@ -39,8 +39,10 @@ impl Default for BatchCapacity {
 const HARDWARE_BUDGET: u64 = 128 << 20;
 const SOFTWARE_BUDGET: u64 = 16 << 20;
 
-/// The same for the workspaces of the search: some thousand configurations on a GPU, which fill it.
+/// The same for the workspaces of the search: some thousand configurations on a GPU, which fill it, and on one that has
+/// the host's memory.
 const HARDWARE_WORKSPACES: u64 = 2 << 30;
+const INTEGRATED_WORKSPACES: u64 = 256 << 20;
 const SOFTWARE_WORKSPACES: u64 = 64 << 20;
 
 impl BatchCapacity {
@@ -58,7 +60,11 @@ impl BatchCapacity {
 
     /// Cut to what workspaces of so many bytes may take in all.
     fn for_workspaces(self, context: &Context, bytes: usize) -> Self {
-        let budget = if context.adapter().hardware { HARDWARE_WORKSPACES } else { SOFTWARE_WORKSPACES };
+        let budget = match context.adapter() {
+            adapter if !adapter.hardware => SOFTWARE_WORKSPACES,
+            adapter if adapter.is_integrated() => INTEGRATED_WORKSPACES,
+            _ => HARDWARE_WORKSPACES,
+        };
         let budget = budget.min(context.binding_limit()) as usize;
         let chunk = budget.checked_div(bytes).map_or(self.chunk, |most| self.chunk.min(most).max(1));
         Self { chunk, ..self }
