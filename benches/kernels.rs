@@ -159,7 +159,7 @@ fn sweep(context: &Arc<Context>, scene: &Scene, algorithm: Algorithm, adapter: A
 }
 
 /// The search in f64 for every `stride`-th configuration of the shipped sphere scene: what it takes, counted by the
-/// kernels themselves, and the rates that bound an H200 to.
+/// kernels themselves, and the rates to which that bounds an H200.
 fn count(context: &Arc<Context>, stride: usize, adapter: Adapter) -> Result<(), Box<dyn Error>> {
     let scene = load("datasets/sphere.toml")?;
     let scene = refined(&scene, if adapter.hardware { SWEPT } else { 1 });
@@ -209,8 +209,8 @@ fn count(context: &Arc<Context>, stride: usize, adapter: Adapter) -> Result<(), 
     let [peak, memory] = [0, 1].map(|k| 1e-6 * H200[k] / whole[k]);
     let kernels: f64 = times.iter().map(|kernel| kernel.seconds).sum();
     println!(
-        "  an H200 is bound to {memory:.1} million in contact a second by its memory, to {peak:.1} by its arithmetic; here: \
-         {:.3}",
+        "  an H200 is bound to {memory:.1} million in contact a second by its memory, to {peak:.1} by its arithmetic; \
+         here: {:.3}",
         1e-6 * counts.configurations as f64 / kernels
     );
     Ok(())

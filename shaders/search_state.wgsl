@@ -52,12 +52,12 @@ fn rest_distance(node: u32) -> real {
     return real(positions[member * parameters.proxy_nodes + node].w) + proxy_radius(node);
 }
 
-// Position at rest of the surface node in `place`; and the sphere about it within which a point is to every facet that
-// hangs on the node as near as to the sphere of that facet.
+// Position at rest of the surface node in `place`.
 fn at_rest(place: u32) -> vec3<real> {
     return sphere_of(place).xyz;
 }
 
+// A sphere around it: no facet that hangs on the node has a sphere that is nearer to a point.
 fn sphere_of(place: u32) -> vec4<real> {
     return surface[at_proxy() + parameters.proxy_nodes + place];
 }

@@ -1,9 +1,9 @@
 // The facets that are closest to points, one point an invocation, which a workgroup finds together: a search by each
 // invocation alone would have all wait for the longest one, and pass through the same spheres.
 //
-// Bounding spheres at rest leave, of the facets around any point, pairs of a point and a facet; flat triangles leave
-// fewer. These are measured as many at a time as there are invocations, whosever the point is. Which pairs are measured
-// depends on timing, the closest facet does not.
+// Bounding spheres at rest leave few pairs of a point and a facet, and flat triangles fewer. As many pairs are measured
+// at a time as there are invocations, whosever the point is. Which pairs are measured depends on timing; which facet is
+// closest does not.
 //
 // The stage declares WORKGROUP, which is at most 32; `facet_in_order`; and for facets that are bent their corners,
 // `triangle_of(facet)`, and by how much they stand off their triangles, `bulge()`.
@@ -11,7 +11,7 @@
 // Facets that share a sphere which is looked at before theirs.
 const CLUSTER: u32 = 32u;
 
-// What a chunk of facets may add to pairs that are fewer than a round.
+// Most pairs that wait: fewer than are measured together, and each of as many facets with each point.
 override PAIRS: u32 = WORKGROUP * (WORKGROUP + 1u);
 
 // Each invocation's point; w is the distance beyond which no facet matters to it, below zero where there is none.
@@ -31,12 +31,14 @@ var<workgroup> features: array<u32, WORKGROUP>;
 // Pairs that this invocation has measured.
 var<private> measured: u32;
 
-// Passes through loops so far, at most; those that look for the point of a facet.
+// Passes through loops so far, at most.
 var<private> passes: u32;
+
+// Passes through loops that it takes to measure a pair.
 const PASSES_TO_MEASURE: u32 = 3u * FACET_ITERATIONS + 3u;
 
-// Of the points of `mask` those to which something may matter that lay within a sphere at rest, and has left its place
-// by no more than `moved`.
+// The points of `mask` that may be near enough to what lay within a sphere at rest and has moved no farther than
+// `moved`.
 fn points_near(sphere: vec4<real>, mask: u32, moved: real) -> u32 {
     var found = 0u;
     for (var rest = mask; rest != 0u; rest &= rest - 1u) {
@@ -50,7 +52,7 @@ fn points_near(sphere: vec4<real>, mask: u32, moved: real) -> u32 {
     return found;
 }
 
-// Adds the facet in place `leaf` of the order with the points of `mask` that it may be closest to.
+// Pairs the facet in place `leaf` of the order with those points of `mask` to which it may be closest.
 fn add_pairs(leaf: u32, mask: u32, moved: real) {
     var rest = points_near(surface[parameters.leaves + leaf], mask, moved);
     if rest == 0u {

@@ -23,7 +23,7 @@ const WORKGROUP: u32 = 64;
 struct BoundKernel {
     kernel: Kernel,
     bound: wgpu::BindGroup,
-    /// How many it is for that a workgroup takes.
+    /// Nodes or configurations that one workgroup takes.
     workgroup: u32,
 }
 

@@ -249,7 +249,7 @@ impl Parts {
             }
         }
         parameters.at_spheres = numbers.len() as u32;
-        numbers.extend(spheres[..parameters.covered as usize].chunks(NODES_TOGETHER).map(sphere_of));
+        numbers.extend(spheres[..parameters.covered as usize].chunks(NODES_TOGETHER).map(enclosing_sphere));
         let mut mesh = mesh(model);
         parameters.at_order = mesh.len() as u32;
         mesh.extend(leaves(model));
@@ -284,8 +284,9 @@ impl Numbering {
     fn new(model: &contact::Model<'_>, order: &[u32]) -> Self {
         let all = 0..model.object.surface_nodes as u32;
         let is_covered = |node: &u32| model.compliance.place(*node).is_some();
-        let mut is_listed = vec![model.contact.algorithm == Algorithm::Paper; all.len()];
-        let mut nodes = if is_listed[0] { model.compliance.nodes.clone() } else { Vec::new() };
+        let by_number = model.contact.algorithm == Algorithm::Paper;
+        let mut nodes = if by_number { model.compliance.nodes.clone() } else { Vec::new() };
+        let mut is_listed = vec![by_number; all.len()];
         for node in order.iter().flat_map(|&t| model.object.triangles[t as usize]) {
             if is_covered(&node) && !std::mem::replace(&mut is_listed[node as usize], true) {
                 nodes.push(node);
@@ -324,8 +325,8 @@ impl Numbering {
     }
 }
 
-/// A sphere around spheres.
-fn sphere_of(spheres: &[[f64; 4]]) -> [f64; 4] {
+/// A sphere around spheres: centre and radius [m].
+fn enclosing_sphere(spheres: &[[f64; 4]]) -> [f64; 4] {
     let at = |[x, y, z, _]: &[f64; 4]| DVec3::new(*x, *y, *z);
     let centre = spheres.iter().map(at).sum::<DVec3>() / spheres.len() as f64;
     four(centre, spheres.iter().map(|sphere| at(sphere).distance(centre) + sphere[3]).fold(0.0, f64::max))
@@ -381,11 +382,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_near_the_sphere_of_a_facet_is_near_those_of_its_nodes_and_of_their_groups() {
+    fn what_is_near_the_enclosing_sphere_a_facet_is_near_those_of_its_nodes_and_of_their_groups() {
         with_model(Algorithm::Energy, SpringKind::Isotropic, |model, numbering| {
             let (mut random, mut near, mut missed) = (Random::new(5), 0, 0);
             let spheres = numbering.spheres(model, 0.0);
-            let groups: Vec<[f64; 4]> = spheres.chunks(NODES_TOGETHER).map(sphere_of).collect();
+            let groups: Vec<[f64; 4]> = spheres.chunks(NODES_TOGETHER).map(enclosing_sphere).collect();
             // By how much a point is outside.
             let beyond = |[x, y, z, radius]: [f64; 4], point: DVec3| point.distance(DVec3::new(x, y, z)) - radius;
             for _ in 0..400 {

@@ -176,6 +176,7 @@ pub static SEARCH_STEP: [Shader; 2] = in_both(stage(
         LISTING,
         BOUNDING_SPHERES,
         SEARCH_SUPPORT,
+        include_str!("../../shaders/search_woodbury.wgsl"),
         include_str!("../../shaders/search_step.wgsl"),
     ],
     &[&[], ISOTROPIC, FROZEN],
