@@ -98,7 +98,7 @@ pub enum MergeError {
         path: PathBuf,
     },
     /// A folder or file cannot be read.
-    #[error("{path}: cannot be read: {source}")]
+    #[error("{path}: cannot be read: {source}; check the path and its permissions")]
     Unreadable {
         /// Its path.
         path: PathBuf,
@@ -313,11 +313,11 @@ impl Merge {
 fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, MergeError> {
     let mut files = Vec::new();
     for path in paths {
-        if !path.is_dir() {
+        let unreadable = |source| MergeError::Unreadable { path: path.clone(), source };
+        if !fs::metadata(path).map_err(unreadable)?.is_dir() {
             files.push(path.clone());
             continue;
         }
-        let unreadable = |source| MergeError::Unreadable { path: path.clone(), source };
         for entry in fs::read_dir(path).map_err(unreadable)? {
             let file = entry.map_err(unreadable)?.path();
             if file.extension().is_some_and(|extension| extension == EXTENSION) {

@@ -104,6 +104,15 @@ fn shards_merge_to_the_bits_of_one_bake() {
 }
 
 #[test]
+fn shards_that_are_not_there_are_named() {
+    let error = merged(Path::new("nowhere"), Path::new("unused.haptize")).unwrap_err().to_string();
+    assert!(
+        error.starts_with("nowhere: cannot be read") && error.ends_with("check the path and its permissions"),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_shard_run_twice_is_left_alone_and_an_interrupted_merge_continues() {
     let (scene, folder) = (scene(), fixture::Folder::new());
     let parts = solved(&scene);
@@ -178,7 +187,10 @@ fn what_does_not_belong_together_is_refused() {
     fs::write(&note, "my notes").unwrap();
     let refused = gathered();
     assert!(matches!(&refused, MergeError::NoShard { path, .. } if *path == note), "{refused}");
-    assert!(matches!(Merge::gather(&[note.with_extension("none")]).map(|_| ()).unwrap_err(), MergeError::Sweep(_)));
+    assert!(matches!(
+        Merge::gather(&[note.with_extension("none")]).map(|_| ()).unwrap_err(),
+        MergeError::Unreadable { .. }
+    ));
     let empty = tempfile::tempdir().unwrap();
     let refused = Merge::gather(&[empty.path().to_path_buf()]).map(|_| ()).unwrap_err();
     assert!(refused.to_string().contains("bake --shard"), "{refused}");
