@@ -228,7 +228,7 @@ fn main() {
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();
     model.with_tangent = true;
-    let judges = [11, 12].map(|seed| Judge::new(&scene, &model, seed, 1000).unwrap());
+    let mut judges = [11, 12].map(|seed| Judge::new(&scene, &model, seed, 1000).unwrap());
     let mut backend = CpuBackend::new(&model, 0).unwrap();
     let batch = backend.chunk();
     println!("\norder      base   levels  nodes  by level  bytes  solved  equilibria  seen  unseen  rounds  seconds");
@@ -242,7 +242,7 @@ fn main() {
     let mut fill = |order, spacing: f64, levels, aim| {
         let begin = Instant::now();
         let refine = Refine { model: &model, base: grid(&scene, spacing), levels, order, aim, most: 50_000, batch };
-        let refined = refine.fill(&judges[0], &mut backend).unwrap();
+        let refined = refine.fill(&mut judges, &mut backend).unwrap();
         let error = judges[1].relative_error(|q| refined.store.sample(q).torque());
         // In the file: key and mask of a block, numbers, gap and status of a node.
         let bytes = 16 * refined.store.blocks().len() + refined.nodes * (4 * width(refine.base.joints()) + 5);

@@ -2,7 +2,7 @@
 
 use super::{
     Failure, Report, tell,
-    watch::{left_to_cpu, megabytes},
+    watch::{left_to_cpu, lowered, megabytes},
 };
 use crate::{
     contact::{Backend, Model},
@@ -47,25 +47,25 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
     let solving = Instant::now();
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
     let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;
-    let unseen = Judge::new(scene, &model, 2, JUDGED)?;
+    let mut judges = [seen, Judge::new(scene, &model, 2, JUDGED)?];
     let aim = match wanted.aim {
         Aim::Relative(share) => share,
-        Aim::Absolute(torque) => torque / seen.torque(),
+        Aim::Absolute(torque) => torque / judges[0].torque(),
     };
     let (base, batch) = (grid_of(scene), backend.chunk());
     let refine = Refine { model: &model, base, levels: wanted.levels, order, aim, most: wanted.most, batch };
     let each = matches!(backend, ChosenBackend::Cpu(_)).then_some(each);
-    let most_memory = announce(&refine, each);
-    let refined = refine.fill(&seen, &mut backend)?;
+    let most_memory = announce(&refine, &judges[0], each);
+    let refined = refine.fill(&mut judges, &mut backend)?;
     refined.notices.iter().for_each(|notice| tell(format_args!("haptize: {notice}")));
-    let measured = unseen.relative_error(|q| refined.store.sample(q).torque());
+    let measured = judges[1].relative_error(|q| refined.store.sample(q).torque());
     let (kept, file) = (measured <= aim, wanted.output.display());
     let memory = refined.store.bytes();
     let mut json = serde_json::json!({
         "file": file.to_string(), "nodes": refined.nodes, "by_level": refined.by_level,
         "equilibria": refined.equilibria, "solved": refined.solved, "blocks": refined.store.blocks().len(),
         "memory": memory, "most_memory": most_memory, "error": measured, "aim": aim, "uniform": uniform(&refine),
-        "rounds": refined.rounds, "backend": backend.name(), "adapter": backend.adapter(),
+        "rounds": refined.rounds, "lowered": refined.lowered, "backend": backend.name(), "adapter": backend.adapter(),
         "left_to_cpu": backend.left_to_cpu(), "warnings": refined.notices, "kept": kept,
     });
     let mut text = String::new();
@@ -103,7 +103,7 @@ fn uniform(refine: &Refine<'_>) -> usize {
 
 /// Prints what the filling is going to take, before it begins; `each` is the time of a node [s], where it is known.
 /// Returns the memory of the store at most [bytes].
-fn announce(refine: &Refine<'_>, each: Option<f64>) -> usize {
+fn announce(refine: &Refine<'_>, judge: &Judge, each: Option<f64>) -> usize {
     let (percent, uniform) = (100.0 * refine.aim, uniform(refine));
     tell(format_args!(
         "haptize: for an rms error of {percent:.2} %: {} points of the scene's grid, and of up to {uniform} where it \
@@ -114,8 +114,10 @@ fn announce(refine: &Refine<'_>, each: Option<f64>) -> usize {
     let [memory, disk] = Store::most_bytes(refine.base.axes.len(), most);
     let time = each.map_or(String::new(), |each| format!("{:.0} s to solve, ", (each * most as f64).ceil()));
     tell(format_args!(
-        "haptize: that is at most {most} nodes, which would take about {time}{} of memory and {} of disk",
+        "haptize: that is at most {most} nodes, which would take about {time}{} of memory, {} more while they are \
+         solved, and {} of disk",
         megabytes(memory),
+        megabytes(refine.filling_bytes(most, judge)),
         megabytes(disk)
     ));
     memory
@@ -144,5 +146,6 @@ fn describe(
          solved, {equilibria} equilibria, {rounds} rounds, on {name} ({adapter})",
         uniform as f64 / (*nodes).max(1) as f64
     )?;
-    left_to_cpu(text, backend.left_to_cpu())
+    left_to_cpu(text, backend.left_to_cpu())?;
+    lowered(text, refined.lowered)
 }

@@ -15,7 +15,8 @@
 //! So the result depends on the results from rest alone: not on threads, chunks, or an interruption. Starts are the
 //! stored forces, in f32, in memory as in a part. The correction runs on the CPU, whatever backend solved from rest.
 //!
-//! Points and their neighbours are those of any [`Lattice`], such as a uniform grid.
+//! Points and their neighbours are those of any [`Lattice`]: a uniform grid here, the nodes of a store in
+//! `refine/nodebook.rs`.
 //!
 //! Memory: the new results, and one stretch of points at a time.
 
@@ -67,7 +68,7 @@ pub struct Lowered {
     pub converged: usize,
     /// Greatest decrease of U at a point that had converged, over U [1].
     pub greatest: f64,
-    /// Rounds, the last of which changed nothing.
+    /// Rounds, the last of which changed nothing; of a store the sum over all batches of new nodes.
     pub rounds: usize,
     /// Searches from a neighbour's forces.
     pub searches: usize,
@@ -229,8 +230,8 @@ fn starts<L: Lattice>(lattice: &L, point: L::Point, may_start: impl Fn(L::Point)
     starts
 }
 
-/// Returns the energy here beyond what the equilibrium there predicts and the tolerance allows; above zero a search from
-/// there is worth while. `spacing` is that of the lattice along each axis [J].
+/// Returns the energy here beyond what the equilibrium there predicts and the tolerance allows [J]; above zero a search
+/// from there is worth while. `spacing` is that of the lattice along each axis [rad or m].
 pub(super) fn excess(
     (q, here): (&JointVector, &PointResult),
     (from, there): (&JointVector, &PointResult),

@@ -105,9 +105,14 @@ impl Scale {
 /// Solves the node at `q`.
 pub(super) fn solve(solver: &mut Solver<'_>, q: &JointVector, scale: &Scale) -> Solved {
     let here = solver.solve(q);
-    let begun = begin(solver, q, &here, scale);
+    holding(solver, q, &here, scale)
+}
+
+/// Returns the node at `q` that holds the equilibrium `here`.
+pub(super) fn holding(solver: &mut Solver<'_>, q: &JointVector, here: &Equilibrium, scale: &Scale) -> Solved {
+    let begun = begin(solver, q, here, scale);
     let behind = begun.behind.map(|at| solver.solve(&at));
-    begun.conclude(q, &here, behind.as_ref(), scale)
+    begun.conclude(q, here, behind.as_ref(), scale)
 }
 
 /// Solves the nodes at `configurations` together, as [`solve`] does one: contact by `backend`, the searches for the

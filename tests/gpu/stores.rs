@@ -26,11 +26,11 @@ const RECORD_ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 
 /// Fills both levels of a store, whole, and prints how fast.
 fn fill<B: Backend>(name: &str, scene: &Scene, model: &Model<'_>, batch: usize, backend: &mut B) -> Refined {
-    let judges = [1, 2].map(|seed| Judge::new(scene, model, seed, 50).unwrap());
+    let mut judges = [1, 2].map(|seed| Judge::new(scene, model, seed, 50).unwrap());
     let (base, order) = (grid_of(scene), Order::Potential);
     let refine = Refine { model, base, levels: 2, order, aim: f64::MIN_POSITIVE, most: 10_000, batch };
     let start = Instant::now();
-    let refined = refine.fill(&judges[0], backend).unwrap();
+    let refined = refine.fill(&mut judges, backend).unwrap();
     println!(
         "{name}: {} nodes solved, {:.0} a second",
         refined.solved,

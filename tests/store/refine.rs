@@ -89,9 +89,9 @@ impl World {
         backend: &mut B,
     ) -> Filled {
         let model = self.model();
-        let judges = [1, 2].map(|seed| Judge::new(&self.scene, &model, seed, 100).unwrap());
+        let mut judges = [1, 2].map(|seed| Judge::new(&self.scene, &model, seed, 100).unwrap());
         let refine = Refine { model: &model, base: self.base(cells), levels, order, aim, most: 20_000, batch };
-        let refined = refine.fill(&judges[0], backend).unwrap();
+        let refined = refine.fill(&mut judges, backend).unwrap();
         let unseen = judges[1].relative_error(|q| refined.store.sample(q).torque());
         Filled { refined, unseen }
     }
@@ -203,10 +203,10 @@ fn a_store_whose_device_is_lost_is_filled_by_the_cpu_and_says_so() {
     blocks.for_each(|((key, block), (other_key, other))| assert_eq!((key, block.nodes()), (other_key, other.nodes())));
     let error = {
         let mut device = Breaking(CpuBackend::new(&model, 2).unwrap(), 35);
-        let judges = [1, 2].map(|seed| Judge::new(&world.scene, &model, seed, 10).unwrap());
+        let mut judges = [1, 2].map(|seed| Judge::new(&world.scene, &model, seed, 10).unwrap());
         let (base, order) = (world.base(4), Order::Potential);
         let refine = Refine { model: &model, base, levels: 1, order, aim: 1.0, most: 1000, batch: 10 };
-        refine.fill(&judges[0], &mut device).err().unwrap()
+        refine.fill(&mut judges, &mut device).err().unwrap()
     };
     assert_eq!(error.to_string(), "the backend failed: device lost");
 }

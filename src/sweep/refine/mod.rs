@@ -18,22 +18,27 @@
 //! is measured again, until it keeps the aim.
 //!
 //! *Backend.* The new nodes of a level are solved together by any [`Backend`]. All else runs on the CPU: searches for
-//! the boundary of contact (`node.rs`), and what is measured.
+//! the boundary of contact (`node.rs`), for lower equilibria (`nodebook.rs`), and what is measured.
 
 mod judge;
 mod nodebook;
 
 pub use judge::Judge;
 
-use super::node::Scale;
+use super::{
+    Lowered,
+    lowest::applies,
+    node::Scale,
+    reference::{REFERENCE_TOLERANCE, tight},
+};
 use crate::{
     JointVector, MAX_JOINTS,
     contact::{Backend, Model, Solvers, Status},
     dataset::Grid,
     scene::{JointKind, LEVER_ARM},
-    store::{Nodes, Order, Place, PublishError, Space, SpaceError, Store},
+    store::{Nodes, Order, Place, PublishError, Space, SpaceError, Store, record::width},
 };
-use nodebook::{HeldNodes, Nodebook};
+use nodebook::{HeldNodes, Nodebook, held_bytes};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Standard deviations by which the measured squared error is to be below the aim's [1]. Larger: more nodes. Smaller:
@@ -74,7 +79,7 @@ pub struct Refined {
     pub nodes: usize,
     /// Nodes of each level.
     pub by_level: Vec<usize>,
-    /// Equilibria solved in contact, all rounds.
+    /// Equilibria solved in contact, all rounds, searches for lower ones aside.
     pub equilibria: usize,
     /// Nodes solved, all rounds; some may be left out of the store.
     pub solved: usize,
@@ -82,6 +87,8 @@ pub struct Refined {
     pub measured: f64,
     /// Rounds.
     pub rounds: usize,
+    /// Result of the search for lower equilibria, of all nodes solved; absent if there was none.
+    pub lowered: Option<Lowered>,
     /// Notices of the backend; nodes are counted from zero in the order in which they were solved.
     pub notices: Vec<String>,
 }
@@ -101,31 +108,49 @@ pub enum RefineError {
 }
 
 impl Refine<'_> {
-    /// Fills a store, whose nodes `backend` solves, until its error at the configurations of `judge` is at most the aim,
-    /// or nothing more can be done.
+    /// Fills a store, whose nodes `backend` solves, until its error at the configurations of the first of `judges` is
+    /// at most the aim, or nothing more can be done. Equilibria of both judges are replaced by lower ones that are
+    /// reached from the nodes.
     ///
     /// # Errors
     /// [`RefineError`].
-    pub fn fill<B: Backend>(&self, judge: &Judge, backend: &mut B) -> Result<Refined, RefineError> {
-        let mut filling = self.begin(backend)?;
-        let aim = (self.aim * judge.torque()).powi(2);
+    pub fn fill<B: Backend>(&self, judges: &mut [Judge; 2], backend: &mut B) -> Result<Refined, RefineError> {
+        let [seen, unseen] = judges;
+        let exact = self.model.with_contact(tight(self.model.contact, REFERENCE_TOLERANCE));
+        let solvers = Solvers::new(&exact, rayon::current_num_threads());
+        let lowest = applies(self.model.contact.algorithm);
+        let mut filling = self.begin(backend, lowest)?;
         let mut rounds = 0;
         loop {
             rounds += 1;
+            if lowest {
+                seen.lower(&solvers, &filling.book.nodes);
+            }
             let store = filling.store(self.order)?;
-            let (mean, deviation) = judge.0.mean_square(|q| store.sample(q).torque());
+            let (mean, deviation) = seen.0.mean_square(|q| store.sample(q).torque());
+            let aim = (self.aim * seen.torque()).powi(2);
             let refinable = filling.leaves.iter().any(|leaf| leaf.level + 1 < self.levels);
             // A store that errs by nothing has no deviation either.
             let reserve = 1.0 + CONFIDENCE * deviation / mean.max(f64::MIN_POSITIVE);
             if mean * reserve <= aim || !refinable || filling.book.nodes.count() >= self.most {
-                return Ok(filling.report(store, mean.sqrt() / judge.torque(), rounds));
+                if lowest {
+                    unseen.lower(&solvers, &filling.book.nodes);
+                }
+                return Ok(filling.report(store, mean.sqrt() / seen.torque(), rounds));
             }
             filling.refine(&store, aim / (mean * reserve))?;
         }
     }
 
+    /// Memory that `nodes` nodes take beside their store while it is filled, if contact has forces on so many of the
+    /// object's nodes as those of `judge` have [bytes].
+    #[must_use]
+    pub fn filling_bytes(&self, nodes: usize, judge: &Judge) -> usize {
+        (nodes as f64 * held_bytes(width(self.base.joints()), judge.mean_forces())).ceil() as usize
+    }
+
     /// The base alone.
-    fn begin<'a, B: Backend>(&'a self, backend: &'a mut B) -> Result<Filling<'a, B>, RefineError> {
+    fn begin<'a, B: Backend>(&'a self, backend: &'a mut B, lowest: bool) -> Result<Filling<'a, B>, RefineError> {
         let space = Space::new(&self.base, self.levels)?;
         let mut levers = JointVector::zeros(space.joints());
         levers.iter_mut().zip(&self.model.chain.joints).for_each(|(lever, joint)| {
@@ -133,7 +158,7 @@ impl Refine<'_> {
         });
         let scale = Scale::new(self.model, &space);
         let solvers = Solvers::new(self.model, rayon::current_num_threads());
-        let mut book = Nodebook::new((space.clone(), scale), (backend, self.batch), solvers);
+        let mut book = Nodebook::new((space.clone(), scale), (backend, self.batch), solvers, lowest);
         let base = lattice(&space, |last| last);
         book.solve(0, base.iter().copied())?;
         let mut nodes = vec![BTreeSet::new(); self.levels as usize];
@@ -182,6 +207,7 @@ impl<B: Backend> Filling<'_, B> {
             store,
             measured,
             rounds,
+            lowered: self.book.lowered(),
             notices: self.book.notices.clone(),
         }
     }
@@ -191,7 +217,7 @@ impl<B: Backend> Filling<'_, B> {
         let corners = 1_usize << self.book.nodes.space.joints();
         let solved = (0..corners).filter_map(|set| self.book.nodes.get(0, &corner(low, set)));
         let squares = solved.map(|held| {
-            let parts = held.result.torque.iter().zip(self.levers.iter());
+            let parts = held.node.result.torque.iter().zip(self.levers.iter());
             parts.map(|(tau, lever)| (lever * tau).powi(2)).sum::<f64>()
         });
         (squares.sum::<f64>() / corners as f64).sqrt()
@@ -202,11 +228,11 @@ impl<B: Backend> Filling<'_, B> {
     fn square(&self, store: &Store, level: u32, node: &Place) -> f64 {
         let nodes = &self.book.nodes;
         let Some(held) = nodes.get(level, node) else { return 0.0 };
-        if !matches!(held.result.status, Status::Free | Status::Contact) {
+        if !matches!(held.node.result.status, Status::Free | Status::Contact) {
             return 0.0;
         }
         let torque = store.sample(&nodes.space.configuration(level, node)).torque();
-        let parts = torque.iter().zip(held.result.torque.iter()).zip(self.levers.iter());
+        let parts = torque.iter().zip(held.node.result.torque.iter()).zip(self.levers.iter());
         parts.map(|((a, b), lever)| (lever * (a - b)).powi(2)).sum()
     }
 
@@ -354,7 +380,7 @@ fn publish(store: &mut Store, held: &HeldNodes, level: u32, nodes: &BTreeSet<Pla
     for ((at, block), published) in &mut blocks {
         for (place, node) in space.nodes(*at, block).filter(|(_, node)| *at == level && nodes.contains(node)) {
             if let Some(held) = held.get(level, &node) {
-                published.push(place, &held.record, held.result.gap, held.result.status);
+                published.push(place, &held.node.record, held.node.result.gap, held.node.result.status);
             }
         }
     }
