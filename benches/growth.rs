@@ -27,6 +27,7 @@ use haptize::{
     scene::{ProxyNodeSpec, Scene},
     store::{Order, Space, Store, record::width},
     sweep::{
+        CpuBackend,
         ahead::{Ahead, Whereabouts},
         build_object, grid_of,
         refine::{Judge, Refine},
@@ -124,9 +125,9 @@ fn cost(store: &Store, base: &Grid, (spent, solved): (f64, u64), error: f64, way
 }
 
 /// Fills a store and takes its costs.
-fn fill(refine: &Refine<'_>, judges: &[Judge; 2]) -> Cost {
+fn fill(refine: &Refine<'_>, judges: &mut [Judge; 2], backend: &mut CpuBackend<'_>) -> Cost {
     let begin = processor_time();
-    let refined = refine.fill(&judges[0]).unwrap();
+    let refined = refine.fill(judges, backend).unwrap();
     let spent = (processor_time() - begin, refined.solved as u64);
     let axes = &refine.base.axes;
     let way = |k: f64| {
@@ -168,8 +169,10 @@ fn costs(scene: &Scene, joints: usize, most: usize) -> [Vec<Cost>; 3] {
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();
     model.with_tangent = true;
-    let judges = [1, 2].map(|seed| Judge::new(&scene, &model, seed, JUDGED).unwrap());
-    let refine = |base, levels, aim| Refine { model: &model, base, levels, order: Order::Potential, aim, most };
+    let mut judges = [1, 2].map(|seed| Judge::new(&scene, &model, seed, JUDGED).unwrap());
+    let mut backend = CpuBackend::new(&model, 0).unwrap();
+    let batch = backend.chunk();
+    let refine = |base, levels, aim| Refine { model: &model, base, levels, order: Order::Potential, aim, most, batch };
     let base = grid_of(&scene);
     let tell = |kind: &str, cost: &Cost| {
         let Cost { uniform, nodes, bytes, error, look_up, node } = cost;
@@ -184,12 +187,12 @@ fn costs(scene: &Scene, joints: usize, most: usize) -> [Vec<Cost>; 3] {
         if grid.points() > most {
             break;
         }
-        uniform.push(fill(&refine(grid, 1, f64::INFINITY), &judges));
+        uniform.push(fill(&refine(grid, 1, f64::INFINITY), &mut judges, &mut backend));
         tell("uniform", &uniform[uniform.len() - 1]);
     }
     let mut stores: Vec<Cost> = Vec::new();
     for aim in AIMS {
-        let cost = fill(&refine(base.clone(), LEVELS[joints - 1], aim), &judges);
+        let cost = fill(&refine(base.clone(), LEVELS[joints - 1], aim), &mut judges, &mut backend);
         let is_full = cost.nodes >= 0.3 * most as f64;
         // An aim that the store before keeps asks for nothing.
         if stores.last().is_none_or(|before| before.nodes < cost.nodes) {

@@ -32,7 +32,7 @@ use haptize::{
         record::{slope, width},
     },
     sweep::{
-        BackendChoice, Bake, build_object,
+        BackendChoice, Bake, CpuBackend, build_object,
         refine::{Judge, Refine},
         sample,
     },
@@ -228,20 +228,22 @@ fn main() {
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();
     model.with_tangent = true;
-    let [seen, unseen] = [11, 12].map(|seed| Judge::new(&scene, &model, seed, 1000).unwrap());
+    let mut judges = [11, 12].map(|seed| Judge::new(&scene, &model, seed, 1000).unwrap());
+    let mut backend = CpuBackend::new(&model, 0).unwrap();
+    let batch = backend.chunk();
     println!("\norder      base   levels  nodes  by level  bytes  solved  equilibria  seen  unseen  rounds  seconds");
     let dense = |interpolation, spacings: &[f64]| -> Vec<Spent> {
-        spacings.iter().map(|spacing| dense_grid(&scene, *spacing, interpolation, &unseen)).collect()
+        spacings.iter().map(|spacing| dense_grid(&scene, *spacing, interpolation, &judges[1])).collect()
     };
     let mut rows = vec![
         ("dense linear", dense(Interpolation::Linear, &[4.0, 2.0, 1.0, 0.5, 0.4])),
         ("dense potential", dense(Interpolation::Potential, &[4.0, 2.0, 1.4, 1.0, 0.7])),
     ];
-    let fill = |order, spacing: f64, levels, aim| {
+    let mut fill = |order, spacing: f64, levels, aim| {
         let begin = Instant::now();
-        let refine = Refine { model: &model, base: grid(&scene, spacing), levels, order, aim, most: 50_000 };
-        let refined = refine.fill(&seen).unwrap();
-        let error = unseen.relative_error(|q| refined.store.sample(q).torque());
+        let refine = Refine { model: &model, base: grid(&scene, spacing), levels, order, aim, most: 50_000, batch };
+        let refined = refine.fill(&mut judges, &mut backend).unwrap();
+        let error = judges[1].relative_error(|q| refined.store.sample(q).torque());
         // In the file: key and mask of a block, numbers, gap and status of a node.
         let bytes = 16 * refined.store.blocks().len() + refined.nodes * (4 * width(refine.base.joints()) + 5);
         println!(

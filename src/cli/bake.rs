@@ -86,11 +86,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     output::check(&Sweep::growing_of(&output), Kind::Dataset, [])?;
     let scene = reach::complete(scene, arguments.backend, arguments.max_error.is_some())?;
     if let (Some(aim), Some(levels)) = (arguments.max_error, arguments.refine) {
-        if arguments.backend == BackendChoice::Gpu {
-            return Err("the GPU refines no grid: leave --backend gpu or --refine out".into());
-        }
         let wanted = refine::RefinementGoal { aim, levels, most: arguments.max_points, output: &output };
-        let mut report = refine::run(&scene, &wanted)?;
+        let mut report = refine::run(&scene, &wanted, arguments.backend)?;
         earlier.tell(&mut report.text, &mut report.json);
         return Ok(report);
     }

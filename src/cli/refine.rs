@@ -1,15 +1,18 @@
 //! `haptize bake --max-error ERROR --refine LEVELS`: the scene's grid, refined where the interpolation errs.
 
-use super::{Failure, Report, tell, watch::megabytes};
+use super::{
+    Failure, Report, tell,
+    watch::{left_to_cpu, lowered, megabytes},
+};
 use crate::{
-    contact::Model,
+    contact::{Backend, Model},
     dataset::{Dataset, Provenance, Surface},
     proxy::Chain,
     scene::Scene,
     store::{Order, Store},
     sweep::{
-        Aim, CpuBackend, build_object, check_algorithm, grid_of, order_of,
-        refine::{Judge, Refine},
+        Aim, BackendChoice, ChosenBackend, CpuBackend, build_object, check_algorithm, grid_of, order_of,
+        refine::{Judge, Refine, Refined},
         sample,
     },
 };
@@ -32,7 +35,7 @@ pub struct RefinementGoal<'a> {
 }
 
 /// Refines, measures and writes. Exit code 1 where the error that is measured is larger than asked for.
-pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure> {
+pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -> Result<Report, Failure> {
     let began = Instant::now();
     check_algorithm(scene)?;
     let object = build_object(scene)?;
@@ -40,72 +43,109 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>) -> Result<Report, Failure
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
     let order = order_of(scene);
     model.with_tangent = order == Order::Potential;
+    let mut backend = ChosenBackend::open(backend, &model)?;
     let solving = Instant::now();
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
     let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;
-    let unseen = Judge::new(scene, &model, 2, JUDGED)?;
+    let mut judges = [seen, Judge::new(scene, &model, 2, JUDGED)?];
     let aim = match wanted.aim {
         Aim::Relative(share) => share,
-        Aim::Absolute(torque) => torque / seen.torque(),
+        Aim::Absolute(torque) => torque / judges[0].torque(),
     };
-    let base = grid_of(scene);
-    let uniform: usize = base.axes.iter().map(|axis| ((axis.count - 1) << (wanted.levels - 1)) + 1).product();
-    let percent = 100.0 * aim;
-    tell(format_args!(
-        "haptize: for an rms error of {percent:.2} %: {} points of the scene's grid, and of up to {uniform} where it \
-         errs",
-        base.points()
-    ));
-    let most = uniform.min(wanted.most);
-    let [memory, disk] = Store::most_bytes(base.axes.len(), most);
-    tell(format_args!(
-        "haptize: that is at most {most} nodes, which would take about {:.0} s to solve, {} of memory and {} of disk",
-        (each * most as f64).ceil(),
-        megabytes(memory),
-        megabytes(disk)
-    ));
-    let refine = Refine { model: &model, base: base.clone(), levels: wanted.levels, order, aim, most: wanted.most };
-    let refined = refine.fill(&seen)?;
-    let measured = unseen.relative_error(|q| refined.store.sample(q).torque());
-    let (bytes, blocks) = (refined.store.bytes(), refined.store.blocks().len());
+    let (base, batch) = (grid_of(scene), backend.chunk());
+    let refine = Refine { model: &model, base, levels: wanted.levels, order, aim, most: wanted.most, batch };
+    let each = matches!(backend, ChosenBackend::Cpu(_)).then_some(each);
+    let most_memory = announce(&refine, &judges[0], each);
+    let refined = refine.fill(&mut judges, &mut backend)?;
+    refined.notices.iter().for_each(|notice| tell(format_args!("haptize: {notice}")));
+    let measured = judges[1].relative_error(|q| refined.store.sample(q).torque());
+    let (kept, file) = (measured <= aim, wanted.output.display());
+    let memory = refined.store.bytes();
+    let mut json = serde_json::json!({
+        "file": file.to_string(), "nodes": refined.nodes, "by_level": refined.by_level,
+        "equilibria": refined.equilibria, "solved": refined.solved, "blocks": refined.store.blocks().len(),
+        "memory": memory, "most_memory": most_memory, "error": measured, "aim": aim, "uniform": uniform(&refine),
+        "rounds": refined.rounds, "lowered": refined.lowered, "backend": backend.name(), "adapter": backend.adapter(),
+        "left_to_cpu": backend.left_to_cpu(), "warnings": refined.notices, "kept": kept,
+    });
+    let mut text = String::new();
+    describe(&mut text, &refine, &refined, measured, &backend)?;
     let notice = format!(
-        "refined for an rms error of {percent:.2} %: {:.2} % at {JUDGED} configurations in contact that were not used",
+        "refined for an rms error of {:.2} %: {:.2} % at {JUDGED} configurations in contact that were not used",
+        100.0 * aim,
         100.0 * measured
     );
-    let provenance = Provenance { notices: vec![notice], ..CpuBackend::provenance(scene) };
-    let (nodes, solved, by_level, rounds) = (refined.nodes, refined.solved, refined.by_level.clone(), refined.rounds);
-    let equilibria = refined.equilibria;
+    let notices = [vec![notice], refined.notices].concat();
+    let (backend, adapter) = (backend.name().to_owned(), backend.adapter());
+    let provenance = Provenance { notices, backend, adapter, ..CpuBackend::provenance(scene) };
     let surface = Some(Surface::of(&object));
-    let dataset = Dataset::refined(Arc::new(refined.store), base, surface, scene.text.clone(), provenance);
+    let dataset = Dataset::refined(Arc::new(refined.store), refine.base, surface, scene.text.clone(), provenance);
     dataset.save(wanted.output)?;
-    let (seconds, file) = (began.elapsed().as_secs_f64(), std::fs::metadata(wanted.output)?.len() as usize);
-    let kept = measured <= aim;
-    let mut text = String::new();
-    writeln!(text, "{}: {nodes} nodes, {by_level:?} by level, {seconds:.1} s", wanted.output.display())?;
-    writeln!(
-        text,
-        "  error        {:.2} % rms at configurations not used, {percent:.2} % asked for",
-        100.0 * measured
-    )?;
-    writeln!(
-        text,
-        "  nodes        {:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {solved} \
-         solved, {equilibria} equilibria, {rounds} rounds",
-        uniform as f64 / nodes.max(1) as f64
-    )?;
-    writeln!(text, "  bytes        {} on the disk, {} in memory", megabytes(file), megabytes(bytes))?;
+    let (seconds, bytes) = (began.elapsed().as_secs_f64(), std::fs::metadata(wanted.output)?.len() as usize);
+    json["bytes"] = bytes.into();
+    json["seconds"] = seconds.into();
+    let (nodes, by_level) = (refined.nodes, refined.by_level);
+    text.insert_str(0, &format!("{file}: {nodes} nodes, {by_level:?} by level, {seconds:.1} s\n"));
+    writeln!(text, "  bytes        {} on the disk, {} in memory", megabytes(bytes), megabytes(memory))?;
     if !kept {
         writeln!(
             text,
             "  the aim was missed: the dataset is whole, and errs by more; give more levels or more points"
         )?;
     }
-    let json = serde_json::json!({
-        "file": wanted.output.display().to_string(), "nodes": nodes, "by_level": by_level,
-        "equilibria": equilibria, "solved": solved, "blocks": blocks, "bytes": file, "memory": bytes,
-        "most_memory": memory, "error": measured, "aim": aim, "uniform": uniform, "rounds": rounds,
-        "seconds": seconds,
-        "kept": kept,
-    });
     Ok(Report { text, json, whole: kept })
+}
+
+/// Points of a uniform grid of the finest spacing.
+fn uniform(refine: &Refine<'_>) -> usize {
+    refine.base.axes.iter().map(|axis| ((axis.count - 1) << (refine.levels - 1)) + 1).product()
+}
+
+/// Prints what the filling is going to take, before it begins; `each` is the time of a node [s], where it is known.
+/// Returns the memory of the store at most [bytes].
+fn announce(refine: &Refine<'_>, judge: &Judge, each: Option<f64>) -> usize {
+    let (percent, uniform) = (100.0 * refine.aim, uniform(refine));
+    tell(format_args!(
+        "haptize: for an rms error of {percent:.2} %: {} points of the scene's grid, and of up to {uniform} where it \
+         errs",
+        refine.base.points()
+    ));
+    let most = uniform.min(refine.most);
+    let [memory, disk] = Store::most_bytes(refine.base.axes.len(), most);
+    let time = each.map_or(String::new(), |each| format!("{:.0} s to solve, ", (each * most as f64).ceil()));
+    tell(format_args!(
+        "haptize: that is at most {most} nodes, which would take about {time}{} of memory, {} more while they are \
+         solved, and {} of disk",
+        megabytes(memory),
+        megabytes(refine.filling_bytes(most, judge)),
+        megabytes(disk)
+    ));
+    memory
+}
+
+/// Describes what was filled, for people; `measured`: the rms error over the rms torque.
+fn describe(
+    text: &mut String,
+    refine: &Refine<'_>,
+    refined: &Refined,
+    measured: f64,
+    backend: &ChosenBackend<'_>,
+) -> std::fmt::Result {
+    let uniform = uniform(refine);
+    let Refined { nodes, solved, equilibria, rounds, .. } = refined;
+    let (name, adapter) = (backend.name(), backend.adapter());
+    writeln!(
+        text,
+        "  error        {:.2} % rms at configurations not used, {:.2} % asked for",
+        100.0 * measured,
+        100.0 * refine.aim
+    )?;
+    writeln!(
+        text,
+        "  nodes        {:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {solved} \
+         solved, {equilibria} equilibria, {rounds} rounds, on {name} ({adapter})",
+        uniform as f64 / (*nodes).max(1) as f64
+    )?;
+    left_to_cpu(text, backend.left_to_cpu())?;
+    lowered(text, refined.lowered)
 }

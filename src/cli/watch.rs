@@ -59,9 +59,7 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Optio
         });
         writeln!(text, "  forecast     {time}{} of disk (predicted {})", megabytes(size), megabytes(forecast.disk))?;
     }
-    if *left_to_cpu > 0 {
-        writeln!(text, "  by the CPU   {left_to_cpu} of them, which the GPU did not decide")?;
-    }
+    self::left_to_cpu(text, *left_to_cpu)?;
     writeln!(
         text,
         "  residual     at most {:.1e} where converged; iterations {mean:.1} on average, {max} at most",
@@ -73,6 +71,14 @@ pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Optio
     info::mesh_ripple(text, report.mesh_ripple)?;
     lowered(text, report.lowered)?;
     info::error(text, report.error.as_ref(), aim)
+}
+
+/// Describes how many configurations a GPU left to the CPU.
+pub fn left_to_cpu(text: &mut String, count: usize) -> fmt::Result {
+    if count == 0 {
+        return Ok(());
+    }
+    writeln!(text, "  by the CPU   {count} of them, which the GPU did not decide")
 }
 
 /// Describes what the search for lower equilibria did.

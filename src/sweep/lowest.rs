@@ -15,6 +15,9 @@
 //! So the result depends on the results from rest alone: not on threads, chunks, or an interruption. Starts are the
 //! stored forces, in f32, in memory as in a part. The correction runs on the CPU, whatever backend solved from rest.
 //!
+//! Points and their neighbours are those of any [`Lattice`]: a uniform grid here, the nodes of a store in
+//! `refine/nodebook.rs`.
+//!
 //! Memory: the new results, and one stretch of points at a time.
 
 use super::{
@@ -30,7 +33,7 @@ use crate::{
 use rayon::prelude::*;
 use serde::Serialize;
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     sync::atomic::{AtomicBool, Ordering},
     time::Instant,
 };
@@ -65,7 +68,7 @@ pub struct Lowered {
     pub converged: usize,
     /// Greatest decrease of U at a point that had converged, over U [1].
     pub greatest: f64,
-    /// Rounds, the last of which changed nothing.
+    /// Rounds, the last of which changed nothing; of a store the sum over all batches of new nodes.
     pub rounds: usize,
     /// Searches from a neighbour's forces.
     pub searches: usize,
@@ -73,10 +76,40 @@ pub struct Lowered {
     pub seconds: f64,
 }
 
-/// Where results are compared.
-pub(super) struct Neighbourhood<'a> {
+/// Points with results, and which of them lie beside one another.
+pub(super) trait Lattice: Sync {
+    /// Names a point. Starts are taken in ascending order.
+    type Point: Copy + Ord + Send + Sync;
+    /// What is kept of a new result.
+    type Row: Send;
+
+    /// Returns the configuration of a point [rad or m].
+    fn configuration(&self, point: Self::Point) -> JointVector;
+
+    /// Returns the neighbours of a point that have results, each with the lattice's spacing there [rad or m].
+    fn neighbours(&self, point: Self::Point) -> impl Iterator<Item = (Self::Point, JointVector)>;
+
+    /// Returns the status of a point.
+    fn status(&self, point: Self::Point) -> Status;
+
+    /// Returns the result of a point.
+    fn result(&self, point: Self::Point) -> PointResult;
+
+    /// Returns the forces on the object's nodes at a point, ascending by node [N].
+    fn forces(&self, point: Self::Point) -> Vec<NodeForce>;
+
+    /// Returns what is kept of a new result, found at `q` by `solver`.
+    fn row(&self, solver: &mut Solver<'_>, q: &JointVector, found: &Equilibrium) -> Self::Row;
+
+    /// Replaces results.
+    fn replace(&mut self, found: BTreeMap<Self::Point, Self::Row>);
+}
+
+/// A uniform grid, whose results are in a table.
+struct UniformGrid<'a, 't> {
     grid: &'a Grid,
-    table: &'a Table<'a>,
+    table: &'a mut Table<'t>,
+    shape: Shape,
 }
 
 /// Whether `scene`s of this algorithm have several equilibria of which the lowest counts: the paper's steps define its
@@ -95,66 +128,125 @@ pub(super) fn correct(
 ) -> Option<Lowered> {
     let (start, points) = (Instant::now(), grid.points());
     let solvers = Solvers::new(model, rayon::current_num_threads());
+    let all = (0..points).step_by(STRETCH).map(|first| (first..points.min(first + STRETCH)).collect());
     let mut lowered = Lowered::default();
-    // Points that changed in the round before; all of them before the first round.
-    let mut changed: Option<BTreeSet<usize>> = None;
-    loop {
-        lowered.rounds += 1;
-        let around = Neighbourhood { grid, table };
-        let targets: Box<dyn Iterator<Item = Vec<usize>>> = match &changed {
-            None => Box::new((0..points).step_by(STRETCH).map(|first| (first..points.min(first + STRETCH)).collect())),
-            Some(changed) => {
-                let beside: BTreeSet<usize> = changed.iter().flat_map(|&point| neighbours(grid, point)).collect();
-                let beside: Vec<usize> = beside.into_iter().collect();
-                let stretches: Vec<Vec<usize>> = beside.chunks(STRETCH).map(<[usize]>::to_vec).collect();
-                Box::new(stretches.into_iter())
-            }
-        };
-        let mut found = Replaced::new();
-        for stretch in targets {
-            if stop.load(Ordering::Relaxed) {
-                return None;
-            }
-            let has_changed = |n: usize| changed.as_ref().is_none_or(|changed| changed.contains(&n));
-            let searches: Vec<(usize, Vec<usize>)> = stretch
-                .into_par_iter()
-                .map(|point| (point, around.starts(point, has_changed)))
-                .filter(|(_, starts)| !starts.is_empty())
-                .collect();
-            lowered.searches += searches.iter().map(|(_, starts)| starts.len()).sum::<usize>();
-            let results = solvers.map(&searches, |solver, (point, starts)| {
-                if stop.load(Ordering::Relaxed) {
-                    return None;
-                }
-                let before = around.table.result(*point);
-                let starts = starts.iter().map(|&n| around.table.forces(n));
-                let lowest = lower(solver, &grid.configuration(*point), Some(&before), starts)?;
-                let mut row = Columns::default();
-                row.push(&lowest, shape);
-                Some((*point, row))
-            });
-            found.extend(results.into_iter().flatten());
-        }
-        if stop.load(Ordering::Relaxed) {
-            return None;
-        }
-        if found.is_empty() {
-            break;
-        }
-        changed = Some(found.keys().copied().collect());
-        table.replaced.extend(found);
-    }
-    lowered.points = table.replaced.len();
+    settle(&mut UniformGrid { grid, table, shape }, &solvers, all, |_| true, stop, &mut lowered)?;
     for (&point, row) in &table.replaced {
         let before = table.before(point);
-        if before.status == Status::Contact {
-            lowered.greatest = lowered.greatest.max((before.energy - row.energy[0]) / before.energy);
-        } else {
-            lowered.converged += 1;
-        }
+        lowered.count((before.status, before.energy), row.energy[0]);
     }
     lowered.seconds = start.elapsed().as_secs_f64();
     Some(lowered)
+}
+
+impl Lowered {
+    /// Counts a point whose result from rest, status and energy [J], gave way to one of lower `energy` [J].
+    pub(super) fn count(&mut self, (status, before): (Status, f64), energy: f64) {
+        self.points += 1;
+        if status == Status::Contact {
+            self.greatest = self.greatest.max((before - energy) / before);
+        } else {
+            self.converged += 1;
+        }
+    }
+}
+
+/// Replaces results of `lattice` by lower ones, round by round, until nothing changes, and counts rounds and searches.
+/// The first round looks at the points of `first`, for neighbours of which or beside which one `is_new`. `None` when it
+/// was stopped; no result of an unfinished round is kept.
+pub(super) fn settle<L: Lattice>(
+    lattice: &mut L,
+    solvers: &Solvers<'_>,
+    first: impl Iterator<Item = Vec<L::Point>>,
+    is_new: impl Fn(L::Point) -> bool + Sync,
+    stop: &AtomicBool,
+    lowered: &mut Lowered,
+) -> Option<()> {
+    let mut found =
+        round(lattice, solvers, first, |point, start| is_new(point) || is_new(start), stop, &mut lowered.searches)?;
+    lowered.rounds += 1;
+    while !found.is_empty() {
+        let changed: BTreeSet<L::Point> = found.keys().copied().collect();
+        lattice.replace(found);
+        let beside: BTreeSet<L::Point> =
+            changed.iter().flat_map(|&point| lattice.neighbours(point)).map(|(beside, _)| beside).collect();
+        let beside: Vec<L::Point> = beside.into_iter().collect();
+        let stretches = beside.chunks(STRETCH).map(<[L::Point]>::to_vec);
+        let has_changed = |_, start| changed.contains(&start);
+        found = round(lattice, solvers, stretches, has_changed, stop, &mut lowered.searches)?;
+        lowered.rounds += 1;
+    }
+    Some(())
+}
+
+/// Returns the results of one round at `points`: lower ones, from neighbours that may start a search there.
+fn round<L: Lattice>(
+    lattice: &L,
+    solvers: &Solvers<'_>,
+    points: impl Iterator<Item = Vec<L::Point>>,
+    may_start: impl Fn(L::Point, L::Point) -> bool + Sync,
+    stop: &AtomicBool,
+    count: &mut usize,
+) -> Option<BTreeMap<L::Point, L::Row>> {
+    let mut found = BTreeMap::new();
+    for stretch in points {
+        let searches: Vec<(L::Point, Vec<L::Point>)> = stretch
+            .into_par_iter()
+            .map(|point| (point, starts(lattice, point, |start| may_start(point, start))))
+            .filter(|(_, starts)| !starts.is_empty())
+            .collect();
+        *count += searches.iter().map(|(_, starts)| starts.len()).sum::<usize>();
+        let results = solvers.map(&searches, |solver, (point, starts)| {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            let (q, before) = (lattice.configuration(*point), lattice.result(*point));
+            let lowest = lower(solver, &q, Some(&before), starts.iter().map(|&start| lattice.forces(start)))?;
+            Some((*point, lattice.row(solver, &q, &lowest)))
+        });
+        found.extend(results.into_iter().flatten());
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+    }
+    Some(found)
+}
+
+/// Returns the neighbours of `point` whose equilibria it may be lower in, ascending; of those that `may_start`.
+fn starts<L: Lattice>(lattice: &L, point: L::Point, may_start: impl Fn(L::Point) -> bool) -> Vec<L::Point> {
+    if !matches!(lattice.status(point), Status::Contact | Status::Unconverged) {
+        return Vec::new();
+    }
+    let (q, here) = (lattice.configuration(point), lattice.result(point));
+    let mut starts: Vec<L::Point> = lattice
+        .neighbours(point)
+        .filter(|&(n, _)| may_start(n) && lattice.status(n) == Status::Contact)
+        .filter(|(n, spacing)| {
+            excess((&q, &here), (&lattice.configuration(*n), &lattice.result(*n)), spacing.iter().copied()) > 0.0
+        })
+        .map(|(n, _)| n)
+        .collect();
+    starts.sort_unstable();
+    starts
+}
+
+/// Returns the energy here beyond what the equilibrium there predicts and the tolerance allows [J]; above zero a search
+/// from there is worth while. `spacing` is that of the lattice along each axis [rad or m].
+pub(super) fn excess(
+    (q, here): (&JointVector, &PointResult),
+    (from, there): (&JointVector, &PointResult),
+    spacing: impl Iterator<Item = f64>,
+) -> f64 {
+    if here.status != Status::Contact {
+        return f64::INFINITY;
+    }
+    let (mut predicted, mut work) = (there.energy, 0.0_f64);
+    for (a, step) in spacing.enumerate() {
+        let mean = 0.5 * (there.torque[a] + here.torque[a]);
+        predicted -= mean * (q[a] - from[a]);
+        work = work.max(0.5 * (there.torque[a].abs() + here.torque[a].abs()) * step);
+    }
+    here.energy - (predicted + EDGE_TOLERANCE * work)
 }
 
 /// Searches at `q` from each of `starts`, forces on the object's nodes, in order. Returns the lowest equilibrium that
@@ -181,42 +273,40 @@ pub(super) fn lower(
     lowest
 }
 
-impl<'a> Neighbourhood<'a> {
-    /// Results of the points of `grid` in `table`.
-    pub fn new(grid: &'a Grid, table: &'a Table<'a>) -> Self {
-        Self { grid, table }
+impl Lattice for UniformGrid<'_, '_> {
+    type Point = usize;
+    type Row = Columns;
+
+    fn configuration(&self, point: usize) -> JointVector {
+        self.grid.configuration(point)
     }
 
-    /// Neighbours of `point` whose equilibria it may be lower in, ascending; of those that `may_start`.
-    fn starts(&self, point: usize, may_start: impl Fn(usize) -> bool) -> Vec<usize> {
-        let status = self.table.status(point);
-        if !matches!(status, Status::Contact | Status::Unconverged) {
-            return Vec::new();
-        }
-        let here = self.table.result(point);
-        let mut starts: Vec<usize> = neighbours(self.grid, point)
-            .filter(|&n| may_start(n) && self.table.status(n) == Status::Contact)
-            .filter(|&n| {
-                let (q, from) = (self.grid.configuration(point), self.grid.configuration(n));
-                self.is_promising(&q, &here, &from, &self.table.result(n))
-            })
-            .collect();
-        starts.sort_unstable();
-        starts
+    fn neighbours(&self, point: usize) -> impl Iterator<Item = (usize, JointVector)> {
+        let mut spacing = JointVector::zeros(self.grid.joints());
+        spacing.iter_mut().zip(&self.grid.axes).for_each(|(spacing, axis)| *spacing = axis.step);
+        neighbours(self.grid, point).map(move |n| (n, spacing))
     }
 
-    /// Whether the equilibrium `there`, at `from`, predicts a lower energy at `q` than that of `here`.
-    pub fn is_promising(&self, q: &JointVector, here: &PointResult, from: &JointVector, there: &PointResult) -> bool {
-        if here.status != Status::Contact {
-            return true;
-        }
-        let (mut predicted, mut work) = (there.energy, 0.0_f64);
-        for (a, axis) in self.grid.axes.iter().enumerate() {
-            let mean = 0.5 * (there.torque[a] + here.torque[a]);
-            predicted -= mean * (q[a] - from[a]);
-            work = work.max(0.5 * (there.torque[a].abs() + here.torque[a].abs()) * axis.step);
-        }
-        here.energy > predicted + EDGE_TOLERANCE * work
+    fn status(&self, point: usize) -> Status {
+        self.table.status(point)
+    }
+
+    fn result(&self, point: usize) -> PointResult {
+        self.table.result(point)
+    }
+
+    fn forces(&self, point: usize) -> Vec<NodeForce> {
+        self.table.forces(point)
+    }
+
+    fn row(&self, _: &mut Solver<'_>, _: &JointVector, found: &Equilibrium) -> Columns {
+        let mut row = Columns::default();
+        row.push(found, self.shape);
+        row
+    }
+
+    fn replace(&mut self, found: Replaced) {
+        self.table.replaced.extend(found);
     }
 }
 
@@ -282,16 +372,17 @@ mod tests {
         // U grows by 1 a step of 1 with torque -1; point 2 holds 0.5 too much.
         let grid = synthetic::grid(&[(0.0, 1.0, 5)]);
         let five = columns(&[1.0, 2.0, 3.5, 4.0, 5.0]);
-        let table = Table::new(SHAPE.width(), vec![Block::of(&five, 0)]);
-        let around = Neighbourhood::new(&grid, &table);
-        let starts: Vec<_> = (0..5).map(|point| around.starts(point, |_| true)).collect();
-        assert_eq!(starts, [vec![], vec![], vec![1, 3], vec![], vec![]]);
-        assert_eq!(around.starts(2, |n| n == 3), [3]);
+        let mut table = Table::new(SHAPE.width(), vec![Block::of(&five, 0)]);
+        let around = UniformGrid { grid: &grid, table: &mut table, shape: SHAPE };
+        let found: Vec<_> = (0..5).map(|point| starts(&around, point, |_| true)).collect();
+        assert_eq!(found, [vec![], vec![], vec![1, 3], vec![], vec![]]);
+        assert_eq!(starts(&around, 2, |n| n == 3), [3]);
         // Below the tolerance nothing is tried.
         let near = columns(&[1.0, 2.0 + 0.5 * EDGE_TOLERANCE, 3.0]);
-        let table = Table::new(SHAPE.width(), vec![Block::of(&near, 0)]);
+        let mut table = Table::new(SHAPE.width(), vec![Block::of(&near, 0)]);
         let grid = synthetic::grid(&[(0.0, 1.0, 3)]);
-        assert!((0..3).all(|point| Neighbourhood::new(&grid, &table).starts(point, |_| true).is_empty()));
+        let around = UniformGrid { grid: &grid, table: &mut table, shape: SHAPE };
+        assert!((0..3).all(|point| starts(&around, point, |_| true).is_empty()));
     }
 
     /// New results in a table, in columns, and in the count of contacts.

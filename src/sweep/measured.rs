@@ -9,7 +9,7 @@
 //! each configuration, so that memory does not grow with the grid. The boundary layer then knows the surroundings only.
 
 use super::{
-    lowest::{self, Neighbourhood},
+    lowest,
     table::{PointResult, Table},
 };
 use crate::{
@@ -77,7 +77,6 @@ impl ErrorCheck<'_> {
             return Ok(None);
         }
         let places = places(grid, table, contacts, count);
-        let around = Neighbourhood::new(grid, table);
         let solvers = Solvers::new(self.model, rayon::current_num_threads());
         let solved = solvers.map(&places, |solver, place| {
             if stop.load(Ordering::Relaxed) {
@@ -90,7 +89,8 @@ impl ErrorCheck<'_> {
                     let may_start = self.lowest && known.status.is_in_contact();
                     may_start && table.status(corner) == Status::Contact && {
                         let from = grid.configuration(corner);
-                        around.is_promising(&place.q, &known, &from, &table.result(corner))
+                        let spacing = grid.axes.iter().map(|axis| axis.step);
+                        lowest::excess((&place.q, &known), (&from, &table.result(corner)), spacing) > 0.0
                     }
                 })
                 .map(|corner| table.forces(corner));

@@ -16,9 +16,10 @@
 //! than some cells of the base, or not found, w is `-sqrt(kc) g`, that of one contact spring; where it is farther by a
 //! bound of the proxy's motion, without slopes.
 
+use super::table::PointResult;
 use crate::{
     JointVector,
-    contact::{Model, Solver, Status},
+    contact::{Backend, Equilibrium, Model, Solver, Solvers, Status, Work},
     field::{GRADIENT_STEP, LEAST_ENERGY, boundary::LEAST_GAP},
     scene::{Algorithm, Interpolation, Scene},
     store::{
@@ -62,17 +63,12 @@ pub fn order_of(scene: &Scene) -> Order {
 }
 
 /// A solved node.
-#[derive(Clone, Debug)]
-pub struct Solved {
+pub(super) struct Solved {
     /// w, gradient, mixed derivatives; see [`crate::store::record`].
     pub record: Vec<f32>,
-    /// Contact torque [N m or N].
-    pub torque: JointVector,
-    /// See [`crate::contact::Equilibrium::gap`] [m].
-    pub gap: f32,
-    /// Status.
-    pub status: Status,
-    /// Equilibria that were solved for it: none where nothing is near, two at most.
+    /// Equilibrium at the node.
+    pub result: PointResult,
+    /// Equilibria that were solved in contact for it: none where nothing is near, two at most.
     pub equilibria: u32,
 }
 
@@ -108,30 +104,131 @@ impl Scale {
 
 /// Solves the node at `q`.
 pub(super) fn solve(solver: &mut Solver<'_>, q: &JointVector, scale: &Scale) -> Solved {
-    let joints = q.len();
     let here = solver.solve(q);
-    let touches = here.status.is_in_contact();
-    let mut solved = Solved {
-        record: vec![0.0; width(joints)],
-        torque: here.torque,
-        gap: here.gap as f32,
-        status: here.status,
-        equilibria: u32::from(touches),
-    };
-    let steps = &scale.steps;
-    let record = if touches && here.energy > LEAST_ENERGY {
-        let tangent: Option<Vec<f64>> = here.tangent.map(|tangent| tangent.lower().collect());
-        root_of(here.energy, &here.torque, tangent.as_deref())
-    } else if here.gap > FARTHEST * scale.reach {
-        let mut record = vec![0.0; width(joints)];
-        record[0] = -scale.kc.sqrt() * here.gap;
-        record
-    } else {
-        continued(solver, q, here.gap.max(0.0), scale, &mut solved.equilibria)
-    };
-    let record = limited(record, steps);
-    solved.record.iter_mut().zip(record).for_each(|(to, number)| *to = number as f32);
-    solved
+    holding(solver, q, &here, scale)
+}
+
+/// Returns the node at `q` that holds the equilibrium `here`.
+pub(super) fn holding(solver: &mut Solver<'_>, q: &JointVector, here: &Equilibrium, scale: &Scale) -> Solved {
+    let begun = begin(solver, q, here, scale);
+    let behind = begun.behind.map(|at| solver.solve(&at));
+    begun.conclude(q, here, behind.as_ref(), scale)
+}
+
+/// Solves the nodes at `configurations` together, as [`solve`] does one: contact by `backend`, the searches for the
+/// boundary by `solvers`. Returns each with its equilibrium, without touches. `batch` is a good number of
+/// configurations for one call of the backend; `note` takes its notices, each with the number of the first node for
+/// which it holds.
+///
+/// # Errors
+/// When the backend fails.
+pub(super) fn solve_all<B: Backend>(
+    backend: &mut B,
+    batch: usize,
+    solvers: &Solvers<'_>,
+    configurations: &[JointVector],
+    scale: &Scale,
+    note: &mut dyn FnMut(usize, String),
+) -> Result<Vec<(Solved, Equilibrium)>, B::Error> {
+    let nodes: Vec<(usize, JointVector)> = configurations.iter().copied().enumerate().collect();
+    let here = Batches::solve(backend, batch, &nodes, note)?;
+    let held: Vec<(&JointVector, &Equilibrium)> = configurations.iter().zip(&here).collect();
+    let begun = solvers.map(&held, |solver, (q, here)| begin(solver, q, here, scale));
+    let behind: Vec<(usize, JointVector)> =
+        begun.iter().enumerate().filter_map(|(node, begun)| Some((node, begun.behind?))).collect();
+    let mut beyond = Batches::solve(backend, batch, &behind, note)?.into_iter();
+    let solved = begun.into_iter().zip(configurations.iter().zip(here)).map(|(begun, (q, here))| {
+        let beyond = begun.behind.and_then(|_| beyond.next());
+        (begun.conclude(q, &here, beyond.as_ref(), scale), here)
+    });
+    Ok(solved.collect())
+}
+
+/// Configurations of nodes on their way through a backend, and their equilibria.
+struct Batches<'a> {
+    /// Those that the backend does not have yet, so many at a time.
+    left: std::slice::Chunks<'a, (usize, JointVector)>,
+    /// Number of a node, and a configuration of it.
+    all: &'a [(usize, JointVector)],
+    solved: Vec<Equilibrium>,
+    note: &'a mut dyn FnMut(usize, String),
+}
+
+impl<'a> Batches<'a> {
+    fn solve<B: Backend>(
+        backend: &mut B,
+        batch: usize,
+        all: &'a [(usize, JointVector)],
+        note: &'a mut dyn FnMut(usize, String),
+    ) -> Result<Vec<Equilibrium>, B::Error> {
+        let mut work = Self { left: all.chunks(batch.max(1)), all, solved: Vec::with_capacity(all.len()), note };
+        backend.stream(&mut work)?;
+        Ok(work.solved)
+    }
+}
+
+impl Work for Batches<'_> {
+    fn next(&mut self) -> Option<Vec<JointVector>> {
+        self.left.next().map(|batch| batch.iter().map(|(_, q)| *q).collect())
+    }
+
+    fn take(&mut self, equilibria: Vec<Equilibrium>) {
+        // Touches take the most memory, and no node needs them.
+        self.solved.extend(equilibria.into_iter().map(|here| Equilibrium { touches: Vec::new(), ..here }));
+    }
+
+    fn note(&mut self, notice: String) {
+        let first = self.all.get(self.solved.len()).or(self.all.last());
+        (self.note)(first.map_or(0, |(node, _)| *node), notice);
+    }
+}
+
+/// A node whose equilibrium is solved.
+struct Begun {
+    /// Its numbers, unless contact behind the boundary gives others.
+    record: Vec<f64>,
+    /// Configuration behind the boundary of contact at which that is solved; `None` for a node that does not continue
+    /// it.
+    behind: Option<JointVector>,
+}
+
+/// Begins the node at `q` with the equilibrium `here`.
+fn begin(solver: &mut Solver<'_>, q: &JointVector, here: &Equilibrium, scale: &Scale) -> Begun {
+    if here.status.is_in_contact() && here.energy > LEAST_ENERGY {
+        let tangent: Option<Vec<f64>> = here.tangent.as_ref().map(|tangent| tangent.lower().collect());
+        return Begun { record: root_of(here.energy, &here.torque, tangent.as_deref()), behind: None };
+    }
+    let gap = here.gap.max(0.0);
+    let mut record = vec![0.0; width(q.len())];
+    record[0] = -scale.kc.sqrt() * gap;
+    if gap > FARTHEST * scale.reach {
+        return Begun { record, behind: None };
+    }
+    let slopes = gradient(solver, q, &scale.steps);
+    slopes.iter().enumerate().for_each(|(a, slope_of_gap)| record[slope(a)] = -scale.kc.sqrt() * slope_of_gap);
+    Begun { record, behind: behind(solver, q, gap, slopes, &scale.steps) }
+}
+
+impl Begun {
+    /// Returns the node at `q`, which holds `here`, with the equilibrium `behind` its boundary.
+    fn conclude(self, q: &JointVector, here: &Equilibrium, behind: Option<&Equilibrium>, scale: &Scale) -> Solved {
+        let Self { mut record, behind: at } = self;
+        if let (Some(at), Some(behind)) = (at, behind)
+            && behind.status == Status::Contact
+            && behind.energy > LEAST_ENERGY
+        {
+            let mut root = root_of(behind.energy, &behind.torque, None);
+            root[0] += (0..q.len()).map(|a| root[slope(a)] * (q[a] - at[a])).sum::<f64>();
+            if root[0] <= 0.0 {
+                record = root;
+            }
+        }
+        Solved {
+            record: limited(record, &scale.steps).into_iter().map(|number| number as f32).collect(),
+            result: PointResult::of(here),
+            equilibria: u32::from(here.status.is_in_contact()) + u32::from(behind.is_some()),
+        }
+    }
 }
 
 /// The numbers of a node with mixed derivatives that change no slope by more than the largest, over a cell of the base.
@@ -146,48 +243,37 @@ fn limited(mut record: Vec<f64>, steps: &[f64]) -> Vec<f64> {
     record
 }
 
-/// The numbers of a free node with gap `gap`.
-fn continued(solver: &mut Solver<'_>, q: &JointVector, gap: f64, scale: &Scale, equilibria: &mut u32) -> Vec<f64> {
-    let Scale { steps, kc, .. } = scale;
-    let joints = q.len();
-    let mut record = vec![0.0; width(joints)];
-    let slopes = gradient(solver, q, steps);
-    record[0] = -kc.sqrt() * gap;
-    (0..joints).for_each(|a| record[slope(a)] = -kc.sqrt() * slopes[a]);
+/// Returns a configuration just behind the boundary of contact, which Newton steps find from `q`, `gap` away with the
+/// gradient `slopes`; `None` where it is far, or not found.
+fn behind(
+    solver: &mut Solver<'_>,
+    q: &JointVector,
+    gap: f64,
+    mut slopes: JointVector,
+    steps: &[f64],
+) -> Option<JointVector> {
     let depth = (DEPTH_SHARE * gap).max(LEAST_GAP);
-    let (mut at, mut distance, mut slopes) = (*q, gap, slopes);
+    let (mut at, mut distance) = (*q, gap);
     for step in 0..STEPS {
         let square: f64 = slopes.iter().zip(steps).map(|(g, h)| (g * h).powi(2)).sum();
         if square <= LEAST_GAP * LEAST_GAP {
-            return record;
+            return None;
         }
-        for a in 0..joints {
+        for a in 0..q.len() {
             at[a] -= (distance + depth) * steps[a] * steps[a] * slopes[a] / square;
         }
-        let far = (0..joints).any(|a| (at[a] - q[a]).abs() > FARTHEST * steps[a]);
-        if far {
-            return record;
+        if (0..q.len()).any(|a| (at[a] - q[a]).abs() > FARTHEST * steps[a]) {
+            return None;
         }
         distance = solver.gap(&at);
         if distance < -0.5 * depth && distance > -2.0 * depth {
-            break;
+            return Some(at);
         }
-        if step + 1 == STEPS {
-            return record;
-        }
-        slopes = gradient(solver, &at, steps);
-    }
-    *equilibria += 1;
-    let beyond = solver.solve(&at);
-    if beyond.status == Status::Contact && beyond.energy > LEAST_ENERGY {
-        let root = root_of(beyond.energy, &beyond.torque, None);
-        let rise: f64 = (0..joints).map(|a| root[slope(a)] * (q[a] - at[a])).sum();
-        if root[0] + rise <= 0.0 {
-            record = root;
-            record[0] += rise;
+        if step + 1 < STEPS {
+            slopes = gradient(solver, &at, steps);
         }
     }
-    record
+    None
 }
 
 /// Gradient of the gap by central differences [m/rad].

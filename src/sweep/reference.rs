@@ -1,6 +1,6 @@
 //! Directly solved random configurations, and the distance of other answers from them.
 
-use super::{Backend, BackendError, CpuBackend};
+use super::{Backend, BackendError, CpuBackend, table::PointResult};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},
@@ -22,8 +22,12 @@ pub(crate) struct Reference {
     pub places: Vec<JointVector>,
     /// Torques there, converged.
     pub exact: Vec<JointVector>,
+    /// Energies there [J].
+    energies: Vec<f64>,
     pub in_contact: usize,
     pub left_out: usize,
+    /// Mean number of the object's nodes with a contact force [1].
+    pub mean_forces: f64,
     /// rms of the torque [N m].
     pub torque: f64,
     /// rms of its own error [N m].
@@ -58,20 +62,24 @@ impl Reference {
             q
         };
         let drawn: Vec<JointVector> = (0..count).map(place).collect();
-        let tight = |tolerance: f64| ContactSpec {
-            algorithm: Algorithm::Energy,
-            tolerance,
-            max_iterations: scene.contact.max_iterations.saturating_mul(10),
-            ..scene.contact
-        };
-        let converged = equilibria(model, tight(REFERENCE_TOLERANCE), &drawn)?;
-        let rougher = equilibria(model, tight(100.0 * REFERENCE_TOLERANCE), &drawn)?;
+        let converged = equilibria(model, tight(scene.contact, REFERENCE_TOLERANCE), &drawn)?;
+        let rougher = equilibria(model, tight(scene.contact, 100.0 * REFERENCE_TOLERANCE), &drawn)?;
         let mut levers = JointVector::zeros(model.chain.joints.len());
         levers.iter_mut().zip(&scene.proxy.joints).for_each(|(lever, joint)| {
             *lever = if joint.kind == JointKind::Prismatic { LEVER_ARM } else { 1.0 };
         });
-        let mut reference =
-            Self { places: Vec::new(), exact: Vec::new(), in_contact: 0, left_out: 0, torque: 0.0, error: 0.0, levers };
+        let forces: usize = converged.iter().map(|equilibrium| equilibrium.forces.len()).sum();
+        let mut reference = Self {
+            places: Vec::new(),
+            exact: Vec::new(),
+            energies: Vec::new(),
+            in_contact: 0,
+            left_out: 0,
+            mean_forces: forces as f64 / count.max(1) as f64,
+            torque: 0.0,
+            error: 0.0,
+            levers,
+        };
         let mut rough = Vec::new();
         for ((q, equilibrium), other) in drawn.into_iter().zip(converged).zip(rougher) {
             match equilibrium.status {
@@ -79,6 +87,7 @@ impl Reference {
                     reference.in_contact += usize::from(equilibrium.status == Status::Contact);
                     reference.places.push(q);
                     reference.exact.push(equilibrium.torque);
+                    reference.energies.push(equilibrium.energy);
                     rough.push(other.torque);
                 }
                 _ => reference.left_out += 1,
@@ -111,12 +120,27 @@ impl Reference {
     /// The first `count` configurations.
     pub fn first(&self, count: usize) -> Self {
         let (places, exact) = (self.places[..count].to_vec(), self.exact[..count].to_vec());
-        Self { places, exact, ..*self }
+        Self { places, exact, energies: self.energies[..count].to_vec(), ..*self }
     }
 
     /// The same configurations with other torques.
     pub fn with(&self, exact: Vec<JointVector>) -> Self {
-        Self { places: self.places.clone(), exact, ..*self }
+        Self { places: self.places.clone(), exact, energies: self.energies.clone(), ..*self }
+    }
+
+    /// Returns the result at place number `k`; free, or in contact and converged.
+    pub(super) fn result(&self, k: usize) -> PointResult {
+        let energy = self.energies[k];
+        let status = if energy > 0.0 { Status::Contact } else { Status::Free };
+        let residual = REFERENCE_TOLERANCE as f32;
+        PointResult { status, torque: self.exact[k], energy, gap: 0.0, residual, iterations: 0 }
+    }
+
+    /// Replaces the equilibrium at place number `k`.
+    pub(super) fn replace(&mut self, k: usize, equilibrium: &Equilibrium) {
+        (self.exact[k], self.energies[k]) = (equilibrium.torque, equilibrium.energy);
+        let zero = JointVector::zeros(self.levers.len());
+        self.torque = self.errors(|_| zero).0;
     }
 
     /// Mean of the squared distance of the torque that `answer` gives at each place from the exact one, and the
@@ -145,6 +169,12 @@ impl Reference {
         };
         self.places.iter().zip(&self.exact).map(square).collect()
     }
+}
+
+/// The energy form of `contact`, solved to `tolerance`.
+pub(super) fn tight(contact: ContactSpec, tolerance: f64) -> ContactSpec {
+    let max_iterations = contact.max_iterations.saturating_mul(10);
+    ContactSpec { algorithm: Algorithm::Energy, tolerance, max_iterations, ..contact }
 }
 
 /// `places` solved as `contact` says, on all cores.

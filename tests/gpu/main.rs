@@ -7,3 +7,4 @@ mod equilibria;
 mod fixture;
 mod frames;
 mod search;
+mod stores;

@@ -10,5 +10,6 @@ mod fixture;
 mod interleavings;
 mod interpolation;
 mod live;
+mod lowest;
 mod publication;
 mod refine;

@@ -3,16 +3,20 @@
 
 use haptize::{
     JointVector,
-    contact::{Model, Status},
+    contact::{Equilibrium, Model, Status},
     dataset::{Axis, Grid},
+    object::Object,
     proxy::Chain,
     scene::Scene,
-    store::{Order, record::width},
+    store::{Order, Space, Store, record::width},
     sweep::{
+        Backend, CpuBackend, WithFallback,
+        ahead::Ahead,
         build_object,
         refine::{Judge, Refine, Refined},
     },
 };
+use std::sync::Arc;
 
 /// A ball of 6 mm on two joints and a slide, pressed some 8 mm into a sphere with a skin: so deep it has one
 /// equilibrium. No node lies on a plane of symmetry.
@@ -47,28 +51,56 @@ struct Filled {
     unseen: f64,
 }
 
-/// A base of `cells` cells along each axis, filled to `aim`, and its error at configurations that it has not seen.
+/// Object and proxy of the scene.
+struct World {
+    scene: Scene,
+    object: Object,
+    chain: Chain,
+}
+
+impl World {
+    fn new() -> Self {
+        let scene = Scene::parse(SCENE, "refine.toml").unwrap();
+        Self { object: build_object(&scene).unwrap(), chain: Chain::new(&scene.proxy), scene }
+    }
+
+    fn model(&self) -> Model<'_> {
+        let mut model = Model::new(&self.object, &self.chain, self.scene.contact);
+        model.with_tangent = true;
+        model
+    }
+
+    /// `cells` cells along each axis.
+    fn base(&self, cells: usize) -> Grid {
+        let axes = self.scene.proxy.joints.iter().zip(&self.scene.grid.axes).map(|(joint, axis)| {
+            let step = axis.step * (axis.count - 1) as f64 / cells as f64;
+            Axis { name: joint.name.clone(), unit: "rad".into(), start: axis.start, step, count: cells + 1 }
+        });
+        Grid { axes: axes.collect() }
+    }
+
+    /// A base of `cells` cells along each axis, filled to `aim` by `backend`, `batch` configurations at a time, and its
+    /// error at configurations that it has not seen.
+    fn fill<B: Backend>(
+        &self,
+        (cells, levels, batch): (usize, u32, usize),
+        order: Order,
+        aim: f64,
+        backend: &mut B,
+    ) -> Filled {
+        let model = self.model();
+        let mut judges = [1, 2].map(|seed| Judge::new(&self.scene, &model, seed, 100).unwrap());
+        let refine = Refine { model: &model, base: self.base(cells), levels, order, aim, most: 20_000, batch };
+        let refined = refine.fill(&mut judges, backend).unwrap();
+        let unseen = judges[1].relative_error(|q| refined.store.sample(q).torque());
+        Filled { refined, unseen }
+    }
+}
+
+/// The same on the CPU.
 fn fill(cells: usize, levels: u32, order: Order, aim: f64) -> Filled {
-    let scene = Scene::parse(SCENE, "refine.toml").unwrap();
-    let object = build_object(&scene).unwrap();
-    let chain = Chain::new(&scene.proxy);
-    let mut model = Model::new(&object, &chain, scene.contact);
-    model.with_tangent = true;
-    let axes = scene.proxy.joints.iter().zip(&scene.grid.axes).map(|(joint, axis)| {
-        let range = axis.step * (axis.count - 1) as f64;
-        Axis {
-            name: joint.name.clone(),
-            unit: "rad".into(),
-            start: axis.start,
-            step: range / cells as f64,
-            count: cells + 1,
-        }
-    });
-    let base = Grid { axes: axes.collect() };
-    let [seen, unseen] = [1, 2].map(|seed| Judge::new(&scene, &model, seed, 100).unwrap());
-    let refined = Refine { model: &model, base, levels, order, aim, most: 20_000 }.fill(&seen).unwrap();
-    let unseen = unseen.relative_error(|q| refined.store.sample(q).torque());
-    Filled { refined, unseen }
+    let world = World::new();
+    world.fill((cells, levels, 100), order, aim, &mut CpuBackend::new(&world.model(), 0).unwrap())
 }
 
 #[test]
@@ -110,6 +142,73 @@ fn nodes_hold_what_the_solver_found_and_two_fillings_are_the_same() {
     }
     assert!(seen.iter().all(|count| *count > 10), "{seen:?}");
     assert_eq!(one.store.blocks().len(), other.store.blocks().len());
+}
+
+/// One solver takes node after node where a store is filled on demand.
+#[test]
+fn nodes_that_are_solved_together_are_those_solved_one_by_one_to_the_bit() {
+    let world = World::new();
+    let model = world.model();
+    let alone = Arc::new(Store::new(Space::new(&world.base(6), 1).unwrap(), Order::Potential, 100));
+    let ahead = Ahead::new(&model, Arc::clone(&alone));
+    let mut solver = ahead.solver();
+    for batch in [1, 50, 1000] {
+        let mut backend = CpuBackend::new(&model, 2).unwrap();
+        let together = world.fill((6, 1, batch), Order::Potential, 1.0, &mut backend).refined;
+        assert_eq!(together.nodes, 7 * 7 * 7);
+        for (key, block) in together.store.blocks() {
+            let (level, place) = together.store.space().block(key).unwrap();
+            if batch == 1 {
+                assert!(ahead.solve(&mut solver, level, &place));
+            }
+            assert_eq!(alone.get(level, &place).unwrap().nodes(), block.nodes(), "batches of {batch}");
+        }
+        // Free nodes near contact take an equilibrium of their own.
+        let solved = usize::try_from(ahead.solved().equilibria).unwrap();
+        assert!(together.equilibria == solved && solved > 150, "{} and {solved}", together.equilibria);
+    }
+}
+
+/// A device that solves as the CPU does, until it has solved so many.
+struct Breaking<'a>(CpuBackend<'a>, usize);
+
+#[derive(Debug, thiserror::Error)]
+#[error("device lost")]
+struct DeviceLost;
+
+impl Backend for Breaking<'_> {
+    type Error = DeviceLost;
+    fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, DeviceLost> {
+        self.1 = self.1.checked_sub(configurations.len()).ok_or(DeviceLost)?;
+        self.0.solve(configurations).map_err(|never| match never {})
+    }
+}
+
+#[test]
+fn a_store_whose_device_is_lost_is_filled_by_the_cpu_and_says_so() {
+    let world = World::new();
+    let model = world.model();
+    let filled = |breaks_after: usize| {
+        let device = Breaking(CpuBackend::new(&model, 2).unwrap(), breaks_after);
+        let mut backend = WithFallback::new(device, "a made-up device", &model);
+        world.fill((4, 2, 10), Order::Potential, 0.05, &mut backend).refined
+    };
+    let (whole, lossy) = (filled(usize::MAX), filled(35));
+    assert!(whole.notices.is_empty() && whole.by_level[1] > 0, "{:?}, {:?}", whole.notices, whole.by_level);
+    let [notice] = &lossy.notices[..] else { panic!("{:?}", lossy.notices) };
+    // The fourth batch of ten fails.
+    assert!(notice.starts_with("from the store's node 30 on: solved by "), "{notice}");
+    assert!(notice.ends_with("since a made-up device failed: device lost"), "{notice}");
+    let blocks = whole.store.blocks().into_iter().zip(lossy.store.blocks());
+    blocks.for_each(|((key, block), (other_key, other))| assert_eq!((key, block.nodes()), (other_key, other.nodes())));
+    let error = {
+        let mut device = Breaking(CpuBackend::new(&model, 2).unwrap(), 35);
+        let mut judges = [1, 2].map(|seed| Judge::new(&world.scene, &model, seed, 10).unwrap());
+        let (base, order) = (world.base(4), Order::Potential);
+        let refine = Refine { model: &model, base, levels: 1, order, aim: 1.0, most: 1000, batch: 10 };
+        refine.fill(&mut judges, &mut device).err().unwrap()
+    };
+    assert_eq!(error.to_string(), "the backend failed: device lost");
 }
 
 #[test]

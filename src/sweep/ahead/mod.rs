@@ -276,7 +276,7 @@ impl<'a> Ahead<'a> {
             let is_free = level > 0 && solver.gap(&q) > self.scale.reach(level) && self.store.sample(&q).value <= 0.0;
             if !is_free {
                 let solved = node::solve(solver, &q, &self.scale);
-                nodes.push(place, &solved.record, solved.gap, solved.status);
+                nodes.push(place, &solved.record, solved.result.gap, solved.result.status);
                 equilibria += u64::from(solved.equilibria);
             }
         }

@@ -16,18 +16,29 @@
 //! no more than the aim. (Doerfler 1996, A convergent adaptive algorithm for Poisson's equation, whose bulk is a fixed
 //! share; here it follows from the aim.) Cells in which no error is expected wait until no others are left. The store
 //! is measured again, until it keeps the aim.
+//!
+//! *Backend.* The new nodes of a level are solved together by any [`Backend`]. All else runs on the CPU: searches for
+//! the boundary of contact (`node.rs`), for lower equilibria (`nodebook.rs`), and what is measured.
+
+mod judge;
+mod nodebook;
+
+pub use judge::Judge;
 
 use super::{
-    node::{self, Scale, Solved},
-    reference::{Reference, ReferenceError},
+    Lowered,
+    lowest::applies,
+    node::Scale,
+    reference::{REFERENCE_TOLERANCE, tight},
 };
 use crate::{
     JointVector, MAX_JOINTS,
-    contact::{Model, Solvers, Status},
+    contact::{Backend, Model, Solvers, Status},
     dataset::Grid,
-    scene::{JointKind, LEVER_ARM, Scene},
-    store::{Nodes, Order, Place, PublishError, Space, SpaceError, Store},
+    scene::{JointKind, LEVER_ARM},
+    store::{Nodes, Order, Place, PublishError, Space, SpaceError, Store, record::width},
 };
+use nodebook::{HeldNodes, Nodebook, held_bytes};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Standard deviations by which the measured squared error is to be below the aim's [1]. Larger: more nodes. Smaller:
@@ -56,6 +67,8 @@ pub struct Refine<'a> {
     pub aim: f64,
     /// Most nodes that are solved.
     pub most: usize,
+    /// Configurations for one call of the backend [1]; results do not depend on it.
+    pub batch: usize,
 }
 
 /// A filled store, and how it was filled.
@@ -66,7 +79,7 @@ pub struct Refined {
     pub nodes: usize,
     /// Nodes of each level.
     pub by_level: Vec<usize>,
-    /// Equilibria solved in contact, all rounds.
+    /// Equilibria solved in contact, all rounds, searches for lower ones aside.
     pub equilibria: usize,
     /// Nodes solved, all rounds; some may be left out of the store.
     pub solved: usize,
@@ -74,6 +87,10 @@ pub struct Refined {
     pub measured: f64,
     /// Rounds.
     pub rounds: usize,
+    /// Result of the search for lower equilibria, of all nodes solved; absent if there was none.
+    pub lowered: Option<Lowered>,
+    /// Notices of the backend; nodes are counted from zero in the order in which they were solved.
+    pub notices: Vec<String>,
 }
 
 /// A store cannot be filled.
@@ -85,151 +102,69 @@ pub enum RefineError {
     /// A solved block was refused.
     #[error(transparent)]
     Publish(#[from] PublishError),
-    /// No threads.
-    #[error(transparent)]
-    Threads(#[from] rayon::ThreadPoolBuildError),
-}
-
-/// Random configurations, solved directly, with which interpolations are compared.
-pub struct Judge(Reference);
-
-impl Judge {
-    /// Draws configurations in the grid of `scene` until `contacts` of them are in contact, the same ones every time
-    /// for the same `seed`.
-    ///
-    /// # Errors
-    /// When nothing touches.
-    pub fn new(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, ReferenceError> {
-        Reference::in_contact(scene, model, seed, contacts).map(Self)
-    }
-
-    /// Number of configurations that were solved, free ones among them.
-    #[must_use]
-    pub fn solved(&self) -> usize {
-        // Each is solved twice: see [`Reference::solve`].
-        2 * (self.0.places.len() + self.0.left_out)
-    }
-
-    /// Rms of the torque [N m].
-    #[must_use]
-    pub fn torque(&self) -> f64 {
-        self.0.torque
-    }
-
-    /// Rms error of the torque that `answer` gives, over the rms of the torque [1].
-    pub fn relative_error(&self, answer: impl FnMut(&JointVector) -> JointVector) -> f64 {
-        self.0.errors(answer).0 / self.0.torque
-    }
-}
-
-/// Solves nodes, each once.
-struct Nodebook<'a> {
-    space: Space,
-    scale: Scale,
-    levers: JointVector,
-    pool: rayon::ThreadPool,
-    solvers: Solvers<'a>,
-    solved: HashMap<(u32, Place), Solved>,
-}
-
-impl Nodebook<'_> {
-    /// Solves those of `nodes` of `level` that are not.
-    fn solve(&mut self, level: u32, nodes: impl IntoIterator<Item = Place>) {
-        let wanted: BTreeSet<Place> =
-            nodes.into_iter().filter(|node| !self.solved.contains_key(&(level, *node))).collect();
-        let wanted: Vec<Place> = wanted.into_iter().collect();
-        let (space, scale) = (&self.space, &self.scale);
-        let solvers = &self.solvers;
-        let solve =
-            || solvers.map(&wanted, |solver, place| node::solve(solver, &space.configuration(level, place), scale));
-        let solved = self.pool.install(solve);
-        self.solved.extend(wanted.iter().map(|place| (level, *place)).zip(solved));
-    }
-
-    /// Rms of the torque at the corners of a cell of the base [N m].
-    fn torque(&self, low: &Place) -> f64 {
-        let corners = 1_usize << self.space.joints();
-        let solved = (0..corners).filter_map(|set| self.solved.get(&(0, corner(low, set))));
-        let squares = solved.map(|solved| {
-            let parts = solved.torque.iter().zip(self.levers.iter());
-            parts.map(|(tau, lever)| (lever * tau).powi(2)).sum::<f64>()
-        });
-        (squares.sum::<f64>() / corners as f64).sqrt()
-    }
-
-    /// Distance of the torque that `store` gives at a solved node from the solved one; zero where that did not converge
-    /// [N m].
-    fn error(&self, store: &Store, level: u32, node: &Place) -> f64 {
-        let Some(solved) = self.solved.get(&(level, *node)) else { return 0.0 };
-        if !matches!(solved.status, Status::Free | Status::Contact) {
-            return 0.0;
-        }
-        let torque = store.sample(&self.space.configuration(level, node)).torque();
-        let parts = torque.iter().zip(solved.torque.iter()).zip(self.levers.iter());
-        parts.map(|((a, b), lever)| (lever * (a - b)).powi(2)).sum::<f64>().sqrt()
-    }
+    /// The backend failed.
+    #[error("the backend failed: {0}")]
+    Backend(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl Refine<'_> {
-    /// Fills a store until its error at the configurations of `judge` is at most the aim, or nothing more can be done.
+    /// Fills a store, whose nodes `backend` solves, until its error at the configurations of the first of `judges` is
+    /// at most the aim, or nothing more can be done. Equilibria of both judges are replaced by lower ones that are
+    /// reached from the nodes.
     ///
     /// # Errors
     /// [`RefineError`].
-    pub fn fill(&self, judge: &Judge) -> Result<Refined, RefineError> {
-        let reference = &judge.0;
-        let mut filling = self.begin()?;
-        let aim = (self.aim * reference.torque).powi(2);
+    pub fn fill<B: Backend>(&self, judges: &mut [Judge; 2], backend: &mut B) -> Result<Refined, RefineError> {
+        let [seen, unseen] = judges;
+        let exact = self.model.with_contact(tight(self.model.contact, REFERENCE_TOLERANCE));
+        let solvers = Solvers::new(&exact, rayon::current_num_threads());
+        let lowest = applies(self.model.contact.algorithm);
+        let mut filling = self.begin(backend, lowest)?;
         let mut rounds = 0;
         loop {
             rounds += 1;
+            if lowest {
+                seen.lower(&solvers, &filling.book.nodes);
+            }
             let store = filling.store(self.order)?;
-            let (mean, deviation) = reference.mean_square(|q| store.sample(q).torque());
+            let (mean, deviation) = seen.0.mean_square(|q| store.sample(q).torque());
+            let aim = (self.aim * seen.torque()).powi(2);
             let refinable = filling.leaves.iter().any(|leaf| leaf.level + 1 < self.levels);
             // A store that errs by nothing has no deviation either.
             let reserve = 1.0 + CONFIDENCE * deviation / mean.max(f64::MIN_POSITIVE);
-            if mean * reserve <= aim || !refinable || filling.book.solved.len() >= self.most {
-                return Ok(self.report(store, &filling, mean.sqrt() / reference.torque, rounds));
+            if mean * reserve <= aim || !refinable || filling.book.nodes.count() >= self.most {
+                if lowest {
+                    unseen.lower(&solvers, &filling.book.nodes);
+                }
+                return Ok(filling.report(store, mean.sqrt() / seen.torque(), rounds));
             }
-            filling.refine(&store, aim / (mean * reserve));
+            filling.refine(&store, aim / (mean * reserve))?;
         }
     }
 
+    /// Memory that `nodes` nodes take beside their store while it is filled, if contact has forces on so many of the
+    /// object's nodes as those of `judge` have [bytes].
+    #[must_use]
+    pub fn filling_bytes(&self, nodes: usize, judge: &Judge) -> usize {
+        (nodes as f64 * held_bytes(width(self.base.joints()), judge.mean_forces())).ceil() as usize
+    }
+
     /// The base alone.
-    fn begin(&self) -> Result<Filling<'_>, RefineError> {
+    fn begin<'a, B: Backend>(&'a self, backend: &'a mut B, lowest: bool) -> Result<Filling<'a, B>, RefineError> {
         let space = Space::new(&self.base, self.levels)?;
-        let pool = rayon::ThreadPoolBuilder::new().build()?;
         let mut levers = JointVector::zeros(space.joints());
         levers.iter_mut().zip(&self.model.chain.joints).for_each(|(lever, joint)| {
             *lever = if joint.kind == JointKind::Prismatic { LEVER_ARM } else { 1.0 };
         });
-        let mut book = Nodebook {
-            scale: Scale::new(self.model, &space),
-            space: space.clone(),
-            levers,
-            solvers: Solvers::new(self.model, pool.current_num_threads()),
-            pool,
-            solved: HashMap::new(),
-        };
+        let scale = Scale::new(self.model, &space);
+        let solvers = Solvers::new(self.model, rayon::current_num_threads());
+        let mut book = Nodebook::new((space.clone(), scale), (backend, self.batch), solvers, lowest);
         let base = lattice(&space, |last| last);
-        book.solve(0, base.iter().copied());
+        book.solve(0, base.iter().copied())?;
         let mut nodes = vec![BTreeSet::new(); self.levels as usize];
         nodes[0] = base.into_iter().collect();
         let leaves = lattice(&space, |last| last - 1).into_iter().map(|low| Leaf { level: 0, low, square: 0.0 });
-        Ok(Filling { book, nodes, leaves: leaves.collect(), squares: HashMap::new() })
-    }
-
-    fn report(&self, store: Store, filling: &Filling<'_>, measured: f64, rounds: usize) -> Refined {
-        let by_level: Vec<usize> = filling.nodes.iter().map(BTreeSet::len).collect();
-        let solved = &filling.book.solved;
-        Refined {
-            nodes: by_level.iter().sum(),
-            by_level,
-            equilibria: solved.values().map(|solved| solved.equilibria as usize).sum(),
-            solved: solved.len(),
-            store,
-            measured,
-            rounds,
-        }
+        Ok(Filling { book, levers, nodes, leaves: leaves.collect(), squares: HashMap::new() })
     }
 }
 
@@ -242,8 +177,9 @@ struct Leaf {
 }
 
 /// A store that is being filled.
-struct Filling<'a> {
-    book: Nodebook<'a>,
+struct Filling<'a, B> {
+    book: Nodebook<'a, B>,
+    levers: JointVector,
     /// The nodes of each level.
     nodes: Vec<BTreeSet<Place>>,
     leaves: Vec<Leaf>,
@@ -251,23 +187,64 @@ struct Filling<'a> {
     squares: HashMap<(u32, Place), f64>,
 }
 
-impl Filling<'_> {
+impl<B: Backend> Filling<'_, B> {
     /// The store of what is there.
     fn store(&self, order: Order) -> Result<Store, PublishError> {
-        let mut store = Store::new(self.book.space.clone(), order, 0);
+        let mut store = Store::new(self.book.nodes.space.clone(), order, 0);
         for (level, nodes) in (0..).zip(&self.nodes) {
-            publish(&mut store, &self.book, level, nodes)?;
+            publish(&mut store, &self.book.nodes, level, nodes)?;
         }
         Ok(store)
     }
 
-    /// Solves those of `nodes` of `level` that are not, and compares `store` with them.
-    fn compare(&mut self, store: &Store, level: u32, nodes: &BTreeSet<Place>) {
-        self.book.solve(level, nodes.iter().copied());
-        for node in nodes {
-            let book = &self.book;
-            self.squares.entry((level, *node)).or_insert_with(|| book.error(store, level, node).powi(2));
+    fn report(&self, store: Store, measured: f64, rounds: usize) -> Refined {
+        let by_level: Vec<usize> = self.nodes.iter().map(BTreeSet::len).collect();
+        Refined {
+            nodes: by_level.iter().sum(),
+            by_level,
+            equilibria: self.book.nodes.equilibria(),
+            solved: self.book.nodes.count(),
+            store,
+            measured,
+            rounds,
+            lowered: self.book.lowered(),
+            notices: self.book.notices.clone(),
         }
+    }
+
+    /// Rms of the torque at the corners of a cell of the base [N m].
+    fn torque(&self, low: &Place) -> f64 {
+        let corners = 1_usize << self.book.nodes.space.joints();
+        let solved = (0..corners).filter_map(|set| self.book.nodes.get(0, &corner(low, set)));
+        let squares = solved.map(|held| {
+            let parts = held.node.result.torque.iter().zip(self.levers.iter());
+            parts.map(|(tau, lever)| (lever * tau).powi(2)).sum::<f64>()
+        });
+        (squares.sum::<f64>() / corners as f64).sqrt()
+    }
+
+    /// Squared distance of the torque that `store` gives at a solved node from the solved one; zero where that did not
+    /// converge [N^2 m^2].
+    fn square(&self, store: &Store, level: u32, node: &Place) -> f64 {
+        let nodes = &self.book.nodes;
+        let Some(held) = nodes.get(level, node) else { return 0.0 };
+        if !matches!(held.node.result.status, Status::Free | Status::Contact) {
+            return 0.0;
+        }
+        let torque = store.sample(&nodes.space.configuration(level, node)).torque();
+        let parts = torque.iter().zip(held.node.result.torque.iter()).zip(self.levers.iter());
+        parts.map(|((a, b), lever)| (lever * (a - b)).powi(2)).sum()
+    }
+
+    /// Solves those of `nodes` of `level` that are not, and compares `store` with them.
+    fn compare(&mut self, store: &Store, level: u32, nodes: &BTreeSet<Place>) -> Result<(), RefineError> {
+        self.book.solve(level, nodes.iter().copied())?;
+        for node in nodes {
+            if !self.squares.contains_key(&(level, *node)) {
+                self.squares.insert((level, *node), self.square(store, level, node));
+            }
+        }
+        Ok(())
     }
 
     /// Sum of the squared errors at those of `nodes` of `level` that are solved, and their number.
@@ -277,17 +254,17 @@ impl Filling<'_> {
     }
 
     /// Expects an error of each leaf.
-    fn expect(&mut self, store: &Store) {
-        let space = self.book.space.clone();
+    fn expect(&mut self, store: &Store) -> Result<(), RefineError> {
+        let space = self.book.nodes.space.clone();
         let joints = space.joints();
         let cells = lattice(&space, |last| last - 1);
         let middles = cells.iter().map(|low| odd(&space, low)).collect();
-        self.compare(store, 1, &middles);
-        let torque: f64 = cells.iter().map(|low| self.book.torque(low).powi(2)).sum();
+        self.compare(store, 1, &middles)?;
+        let torque: f64 = cells.iter().map(|low| self.torque(low).powi(2)).sum();
         let share = self.known(1, middles.into_iter()).0 / torque.max(f64::MIN_POSITIVE);
         let expected = |Leaf { level, low, .. }: &Leaf| {
             let before = if *level == 0 {
-                share * self.book.torque(low).powi(2)
+                share * self.torque(low).powi(2)
             } else {
                 let (sum, count) = self.known(*level, (0..1 << joints).map(|set| corner(low, set)));
                 FALL * sum / count.max(1.0)
@@ -297,6 +274,7 @@ impl Filling<'_> {
         };
         let squares: Vec<f64> = self.leaves.iter().map(expected).collect();
         self.leaves.iter_mut().zip(squares).for_each(|(leaf, square)| leaf.square = square);
+        Ok(())
     }
 
     /// Takes the leaves to refine for a squared error of `goal` times the present one: those that err most, and no
@@ -314,7 +292,7 @@ impl Filling<'_> {
             refinable = erring;
         }
         // In bulk a refined cell adds as many nodes as it has halves.
-        let halves = 2.0_f64.powi(self.book.space.joints() as i32);
+        let halves = 2.0_f64.powi(self.book.nodes.space.joints() as i32);
         let there: usize = self.nodes.iter().map(BTreeSet::len).sum();
         let least = (GROWTH * there as f64 / halves).ceil() as usize;
         let whole: f64 = self.leaves.iter().map(|leaf| leaf.square).sum();
@@ -327,14 +305,14 @@ impl Filling<'_> {
     }
 
     /// Refines for a squared error of `goal` times that of `store`, which is the store of what is there.
-    fn refine(&mut self, store: &Store, goal: f64) {
-        let space = self.book.space.clone();
-        self.expect(store);
+    fn refine(&mut self, store: &Store, goal: f64) -> Result<(), RefineError> {
+        let space = self.book.nodes.space.clone();
+        self.expect(store)?;
         let marked = self.mark(goal);
         for level in 0..self.nodes.len() as u32 - 1 {
             let cells = || marked.iter().filter(|leaf| leaf.level == level);
             let nodes: BTreeSet<Place> = cells().flat_map(|leaf| inside(&space, &leaf.low)).collect();
-            self.compare(store, level + 1, &nodes);
+            self.compare(store, level + 1, &nodes)?;
             self.nodes[level as usize + 1].extend(nodes);
             let lows = cells().flat_map(|leaf| {
                 let first = leaf.low.map(|i| 2 * i);
@@ -342,6 +320,7 @@ impl Filling<'_> {
             });
             self.leaves.extend(lows.map(|low| Leaf { level: level + 1, low, square: 0.0 }));
         }
+        Ok(())
     }
 }
 
@@ -383,7 +362,7 @@ fn inside(space: &Space, low: &Place) -> impl Iterator<Item = Place> {
 }
 
 /// Publishes `nodes` of `level`, all solved, with whatever empty blocks they rest on.
-fn publish(store: &mut Store, book: &Nodebook<'_>, level: u32, nodes: &BTreeSet<Place>) -> Result<(), PublishError> {
+fn publish(store: &mut Store, held: &HeldNodes, level: u32, nodes: &BTreeSet<Place>) -> Result<(), PublishError> {
     let space = store.space().clone();
     let mut blocks: BTreeMap<(u32, Place), Nodes> = BTreeMap::new();
     for node in nodes {
@@ -400,8 +379,8 @@ fn publish(store: &mut Store, book: &Nodebook<'_>, level: u32, nodes: &BTreeSet<
     }
     for ((at, block), published) in &mut blocks {
         for (place, node) in space.nodes(*at, block).filter(|(_, node)| *at == level && nodes.contains(node)) {
-            if let Some(solved) = book.solved.get(&(level, node)) {
-                published.push(place, &solved.record, solved.gap, solved.status);
+            if let Some(held) = held.get(level, &node) {
+                published.push(place, &held.node.record, held.node.result.gap, held.node.result.status);
             }
         }
     }

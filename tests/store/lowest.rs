@@ -1,0 +1,158 @@
+//! The lowest equilibrium in stores that are filled for an error, where contact has several.
+
+use haptize::{
+    contact::{Model, Status},
+    dataset::Dataset,
+    object::Object,
+    proxy::Chain,
+    scene::Scene,
+    store::{Order, Space, Store},
+    sweep::{
+        CpuBackend, Run, Sweep,
+        ahead::Ahead,
+        grid_of,
+        refine::{Judge, Refine, Refined},
+    },
+};
+use std::sync::{Arc, atomic::AtomicBool};
+
+/// Two points on two slides, 14 to 20 mm below the top of a sphere of 102 nodes, whose facets they feel; equilibria
+/// change every few millimetres.
+const SCENE: &str = r#"
+name = "deep points"
+[object]
+sphere = { radius = 0.05, rings = 10, segments = 10 }
+springs = { kind = "isotropic", stiffness = 150.0 }
+ground = { stiffness = 50.0 }
+[contact]
+surface = "facets"
+stiffness = 5000.0
+algorithm = "energy"
+[grid]
+axes = [{ start = -0.0201, step = 0.0006, count = 67 }, { start = 0.030, step = 0.001, count = 7 }]
+[[proxy.joint]]
+name = "across"
+kind = "prismatic"
+axis = [1, 0, 0]
+limits = [-0.1, 0.1]
+[[proxy.joint]]
+name = "down"
+kind = "prismatic"
+axis = [0, 0, 1]
+limits = [0, 0.1]
+nodes = [{ from = [0, 0.000453, 0], to = [0, 0.003453, 0], count = 2 }]
+"#;
+
+/// Rms error that a store of the lowest equilibria keeps, over the rms force [1]: where two branches cross the lowest
+/// energy has a kink, at which the force of a cell errs by its jump. Those cells are few: 3.5 % were measured. With
+/// equilibria of different branches side by side the error was 141 %.
+const KEPT: f64 = 0.1;
+
+/// Object and proxy of the scene.
+struct World {
+    scene: Scene,
+    object: Object,
+    chain: Chain,
+}
+
+impl World {
+    fn new() -> Self {
+        let scene = Scene::parse(SCENE, "deep.toml").unwrap();
+        Self { object: Object::build(&scene.object).unwrap(), chain: Chain::new(&scene.proxy), scene }
+    }
+
+    fn model(&self) -> Model<'_> {
+        let mut model = Model::new(&self.object, &self.chain, self.scene.contact);
+        model.with_tangent = true;
+        model
+    }
+
+    /// Both levels of a store, whole, filled on so many threads.
+    fn fill(&self, threads: usize, batch: usize) -> Refined {
+        let (model, base) = (self.model(), grid_of(&self.scene));
+        let mut judges = [1, 2].map(|seed| Judge::new(&self.scene, &model, seed, 100).unwrap());
+        let (order, aim, most) = (Order::Potential, f64::MIN_POSITIVE, usize::MAX);
+        let refine = Refine { model: &model, base, levels: 2, order, aim, most, batch };
+        let mut backend = CpuBackend::new(&model, threads).unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| refine.fill(&mut judges, &mut backend).unwrap())
+    }
+
+    /// The same blocks, each node solved from rest alone.
+    fn solved_from_rest(&self, filled: &Store) -> Arc<Store> {
+        let (model, space) = (self.model(), Space::new(&grid_of(&self.scene), 2).unwrap());
+        let store = Arc::new(Store::new(space, Order::Potential, filled.blocks().len()));
+        let ahead = Ahead::new(&model, Arc::clone(&store));
+        let mut solver = ahead.solver();
+        for (key, _) in filled.blocks() {
+            let (level, block) = filled.space().block(key).unwrap();
+            assert!(ahead.solve(&mut solver, level, &block));
+        }
+        store
+    }
+
+    /// The lowest equilibria of a uniform grid of half the spacing, none of whose points is a node of the store.
+    fn lowest(&self) -> Dataset {
+        let mut scene = self.scene.clone();
+        for axis in &mut scene.grid.axes {
+            axis.step *= 0.5;
+            axis.start += 0.37 * axis.step;
+            axis.count = 2 * axis.count - 2;
+        }
+        let model = self.model();
+        let mut sweep = Sweep::new(&scene, &self.object, "cpu", "none", "2012-03-04T00:00:00Z").unwrap();
+        sweep.find_lowest(&model).unwrap();
+        let run = Run { chunk: 1000, stop: &AtomicBool::new(false), progress: &mut |_| () };
+        sweep.run(&mut CpuBackend::new(&model, 0).unwrap(), run).unwrap().0
+    }
+}
+
+/// Rms error of the force of `store` at the points of `exact` in contact, over the rms force [1].
+fn error(store: &Store, exact: &Dataset) -> f64 {
+    let (mut missed, mut whole) = (0.0, 0.0);
+    for point in (0..exact.grid.points()).filter(|&point| exact.status(point) == Status::Contact) {
+        let found = store.sample(&exact.grid.configuration(point)).torque();
+        let force = exact.torque(point);
+        missed += found.iter().zip(force).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        whole += force.iter().map(|force| force.powi(2)).sum::<f64>();
+    }
+    (missed / whole).sqrt()
+}
+
+#[test]
+fn a_store_of_the_lowest_equilibria_errs_less_than_one_from_rest() {
+    let world = World::new();
+    let (filled, exact) = (world.fill(2, 100), world.lowest());
+    let from_rest = world.solved_from_rest(&filled.store);
+    let [kept, missed] = [&filled.store, &*from_rest].map(|store| error(store, &exact));
+    let lowered = filled.lowered.unwrap();
+    println!("{kept} beside {missed} from rest; {lowered:?}, of {} nodes", filled.nodes);
+    assert!(kept < KEPT && missed > 5.0 * KEPT, "{kept} beside {missed} from rest");
+    // What was measured while it was filled says the same, of equilibria that were lowered, too.
+    assert!(filled.measured < KEPT, "{}", filled.measured);
+    let mut changed = 0;
+    for (key, block) in filled.store.blocks() {
+        let (level, place) = filled.store.space().block(key).unwrap();
+        let (lowest, rest) = (block.nodes(), from_rest.get(level, &place).unwrap().nodes());
+        assert_eq!(lowest.present, rest.present);
+        let numbers = lowest.records.len() / lowest.status.len();
+        for (lowest, rest) in lowest.records.chunks(numbers).zip(rest.records.chunks(numbers)) {
+            // The energy is half the square of the first number.
+            assert!(lowest == rest || lowest[0] < rest[0], "{lowest:?} beside {rest:?}");
+            changed += usize::from(lowest != rest);
+        }
+    }
+    assert!(changed == lowered.points && changed > 100, "{changed} changed, {lowered:?}");
+    assert!(lowered.greatest > 0.01 && lowered.rounds > 3 && lowered.searches >= changed, "{lowered:?}");
+}
+
+#[test]
+fn the_lowest_equilibria_of_a_store_depend_on_neither_threads_nor_batches() {
+    let world = World::new();
+    let [one, other] = [(1, 7), (3, 1000)].map(|(threads, batch)| world.fill(threads, batch));
+    assert_eq!(one.store.blocks().len(), other.store.blocks().len());
+    for ((key, block), (other_key, other)) in one.store.blocks().into_iter().zip(other.store.blocks()) {
+        assert_eq!((key, block.nodes()), (other_key, other.nodes()));
+    }
+    assert_eq!((one.measured, one.rounds), (other.measured, other.rounds));
+}
