@@ -16,7 +16,7 @@ use haptize::{
     device::{Device, Motion, Recorded},
     proxy::Chain,
     render::{
-        live::{Live, LiveEnds},
+        live::{AtTheProxy, Live, LiveEnds},
         session::Driver,
         setup::Setup,
         trace::Tick,
@@ -110,12 +110,13 @@ impl World<'_> {
         for bounds in self.chain.jacobian_bounds(&self.chain.joints.iter().map(|j| j.limits).collect::<Vec<_>>()) {
             levers.iter_mut().zip(bounds.iter()).for_each(|(lever, bound)| *lever = lever.max(*bound));
         }
-        let (live, LiveEnds { mut whereabouts, solutions, mut answers }) =
-            Live::new(&start, self.levels, &levers, 1, direct);
+        let at_the_proxy = AtTheProxy { torque: direct, forces: false };
+        let (live, ends) = Live::new(&start, self.levels, &levers, 1, at_the_proxy);
+        let LiveEnds { mut whereabouts, solutions, mut answers } = ends;
         let mut solver = ahead.solver();
         ahead.prepare(&start, 1, Duration::from_secs(600));
         println!("prepared: {:?}", ahead.solved());
-        let mut driver = Driver::new(&setup.haptics, device).unwrap().with_live(Some(live));
+        let mut driver = Driver::new(&setup.haptics, device, Some(live)).unwrap();
         let mut follower = Follower::new(self.model);
         let mut solutions = solutions;
         let (mut spent, mut spent_direct, mut ticks) = (0.0, 0.0_f64, Vec::<Tick>::new());

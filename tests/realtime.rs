@@ -20,7 +20,7 @@ use haptize::{
         flags::Fault,
         graphics::Graphics,
         haptic::{Haptics, Inputs},
-        live::{Live, LiveEnds},
+        live::{AtTheProxy, Live, LiveEnds},
         realtime::{self, Ends, HapticLoop, Options},
         recording::Recording,
         session::{Driver, Plan},
@@ -96,7 +96,7 @@ fn the_real_time_loop_allocates_nothing() {
     let data = object(3);
     let haptics = build(&data);
     let mut hand = hand(3);
-    let (mut body, Ends { mut ticks, mut latest, clear, .. }) = HapticLoop::new(&haptics, &mut hand).unwrap();
+    let (mut body, Ends { mut ticks, mut latest, clear, .. }) = HapticLoop::new(&haptics, &mut hand, None).unwrap();
     assert_no_alloc(|| {
         for k in 0..300 {
             body.tick();
@@ -118,7 +118,7 @@ fn no_tick_is_missed_that_is_done_in_arrears() {
     let data = object(3);
     let haptics = build(&data);
     let mut hand = hand(3);
-    let (mut body, Ends { mut ticks, .. }) = HapticLoop::new(&haptics, &mut hand).unwrap();
+    let (mut body, Ends { mut ticks, .. }) = HapticLoop::new(&haptics, &mut hand, None).unwrap();
     body.tick_relaxed();
     let mut waited = Duration::ZERO;
     assert_no_alloc(|| {
@@ -215,7 +215,7 @@ fn a_loop_that_keeps_missing_its_deadlines_lets_go_without_a_jump_and_says_why()
     // Time is told, not waited for: pressed for a second on time, then as the machine allows.
     let run = |late: f64| {
         let mut hand = along(3, [(0.0, -0.2), (0.5, 0.3)]);
-        let mut driver = Driver::new(&haptics, &mut hand).unwrap();
+        let mut driver = Driver::new(&haptics, &mut hand, None).unwrap();
         let (mut before, mut greatest) = (JointVector::zeros(3), 0.0);
         for k in 0..2000 {
             let interval = if k < 1000 { 1e-3 } else { late };
@@ -247,7 +247,7 @@ fn the_first_deadline_comes_after_the_system_has_granted_what_it_grants() {
     let data = object(3);
     let haptics = build(&data);
     let mut hand = hand(3);
-    let (mut body, Ends { mut late, .. }) = HapticLoop::new(&haptics, &mut hand).unwrap();
+    let (mut body, Ends { mut late, .. }) = HapticLoop::new(&haptics, &mut hand, None).unwrap();
     // As long as memory may take to be locked.
     std::thread::sleep(Duration::from_millis(200));
     body.begin();
@@ -342,17 +342,27 @@ fn contact_that_is_solved_meanwhile_allocates_nothing_in_a_tick() {
     let grid = grid_of(&scene);
     let space = Space::new(&grid, 2).unwrap();
     let levers = JointVector::from_slice(&[0.3; MAX_JOINTS]);
-    for (order, direct) in [(Order::Potential, false), (Order::Potential, true), (Order::Linear, false)] {
+    let friction = "\n[haptics.friction]\ncoefficient = 0.3\nstiffness = 1000.0\n";
+    for (order, torque, forces) in [
+        (Order::Potential, false, false),
+        (Order::Potential, true, false),
+        (Order::Linear, false, false),
+        (Order::Linear, false, true),
+    ] {
         let store = Arc::new(Store::new(space.clone(), order, 20_000));
         let ahead = Ahead::new(&model, Arc::clone(&store));
-        let dataset = Dataset::refined(store, grid.clone(), None, scene.text.clone(), Provenance::default());
+        let text = scene.text.clone() + if forces { friction } else { "" };
+        let dataset = Dataset::refined(store, grid.clone(), None, text, Provenance::default());
         let setup = Setup::new(&dataset).unwrap();
         // In contact from the beginning, where nothing is known yet.
         let way = [Waypoint { time: 0.0, ..scene.motion.press[2] }, Waypoint { time: 0.3, ..scene.motion.press[3] }];
         let mut hand = setup.hand(Motion::through(&way, MAX_JOINTS).unwrap()).unwrap();
-        let (live, LiveEnds { mut whereabouts, solutions, mut answers }) = Live::new(&way[0].q, 2, &levers, 1, direct);
-        let mut driver = Driver::new(&setup.haptics, &mut hand).unwrap().with_live(Some(live));
-        let (mut solutions, mut solver, mut follower) = (solutions, ahead.solver(), Follower::new(&model));
+        let at_the_proxy = AtTheProxy { torque, forces };
+        let (live, ends) = Live::new(&way[0].q, 2, &levers, 1, at_the_proxy);
+        let LiveEnds { mut whereabouts, solutions, mut answers } = ends;
+        let mut driver = Driver::new(&setup.haptics, &mut hand, Some(live)).unwrap();
+        let (mut solutions, mut solver, mut follower) =
+            (solutions, ahead.solver(), Follower::new(&model).with_forces(forces));
         for k in 0..600 {
             assert_no_alloc(|| driver.tick(1e-3, 1e-3));
             if let Some(solutions) = &mut solutions {
@@ -366,10 +376,13 @@ fn contact_that_is_solved_meanwhile_allocates_nothing_in_a_tick() {
             }
         }
         let answers = answers.read();
-        assert_eq!(answers.direct > 0, direct, "{answers:?}");
+        assert_eq!(answers.direct > 0, torque, "{answers:?}");
         assert!(answers.changes > 0, "{answers:?}");
+        if forces {
+            continue;
+        }
         let mut hand = setup.hand(Motion::through(&way, MAX_JOINTS).unwrap()).unwrap();
-        let mut driver = Driver::new(&setup.haptics, &mut hand).unwrap();
+        let mut driver = Driver::new(&setup.haptics, &mut hand, None).unwrap();
         let mut touched = 0;
         assert_no_alloc(|| {
             for _ in 0..300 {

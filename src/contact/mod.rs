@@ -111,6 +111,12 @@ impl Equilibrium {
             touches: Vec::new(),
         }
     }
+
+    /// Returns the forces on the proxy's nodes that are touched, ascending by node [N].
+    #[must_use]
+    pub fn on_proxy(&self) -> Vec<NodeForce> {
+        self.touches.iter().map(|touch| NodeForce { node: touch.proxy_node, force: touch.force }).collect()
+    }
 }
 
 /// Contact force f_j on one node of the object.

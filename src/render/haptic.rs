@@ -26,6 +26,7 @@ use super::{
 };
 use crate::{
     JointVector,
+    contact::NodeForce,
     field::{Sample, TorqueField, range::HaptizedRange},
     scene::HapticsSpec,
 };
@@ -278,7 +279,8 @@ impl Haptics {
         state.held.push(&torque);
 
         let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
-        let stopped = self.move_proxy(state, interval, &velocity, &sample);
+        let solved = live.as_deref().map_or(&[][..], |live| live.forces(&proxy));
+        let stopped = self.move_proxy(state, interval, &velocity, &sample, solved);
         if let Some(live) = live {
             live.tell(&state.motion.position, &state.proxy_velocity);
         }
@@ -308,8 +310,16 @@ impl Haptics {
         torque
     }
 
-    /// One step of the proxy over `interval` [s], booked; what stopped it. The device moves at `velocity`.
-    fn move_proxy(&self, state: &mut State, interval: f64, velocity: &JointVector, sample: &Sample) -> Flags {
+    /// One step of the proxy over `interval` [s], booked; what stopped it. The device moves at `velocity`, and contact
+    /// forces are `solved` at the proxy.
+    fn move_proxy(
+        &self,
+        state: &mut State,
+        interval: f64,
+        velocity: &JointVector,
+        sample: &Sample,
+        solved: &[NodeForce],
+    ) -> Flags {
         let stage = self.npmi.stage(&state.motion, interval);
         let limits = self.npmi.limits();
         let stops = self.range.stops(&state.motion.position, &state.motion.velocity, interval, limits);
@@ -334,8 +344,8 @@ impl Haptics {
         let step = match (&self.effects, &mut state.effects) {
             (Some(effects), Some(memory)) => {
                 let share = if sample.contact { sample.share } else { 0.0 };
-                let pending = Pending { npmi: &self.npmi, stage: &stage, interval, load };
-                effects.step(pending, memory, &mut state.motion, share, &mut extra)
+                let pending = Pending { npmi: &self.npmi, stage: &stage, interval, load, share, solved };
+                effects.step(pending, memory, &mut state.motion, &mut extra)
             }
             _ => self.npmi.advance(&stage, &mut state.motion, interval, &load),
         };

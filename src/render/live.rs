@@ -6,13 +6,15 @@
 //! [horizon](crate::store::Store::horizon). From tick to tick the torque passes over without a jump and without energy
 //! from nowhere (`passage.rs`).
 //!
+//! A store keeps no contact forces. Effects at contacts have those of the equilibrium solved at the proxy.
+//!
 //! Nothing here allocates, locks or waits: places and solutions go through triple buffers, of which each end has a
 //! value of its own.
 
 use super::{accounts::Accounts, passage::Passage};
 use crate::{
     JointVector,
-    contact::Status,
+    contact::{NodeForce, Status},
     field::{Flags, Sample, TorqueField},
     store::{Store, space::MAX_LEVELS},
     sweep::ahead::{Solution, Whereabouts},
@@ -36,11 +38,29 @@ pub struct Live {
     whereabouts: Vec<triple_buffer::Input<Whereabouts>>,
     /// Absent unless the scene asks for them.
     solutions: Option<triple_buffer::Output<Solution>>,
+    at_the_proxy: AtTheProxy,
     tick: u64,
     last: Option<Felt>,
     passage: Passage,
     answers: Answers,
     published: triple_buffer::Input<Answers>,
+}
+
+/// What the scene needs of the equilibrium at the proxy.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AtTheProxy {
+    /// Torque and tangent, which are felt in the place of the store's.
+    pub torque: bool,
+    /// Forces on the proxy's nodes, for effects at contacts.
+    pub forces: bool,
+}
+
+impl AtTheProxy {
+    /// Whether it is solved at all.
+    #[must_use]
+    pub fn is_solved(self) -> bool {
+        self.torque || self.forces
+    }
 }
 
 /// The other ends of a [`Live`].
@@ -123,40 +143,57 @@ impl Source<'_> {
 
 impl Live {
     /// For a proxy that starts at `start`, with so many `levels` wanted and the greatest lever of each joint; `threads`
-    /// fill the store, and with `direct` another one solves at the proxy.
+    /// fill the store, and another one solves `at_the_proxy` what is needed there.
     #[must_use]
     pub fn new(
         start: &JointVector,
         levels: u32,
         levers: &JointVector,
         threads: usize,
-        direct: bool,
+        at_the_proxy: AtTheProxy,
     ) -> (Self, LiveEnds) {
-        let joints = start.len();
+        let (joints, is_solved) = (start.len(), at_the_proxy.is_solved());
         let ends = || triple_buffer::triple_buffer(&Whereabouts::at_rest(start));
-        let (inputs, outputs) = (0..threads + usize::from(direct)).map(|_| ends()).unzip();
+        let (inputs, outputs) = (0..threads + usize::from(is_solved)).map(|_| ends()).unzip();
         let (written, read) = triple_buffer::triple_buffer(&Solution::none(joints));
         let (published, answers) = triple_buffer::triple_buffer(&Answers::default());
         let live = Self {
             wanted: levels,
             levers: *levers,
             whereabouts: inputs,
-            solutions: direct.then_some(read),
+            solutions: is_solved.then_some(read),
+            at_the_proxy,
             tick: 0,
             last: None,
             passage: Passage::new(joints),
             answers: Answers::default(),
             published,
         };
-        (live, LiveEnds { whereabouts: outputs, solutions: direct.then_some(written), answers })
+        (live, LiveEnds { whereabouts: outputs, solutions: is_solved.then_some(written), answers })
+    }
+
+    /// Whether it gives contact forces.
+    #[must_use]
+    pub fn solves_forces(&self) -> bool {
+        self.at_the_proxy.forces
+    }
+
+    /// Forces on the proxy's nodes in the tick whose contact was sampled last, at `x`; none where no solution is good
+    /// [N].
+    pub(super) fn forces(&self, x: &JointVector) -> &[NodeForce] {
+        let solution = self.solutions.as_ref().map(triple_buffer::Output::peek_output_buffer);
+        match solution.filter(|solution| serves(solution, x, self.tick, &self.levers)) {
+            Some(solution) => &solution.on_proxy,
+            None => &[],
+        }
     }
 
     /// The contact field at `x` in a tick of `period` [s].
     pub(super) fn sample(&mut self, field: &TorqueField, x: &JointVector, accounts: &Accounts, period: f64) -> Sample {
-        let Self { wanted, levers, solutions, tick, last, passage, answers, .. } = self;
+        let Self { wanted, levers, solutions, at_the_proxy, tick, last, passage, answers, .. } = self;
         let horizon = field.store().map_or(0, Store::horizon);
         let solution = solutions.as_mut().map(|solutions| solutions.read());
-        let source = match solution.filter(|solution| serves(solution, x, *tick, levers)) {
+        let source = match solution.filter(|solution| at_the_proxy.torque && serves(solution, x, *tick, levers)) {
             Some(solution) => Source::Solution(solution),
             None => Source::Store { field, horizon },
         };

@@ -1,6 +1,6 @@
 //! A scene that is felt while its contact is solved, ahead of the motion, and what was solved for it.
 
-use super::live::{Answers, Live, LiveEnds};
+use super::live::{Answers, AtTheProxy, Live, LiveEnds};
 use crate::{
     JointVector,
     contact::Model,
@@ -11,7 +11,7 @@ use crate::{
     store::{Order, Space, SpaceError, Store},
     sweep::{
         CpuBackend, NoEnergy, SceneObjectError,
-        ahead::{Ahead, Solution, Solved, Whereabouts, follow},
+        ahead::{Ahead, Follower, Solution, Solved, Whereabouts, follow},
         build_object, check_algorithm, grid_of, order_of, sample,
     },
 };
@@ -166,11 +166,15 @@ impl OnDemand {
     /// When the model cannot be made, or the system gives no threads.
     pub fn begin(self: &Arc<Self>, start: &JointVector) -> Result<(Live, Exploration), OnDemandError> {
         let began = Instant::now();
-        let direct = self.scene.haptics.interpolation == Interpolation::Direct;
+        let haptics = &self.scene.haptics;
+        let at_the_proxy = AtTheProxy {
+            torque: haptics.interpolation == Interpolation::Direct,
+            forces: haptics.effects.at_contacts().is_some(),
+        };
         let levels = self.store.space().levels();
-        let (live, ends) = Live::new(start, levels, &self.levers(), self.threads, direct);
+        let (live, ends) = Live::new(start, levels, &self.levers(), self.threads, at_the_proxy);
         let LiveEnds { whereabouts, solutions, answers } = ends;
-        let ends = WorkerEnds { whereabouts, solutions };
+        let ends = WorkerEnds { whereabouts, solutions, with_forces: at_the_proxy.forces };
         let over = Arc::new(AtomicBool::new(false));
         let (report, ready) = mpsc::channel();
         let (this, raised, start) = (Arc::clone(self), Arc::clone(&over), *start);
@@ -211,6 +215,7 @@ impl OnDemand {
 struct WorkerEnds {
     whereabouts: Vec<triple_buffer::Output<Whereabouts>>,
     solutions: Option<triple_buffer::Input<Solution>>,
+    with_forces: bool,
 }
 
 impl WorkerEnds {
@@ -222,13 +227,14 @@ impl WorkerEnds {
         over: &AtomicBool,
         ready: &mpsc::Sender<Result<(), OnDemandError>>,
     ) {
-        let Self { mut whereabouts, solutions } = self;
+        let Self { mut whereabouts, solutions, with_forces } = self;
         thread::scope(|scope| {
             let begin = || -> io::Result<()> {
                 if let Some(solutions) = solutions
                     && let Some(end) = whereabouts.pop()
                 {
-                    let work = move || follow(model, end, solutions, over);
+                    let follower = Follower::new(model).with_forces(with_forces);
+                    let work = move || follow(follower, end, solutions, over);
                     thread::Builder::new().name("equilibrium".into()).spawn_scoped(scope, work)?;
                 }
                 for end in whereabouts {

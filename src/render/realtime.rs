@@ -87,12 +87,16 @@ impl ClearFault {
 }
 
 impl<'session> HapticLoop<'session> {
-    /// A loop with its first deadline now.
+    /// A loop with its first deadline now; with `live` over contact that is solved meanwhile.
     ///
     /// # Errors
-    /// When the device reports no position, or there is no memory.
-    pub fn new(haptics: &'session Haptics, device: &'session mut dyn Device) -> Result<(Self, Ends), SessionError> {
-        let driver = Driver::new(haptics, device)?;
+    /// As [`Driver::new`], or when there is no memory.
+    pub fn new(
+        haptics: &'session Haptics,
+        device: &'session mut dyn Device,
+        live: Option<Live>,
+    ) -> Result<(Self, Ends), SessionError> {
+        let driver = Driver::new(haptics, device, live)?;
         let (recorder, ticks) = rtrb::RingBuffer::new(RING);
         let (late, late_ticks) = rtrb::RingBuffer::new(LATE_RING);
         let start = crate::JointVector::zeros(haptics.joints());
@@ -118,12 +122,6 @@ impl<'session> HapticLoop<'session> {
             stopped: false,
         };
         Ok((this, Ends { ticks, latest: reader, late: late_ticks, clear: ClearFault(clear) }))
-    }
-
-    /// The same over contact that is solved meanwhile.
-    #[must_use]
-    pub fn with_live(self, live: Option<Live>) -> Self {
-        Self { driver: self.driver.with_live(live), ..self }
     }
 
     /// Asks the system for a real-time priority for the calling thread, and sets the first deadline to now. Returns
@@ -267,8 +265,7 @@ pub fn run(
 ) -> Result<(Trace, Timing), SessionError> {
     let Options { stop, live, mut on_tick } = options;
     let scheduler = device.scheduler();
-    let (body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device)?;
-    let mut body = body.with_live(live);
+    let (mut body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device, live)?;
     let start = *body.driver.start();
     let frame_cost = Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()))?;
     let mut recorded = plan.new_ticks()?;

@@ -212,7 +212,7 @@ impl Recording {
         joints: Vec<JointLabel>,
     ) -> Result<Trace, SessionError> {
         let mut device = Playback { recording: self, next: None };
-        let mut driver = Driver::new(haptics, &mut device)?;
+        let mut driver = Driver::new(haptics, &mut device, None)?;
         let plan = Plan { joints, ticks: self.rows.len(), snapshots: self.kept.clone() };
         let mut frames = graphics.map(|graphics| Frames::new(graphics, &plan));
         let mut ticks = plan.new_ticks()?;

@@ -5,6 +5,7 @@
 //! first tick at or after `j T_g`, from the proxy's configuration then.
 
 use super::{
+    effects::ContactEffects,
     flags::Fault,
     graphics::{Graphics, GraphicsError},
     haptic::{Haptics, Inputs, State},
@@ -31,6 +32,12 @@ pub enum SessionError {
     /// The device's first position is none.
     #[error("the session cannot start: {0}")]
     Start(#[from] Fault),
+    /// An effect needs contact forces, which are neither stored nor solved.
+    #[error(
+        "friction and contact damping need contact forces, which a store of several levels does not keep: play or view \
+         the scene with --on-demand FILE, which solves them while they are felt, or bake its grid without --refine"
+    )]
+    NoForces,
     /// The object cannot be drawn.
     #[error(transparent)]
     Graphics(#[from] GraphicsError),
@@ -89,21 +96,22 @@ impl Plan {
 }
 
 impl<'session> Driver<'session> {
-    /// Reads the device and puts the proxy there, at rest.
+    /// Reads the device and puts the proxy there, at rest; with `live` over contact that is solved meanwhile.
     ///
     /// # Errors
-    /// When the device reports no position.
-    pub fn new(haptics: &'session Haptics, device: &'session mut dyn Device) -> Result<Self, Fault> {
+    /// When the device reports no position, or contact forces are needed that nobody gives.
+    pub fn new(
+        haptics: &'session Haptics,
+        device: &'session mut dyn Device,
+        live: Option<Live>,
+    ) -> Result<Self, SessionError> {
+        let are_solved = live.as_ref().is_some_and(Live::solves_forces);
+        if haptics.effects().is_some_and(ContactEffects::need_solved_forces) && !are_solved {
+            return Err(SessionError::NoForces);
+        }
         let position = device.read(0.0).position;
         let state = haptics.start(&position)?;
-        Ok(Self { haptics, device, state, time: 0.0, ticks: 0, restart: false, start: position, live: None })
-    }
-
-    /// The same over contact that is solved meanwhile.
-    #[must_use]
-    pub fn with_live(mut self, live: Option<Live>) -> Self {
-        self.live = live;
-        self
+        Ok(Self { haptics, device, state, time: 0.0, ticks: 0, restart: false, start: position, live })
     }
 
     /// Asks for a fault to be cleared at the next tick: the loop then starts again where the device is. Nothing happens
@@ -214,7 +222,7 @@ pub fn run(
     graphics: Option<&mut Graphics<'_>>,
     plan: &Plan,
 ) -> Result<Trace, SessionError> {
-    let mut driver = Driver::new(haptics, device)?;
+    let mut driver = Driver::new(haptics, device, None)?;
     let mut frames = graphics.map(|graphics| Frames::new(graphics, plan));
     let mut ticks = plan.new_ticks()?;
     for _ in 0..plan.ticks {

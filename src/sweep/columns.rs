@@ -8,7 +8,7 @@
 //! ```
 
 use crate::JointMatrix;
-use crate::contact::{Equilibrium, NodeForce, Status, Touch};
+use crate::contact::{Equilibrium, NodeForce, Status};
 use bytemuck::Pod;
 use std::collections::{BTreeMap, TryReserveError};
 
@@ -266,7 +266,7 @@ impl Columns {
     /// does not have or out of order) becomes an unconverged point without torque and forces, of residual 1: the empty
     /// answer, which balances nothing.
     pub fn push(&mut self, equilibrium: &Equilibrium, shape: Shape) {
-        let Equilibrium { status, iterations, residual, energy, gap, torque, forces, tangent, touches } = equilibrium;
+        let Equilibrium { status, iterations, residual, energy, gap, torque, forces, tangent, .. } = equilibrium;
         let sound = torque.len() == shape.joints
             && torque.is_finite()
             && energy.is_finite()
@@ -275,7 +275,7 @@ impl Columns {
             && forces.iter().all(|contact| contact.force.as_vec3().is_finite())
             && forces.is_sorted_by(|a, b| a.node < b.node)
             && forces.last().is_none_or(|last| (last.node as usize) < shape.surface_nodes);
-        let on_proxy = if shape.with_touches { on_proxy(touches) } else { Vec::new() };
+        let on_proxy = if shape.with_touches { equilibrium.on_proxy() } else { Vec::new() };
         let sound = sound
             && on_proxy.is_sorted_by(|a, b| a.node < b.node)
             && on_proxy.iter().all(|contact| contact.force.as_vec3().is_finite());
@@ -404,11 +404,6 @@ impl Columns {
         columns.status = take(&mut rest, points)?;
         (columns.contacts.fit() && columns.touches.fit()).then_some(columns)
     }
-}
-
-/// Forces on the proxy's nodes that are touched, ascending by node [N].
-fn on_proxy(touches: &[Touch]) -> Vec<NodeForce> {
-    touches.iter().map(|touch| NodeForce { node: touch.proxy_node, force: touch.force }).collect()
 }
 
 /// Takes `count` numbers off the front of `bytes`, which need not be aligned.

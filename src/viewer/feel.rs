@@ -300,10 +300,9 @@ impl Body {
     fn by_the_clock(mut self, report: &mpsc::Sender<Result<Seen, String>>, refuse: &mpsc::Sender<Vec<String>>) {
         let scheduler = self.device.scheduler();
         let goes_on = || !self.stop.load(Ordering::Acquire);
-        match HapticLoop::new(&self.haptics, &mut self.device) {
+        match HapticLoop::new(&self.haptics, &mut self.device, self.live) {
             Err(error) => drop(report.send(Err(error.to_string()))),
-            Ok((body, Ends { ticks, latest, clear, .. })) => {
-                let mut body = body.with_live(self.live);
+            Ok((mut body, Ends { ticks, latest, clear, .. })) => {
                 drop(report.send(Ok((ticks, latest, Some(clear)))));
                 match scheduler {
                     None => {
@@ -341,8 +340,8 @@ impl Body {
         asked: &mpsc::Receiver<usize>,
         done: &mpsc::Sender<()>,
     ) {
-        let mut driver = match Driver::new(&self.haptics, &mut self.device) {
-            Ok(driver) => driver.with_live(self.live),
+        let mut driver = match Driver::new(&self.haptics, &mut self.device, self.live) {
+            Ok(driver) => driver,
             Err(error) => return drop(report.send(Err(error.to_string()))),
         };
         let (mut record, ticks) = rtrb::RingBuffer::new(RING);

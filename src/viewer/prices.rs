@@ -231,7 +231,7 @@ fn tick_costs<const N: usize>(loaded: &Loaded, gains: [&HapticsSpec; N]) -> Opti
     in_turns(|turn| {
         let (haptics, gains) = &loops[turn];
         let mut hand = SimulatedHand::new(gains, motion.clone()).ok()?;
-        let mut driver = Driver::new(haptics, &mut hand).ok()?;
+        let mut driver = Driver::new(haptics, &mut hand, None).ok()?;
         let period = haptics.period();
         let block = |_| {
             let begin = Instant::now();

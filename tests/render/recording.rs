@@ -26,7 +26,7 @@ fn eventful(haptics: &Haptics) -> Trace {
     positions[300] = vector(&[0.1, f64::NAN]);
     positions[500] = vector(&[]);
     let mut device = Scripted::new(positions);
-    let mut driver = Driver::new(haptics, &mut device).unwrap();
+    let mut driver = Driver::new(haptics, &mut device, None).unwrap();
     let mut trace = Trace { start: *driver.start(), ..Trace::default() };
     let mut elapsed = 1e-3;
     for k in 0..599 {

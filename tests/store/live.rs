@@ -10,9 +10,9 @@ use haptize::{
     object::Object,
     proxy::Chain,
     render::{
-        live::{Answers, Live},
+        live::{Answers, AtTheProxy, Live},
         on_demand::OnDemand,
-        session::Driver,
+        session::{Driver, SessionError},
         setup::Setup,
     },
     scene::{Scene, Waypoint},
@@ -49,7 +49,11 @@ impl World {
             );
             text = text.replace("nodes = [", &wrist);
         }
-        let scene = Scene::parse(&text, "small.toml").unwrap();
+        Self::of(&text)
+    }
+
+    fn of(text: &str) -> Self {
+        let scene = Scene::parse(text, "small.toml").unwrap();
         let (object, chain) = (build_object(&scene).unwrap(), Chain::new(&scene.proxy));
         Self { scene, object, chain }
     }
@@ -103,8 +107,8 @@ fn session(
     let mut hand = setup.hand(world.motion(seconds, seed)).unwrap();
     let start = world.motion(seconds, seed).at(0.0).0;
     let levers = JointVector::from_slice(&[0.1, 1.0]);
-    let (live, mut ends) = Live::new(&start, LEVELS, &levers, 1, false);
-    let mut driver = Driver::new(&setup.haptics, &mut hand).unwrap().with_live(Some(live));
+    let (live, mut ends) = Live::new(&start, LEVELS, &levers, 1, AtTheProxy::default());
+    let mut driver = Driver::new(&setup.haptics, &mut hand, Some(live)).unwrap();
     let mut solver = ahead.solver();
     for k in 0..1000 * seconds {
         let (tick, _) = assert_no_alloc(|| driver.tick(1e-3, 1e-3));
@@ -285,4 +289,55 @@ fn a_scene_is_explored_for_its_own_interpolation() {
         dataset.save(&kept).unwrap();
         assert!(OnDemand::open(&path, &kept, 2, Some(1)).is_ok(), "{name}");
     }
+}
+
+/// A store keeps no contact forces; friction has those of the equilibria that are solved at the proxy.
+#[test]
+fn friction_over_a_store_takes_the_work_of_the_solved_normal_forces() {
+    const COEFFICIENT: f64 = 0.5;
+    let friction = format!("\n[haptics.friction]\ncoefficient = {COEFFICIENT}\nstiffness = 5000.0\n");
+    let world = World::of(&(include_str!("../scenes/small.toml").to_owned() + &friction));
+    let (model, store) = (world.model(), world.store());
+    let ahead = Ahead::new(&model, Arc::clone(&store));
+    let setup = Setup::new(&world.dataset(&store)).unwrap();
+    // Into the ball, and across it.
+    let way = [[0.0, -0.25, 0.0], [0.3, -0.25, 0.04], [1.3, 0.25, 0.04]];
+    let way = way.map(|[time, turn, slide]| Waypoint { time, q: JointVector::from_slice(&[turn, slide]) });
+    let motion = || Motion::through(&way, 2).unwrap();
+    let levers = JointVector::from_slice(&[0.1, 1.0]);
+    let live = |forces| Live::new(&way[0].q, LEVELS, &levers, 1, AtTheProxy { torque: false, forces });
+    let (answering, mut ends) = live(true);
+    let mut hand = setup.hand(motion()).unwrap();
+    // Whoever solves no forces is refused at the start, and so is a session in which nobody solves.
+    for without in [Some(live(false).0), None] {
+        let refused = Driver::new(&setup.haptics, &mut hand, without).err();
+        assert!(matches!(refused, Some(SessionError::NoForces)), "{refused:?}");
+    }
+    let mut driver = Driver::new(&setup.haptics, &mut hand, Some(answering)).unwrap();
+    let (mut solver, mut follower) = (ahead.solver(), Follower::new(&model).with_forces(true));
+    let (mut expected, mut taken, mut before) = (0.0, 0.0, None::<JointVector>);
+    let (mut one, mut other) = (world.chain.new_pose(), world.chain.new_pose());
+    for _ in 0..1300 {
+        let (tick, _) = assert_no_alloc(|| driver.tick(1e-3, 1e-3));
+        let accounts = &tick.accounts;
+        assert!(tick.fault.is_none() && accounts.residual().abs() <= 1e-10 * accounts.exchanged.max(1e-6));
+        assert!(accounts.friction_dissipation >= taken - 1e-12 * accounts.exchanged, "{accounts:?}");
+        taken = accounts.friction_dissipation;
+        if let Some(before) = before {
+            world.chain.pose(&before, &mut one);
+            world.chain.pose(&tick.proxy, &mut other);
+            for touch in solver.solve(&tick.proxy).touches {
+                let node = touch.proxy_node as usize;
+                let way = other.nodes[node] - one.nodes[node];
+                let normal = touch.force.normalize();
+                expected += COEFFICIENT * touch.force.length() * way.reject_from_normalized(normal).length();
+            }
+        }
+        before = Some(tick.proxy);
+        while ahead.advance(&mut solver, ends.whereabouts[0].read(), false) {}
+        ends.solutions.as_mut().unwrap().write(follower.solve(ends.whereabouts[1].read()));
+    }
+    // It sticks before it slips, and the bristles hold something in the end.
+    let kept = taken + driver.tick(1e-3, 1e-3).0.accounts.bristles;
+    assert!(expected > 1e-3 && (kept / expected - 1.0).abs() < 0.1, "{kept} J for {expected} J");
 }

@@ -74,7 +74,7 @@ impl Friction {
         motion: &mut Motion,
         extra: &mut Extra,
     ) -> Step {
-        let Pending { npmi, stage, interval, load } = pending;
+        let Pending { npmi, stage, interval, load, .. } = pending;
         let interval = *interval;
         for patch in &mut state.patches {
             patch.bristle = patch.bristle.clamp_length_max(self.sticking_cone(patch) / self.stiffness);
@@ -240,7 +240,7 @@ mod tests {
             torque: JointVector::from_slice(&[1.0]),
             stops: *npmi.limits(),
         };
-        let pending = Pending { npmi: &npmi, stage: &stage, interval: INTERVAL, load };
+        let pending = Pending { npmi: &npmi, stage: &stage, interval: INTERVAL, load, share: 1.0, solved: &[] };
         // Fewer than may change within a tick all find their mode; of more, all are held.
         for (count, held) in [(MOST_SOLVES - 2, 0), (MOST_SOLVES + 3, MOST_SOLVES + 3)] {
             let patches = ladder(&friction, &pending, &motion, count);

@@ -15,6 +15,7 @@ use super::{
 };
 use crate::{
     JointVector, MAX_JOINTS,
+    contact::NodeForce,
     dataset::Dataset,
     field::stencil::LatticeError,
     proxy::{Chain, JointMatrix},
@@ -43,6 +44,10 @@ pub(super) struct Pending<'a> {
     pub interval: f64,
     /// Forces beside those of the effects.
     pub load: Load,
+    /// The factor that the field puts on contact torque and forces; zero out of contact [1].
+    pub share: f64,
+    /// Contact forces that were solved at the proxy [N].
+    pub solved: &'a [NodeForce],
 }
 
 /// State of the effects, and their work space.
@@ -125,6 +130,12 @@ impl ContactEffects {
         }))
     }
 
+    /// Whether they act by contact forces that are solved while they are felt.
+    #[must_use]
+    pub fn need_solved_forces(&self) -> bool {
+        matches!(self.contacts, Contacts::Solved)
+    }
+
     /// Untouched. Allocates what all later ticks need.
     #[must_use]
     pub fn start(&self) -> EffectState {
@@ -136,17 +147,15 @@ impl ContactEffects {
         }
     }
 
-    /// The `pending` step of the proxy with the effects, where the field puts `share` on the dataset's torque; zero out
-    /// of contact. Books into `extra`. Never allocates.
+    /// The `pending` step of the proxy with the effects. Books into `extra`. Never allocates.
     pub(super) fn step(
         &self,
         mut pending: Pending<'_>,
         state: &mut EffectState,
         motion: &mut Motion,
-        share: f64,
         extra: &mut Extra,
     ) -> Step {
-        self.touch(state, &motion.position, share);
+        self.touch(state, &motion.position, &pending);
         let damping = self.contact_damping(&state.patches);
         add(&mut pending.load.damping, 1.0, &damping);
         let step = match &self.friction {
@@ -158,9 +167,9 @@ impl ContactEffects {
     }
 
     /// Finds the proxy nodes in contact at `position`.
-    fn touch(&self, state: &mut EffectState, position: &JointVector, share: f64) {
+    fn touch(&self, state: &mut EffectState, position: &JointVector, pending: &Pending<'_>) {
         state.patches.clear();
-        self.contacts.interpolate(position, share, &mut state.touches);
+        self.contacts.at(position, pending.share, pending.solved, &mut state.touches);
         let mut links = None;
         for (node, touch) in state.touches.iter().enumerate() {
             let Some((normal, pressure)) = touch.normal() else { continue };

@@ -4,7 +4,7 @@
 use super::Whereabouts;
 use crate::{
     JointMatrix, JointVector,
-    contact::{Equilibrium, Model, Solver, Status},
+    contact::{Equilibrium, Model, NodeForce, Solver, Status},
     field::LEAST_ENERGY,
 };
 use std::{
@@ -17,7 +17,7 @@ use std::{
 const IDLE: Duration = Duration::from_micros(50);
 
 /// An equilibrium with its tangent.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
     /// Number of the solution; 0 before the first.
     pub number: u64,
@@ -35,6 +35,8 @@ pub struct Solution {
     pub tangent: JointMatrix,
     /// Nodes of the object in contact.
     pub contact_nodes: u32,
+    /// Forces on the proxy's nodes that are touched [N]; none unless they are asked for.
+    pub on_proxy: Vec<NodeForce>,
 }
 
 impl Solution {
@@ -44,10 +46,11 @@ impl Solution {
         let zeros = JointVector::zeros(joints);
         let tangent = JointMatrix::zeros(joints);
         let status = Status::Outside;
-        Self { number: 0, tick: 0, place: zeros, status, torque: zeros, energy: 0.0, tangent, contact_nodes: 0 }
+        let (energy, on_proxy) = (0.0, Vec::new());
+        Self { number: 0, tick: 0, place: zeros, status, torque: zeros, energy, tangent, contact_nodes: 0, on_proxy }
     }
 
-    fn new(number: u64, at: &Whereabouts, equilibrium: &Equilibrium) -> Self {
+    fn new(number: u64, at: &Whereabouts, equilibrium: &Equilibrium, with_forces: bool) -> Self {
         let joints = at.position.len();
         Self {
             number,
@@ -58,6 +61,7 @@ impl Solution {
             energy: equilibrium.energy,
             tangent: equilibrium.tangent.unwrap_or_else(|| JointMatrix::zeros(joints)),
             contact_nodes: equilibrium.forces.len() as u32,
+            on_proxy: if with_forces { equilibrium.on_proxy() } else { Vec::new() },
         }
     }
 
@@ -89,13 +93,20 @@ pub struct Follower<'a> {
     solver: Solver<'a>,
     before: Option<Equilibrium>,
     number: u64,
+    with_forces: bool,
 }
 
 impl<'a> Follower<'a> {
     /// For equilibria of `model`, which has tangents ([`Model::with_tangent`]).
     #[must_use]
     pub fn new(model: &'a Model<'a>) -> Self {
-        Self { solver: Solver::new(model), before: None, number: 0 }
+        Self { solver: Solver::new(model), before: None, number: 0, with_forces: false }
+    }
+
+    /// The same with forces on the proxy's nodes, if they are wanted.
+    #[must_use]
+    pub fn with_forces(self, with_forces: bool) -> Self {
+        Self { with_forces, ..self }
     }
 
     /// The equilibrium of a proxy `at` its whereabouts.
@@ -105,20 +116,19 @@ impl<'a> Follower<'a> {
         let settled = warm.filter(|found| !found.status.is_failed());
         let found = settled.unwrap_or_else(|| self.solver.solve(&at.position));
         self.number += 1;
-        let solution = Solution::new(self.number, at, &found);
+        let solution = Solution::new(self.number, at, &found, self.with_forces);
         self.before = Some(found);
         solution
     }
 }
 
-/// Solves the equilibrium at the proxy's place in `whereabouts`, again and again, until `over` is raised.
+/// Has `follower` solve the equilibrium at the proxy's place in `whereabouts`, again and again, until `over` is raised.
 pub fn follow(
-    model: &Model<'_>,
+    mut follower: Follower<'_>,
     mut whereabouts: triple_buffer::Output<Whereabouts>,
     mut solutions: triple_buffer::Input<Solution>,
     over: &AtomicBool,
 ) {
-    let mut follower = Follower::new(model);
     while !over.load(Ordering::Acquire) {
         if whereabouts.update() {
             solutions.write(follower.solve(whereabouts.peek_output_buffer()));

@@ -11,7 +11,7 @@ use crate::{
     gpu::{AdapterChoice, Context, FrameCost, FrameError, FrameMethod, FrameUpdate},
     render::{
         graphics::{ContactForces, Graphics, Smoothing},
-        session::{self, Driver, SessionError},
+        session::{self, Driver},
         setup::Setup,
         trace::Trace,
     },
@@ -138,7 +138,7 @@ fn feel_all(
     let times = by_rounds(timed, TRIES, |k| {
         let haptics = &setups[k].haptics;
         let mut device = Recorded::new(motion.clone());
-        let mut driver = Driver::new(haptics, &mut device).map_err(SessionError::from)?;
+        let mut driver = Driver::new(haptics, &mut device, None)?;
         let mut fault = false;
         let block = |_| {
             let begun = Instant::now();
