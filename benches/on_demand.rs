@@ -16,7 +16,7 @@ use haptize::{
     device::{Device, Motion, Recorded},
     proxy::Chain,
     render::{
-        live::{AtTheProxy, Live, LiveEnds},
+        live::{Followed, Live, LiveEnds},
         session::Driver,
         setup::Setup,
         trace::Tick,
@@ -110,8 +110,8 @@ impl World<'_> {
         for bounds in self.chain.jacobian_bounds(&self.chain.joints.iter().map(|j| j.limits).collect::<Vec<_>>()) {
             levers.iter_mut().zip(bounds.iter()).for_each(|(lever, bound)| *lever = lever.max(*bound));
         }
-        let at_the_proxy = AtTheProxy { torque: direct, forces: false };
-        let (live, ends) = Live::new(&start, self.levels, &levers, 1, at_the_proxy);
+        let followed = Followed { torque: direct, forces: false };
+        let (live, ends) = Live::new(&start, self.levels, &levers, 1, followed);
         let LiveEnds { mut whereabouts, solutions, mut answers } = ends;
         let mut solver = ahead.solver();
         ahead.prepare(&start, 1, Duration::from_secs(600));

@@ -20,7 +20,7 @@ use haptize::{
         flags::Fault,
         graphics::Graphics,
         haptic::{Haptics, Inputs},
-        live::{AtTheProxy, Live, LiveEnds},
+        live::{Followed, Live, LiveEnds},
         realtime::{self, Ends, HapticLoop, Options},
         recording::Recording,
         session::{Driver, Plan},
@@ -357,8 +357,8 @@ fn contact_that_is_solved_meanwhile_allocates_nothing_in_a_tick() {
         // In contact from the beginning, where nothing is known yet.
         let way = [Waypoint { time: 0.0, ..scene.motion.press[2] }, Waypoint { time: 0.3, ..scene.motion.press[3] }];
         let mut hand = setup.hand(Motion::through(&way, MAX_JOINTS).unwrap()).unwrap();
-        let at_the_proxy = AtTheProxy { torque, forces };
-        let (live, ends) = Live::new(&way[0].q, 2, &levers, 1, at_the_proxy);
+        let followed = Followed { torque, forces };
+        let (live, ends) = Live::new(&way[0].q, 2, &levers, 1, followed);
         let LiveEnds { mut whereabouts, solutions, mut answers } = ends;
         let mut driver = Driver::new(&setup.haptics, &mut hand, Some(live)).unwrap();
         let (mut solutions, mut solver, mut follower) =

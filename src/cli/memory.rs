@@ -2,7 +2,8 @@
 //!
 //! Rust lets a program answer a failed allocation where it asks first. Any other one ends the process by `abort`, after
 //! a line with the number of bytes. Here the size is remembered, and the signal of `abort` is answered with what to do
-//! and exit code 1.
+//! and exit code 1. So is a panic of the standard library where the system refuses memory that is not allocated, as for
+//! the signal stack of a thread that begins.
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -49,17 +50,22 @@ mod answer {
     /// Whether a thread has begun to answer: of several that find no memory at once only one speaks.
     static ANSWERED: AtomicBool = AtomicBool::new(false);
 
-    /// Text around the number of bytes.
-    const SAID: [&str; 2] = [
-        "out of memory: ",
-        " bytes were asked for in vain; close other programs, raise the limit (ulimit -v), or take a coarser grid or \
-         surface; what was written is kept: an unfinished haptize bake or haptize scan goes on with --resume",
+    /// Whether the standard library has panicked for want of memory.
+    static PANICKED: AtomicBool = AtomicBool::new(false);
+
+    /// What is said, with the number of bytes in the middle where it is known.
+    const SAID: [&str; 4] = [
+        "out of memory",
+        ": ",
+        " bytes were asked for in vain",
+        "; close other programs, raise the limit (ulimit -v), or take a coarser grid or surface; what was written is \
+         kept: an unfinished haptize bake or haptize scan goes on with --resume",
     ];
 
     /// Answers `abort` after a failed allocation. Any other one takes its course.
     extern "C" fn answer<const JSON: bool>(signal: libc::c_int) {
         let failed = FAILED.load(Ordering::Relaxed);
-        if failed == 0 {
+        if failed == 0 && !PANICKED.load(Ordering::Relaxed) {
             // SAFETY: no memory is involved; `abort` raises the signal again, which now ends the process.
             unsafe { libc::signal(signal, libc::SIG_DFL) };
             return;
@@ -84,9 +90,9 @@ mod answer {
             digits[first] = b'0' + (rest % 10) as u8;
             rest /= 10;
         }
-        for part in
-            [around[0].as_bytes(), SAID[0].as_bytes(), &digits[first..], SAID[1].as_bytes(), around[1].as_bytes()]
-        {
+        let [begin, before, after, end] = SAID.map(str::as_bytes);
+        let count = if failed > 0 { [before, &digits[first..], after] } else { [&[][..]; 3] };
+        for part in [&[around[0].as_bytes(), begin], &count[..], &[end, around[1].as_bytes()]].into_iter().flatten() {
             // Where nobody listens there is nobody to tell.
             let _ = rustix::io::write(file, part);
         }
@@ -96,6 +102,15 @@ mod answer {
         let answer = if json { answer::<true> } else { answer::<false> } as extern "C" fn(libc::c_int);
         // SAFETY: the handler calls nothing that may not be called in one.
         unsafe { libc::signal(libc::SIGABRT, answer as libc::sighandler_t) };
+        let refused = std::io::Error::from_raw_os_error(libc::ENOMEM).to_string();
+        let others = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if panic.payload_as_str().is_some_and(|said| said.contains(&refused)) {
+                PANICKED.store(true, Ordering::Relaxed);
+                std::process::abort();
+            }
+            others(panic);
+        }));
     }
 }
 

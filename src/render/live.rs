@@ -38,7 +38,7 @@ pub struct Live {
     whereabouts: Vec<triple_buffer::Input<Whereabouts>>,
     /// Absent unless the scene asks for them.
     solutions: Option<triple_buffer::Output<Solution>>,
-    at_the_proxy: AtTheProxy,
+    followed: Followed,
     tick: u64,
     last: Option<Felt>,
     passage: Passage,
@@ -46,16 +46,16 @@ pub struct Live {
     published: triple_buffer::Input<Answers>,
 }
 
-/// What the scene needs of the equilibrium at the proxy.
+/// What the loop takes of the equilibrium at the proxy, as the scene asks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AtTheProxy {
+pub struct Followed {
     /// Torque and tangent, which are felt in the place of the store's.
     pub torque: bool,
     /// Forces on the proxy's nodes, for effects at contacts.
     pub forces: bool,
 }
 
-impl AtTheProxy {
+impl Followed {
     /// Whether it is solved at all.
     #[must_use]
     pub fn is_solved(self) -> bool {
@@ -143,16 +143,16 @@ impl Source<'_> {
 
 impl Live {
     /// For a proxy that starts at `start`, with so many `levels` wanted and the greatest lever of each joint; `threads`
-    /// fill the store, and another one solves `at_the_proxy` what is needed there.
+    /// fill the store, and another one solves the equilibrium at the proxy, if anything of it is `followed`.
     #[must_use]
     pub fn new(
         start: &JointVector,
         levels: u32,
         levers: &JointVector,
         threads: usize,
-        at_the_proxy: AtTheProxy,
+        followed: Followed,
     ) -> (Self, LiveEnds) {
-        let (joints, is_solved) = (start.len(), at_the_proxy.is_solved());
+        let (joints, is_solved) = (start.len(), followed.is_solved());
         let ends = || triple_buffer::triple_buffer(&Whereabouts::at_rest(start));
         let (inputs, outputs) = (0..threads + usize::from(is_solved)).map(|_| ends()).unzip();
         let (written, read) = triple_buffer::triple_buffer(&Solution::none(joints));
@@ -162,7 +162,7 @@ impl Live {
             levers: *levers,
             whereabouts: inputs,
             solutions: is_solved.then_some(read),
-            at_the_proxy,
+            followed,
             tick: 0,
             last: None,
             passage: Passage::new(joints),
@@ -175,7 +175,7 @@ impl Live {
     /// Whether it gives contact forces.
     #[must_use]
     pub fn solves_forces(&self) -> bool {
-        self.at_the_proxy.forces
+        self.followed.forces
     }
 
     /// Forces on the proxy's nodes in the tick whose contact was sampled last, at `x`; none where no solution is good
@@ -190,10 +190,10 @@ impl Live {
 
     /// The contact field at `x` in a tick of `period` [s].
     pub(super) fn sample(&mut self, field: &TorqueField, x: &JointVector, accounts: &Accounts, period: f64) -> Sample {
-        let Self { wanted, levers, solutions, at_the_proxy, tick, last, passage, answers, .. } = self;
+        let Self { wanted, levers, solutions, followed, tick, last, passage, answers, .. } = self;
         let horizon = field.store().map_or(0, Store::horizon);
         let solution = solutions.as_mut().map(|solutions| solutions.read());
-        let source = match solution.filter(|solution| at_the_proxy.torque && serves(solution, x, *tick, levers)) {
+        let source = match solution.filter(|solution| followed.torque && serves(solution, x, *tick, levers)) {
             Some(solution) => Source::Solution(solution),
             None => Source::Store { field, horizon },
         };

@@ -1,6 +1,6 @@
 //! A scene that is felt while its contact is solved, ahead of the motion, and what was solved for it.
 
-use super::live::{Answers, AtTheProxy, Live, LiveEnds};
+use super::live::{Answers, Followed, Live, LiveEnds};
 use crate::{
     JointVector,
     contact::Model,
@@ -167,14 +167,14 @@ impl OnDemand {
     pub fn begin(self: &Arc<Self>, start: &JointVector) -> Result<(Live, Exploration), OnDemandError> {
         let began = Instant::now();
         let haptics = &self.scene.haptics;
-        let at_the_proxy = AtTheProxy {
+        let followed = Followed {
             torque: haptics.interpolation == Interpolation::Direct,
             forces: haptics.effects.at_contacts().is_some(),
         };
         let levels = self.store.space().levels();
-        let (live, ends) = Live::new(start, levels, &self.levers(), self.threads, at_the_proxy);
+        let (live, ends) = Live::new(start, levels, &self.levers(), self.threads, followed);
         let LiveEnds { whereabouts, solutions, answers } = ends;
-        let ends = WorkerEnds { whereabouts, solutions, with_forces: at_the_proxy.forces };
+        let ends = WorkerEnds { whereabouts, solutions, with_forces: followed.forces };
         let over = Arc::new(AtomicBool::new(false));
         let (report, ready) = mpsc::channel();
         let (this, raised, start) = (Arc::clone(self), Arc::clone(&over), *start);

@@ -1,36 +1,29 @@
 //! Contact that is solved while it is felt: no jump, no energy from nowhere, no allocation, and the same store whoever
 //! solved it.
 
+use super::world::World;
 use assert_no_alloc::assert_no_alloc;
 use haptize::{
     JointVector,
-    contact::{Model, Solver, Status},
+    contact::{Solver, Status},
     dataset::{Dataset, Provenance, Surface},
     device::Motion,
-    object::Object,
-    proxy::Chain,
     render::{
-        live::{Answers, AtTheProxy, Live},
+        live::{Answers, Followed, Live},
         on_demand::OnDemand,
         session::{Driver, SessionError},
         setup::Setup,
     },
-    scene::{Scene, Waypoint},
+    scene::Waypoint,
     store::{Order, Space, Store},
     sweep::{
         ahead::{Ahead, Follower, Whereabouts},
-        build_object, grid_of,
+        grid_of,
     },
 };
 use std::{sync::Arc, thread};
 
 const LEVELS: u32 = 3;
-
-struct World {
-    scene: Scene,
-    object: Object,
-    chain: Chain,
-}
 
 impl World {
     /// Two joints beside a ball.
@@ -50,18 +43,6 @@ impl World {
             text = text.replace("nodes = [", &wrist);
         }
         Self::of(&text)
-    }
-
-    fn of(text: &str) -> Self {
-        let scene = Scene::parse(text, "small.toml").unwrap();
-        let (object, chain) = (build_object(&scene).unwrap(), Chain::new(&scene.proxy));
-        Self { scene, object, chain }
-    }
-
-    fn model(&self) -> Model<'_> {
-        let mut model = Model::new(&self.object, &self.chain, self.scene.contact);
-        model.with_tangent = true;
-        model
     }
 
     fn store(&self) -> Arc<Store> {
@@ -107,7 +88,7 @@ fn session(
     let mut hand = setup.hand(world.motion(seconds, seed)).unwrap();
     let start = world.motion(seconds, seed).at(0.0).0;
     let levers = JointVector::from_slice(&[0.1, 1.0]);
-    let (live, mut ends) = Live::new(&start, LEVELS, &levers, 1, AtTheProxy::default());
+    let (live, mut ends) = Live::new(&start, LEVELS, &levers, 1, Followed::default());
     let mut driver = Driver::new(&setup.haptics, &mut hand, Some(live)).unwrap();
     let mut solver = ahead.solver();
     for k in 0..1000 * seconds {
@@ -240,7 +221,7 @@ fn a_cell_is_whole_wherever_it_lies_within_the_cells_below() {
 }
 
 #[test]
-fn a_solution_at_the_proxy_is_followed_by_its_tangent_to_second_order() {
+fn a_solution_followed_is_followed_by_its_tangent_to_second_order() {
     let world = World::new();
     let model = world.model();
     let start = JointVector::from_slice(&[0.05, 0.04]);
@@ -305,7 +286,7 @@ fn friction_over_a_store_takes_the_work_of_the_solved_normal_forces() {
     let way = way.map(|[time, turn, slide]| Waypoint { time, q: JointVector::from_slice(&[turn, slide]) });
     let motion = || Motion::through(&way, 2).unwrap();
     let levers = JointVector::from_slice(&[0.1, 1.0]);
-    let live = |forces| Live::new(&way[0].q, LEVELS, &levers, 1, AtTheProxy { torque: false, forces });
+    let live = |forces| Live::new(&way[0].q, LEVELS, &levers, 1, Followed { torque: false, forces });
     let (answering, mut ends) = live(true);
     let mut hand = setup.hand(motion()).unwrap();
     // Whoever solves no forces is refused at the start, and so is a session in which nobody solves.

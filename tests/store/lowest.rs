@@ -1,11 +1,9 @@
 //! The lowest equilibrium in stores that are filled for an error, where contact has several.
 
+use super::world::World;
 use haptize::{
-    contact::{Model, Status},
+    contact::Status,
     dataset::Dataset,
-    object::Object,
-    proxy::Chain,
-    scene::Scene,
     store::{Order, Space, Store},
     sweep::{
         CpuBackend, Run, Sweep,
@@ -16,59 +14,17 @@ use haptize::{
 };
 use std::sync::{Arc, atomic::AtomicBool};
 
-/// Two points on two slides, 14 to 20 mm below the top of a sphere of 102 nodes, whose facets they feel; equilibria
-/// change every few millimetres.
-const SCENE: &str = r#"
-name = "deep points"
-[object]
-sphere = { radius = 0.05, rings = 10, segments = 10 }
-springs = { kind = "isotropic", stiffness = 150.0 }
-ground = { stiffness = 50.0 }
-[contact]
-surface = "facets"
-stiffness = 5000.0
-algorithm = "energy"
-[grid]
-axes = [{ start = -0.0201, step = 0.0006, count = 67 }, { start = 0.030, step = 0.001, count = 7 }]
-[[proxy.joint]]
-name = "across"
-kind = "prismatic"
-axis = [1, 0, 0]
-limits = [-0.1, 0.1]
-[[proxy.joint]]
-name = "down"
-kind = "prismatic"
-axis = [0, 0, 1]
-limits = [0, 0.1]
-nodes = [{ from = [0, 0.000453, 0], to = [0, 0.003453, 0], count = 2 }]
-"#;
+/// Contact with several equilibria.
+const SCENE: &str = include_str!("../scenes/deep_points.toml");
 
 /// Rms error that a store of the lowest equilibria keeps, over the rms force [1]: where two branches cross the lowest
 /// energy has a kink, at which the force of a cell errs by its jump. Those cells are few: 3.5 % were measured. With
 /// equilibria of different branches side by side the error was 141 %.
 const KEPT: f64 = 0.1;
 
-/// Object and proxy of the scene.
-struct World {
-    scene: Scene,
-    object: Object,
-    chain: Chain,
-}
-
 impl World {
-    fn new() -> Self {
-        let scene = Scene::parse(SCENE, "deep.toml").unwrap();
-        Self { object: Object::build(&scene.object).unwrap(), chain: Chain::new(&scene.proxy), scene }
-    }
-
-    fn model(&self) -> Model<'_> {
-        let mut model = Model::new(&self.object, &self.chain, self.scene.contact);
-        model.with_tangent = true;
-        model
-    }
-
     /// Both levels of a store, whole, filled on so many threads.
-    fn fill(&self, threads: usize, batch: usize) -> Refined {
+    fn fill_whole(&self, threads: usize, batch: usize) -> Refined {
         let (model, base) = (self.model(), grid_of(&self.scene));
         let mut judges = [1, 2].map(|seed| Judge::new(&self.scene, &model, seed, 100).unwrap());
         let (order, aim, most) = (Order::Potential, f64::MIN_POSITIVE, usize::MAX);
@@ -121,8 +77,8 @@ fn error(store: &Store, exact: &Dataset) -> f64 {
 
 #[test]
 fn a_store_of_the_lowest_equilibria_errs_less_than_one_from_rest() {
-    let world = World::new();
-    let (filled, exact) = (world.fill(2, 100), world.lowest());
+    let world = World::of(SCENE);
+    let (filled, exact) = (world.fill_whole(2, 100), world.lowest());
     let from_rest = world.solved_from_rest(&filled.store);
     let [kept, missed] = [&filled.store, &*from_rest].map(|store| error(store, &exact));
     let lowered = filled.lowered.unwrap();
@@ -148,8 +104,8 @@ fn a_store_of_the_lowest_equilibria_errs_less_than_one_from_rest() {
 
 #[test]
 fn the_lowest_equilibria_of_a_store_depend_on_neither_threads_nor_batches() {
-    let world = World::new();
-    let [one, other] = [(1, 7), (3, 1000)].map(|(threads, batch)| world.fill(threads, batch));
+    let world = World::of(SCENE);
+    let [one, other] = [(1, 7), (3, 1000)].map(|(threads, batch)| world.fill_whole(threads, batch));
     assert_eq!(one.store.blocks().len(), other.store.blocks().len());
     for ((key, block), (other_key, other)) in one.store.blocks().into_iter().zip(other.store.blocks()) {
         assert_eq!((key, block.nodes()), (other_key, other.nodes()));

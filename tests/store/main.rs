@@ -13,3 +13,4 @@ mod live;
 mod lowest;
 mod publication;
 mod refine;
+mod world;

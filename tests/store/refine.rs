@@ -1,18 +1,15 @@
 //! Stores filled by the solver: exact at nodes, within their aim where nothing was solved, with fewer nodes than a
 //! uniform grid.
 
+use super::world::World;
 use haptize::{
     JointVector,
-    contact::{Equilibrium, Model, Status},
+    contact::{Equilibrium, Status},
     dataset::{Axis, Grid},
-    object::Object,
-    proxy::Chain,
-    scene::Scene,
     store::{Order, Space, Store, record::width},
     sweep::{
         Backend, CpuBackend, WithFallback,
         ahead::Ahead,
-        build_object,
         refine::{Judge, Refine, Refined},
     },
 };
@@ -51,25 +48,7 @@ struct Filled {
     unseen: f64,
 }
 
-/// Object and proxy of the scene.
-struct World {
-    scene: Scene,
-    object: Object,
-    chain: Chain,
-}
-
 impl World {
-    fn new() -> Self {
-        let scene = Scene::parse(SCENE, "refine.toml").unwrap();
-        Self { object: build_object(&scene).unwrap(), chain: Chain::new(&scene.proxy), scene }
-    }
-
-    fn model(&self) -> Model<'_> {
-        let mut model = Model::new(&self.object, &self.chain, self.scene.contact);
-        model.with_tangent = true;
-        model
-    }
-
     /// `cells` cells along each axis.
     fn base(&self, cells: usize) -> Grid {
         let axes = self.scene.proxy.joints.iter().zip(&self.scene.grid.axes).map(|(joint, axis)| {
@@ -99,7 +78,7 @@ impl World {
 
 /// The same on the CPU.
 fn fill(cells: usize, levels: u32, order: Order, aim: f64) -> Filled {
-    let world = World::new();
+    let world = World::of(SCENE);
     world.fill((cells, levels, 100), order, aim, &mut CpuBackend::new(&world.model(), 0).unwrap())
 }
 
@@ -147,7 +126,7 @@ fn nodes_hold_what_the_solver_found_and_two_fillings_are_the_same() {
 /// One solver takes node after node where a store is filled on demand.
 #[test]
 fn nodes_that_are_solved_together_are_those_solved_one_by_one_to_the_bit() {
-    let world = World::new();
+    let world = World::of(SCENE);
     let model = world.model();
     let alone = Arc::new(Store::new(Space::new(&world.base(6), 1).unwrap(), Order::Potential, 100));
     let ahead = Ahead::new(&model, Arc::clone(&alone));
@@ -186,7 +165,7 @@ impl Backend for Breaking<'_> {
 
 #[test]
 fn a_store_whose_device_is_lost_is_filled_by_the_cpu_and_says_so() {
-    let world = World::new();
+    let world = World::of(SCENE);
     let model = world.model();
     let filled = |breaks_after: usize| {
         let device = Breaking(CpuBackend::new(&model, 2).unwrap(), breaks_after);

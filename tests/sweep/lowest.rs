@@ -15,32 +15,8 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-/// Two points on two slides, 14 to 20 mm below the top of a sphere of 102 nodes, whose facets they feel; equilibria
-/// change every few millimetres.
-pub const SCENE: &str = r#"
-name = "deep points"
-[object]
-sphere = { radius = 0.05, rings = 10, segments = 10 }
-springs = { kind = "isotropic", stiffness = 150.0 }
-ground = { stiffness = 50.0 }
-[contact]
-surface = "facets"
-stiffness = 5000.0
-algorithm = "energy"
-[grid]
-axes = [{ start = -0.0201, step = 0.0006, count = 67 }, { start = 0.030, step = 0.001, count = 7 }]
-[[proxy.joint]]
-name = "across"
-kind = "prismatic"
-axis = [1, 0, 0]
-limits = [-0.1, 0.1]
-[[proxy.joint]]
-name = "down"
-kind = "prismatic"
-axis = [0, 0, 1]
-limits = [0, 0.1]
-nodes = [{ from = [0, 0.000453, 0], to = [0, 0.003453, 0], count = 2 }]
-"#;
+/// Contact with several equilibria.
+pub const SCENE: &str = include_str!("../scenes/deep_points.toml");
 
 /// Object and proxy of a scene, and sweeps over it.
 struct World {
