@@ -89,14 +89,17 @@ run_programs() {
 }
 
 # Every test. Two programs at a time, since some wait, for a kernel to be compiled or for a process that they kill, while
-# others compute; the longest come first. Those that live by the clock have the machine to themselves.
+# others compute; the longest come first, and what needs the kernels of `gpu` behind it, when most are compiled. Those that
+# live by the clock have the machine to themselves.
 tests() {
-    local messages programs failed=0
+    local messages programs name failed=0
     messages=$(cargo test --locked --workspace --features viewer --quiet --no-run --message-format json-render-diagnostics) || return 1
     programs=$(sed -n 's/.*"manifest_path":"\([^"]*\)\/Cargo.toml".*"profile":{[^}]*"test":true}.*"executable":"\([^"]*\)".*/\1:\2/p' <<<"$messages")
-    local clock='/(devices|realtime)-[0-9a-f]*$' long='/(gpu|reliability|viewer|haptize)-[0-9a-f]*$'
-    { grep -E "$long" <<<"$programs"; grep -Ev "$long|$clock" <<<"$programs"; } |
-        RUST_TEST_THREADS=$(($(nproc) / 2 + 1)) run_programs 2 || failed=1
+    local clock='/(devices|realtime)-[0-9a-f]*$' long='/(gpu|viewer|haptize|cli|reliability)-[0-9a-f]*$'
+    {
+        for name in gpu viewer haptize cli reliability; do grep -E "/$name-[0-9a-f]*$" <<<"$programs"; done
+        grep -Ev "$long|$clock" <<<"$programs"
+    } | RUST_TEST_THREADS=$(($(nproc) / 2 + 1)) run_programs 2 || failed=1
     grep -E "$clock" <<<"$programs" | run_programs 1 || failed=1
     cargo test --locked --workspace --features viewer --quiet --doc || failed=1
     return $failed
