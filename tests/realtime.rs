@@ -353,7 +353,7 @@ fn contact_that_is_solved_meanwhile_allocates_nothing_in_a_tick() {
         let ahead = Ahead::new(&model, Arc::clone(&store));
         let text = scene.text.clone() + if forces { friction } else { "" };
         let dataset = Dataset::refined(store, grid.clone(), None, text, Provenance::default());
-        let setup = Setup::new(&dataset).unwrap();
+        let setup = if forces { Setup::explored(&dataset) } else { Setup::new(&dataset) }.unwrap();
         // In contact from the beginning, where nothing is known yet.
         let way = [Waypoint { time: 0.0, ..scene.motion.press[2] }, Waypoint { time: 0.3, ..scene.motion.press[3] }];
         let mut hand = setup.hand(Motion::through(&way, MAX_JOINTS).unwrap()).unwrap();

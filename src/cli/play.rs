@@ -104,7 +104,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         Some(exploring) => exploring.on_demand.dataset(),
         None => load(&arguments.dataset)?,
     };
-    let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
+    let setup = if exploring.is_some() { Setup::explored(&dataset) } else { Setup::new(&dataset) };
+    let setup = setup.map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
     if let Some(advice) = &setup.advice {
         tell(format_args!("haptize: note: {advice}"));
     }

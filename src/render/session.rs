@@ -32,11 +32,8 @@ pub enum SessionError {
     /// The device's first position is none.
     #[error("the session cannot start: {0}")]
     Start(#[from] Fault),
-    /// An effect needs contact forces, which are neither stored nor solved.
-    #[error(
-        "friction and contact damping need contact forces, which a store of several levels does not keep: play or view \
-         the scene with --on-demand FILE, which solves them while they are felt, or bake its grid without --refine"
-    )]
+    /// An effect needs contact forces that are solved meanwhile, and nobody solves them.
+    #[error("the session cannot start: friction and contact damping need contact forces, and nobody solves them")]
     NoForces,
     /// The object cannot be drawn.
     #[error(transparent)]

@@ -39,6 +39,7 @@ pub struct Setup {
     pub advice: Option<String>,
     /// The motions that the scene does not name, made from the dataset's own contact.
     pub made_motions: Vec<&'static str>,
+    explored: bool,
 }
 
 /// A dataset cannot be rendered.
@@ -97,6 +98,19 @@ impl Setup {
     /// # Errors
     /// When the dataset has no valid scene, or its parts do not fit.
     pub fn new(dataset: &Dataset) -> Result<Self, SetupError> {
+        Self::of(dataset, false)
+    }
+
+    /// The same for a dataset that is explored while it is felt: effects at contacts act by the forces that a
+    /// [`Live`](super::live::Live) gives.
+    ///
+    /// # Errors
+    /// As [`Setup::new`].
+    pub fn explored(dataset: &Dataset) -> Result<Self, SetupError> {
+        Self::of(dataset, true)
+    }
+
+    fn of(dataset: &Dataset, explored: bool) -> Result<Self, SetupError> {
         if dataset.scene.trim().is_empty() {
             return Err(SetupError::NoScene);
         }
@@ -108,7 +122,7 @@ impl Setup {
         }
         dataset.check_scene().map_err(SetupError::Contradiction)?;
         let made_motions = own_motion::add(&mut scene, dataset);
-        let Loop { haptics, bounds, gains, advice } = haptic_loop(dataset, &chain, &scene, &scene.haptics)?;
+        let Loop { haptics, bounds, gains, advice } = haptic_loop(dataset, &chain, &scene, &scene.haptics, explored)?;
         // From here on the gains are as any others.
         scene.haptics = HapticsSpec { proxy_damping_is_free: false, ..gains };
         let exceeded = bounds.iter().filter(|bound| bound.is_exceeded()).cloned().collect();
@@ -119,7 +133,8 @@ impl Setup {
                 None => None,
             },
         };
-        Ok(Self { scene, chain, haptics: Arc::new(haptics), object, bounds, exceeded, advice, made_motions })
+        let haptics = Arc::new(haptics);
+        Ok(Self { scene, chain, haptics, object, bounds, exceeded, advice, made_motions, explored })
     }
 
     /// Returns the haptic loop of `dataset`, from which this was made, with `gains` in the place of the scene's; and
@@ -128,7 +143,7 @@ impl Setup {
     /// # Errors
     /// When they do not make a loop.
     pub fn retuned(&self, dataset: &Dataset, gains: &HapticsSpec) -> Result<(Haptics, Option<String>), SetupError> {
-        let Loop { haptics, advice, .. } = haptic_loop(dataset, &self.chain, &self.scene, gains)?;
+        let Loop { haptics, advice, .. } = haptic_loop(dataset, &self.chain, &self.scene, gains, self.explored)?;
         Ok((haptics, advice))
     }
 
@@ -187,8 +202,14 @@ struct Loop {
     advice: Option<String>,
 }
 
-/// Makes the haptic loop over `dataset`, with `gains` in the place of those of its `scene`.
-fn haptic_loop(dataset: &Dataset, chain: &Chain, scene: &Rendering, gains: &HapticsSpec) -> Result<Loop, SetupError> {
+/// Makes the haptic loop over `dataset`, with `gains` in the place of those of its `scene`; see [`Setup::explored`].
+fn haptic_loop(
+    dataset: &Dataset,
+    chain: &Chain,
+    scene: &Rendering,
+    gains: &HapticsSpec,
+    explored: bool,
+) -> Result<Loop, SetupError> {
     let field = TorqueField::interpolated(dataset, gains.interpolation, gains.threshold, &gains.boundary_slope)?;
     let gains = if gains.proxy_damping_is_free { passivity::damped(gains, &field) } else { gains.clone() };
     let npmi = match gains.proxy_inertia {
@@ -202,7 +223,7 @@ fn haptic_loop(dataset: &Dataset, chain: &Chain, scene: &Rendering, gains: &Hapt
     };
     let bounds = passivity::bounds(&gains, &field, &labels(&dataset.grid));
     let advice = passivity::advice(&gains, &field, &bounds);
-    let effects = ContactEffects::new(&gains.effects, dataset, chain, &scene.text, &scene.path)?;
+    let effects = ContactEffects::new(&gains.effects, (dataset, explored), chain, &scene.text, &scene.path)?;
     let range = HaptizedRange::new(dataset, chain)?;
     let haptics = Haptics::new(field, npmi, &gains)?.with_range(range).with_effects(effects);
     Ok(Loop { haptics, bounds, gains, advice })

@@ -42,7 +42,10 @@ impl Loaded {
     /// # Errors
     /// When the dataset cannot be rendered.
     pub fn new(dataset: Dataset, scene: Option<Scene>, file: Option<PathBuf>) -> Result<Self, SetupError> {
-        let setup = Setup::new(&dataset)?;
+        Self::of(Setup::new(&dataset)?, dataset, scene, file)
+    }
+
+    fn of(setup: Setup, dataset: Dataset, scene: Option<Scene>, file: Option<PathBuf>) -> Result<Self, SetupError> {
         let scene = scene.or_else(|| {
             let path = file.clone().unwrap_or_else(|| setup.scene.path.clone());
             Scene::parse(&dataset.scene, path).ok()
@@ -66,7 +69,8 @@ impl Loaded {
     /// # Errors
     /// When it cannot be rendered.
     pub fn on_demand(on_demand: Arc<OnDemand>) -> Result<Self, SetupError> {
-        let loaded = Self::new(on_demand.dataset(), Some(on_demand.scene().clone()), None)?;
+        let dataset = on_demand.dataset();
+        let loaded = Self::of(Setup::explored(&dataset)?, dataset, Some(on_demand.scene().clone()), None)?;
         Ok(Self { on_demand: Some(on_demand), ..loaded })
     }
 

@@ -280,7 +280,9 @@ fn friction_over_a_store_takes_the_work_of_the_solved_normal_forces() {
     let world = World::of(&(include_str!("../scenes/small.toml").to_owned() + &friction));
     let (model, store) = (world.model(), world.store());
     let ahead = Ahead::new(&model, Arc::clone(&store));
-    let setup = Setup::new(&world.dataset(&store)).unwrap();
+    let refused = Setup::new(&world.dataset(&store)).err().unwrap().to_string();
+    assert!(refused.contains("[haptics.friction]") && refused.contains("--on-demand"), "{refused}");
+    let setup = Setup::explored(&world.dataset(&store)).unwrap();
     // Into the ball, and across it.
     let way = [[0.0, -0.25, 0.0], [0.3, -0.25, 0.04], [1.3, 0.25, 0.04]];
     let way = way.map(|[time, turn, slide]| Waypoint { time, q: JointVector::from_slice(&[turn, slide]) });

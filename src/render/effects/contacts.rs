@@ -54,15 +54,12 @@ impl Touch {
 }
 
 impl Contacts {
-    /// The contacts of `dataset` with a proxy of `nodes` nodes, solved where it is a store; `None` where the dataset
-    /// does not hold them, or holds those of another proxy.
+    /// The contacts of `dataset` with a proxy of `nodes` nodes; `None` where the dataset does not hold them, or holds
+    /// those of another proxy.
     ///
     /// # Errors
     /// When its grid is none.
     pub fn new(dataset: &Dataset, nodes: usize) -> Result<Option<Self>, LatticeError> {
-        if dataset.refinement.is_some() {
-            return Ok(Some(Self::Solved));
-        }
         let Some(touches) = &dataset.touches else { return Ok(None) };
         let known = |node: &u32| u16::try_from(*node).ok().filter(|&node| usize::from(node) < nodes);
         let Some(nodes) = touches.nodes.iter().map(known).collect() else { return Ok(None) };

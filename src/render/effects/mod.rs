@@ -102,24 +102,31 @@ pub enum EffectError {
 }
 
 impl ContactEffects {
-    /// The effects of `spec` over `dataset`, felt by `chain`; `None` where the scene names none. `text` and `path` are
-    /// the scene's, for messages.
+    /// The effects of `spec` over `dataset`, felt by `chain`; `None` where the scene names none. Where the dataset is
+    /// `explored` they act by forces that are solved meanwhile. `text` and `path` are the scene's, for messages.
     ///
     /// # Errors
     /// When the dataset lacks the contact forces.
     pub fn new(
         spec: &HapticEffects,
-        dataset: &Dataset,
+        (dataset, explored): (&Dataset, bool),
         chain: &Chain,
         text: &str,
         path: &Path,
     ) -> Result<Option<Self>, EffectError> {
         let Some((name, place)) = spec.at_contacts() else { return Ok(None) };
-        let contacts = Contacts::new(dataset, chain.nodes.len())?.ok_or_else(|| {
-            let message = format!(
-                "{name} needs the contact forces on this proxy, which the dataset does not hold: bake a virtual \
-                 object again with this scene; for a real object, which tells no contact forces, leave it out"
-            );
+        let stored = || Contacts::new(dataset, chain.nodes.len());
+        let contacts = if explored { Some(Contacts::Solved) } else { stored()? };
+        let contacts = contacts.ok_or_else(|| {
+            let remedy = if dataset.refinement.is_some() {
+                "play or view the scene with --on-demand FILE, which solves them while they are felt, or bake its grid \
+                 without --refine"
+            } else {
+                "bake a virtual object again with this scene; for a real object, which tells no contact forces, leave \
+                 it out"
+            };
+            let message =
+                format!("{name} needs the contact forces on this proxy, which the dataset does not hold: {remedy}");
             Diagnostic::new(path, text, place.clone(), message)
         })?;
         Ok(Some(Self {
