@@ -1,12 +1,12 @@
 //! `haptize bake --max-error ERROR --refine LEVELS`: the scene's grid, refined where the interpolation errs.
 
 use super::{
-    Failure, Report, tell,
+    Failure, Report, info, tell,
     watch::{left_to_cpu, lowered, megabytes},
 };
 use crate::{
     contact::{Backend, Model},
-    dataset::{Dataset, Provenance, Surface},
+    dataset::{Dataset, MeasuredError, Provenance, Surface},
     proxy::Chain,
     scene::Scene,
     store::{Order, Store},
@@ -58,26 +58,22 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
     let most_memory = announce(&refine, &judges[0], each);
     let refined = refine.fill(&mut judges, &mut backend)?;
     refined.notices.iter().for_each(|notice| tell(format_args!("haptize: {notice}")));
-    let measured = judges[1].relative_error(|q| refined.store.sample(q).torque());
-    let (kept, file) = (measured <= aim, wanted.output.display());
+    let measured = judges[1].measure(&refined.store);
+    let error = measured.relative();
+    let (kept, file) = (error <= aim, wanted.output.display());
     let memory = refined.store.bytes();
     let mut json = serde_json::json!({
         "file": file.to_string(), "nodes": refined.nodes, "by_level": refined.by_level,
         "equilibria": refined.equilibria, "solved": refined.solved, "blocks": refined.store.blocks().len(),
-        "memory": memory, "most_memory": most_memory, "error": measured, "aim": aim, "uniform": uniform(&refine),
+        "memory": memory, "most_memory": most_memory, "error": error, "aim": aim, "uniform": uniform(&refine),
         "rounds": refined.rounds, "lowered": refined.lowered, "backend": backend.name(), "adapter": backend.adapter(),
         "left_to_cpu": backend.left_to_cpu(), "warnings": refined.notices, "kept": kept,
     });
     let mut text = String::new();
-    describe(&mut text, &refine, &refined, measured, &backend)?;
-    let notice = format!(
-        "refined for an rms error of {:.2} %: {:.2} % at {JUDGED} configurations in contact that were not used",
-        100.0 * aim,
-        100.0 * measured
-    );
-    let notices = [vec![notice], refined.notices].concat();
-    let (backend, adapter) = (backend.name().to_owned(), backend.adapter());
-    let provenance = Provenance { notices, backend, adapter, ..CpuBackend::provenance(scene) };
+    describe(&mut text, &refine, &refined, &measured, &backend)?;
+    let (backend, adapter, notices) = (backend.name().to_owned(), backend.adapter(), refined.notices);
+    let (error, aim) = (Some(measured), Some(aim));
+    let provenance = Provenance { notices, backend, adapter, error, aim, ..CpuBackend::provenance(scene) };
     let surface = Some(Surface::of(&object));
     let dataset = Dataset::refined(Arc::new(refined.store), refine.base, surface, scene.text.clone(), provenance);
     dataset.save(wanted.output)?;
@@ -123,23 +119,18 @@ fn announce(refine: &Refine<'_>, judge: &Judge, each: Option<f64>) -> usize {
     memory
 }
 
-/// Describes what was filled, for people; `measured`: the rms error over the rms torque.
+/// Describes what was filled, for people.
 fn describe(
     text: &mut String,
     refine: &Refine<'_>,
     refined: &Refined,
-    measured: f64,
+    measured: &MeasuredError,
     backend: &ChosenBackend<'_>,
 ) -> std::fmt::Result {
     let uniform = uniform(refine);
     let Refined { nodes, solved, equilibria, rounds, .. } = refined;
     let (name, adapter) = (backend.name(), backend.adapter());
-    writeln!(
-        text,
-        "  error        {:.2} % rms at configurations not used, {:.2} % asked for",
-        100.0 * measured,
-        100.0 * refine.aim
-    )?;
+    info::error(text, Some(measured), Some(refine.aim))?;
     writeln!(
         text,
         "  nodes        {:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {solved} \

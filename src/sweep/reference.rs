@@ -160,6 +160,11 @@ impl Reference {
         (mean.sqrt(), squares.into_iter().fold(0.0, f64::max).sqrt())
     }
 
+    /// Distance of the torque that `answer` gives at each place from the exact one [N m].
+    pub fn distances(&self, answer: impl FnMut(&JointVector) -> JointVector) -> Vec<f64> {
+        self.squares(answer).into_iter().map(f64::sqrt).collect()
+    }
+
     /// Squared distances of the torque that `answer` gives at each place from the exact one [N^2 m^2].
     fn squares(&self, mut answer: impl FnMut(&JointVector) -> JointVector) -> Vec<f64> {
         let square = |(q, exact): (&JointVector, &JointVector)| {

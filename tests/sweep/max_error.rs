@@ -192,8 +192,18 @@ fn a_refined_bake_keeps_its_error_and_refines_nothing_that_keeps_it_already() {
     assert!(json["memory"].as_u64().unwrap() <= json["most_memory"].as_u64().unwrap(), "{json:#}");
     let between = error_between(&folder.output());
     assert!((0.5..2.0).contains(&(between / error)), "{between} beside {error}");
+    // The dataset states its error, as every other does.
+    let measured = Dataset::load(&folder.output()).unwrap().provenance.error.unwrap();
+    assert!(
+        (measured.relative(), measured.errors.len()) == (error, 1) && measured.configurations >= 1000,
+        "{measured:?}"
+    );
     let told = haptize(folder.0.path(), &["info", "a.haptize"]);
-    assert!(String::from_utf8_lossy(&told.stdout).contains("nodes by level"));
+    let told = String::from_utf8_lossy(&told.stdout);
+    assert!(
+        ["nodes by level", &measured.lines()[0], "0.08 % rms, kept"].iter().all(|part| told.contains(part)),
+        "{told}"
+    );
     // What the grid keeps is not refined.
     let (code, json) = refined("1%", "4");
     assert!(code == Some(0) && json["by_level"] == serde_json::json!([63, 0, 0, 0]), "{json:#}");

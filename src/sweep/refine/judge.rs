@@ -9,7 +9,9 @@ use super::nodebook::HeldNodes;
 use crate::{
     JointVector,
     contact::{Model, Solvers, Status},
-    scene::Scene,
+    dataset::{InterpolationError, MeasuredError},
+    scene::{Interpolation, Scene},
+    store::{Order, Store},
     sweep::{
         lowest::{self, Lattice},
         reference::{Reference, ReferenceError},
@@ -51,6 +53,23 @@ impl Judge {
     /// Rms error of the torque that `answer` gives, over the rms of the torque [1].
     pub fn relative_error(&self, answer: impl FnMut(&JointVector) -> JointVector) -> f64 {
         self.0.errors(answer).0 / self.0.torque
+    }
+
+    /// Returns the errors of the torque of `store`.
+    #[must_use]
+    pub fn measure(&self, store: &Store) -> MeasuredError {
+        let errors = self.0.distances(|q| store.sample(q).torque());
+        let interpolation = match store.order() {
+            Order::Linear => Interpolation::Linear,
+            Order::Potential => Interpolation::Potential,
+        };
+        MeasuredError {
+            configurations: errors.len(),
+            left_out: self.0.left_out,
+            torque: self.0.torque,
+            interpolation: interpolation.name().to_owned(),
+            errors: vec![InterpolationError::of(interpolation.name(), errors)],
+        }
     }
 
     /// Replaces equilibria by lower ones that `solvers` reach from the `nodes` around them.
