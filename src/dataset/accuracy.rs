@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 /// Errors of the torque at random configurations, against the lowest equilibrium that is found there directly: in the
-/// cells of a uniform grid that have a corner in contact, or anywhere in the range of a store. Torques are Euclidean norms over the joints; a prismatic joint's
-/// force counts with an arm of 0.1 m.
+/// cells of a uniform grid that have a corner in contact, or anywhere in the range of a store. Torques are Euclidean
+/// norms over the joints; a prismatic joint's force counts with an arm of 0.1 m.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredError {
     /// Random configurations, solved directly.
