@@ -134,8 +134,9 @@ fn describe(
     writeln!(
         text,
         "  nodes        {:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {solved} \
-         solved, {equilibria} equilibria, {rounds} rounds, on {name} ({adapter})",
-        uniform as f64 / (*nodes).max(1) as f64
+         solved, {equilibria} equilibria, {rounds} {}, on {name} ({adapter})",
+        uniform as f64 / (*nodes).max(1) as f64,
+        if *rounds == 1 { "round" } else { "rounds" }
     )?;
     left_to_cpu(text, backend.left_to_cpu())?;
     lowered(text, refined.lowered)

@@ -9,11 +9,10 @@
 //! *Solved.* A store of nodes at several levels keeps no forces. There a thread of its own solves the equilibrium of
 //! the scene in the dataset once a frame; its forces are those of the configuration itself.
 
-use super::graphics_error::GraphicsError;
+use super::{force_rows::ForceRows, graphics_error::GraphicsError};
 use crate::{
     contact::{Model, NodeForce, Solver, Status},
     dataset::{Dataset, Surface},
-    field::stencil::Lattice,
     proxy::Chain,
     scene::Scene,
     sweep::sample,
@@ -31,7 +30,7 @@ use std::{
 pub struct ContactForces(Source);
 
 enum Source {
-    Stored(Box<Rows>),
+    Stored(Box<ForceRows>),
     Solved(Mutex<AtTheProxy>),
 }
 
@@ -44,7 +43,11 @@ impl ContactForces {
         let solved = dataset.refinement.is_some();
         let source = match &dataset.surface {
             Some(surface) if solved => Source::Solved(Mutex::new(AtTheProxy::new(dataset, surface, nodes)?)),
-            _ => Source::Stored(Box::new(Rows::new(dataset, nodes)?)),
+            _ => {
+                let contacts = dataset.contacts.as_ref().ok_or(GraphicsError::NoForces)?;
+                let rows = ForceRows::new(&dataset.grid, contacts, nodes)?.ok_or(GraphicsError::Rows { nodes })?;
+                Source::Stored(Box::new(rows))
+            }
         };
         Ok(Self(source))
     }
@@ -60,52 +63,10 @@ impl ContactForces {
     pub fn at(&self, q: &[f64], share: f64, forces: &mut [DVec3]) {
         forces.fill(DVec3::ZERO);
         match &self.0 {
-            Source::Stored(rows) => rows.add(q, share, forces),
+            Source::Stored(rows) => rows.at(q, share, |node, scale, force| forces[node] += scale * force),
             // A panic elsewhere leaves nothing half-written in it.
             Source::Solved(solved) => {
                 solved.lock().unwrap_or_else(PoisonError::into_inner).add(q, share, forces);
-            }
-        }
-    }
-}
-
-/// Contact forces of a dataset's grid points, copied out of its file.
-struct Rows {
-    lattice: Lattice,
-    /// One more than there are grid points.
-    offsets: Vec<usize>,
-    nodes: Vec<u32>,
-    /// [N]
-    forces: Vec<[f32; 3]>,
-}
-
-impl Rows {
-    fn new(dataset: &Dataset, nodes: usize) -> Result<Self, GraphicsError> {
-        let lattice = Lattice::new(&dataset.grid)?;
-        let contacts = dataset.contacts.as_ref().ok_or(GraphicsError::NoForces)?;
-        let count = contacts.nodes.len();
-        let offsets: Vec<usize> = contacts.offsets.iter().map(|&o| usize::try_from(o).unwrap_or(usize::MAX)).collect();
-        let fits = offsets.len() == lattice.points() + 1
-            && offsets.is_sorted()
-            && offsets.last() == Some(&count)
-            && contacts.forces.len() == 3 * count
-            && contacts.nodes.iter().all(|&node| (node as usize) < nodes)
-            && contacts.forces.iter().all(|f| f.is_finite());
-        if !fits {
-            return Err(GraphicsError::Rows { nodes });
-        }
-        let forces = contacts.forces.chunks_exact(3).map(|f| [f[0], f[1], f[2]]).collect();
-        Ok(Self { lattice, offsets, nodes: contacts.nodes.to_vec(), forces })
-    }
-
-    fn add(&self, q: &[f64], share: f64, forces: &mut [DVec3]) {
-        for (point, weight) in self.lattice.locate(q).corners() {
-            let scale = share * weight;
-            if scale > 0.0 {
-                let row = self.offsets[point]..self.offsets[point + 1];
-                for (&node, force) in self.nodes[row.clone()].iter().zip(&self.forces[row]) {
-                    forces[node as usize] += scale * DVec3::from(force.map(f64::from));
-                }
             }
         }
     }

@@ -8,6 +8,7 @@ pub mod control;
 pub mod coupling;
 pub mod effects;
 pub mod flags;
+mod force_rows;
 pub mod graphics;
 mod graphics_error;
 pub mod haptic;

@@ -97,7 +97,7 @@ pub struct Follower<'a> {
 }
 
 impl<'a> Follower<'a> {
-    /// For equilibria of `model`, which has tangents ([`Model::with_tangent`]).
+    /// For equilibria of `model`, which has tangents ([`Model::with_tangent`]) where torques are to be followed.
     #[must_use]
     pub fn new(model: &'a Model<'a>) -> Self {
         Self { solver: Solver::new(model), before: None, number: 0, with_forces: false }
