@@ -199,7 +199,7 @@ fn friction_acts_on_the_nodes_that_the_solver_had_in_contact() {
     let mut backend = ChosenBackend::open(BackendChoice::Cpu, &model).unwrap();
     let sweep = Sweep::new(&scene, &object, backend.name(), &backend.adapter(), "2026-01-01T00:00:00Z").unwrap();
     let run = Run { chunk: backend.chunk(), stop: &AtomicBool::new(false), progress: &mut |_| () };
-    let (data, report) = sweep.run(&mut backend, run).unwrap();
+    let (mut data, report) = sweep.run(&mut backend, run).unwrap();
     assert!(report.contact_points > 50, "{report:?}");
     // Forces are stored in f32.
     assert!(torque_error(&data, &chain, 0) < 1e-7, "{}", torque_error(&data, &chain, 0));
@@ -207,4 +207,13 @@ fn friction_acts_on_the_nodes_that_the_solver_had_in_contact() {
     // Another proxy is not felt with these contacts.
     assert!(Contacts::new(&data, chain.nodes.len()).unwrap().is_some());
     assert!(Contacts::new(&data, 20).unwrap().is_none());
+    // Nor are rows that lead beyond the forces, or backwards.
+    let whole = data.touches.as_ref().unwrap().offsets.to_vec();
+    let (middle, last) = (whole.len() / 2, whole.len() - 1);
+    for (place, offset) in [(last, whole[last] + 1), (middle, whole[last] + 1), (0, 1)] {
+        let mut offsets = whole.clone();
+        offsets[place] = offset;
+        data.touches.as_mut().unwrap().offsets = offsets.into();
+        assert!(Contacts::new(&data, chain.nodes.len()).unwrap().is_none(), "{offset} at {place}");
+    }
 }
