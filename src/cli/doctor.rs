@@ -46,7 +46,13 @@ pub fn run(_: &Arguments) -> Result<Report, Failure> {
     writeln!(text, "CPU threads            {threads}")?;
     graphics.tell(&mut text)?;
     let automatic = graphics.automatic();
-    writeln!(text, "{:<22} {automatic} (hardware GPUs, else all CPU threads)", "haptize bake takes")?;
+    let bakes = match automatic {
+        "gpu" if graphics.are_named => "gpu",
+        "gpu" => "gpu; all CPU threads for what they solve in seconds",
+        "cpu" => "cpu, all threads; hardware GPUs for long bakes, where there are any",
+        none => none,
+    };
+    writeln!(text, "{:<22} {bakes}", "haptize bake takes")?;
     for finding in &findings {
         writeln!(text, "{:<22} {}", finding.subject, finding.seen)?;
         if !finding.good {
@@ -83,6 +89,8 @@ struct Graphics {
     adapters: Vec<AdapterSummary>,
     /// Whether each solves when `haptize bake` takes GPUs.
     solves: Vec<bool>,
+    /// Whether the environment names adapters.
+    are_named: bool,
     /// Adapters that the environment names, and this machine does not have.
     missing: Vec<String>,
 }
@@ -99,11 +107,12 @@ impl Graphics {
             }
             solves.push(joins);
         }
+        let are_named = !names.is_empty();
         let missing = names.into_iter().filter(|(_, is_there)| !is_there).map(|(name, _)| name).collect();
-        Self { adapters, solves, missing }
+        Self { adapters, solves, are_named, missing }
     }
 
-    /// The backend that `haptize bake` takes by itself.
+    /// The backend that `haptize bake` takes by itself for long bakes.
     fn automatic(&self) -> &'static str {
         match () {
             () if !self.missing.is_empty() => "none",

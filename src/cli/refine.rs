@@ -43,7 +43,6 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
     let order = order_of(scene);
     model.with_tangent = order == Order::Potential;
-    let mut backend = ChosenBackend::open(backend, &model)?;
     let solving = Instant::now();
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
     let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;
@@ -52,8 +51,11 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
         Aim::Relative(share) => share,
         Aim::Absolute(torque) => torque / judges[0].torque(),
     };
-    let (base, batch) = (grid_of(scene), backend.chunk());
-    let refine = Refine { model: &model, base, levels: wanted.levels, order, aim, most: wanted.most, batch };
+    let mut refine =
+        Refine { model: &model, base: grid_of(scene), levels: wanted.levels, order, aim, most: wanted.most, batch: 1 };
+    let most = uniform(&refine).min(refine.most);
+    let mut backend = ChosenBackend::open(backend.for_work(each * most as f64), &model)?;
+    refine.batch = backend.chunk();
     let each = matches!(backend, ChosenBackend::Cpu(_)).then_some(each);
     let most_memory = announce(&refine, &judges[0], each);
     let refined = refine.fill(&mut judges, &mut backend)?;

@@ -20,7 +20,7 @@ pub enum AdapterChoice {
 pub const ADAPTER_VARIABLE: &str = "WGPU_ADAPTER_NAME";
 
 /// Returns what the environment asks for; nothing if any adapter will do.
-pub(super) fn asked_for() -> Vec<String> {
+pub(crate) fn asked_for() -> Vec<String> {
     let list = std::env::var(ADAPTER_VARIABLE).unwrap_or_default();
     list.split(',').map(str::trim).filter(|part| !part.is_empty()).map(str::to_owned).collect()
 }

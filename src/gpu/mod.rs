@@ -52,6 +52,7 @@ pub mod stages;
 mod timing;
 mod unpack;
 
+pub(crate) use adapter::asked_for;
 pub use adapter::{ADAPTER_VARIABLE, AdapterChoice, AdapterSummary, adapters, named_adapters};
 pub use context::Context;
 pub use error::GpuError;

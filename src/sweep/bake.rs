@@ -121,8 +121,10 @@ impl Bake<'_> {
         sweep_with: impl FnOnce(&Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, SweepError>,
     ) -> Result<T, BakeError> {
         self.prepared(|sweep, backend, run| {
-            let is_timed = matches!(backend, ChosenBackend::Cpu(_));
-            sweep.predict(backend, is_timed)?;
+            if sweep.forecast.is_none() {
+                let is_timed = matches!(backend, ChosenBackend::Cpu(_));
+                sweep.predict(backend, is_timed)?;
+            }
             Ok(sweep_with(sweep, backend, run)?)
         })
     }
@@ -136,11 +138,19 @@ impl Bake<'_> {
         let object = build_object(scene)?;
         let chain = Chain::new(&scene.proxy);
         let model = model_of(scene, &object, &chain)?;
-        let mut backend = ChosenBackend::open(backend, &model)?;
-        let mut sweep = sweep_of(scene, &object, &model, [backend.name(), &backend.adapter(), date], measured)?;
+        let at_first = backend.for_work(0.0);
+        let mut chosen = ChosenBackend::open(at_first, &model)?;
+        let mut sweep = sweep_of(scene, &object, &model, [chosen.name(), &chosen.adapter(), date], measured)?;
+        if at_first != backend {
+            let better = backend.for_work(sweep.seconds_on(&mut chosen)?);
+            if better != at_first {
+                chosen = ChosenBackend::open(better, &model)?;
+                sweep.solved_by(&chosen);
+            }
+        }
         sweep.aim_at(aim);
-        let run = Run { chunk: backend.chunk(), stop, progress };
-        work(&mut sweep, &mut backend, run)
+        let run = Run { chunk: chosen.chunk(), stop, progress };
+        work(&mut sweep, &mut chosen, run)
     }
 }
 

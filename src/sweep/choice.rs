@@ -4,20 +4,37 @@ use super::{Backend, CpuBackend, WithFallback};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Work},
-    gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver, named_adapters},
+    gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver, asked_for, named_adapters},
     memory,
 };
 
 /// Choices of a backend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum BackendChoice {
-    /// All hardware GPUs of the best kind, or those that WGPU_ADAPTER_NAME names; else the CPU.
+    /// The CPU for what it solves in seconds; else all hardware GPUs of the best kind. Those that WGPU_ADAPTER_NAME names
+    /// solve whatever the time.
     #[default]
     Auto,
     /// All cores, f64; never touches Vulkan.
     Cpu,
     /// The same of any adapters, software Vulkan included, or an error.
     Gpu,
+}
+
+/// Time that a GPU takes to begin [s]: so long did an H200's driver compile the kernels at the first start, and for 2 s
+/// at later ones (benches/README.md). What the CPU solves meanwhile no GPU solves sooner.
+const GPU_START: f64 = 6.0;
+
+impl BackendChoice {
+    /// The choice for work that takes the CPU `seconds` [s].
+    pub(crate) fn for_work(self, seconds: f64) -> Self {
+        if self == Self::Auto && asked_for().is_empty() && !is_worth_a_gpu(seconds) { Self::Cpu } else { self }
+    }
+}
+
+/// Whether work that takes the CPU `seconds` [s] is worth the start of a GPU.
+pub(crate) fn is_worth_a_gpu(seconds: f64) -> bool {
+    seconds > GPU_START
 }
 
 /// The backend that was chosen.
@@ -172,6 +189,21 @@ impl Backend for ChosenBackend<'_> {
         match self {
             Self::Cpu(cpu) => cpu.left_to_cpu(),
             Self::Gpu { solver, .. } => solver.left_to_cpu(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gpu_is_taken_for_work_that_outlasts_its_start_unless_it_is_asked_for() {
+        use BackendChoice::{Auto, Cpu, Gpu};
+        for seconds in [0.0, 0.9 * GPU_START, 1.1 * GPU_START, f64::INFINITY] {
+            assert_eq!((Cpu.for_work(seconds), Gpu.for_work(seconds)), (Cpu, Gpu));
+            let decided = if seconds < GPU_START && asked_for().is_empty() { Cpu } else { Auto };
+            assert_eq!(Auto.for_work(seconds), decided, "{seconds} s");
         }
     }
 }

@@ -48,6 +48,15 @@ pub struct Forecast {
 }
 
 impl Sweep<'_> {
+    /// The time that the whole grid takes `cpu`; its sample is kept as the forecast. Zero where the grid is small [s].
+    ///
+    /// # Errors
+    /// Those of the backend.
+    pub fn seconds_on<B: Backend>(&mut self, cpu: &mut B) -> Result<f64, B::Error> {
+        self.predict(cpu, true)?;
+        Ok(self.forecast.and_then(|forecast| forecast.seconds).unwrap_or(0.0))
+    }
+
     /// Samples the sweep's points with `backend`, and keeps the forecast that follows. `is_timed`: whether a sample's
     /// time counts.
     ///

@@ -4,7 +4,7 @@
 //! is cut into chunks, and an interrupted sweep continues where it stopped (see [`Sweep::bake`]).
 
 use super::{
-    Backend, Footprint, Forecast, FreeSpace, SweepError, SweepReport,
+    Backend, ChosenBackend, Footprint, Forecast, FreeSpace, SweepError, SweepReport,
     assembly::{self, Results},
     chunks::{Begun, Solved, together},
     columns::{Columns, Rows, Shape},
@@ -210,6 +210,15 @@ impl<'a> Sweep<'a> {
         let interpolation = haptics.interpolation;
         self.error = Some(ErrorCheck { model, threshold, slope, interpolation, configurations, lowest });
         Ok(())
+    }
+
+    /// Names another backend in the provenance. A forecast of time no longer holds where a GPU solves.
+    pub(crate) fn solved_by(&mut self, backend: &ChosenBackend<'_>) {
+        self.provenance.backend = backend.name().into();
+        self.provenance.adapter = backend.adapter();
+        if let (Some(forecast), ChosenBackend::Gpu { .. }) = (&mut self.forecast, backend) {
+            forecast.seconds = None;
+        }
     }
 
     /// Notes that the grid was chosen for an error; see [`super::Bake::aim`].

@@ -304,7 +304,7 @@ impl Pilot {
             points,
             tolerance: self.tolerance,
             seconds: self.seconds_per_point * points as f64,
-            footprint: footprint(&chosen, backend)?,
+            footprint: footprint(&chosen, backend.for_work(self.seconds_per_point * points as f64))?,
             scene: chosen,
         })
     }

@@ -13,7 +13,9 @@ use crate::{
     proxy::Chain,
     render::on_demand::OnDemand,
     scene::Scene,
-    sweep::{BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, build_object, remedied, sample},
+    sweep::{
+        BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, build_object, is_worth_a_gpu, remedied, sample,
+    },
 };
 use std::{
     error::Error,
@@ -43,7 +45,7 @@ pub enum Task {
 /// The backend of a bake.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Solver {
-    /// The window's adapter if it is a hardware GPU, else the CPU.
+    /// The CPU for what it solves in seconds; else the window's adapter if it is a hardware GPU.
     #[default]
     Auto,
     /// All cores, f64.
@@ -63,7 +65,9 @@ impl Solver {
     #[must_use]
     pub fn what(&self) -> String {
         match self {
-            Self::Auto => "The window's adapter if it is a hardware GPU, else the CPU".into(),
+            Self::Auto => {
+                "The CPU for what it solves in seconds, else the window's adapter if it is a hardware GPU".into()
+            }
             Self::Cpu => "All cores, in f64".into(),
             Self::Adapter(adapter) => adapter.to_string(),
         }
@@ -254,16 +258,13 @@ fn bake(
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
     model.with_tangent = scene.uses_tangent();
     let on_device =
-        solver.device(context).and_then(|device| device.map(|device| GpuSolver::new(device, &model)).transpose());
-    let mut backend = match on_device {
-        Ok(Some(device)) => ChosenBackend::on(device, &model),
-        // Where the GPU cannot take the scene the CPU can.
-        Err(error) if *solver != Solver::Auto => {
-            return Err(
-                format!("{solver} cannot bake: {error}. Choose the CPU or another adapter in the window").into()
-            );
-        }
-        Ok(None) | Err(_) => ChosenBackend::open(BackendChoice::Cpu, &model)?,
+        || solver.device(context).and_then(|device| device.map(|device| GpuSolver::new(device, &model)).transpose());
+    let cpu = || ChosenBackend::open(BackendChoice::Cpu, &model);
+    let mut backend = match solver {
+        Solver::Auto => cpu()?,
+        _ => on_device()
+            .map_err(|error| format!("{solver} cannot bake: {error}. Choose the CPU or another adapter in the window"))?
+            .map_or_else(cpu, |device| Ok(ChosenBackend::on(device, &model)))?,
     };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
     let mut sweep = Sweep::new(&scene, &object, backend.name(), &backend.adapter(), &date)?;
@@ -271,6 +272,13 @@ fn bake(
     sweep.skip_free_space(&model)?;
     sweep.find_lowest(&model)?;
     sweep.measure_error(&model, &scene.haptics, None)?;
+    if *solver == Solver::Auto && is_worth_a_gpu(sweep.seconds_on(&mut backend)?) {
+        // Where the GPU cannot take the scene the CPU can.
+        if let Ok(Some(device)) = on_device() {
+            backend = ChosenBackend::on(device, &model);
+            sweep.solved_by(&backend);
+        }
+    }
     let chunk = backend.chunk();
     let (dataset, report) = sweep.run(&mut backend, Run { chunk, stop, progress })?;
     let mut loaded = Loaded::new(dataset, Some(scene), None)?;
