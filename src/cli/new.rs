@@ -15,8 +15,9 @@ Examples:
   haptize new                            writes sphere.toml
   haptize new --from mesh -o my.toml     writes my.toml, and bean.obj beside it
   haptize new --from touch               writes a scene for the Touch (Phantom Omni)
+  haptize new --from organ               writes a scene of six joints, felt while it is solved
 
-Next: edit the file, then `haptize bake` it (`haptize scan` it for sponge and sponge-side).")]
+Next: edit the file, then do what the command names: bake the scene, scan it, or feel it on demand.")]
 pub struct Arguments {
     /// The scene to begin with.
     #[arg(long, default_value = "sphere")]
@@ -46,6 +47,8 @@ enum Example {
     Paper,
     /// A triangle mesh from a file under an arm of four joints, one of them prismatic.
     Mesh,
+    /// A soft organ under a hooked probe that six joints lead, solved while it is felt.
+    Organ,
     /// A soft ball within reach of the 3D Systems Touch (Phantom Omni).
     Touch,
     /// A soft ball in the workspace of the open device WoodenHaptics.
@@ -60,9 +63,6 @@ enum Example {
     SpongeSide,
 }
 
-/// The mesh that `mesh.toml` names.
-const BEAN: (&str, &str) = ("bean.obj", include_str!("../../datasets/bean.obj"));
-
 impl Example {
     /// Returns the default name of the scene's file, and its text.
     fn scene(self) -> (&'static str, &'static str) {
@@ -70,6 +70,7 @@ impl Example {
             Self::Sphere => ("sphere.toml", include_str!("../../datasets/sphere.toml")),
             Self::Paper => ("paper.toml", include_str!("../../datasets/paper.toml")),
             Self::Mesh => ("mesh.toml", include_str!("../../datasets/mesh.toml")),
+            Self::Organ => ("organ.toml", include_str!("../../datasets/organ.toml")),
             Self::Touch => ("touch.toml", include_str!("../../datasets/touch.toml")),
             Self::Woodenhaptics => ("woodenhaptics.toml", include_str!("../../datasets/woodenhaptics.toml")),
             Self::TwoDiy => ("two_diy.toml", include_str!("../../datasets/two_diy.toml")),
@@ -81,7 +82,21 @@ impl Example {
 
     /// Returns name and text of the mesh that the scene reads, if it reads one.
     fn mesh(self) -> Option<(&'static str, &'static str)> {
-        (self == Self::Mesh).then_some(BEAN)
+        match self {
+            Self::Mesh => Some(("bean.obj", include_str!("../../datasets/bean.obj"))),
+            Self::Organ => Some(("organ.obj", include_str!("../../datasets/organ.obj"))),
+            _ => None,
+        }
+    }
+
+    /// The command that the file `scene` is for.
+    fn next(self, scene: &Path) -> String {
+        let (file, explored) = (scene.display(), scene.with_extension("haptize"));
+        match self {
+            _ if self.is_scanned() => format!("haptize scan {file}"),
+            Self::Organ => format!("haptize play {file} --on-demand {}", explored.display()),
+            _ => format!("haptize bake {file}"),
+        }
     }
 
     fn is_scanned(self) -> bool {
@@ -111,8 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             .map_err(|error| format!("cannot write {}: {error}; give another place by -o", path.display()))?;
     }
     let names: Vec<String> = files.iter().map(|(path, _)| path.display().to_string()).collect();
-    let next = if arguments.from.is_scanned() { "scan" } else { "bake" };
-    let text = format!("wrote {}\nnext: haptize {next} {}\n", names.join(" and "), scene.display());
+    let text = format!("wrote {}\nnext: {}\n", names.join(" and "), arguments.from.next(&scene));
     Ok(Report { text, json: serde_json::json!({ "files": names }), whole: true })
 }
 
