@@ -21,6 +21,9 @@ use crate::{
 use glam::DVec3;
 use std::{collections::BTreeSet, sync::Arc, time::Instant};
 
+/// Configuration, and share of the forces, of a frame.
+type Place = (JointVector, f64);
+
 /// A variant of the scene.
 struct Variant {
     name: String,
@@ -65,11 +68,15 @@ pub fn price(scene: &Scene, rounds: usize, progress: &mut dyn FnMut(&str)) -> Re
             Device { adapter: None, bodies: variants.iter().map(|_| None).collect() }
         }
     };
+    let gpu_places = match &mut device.bodies[GRAPHICS] {
+        Some(body) => fitting(&places, |place| body.play(place))?,
+        None => Vec::new(),
+    };
     let gpu_frames = by_rounds(timed, TRIES, |k| {
         let Some(body) = &mut device.bodies[k] else { return Ok(None) };
         let begun = Instant::now();
-        body.play(&places)?;
-        Ok(Some(vec![begun.elapsed().as_secs_f64() / places.len() as f64]))
+        body.play(&gpu_places)?;
+        Ok(Some(vec![begun.elapsed().as_secs_f64() / gpu_places.len() as f64]))
     })?;
     let takes = |k: usize| match (&device.bodies[k], &device.adapter) {
         (Some(body), _) => Some(body.update.takes()),
@@ -158,7 +165,7 @@ fn feel_all(
 
 /// Configuration and share of the forces in each frame of the session `felt`: those of the plain scene for all
 /// variants.
-fn places(setups: &[Setup], felt: &Trace, duration: f64) -> Vec<(JointVector, f64)> {
+fn places(setups: &[Setup], felt: &Trace, duration: f64) -> Vec<Place> {
     let rate = setups.iter().find_map(|setup| setup.scene.graphics).map_or(0.0, |graphics| graphics.rate);
     let frames = (duration * rate) as usize;
     (0..frames)
@@ -168,18 +175,39 @@ fn places(setups: &[Setup], felt: &Trace, duration: f64) -> Vec<(JointVector, f6
         .collect()
 }
 
+/// As many of `places` as can be drawn within [`FRAMES_TIME`], all along the way. `draw` draws some; its first time
+/// does not count.
+fn fitting(
+    places: &[Place],
+    mut draw: impl FnMut(&[Place]) -> Result<(), FrameError>,
+) -> Result<Vec<Place>, FrameError> {
+    let one = &places[..places.len().min(1)];
+    draw(one)?;
+    let begun = Instant::now();
+    draw(one)?;
+    let most = (FRAMES_TIME / begun.elapsed().as_secs_f64().max(1e-9)).max(1.0) as usize;
+    Ok(places.iter().step_by(places.len().div_ceil(most).max(1)).copied().collect())
+}
+
 /// Draws the frames at `places` of all variants, on the CPU; the times.
 fn draw_all(
     setups: &[Setup],
     datasets: &[Dataset],
-    places: &[(JointVector, f64)],
+    places: &[Place],
     timed: (usize, usize),
 ) -> Result<Times, AccuracyError> {
     let mut drawn: Vec<Option<Graphics<'_>>> =
         setups.iter().zip(datasets).map(|(setup, data)| setup.graphics(data)).collect::<Result<_, _>>()?;
+    let places = match &mut drawn[GRAPHICS] {
+        Some(graphics) => fitting(places, |some| {
+            some.iter().for_each(|(q, share)| graphics.frame(q, *share));
+            Ok(())
+        })?,
+        None => Vec::new(),
+    };
     by_rounds(timed, TRIES, |k| {
         let Some(graphics) = &mut drawn[k] else { return Ok(None) };
-        let frame = |(q, share): &(JointVector, f64)| {
+        let frame = |(q, share): &Place| {
             let begun = Instant::now();
             graphics.frame(q, *share);
             begun.elapsed().as_secs_f64() / places.len() as f64
@@ -251,6 +279,9 @@ fn whole(scene: &Scene, can_act: &[Effect]) -> (bool, Vec<Effect>) {
 /// and whatever else a machine does only adds to it.
 const TRIES: usize = 3;
 
+/// Time that the frames of one run take, about [s]: with all variants, rounds and tries there are some hundred runs.
+const FRAMES_TIME: f64 = 0.2;
+
 /// Ticks of a block: a tenth of a millisecond, which is mostly not interrupted, and long enough for any clock.
 const BLOCK: usize = 100;
 
@@ -314,7 +345,7 @@ struct Body {
 
 impl Body {
     /// A frame for each of `places`, and a wait for the last.
-    fn play(&mut self, places: &[(JointVector, f64)]) -> Result<(), FrameError> {
+    fn play(&mut self, places: &[Place]) -> Result<(), FrameError> {
         for (q, share) in places {
             self.contact.at(q, *share, &mut self.forces);
             let forces = match &mut self.smoothing {
