@@ -11,8 +11,8 @@ use crate::{
 /// Choices of a backend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum BackendChoice {
-    /// The CPU for what it solves in seconds; else all hardware GPUs of the best kind. Those that WGPU_ADAPTER_NAME names
-    /// solve whatever the time.
+    /// The CPU for what it solves in seconds; else all hardware GPUs of the best kind, if there are any. Those that
+    /// WGPU_ADAPTER_NAME names solve whatever the time.
     #[default]
     Auto,
     /// All cores, f64; never touches Vulkan.

@@ -257,14 +257,18 @@ fn bake(
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
     model.with_tangent = scene.uses_tangent();
-    let on_device =
-        || solver.device(context).and_then(|device| device.map(|device| GpuSolver::new(device, &model)).transpose());
+    let on = |device| GpuSolver::new(device, &model).map(|solver| ChosenBackend::on(solver, &model));
     let cpu = || ChosenBackend::open(BackendChoice::Cpu, &model);
-    let mut backend = match solver {
-        Solver::Auto => cpu()?,
-        _ => on_device()
-            .map_err(|error| format!("{solver} cannot bake: {error}. Choose the CPU or another adapter in the window"))?
-            .map_or_else(cpu, |device| Ok(ChosenBackend::on(device, &model)))?,
+    let device = solver.device(context);
+    let (mut backend, for_long_work) = match solver {
+        Solver::Auto => (cpu()?, device?),
+        _ => {
+            let gpu = device.and_then(|device| device.map(on).transpose());
+            let gpu = gpu.map_err(|error| {
+                format!("{solver} cannot bake: {error}. Choose the CPU or another adapter in the window")
+            })?;
+            (gpu.map_or_else(cpu, Ok)?, None)
+        }
     };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
     let mut sweep = Sweep::new(&scene, &object, backend.name(), &backend.adapter(), &date)?;
@@ -272,12 +276,13 @@ fn bake(
     sweep.skip_free_space(&model)?;
     sweep.find_lowest(&model)?;
     sweep.measure_error(&model, &scene.haptics, None)?;
-    if *solver == Solver::Auto && is_worth_a_gpu(sweep.seconds_on(&mut backend)?) {
+    if let Some(device) = for_long_work
+        && is_worth_a_gpu(sweep.seconds_on(&mut backend)?)
         // Where the GPU cannot take the scene the CPU can.
-        if let Ok(Some(device)) = on_device() {
-            backend = ChosenBackend::on(device, &model);
-            sweep.solved_by(&backend);
-        }
+        && let Ok(gpu) = on(device)
+    {
+        backend = gpu;
+        sweep.solved_by(&backend);
     }
     let chunk = backend.chunk();
     let (dataset, report) = sweep.run(&mut backend, Run { chunk, stop, progress })?;
