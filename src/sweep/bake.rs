@@ -113,7 +113,11 @@ impl Bake<'_> {
     /// # Errors
     /// Any [`BakeError`].
     pub fn to_shard(self, folder: &Path, shard: Shard) -> Result<(PathBuf, Option<SweepReport>), BakeError> {
-        self.prepared(|sweep, backend, run| Ok(sweep.bake_shard(backend, folder, shard, run)?))
+        self.prepared(|sweep, backend, run| {
+            // What was sampled is the whole grid.
+            sweep.forecast = None;
+            Ok(sweep.bake_shard(backend, folder, shard, run)?)
+        })
     }
 
     fn with<T>(

@@ -288,3 +288,26 @@ fn a_plan_counts_what_shards_solve() {
     let predicted: usize = plan.shards.iter().map(|shard| shard.bytes).sum();
     assert!((0.5..2.0).contains(&(predicted as f64 / bytes as f64)), "{predicted} predicted, {bytes} written");
 }
+
+/// The sample by which `auto` chooses a backend is of the whole grid: a shard does not pass its cost for its own.
+#[test]
+fn a_shard_states_no_forecast_of_the_whole_grid() {
+    let text = fixture::SCENE
+        .replace("step = 0.1, count = 7", "stop = 0.3, count = 36")
+        .replace("step = 0.004, count = 9", "step = 0.001, count = 29");
+    let scene = Scene::parse(&text, "fine.toml").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    for is_whole in [true, false] {
+        let mut stated = Vec::new();
+        let mut progress = |progress: Progress| stated.push(progress.forecast.is_some());
+        let (backend, stop) = (BackendChoice::Auto, &AtomicBool::new(false));
+        let progress = &mut progress;
+        let bake = Bake { scene: &scene, backend, measured: Some(0), aim: None, date: "", stop, progress };
+        if is_whole {
+            bake.in_memory().unwrap();
+        } else {
+            bake.to_shard(folder.path(), Shard { index: 0, count: 2 }).unwrap();
+        }
+        assert!(!stated.is_empty() && stated.iter().all(|stated| *stated == is_whole), "{stated:?}");
+    }
+}
