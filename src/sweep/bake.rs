@@ -159,7 +159,7 @@ impl Bake<'_> {
 }
 
 /// The model by which the grid of `scene` is solved.
-pub(super) fn model_of<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) -> Result<Model<'a>, ObjectError> {
+pub(crate) fn model_of<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) -> Result<Model<'a>, ObjectError> {
     let mut model = Model::reaching(object, chain, scene.contact, &sample(scene))?;
     model.with_tangent = scene.uses_tangent();
     Ok(model)
@@ -167,7 +167,7 @@ pub(super) fn model_of<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) 
 
 /// The sweep of `scene`, whose object and model these are, with all that a dataset is to say; `solved` are backend,
 /// adapter and date, and `measured` is as in [`Bake::measured`].
-pub(super) fn sweep_of<'a>(
+pub(crate) fn sweep_of<'a>(
     scene: &Scene,
     object: &Object,
     model: &'a Model<'a>,

@@ -35,6 +35,8 @@ mod tally;
 pub use crate::contact::Backend;
 pub use bake::{Bake, BakeError, SceneObjectError, baked, build_object, sample};
 #[cfg(feature = "viewer")]
+pub(crate) use bake::{model_of, sweep_of};
+#[cfg(feature = "viewer")]
 pub(crate) use choice::is_worth_a_gpu;
 pub use choice::{BackendChoice, BackendError, ChosenBackend, OTHER_ADAPTER, remedied};
 pub use cpu::CpuBackend;

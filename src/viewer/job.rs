@@ -7,14 +7,14 @@ use super::{
     loaded::Loaded,
 };
 use crate::{
-    contact::Model,
     dataset::{Dataset, Surface},
     gpu::{AdapterChoice, AdapterSummary, Context, GpuError, GpuSolver},
     proxy::Chain,
     render::on_demand::OnDemand,
     scene::Scene,
     sweep::{
-        BackendChoice, ChosenBackend, Progress, Run, Sweep, SweepError, build_object, is_worth_a_gpu, remedied, sample,
+        BackendChoice, ChosenBackend, Progress, Run, SweepError, build_object, is_worth_a_gpu, model_of, remedied,
+        sweep_of,
     },
 };
 use std::{
@@ -255,8 +255,7 @@ fn bake(
         None => build_object(&scene)?,
     };
     let chain = Chain::new(&scene.proxy);
-    let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
-    model.with_tangent = scene.uses_tangent();
+    let model = model_of(&scene, &object, &chain)?;
     let on = |device| GpuSolver::new(device, &model).map(|solver| ChosenBackend::on(solver, &model));
     let cpu = || ChosenBackend::open(BackendChoice::Cpu, &model);
     let device = solver.device(context);
@@ -271,11 +270,7 @@ fn bake(
         }
     };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
-    let mut sweep = Sweep::new(&scene, &object, backend.name(), &backend.adapter(), &date)?;
-    sweep.diagnose(&model);
-    sweep.skip_free_space(&model)?;
-    sweep.find_lowest(&model)?;
-    sweep.measure_error(&model, &scene.haptics, None)?;
+    let mut sweep = sweep_of(&scene, &object, &model, [backend.name(), &backend.adapter(), &date], None)?;
     if let Some(device) = for_long_work
         && is_worth_a_gpu(sweep.seconds_on(&mut backend)?)
         // Where the GPU cannot take the scene the CPU can.
