@@ -2,7 +2,7 @@
 
 use super::{
     Failure, Report, info, tell,
-    watch::{left_to_cpu, lowered, megabytes},
+    watch::{counted, left_to_cpu, lowered, megabytes},
 };
 use crate::{
     contact::{Backend, Model},
@@ -136,9 +136,9 @@ fn describe(
     writeln!(
         text,
         "  nodes        {:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {solved} \
-         solved, {equilibria} equilibria, {rounds} {}, on {name} ({adapter})",
+         solved, {equilibria} equilibria, {}, on {name} ({adapter})",
         uniform as f64 / (*nodes).max(1) as f64,
-        if *rounds == 1 { "round" } else { "rounds" }
+        counted(*rounds, ["round", "rounds"])
     )?;
     left_to_cpu(text, backend.left_to_cpu())?;
     lowered(text, refined.lowered)

@@ -84,17 +84,21 @@ pub fn left_to_cpu(text: &mut String, count: usize) -> fmt::Result {
 /// Describes what the search for lower equilibria did.
 pub fn lowered(text: &mut String, lowered: Option<Lowered>) -> fmt::Result {
     let Some(Lowered { points, converged, greatest, rounds, searches, seconds }) = lowered else { return Ok(()) };
-    let count = |count: usize, [one, more]: [&str; 2]| format!("{count} {}", if count == 1 { one } else { more });
     let which = match points {
         0 => "no point by neighbours' equilibria".to_owned(),
         _ => format!(
             "{} by neighbours' equilibria, {converged} unconverged from rest, energy by at most {:.1} %",
-            count(points, ["point", "points"]),
+            counted(points, ["point", "points"]),
             100.0 * greatest
         ),
     };
-    let (rounds, searches) = (count(rounds, ["round", "rounds"]), count(searches, ["search", "searches"]));
+    let (rounds, searches) = (counted(rounds, ["round", "rounds"]), counted(searches, ["search", "searches"]));
     writeln!(text, "  lowered      {which}; {rounds}, {searches}, {seconds:.2} s")
+}
+
+/// A number with its noun, in the singular or the plural.
+pub fn counted(count: usize, [one, more]: [&str; 2]) -> String {
+    format!("{count} {}", if count == 1 { one } else { more })
 }
 
 /// Prints what the sweep is going to take, before it begins.
