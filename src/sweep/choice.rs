@@ -11,8 +11,8 @@ use crate::{
 /// Choices of a backend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum BackendChoice {
-    /// The CPU for what it solves in seconds; else all hardware GPUs of the best kind, if there are any. Those that
-    /// WGPU_ADAPTER_NAME names solve whatever the time.
+    /// The CPU for work of some seconds; for longer work all hardware GPUs of the best kind, if there are any. Hardware
+    /// GPUs that WGPU_ADAPTER_NAME names are always taken.
     #[default]
     Auto,
     /// All cores, f64; never touches Vulkan.
@@ -21,8 +21,8 @@ pub enum BackendChoice {
     Gpu,
 }
 
-/// Time that a GPU takes to begin [s]: so long did an H200's driver compile the kernels at the first start, and for 2 s
-/// at later ones (benches/README.md). What the CPU solves meanwhile no GPU solves sooner.
+/// Time that a GPU takes to begin [s]. An H200's driver compiled the kernels for 6 s at the first start, and for 2 s at
+/// later ones (benches/README.md). What the CPU solves meanwhile no GPU solves sooner.
 const GPU_START: f64 = 6.0;
 
 impl BackendChoice {

@@ -48,7 +48,8 @@ pub struct Forecast {
 }
 
 impl Sweep<'_> {
-    /// The time that the whole grid takes `cpu`; its sample is kept as the forecast. Zero where the grid is small [s].
+    /// Returns the time in which `cpu` solves the whole grid, zero where that is small [s]. The sample is kept as the
+    /// forecast.
     ///
     /// # Errors
     /// Those of the backend.
