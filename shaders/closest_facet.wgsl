@@ -49,10 +49,8 @@ fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<real>) -> vec3<real> {
         var there = point.weights;
         var k = 0u;
         if entry == last {
-            take(facet, x);
-            break;
-        }
-        if point.feature < FEATURE_EDGE {
+            // Once more itself.
+        } else if point.feature < FEATURE_EDGE {
             face = around(entry);
             k = place_of_corner(face, node);
             there = one_hot(k);
@@ -64,6 +62,9 @@ fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<real>) -> vec3<real> {
                 + dot(point.weights, one_hot(edge)) * one_hot((back + 1u) % 3u);
         }
         take(face, x);
+        if entry == last {
+            break;
+        }
         let jet = jet_at(there);
         sum += select(real(1.0), angle_at(jet, k), point.feature < FEATURE_EDGE) * normal_of(jet);
     }

@@ -87,83 +87,112 @@ fn angle_at(jet: Jet, k: u32) -> real {
     return real(atan2(f32(length(cross(left, right))), f32(dot(left, right))));
 }
 
+// A point of a facet, and its distance from the origin.
+struct MeasuredPoint {
+    point: ClosestPoint,
+    distance: real,
+}
+
 // The point of the current facet that is closest to the origin.
-fn closest_on_facet() -> ClosestPoint {
+fn closest_on_facet() -> MeasuredPoint {
     let flat = closest_point(vec3<real>(0.0), net[0], net[10], net[14]);
     if !SMOOTH {
-        return flat;
+        return MeasuredPoint(flat, length(blend(flat.weights, net[0], net[10], net[14])));
     }
-    let w = stationary(flat.weights);
-    if w.x >= 0.0 && w.y >= 0.0 && w.z >= 0.0 {
-        return ClosestPoint(w, FEATURE_FACE);
-    }
-    // On an edge beyond which the facet would have to go on.
-    var best = ClosestPoint(flat.weights, FEATURE_FACE);
-    var least = FAR_AWAY;
-    for (var k = 0u; k < 3u; k += 1u) {
-        if dot(w, one_hot((k + 2u) % 3u)) < 0.0 {
-            let found = closest_on_edge(k, flat.weights);
-            let point = jet_at(found.weights).point;
-            let square = dot(point, point);
-            if square < least {
-                least = square;
-                best = found;
+    return closest_on_bent_facet(flat.weights);
+}
+
+// What the search below is at: on an edge the number of that, on the face, or a point that is found and measured.
+const ON_FACE: u32 = 3u;
+const FOUND: u32 = 4u;
+
+// The same on a bent facet, searched from `start`: where the distance is least on the facet continued beyond its edges
+// or, if that is outside, on the edges beyond which it lies. One loop for all, so that invocations that are on the face and
+// on edges go together, and that the program is short: multiprocessors keep little of it at hand.
+fn closest_on_bent_facet(start: vec3<real>) -> MeasuredPoint {
+    var best = MeasuredPoint(ClosestPoint(start, FEATURE_FACE), FAR_AWAY);
+    var on = ON_FACE;
+    var point = best.point;
+    // Place on the edge, from its first corner to its second.
+    var t = real(0.0);
+    var steps = 0u;
+    // A bit for each edge that is left.
+    var edges = 0u;
+    loop {
+        let jet = jet_at(point.weights);
+        if on == FOUND {
+            let away = length(jet.point);
+            if away < best.distance {
+                best = MeasuredPoint(point, away);
             }
+        } else if on == ON_FACE {
+            let step = step_on_face(jet);
+            let u = point.weights.y + step.x;
+            let v = point.weights.z + step.y;
+            let w = vec3<real>(1.0 - u - v, u, v);
+            point.weights = w;
+            steps += 1u;
+            // Far outside Newton's method would not come back.
+            let is_far = w.x < -1.0 || w.y < -1.0 || w.z < -1.0;
+            if !(is_far || abs(step.x) + abs(step.y) < FACET_STEP || steps == FACET_ITERATIONS) {
+                continue;
+            }
+            if w.x >= 0.0 && w.y >= 0.0 && w.z >= 0.0 {
+                on = FOUND;
+                continue;
+            }
+            edges = select(0u, 1u, w.z < 0.0) + select(0u, 2u, w.x < 0.0) + select(0u, 4u, w.y < 0.0);
+        } else {
+            let before = t;
+            t = step_on_edge(jet, on, t);
+            steps += 1u;
+            point.weights = on_edge(on, t);
+            if abs(t - before) < FACET_STEP || steps == FACET_ITERATIONS {
+                point.feature = select(select(FEATURE_EDGE + on, (on + 1u) % 3u, t == 1.0), on, t == 0.0);
+                on = FOUND;
+            }
+            continue;
         }
+        if edges == 0u {
+            break;
+        }
+        // On the next edge, from the point of it that is next to the start.
+        on = firstTrailingBit(edges);
+        edges &= edges - 1u;
+        let head = dot(start, one_hot((on + 1u) % 3u));
+        let sum = head + dot(start, one_hot(on));
+        t = select(real(0.5), head / max(sum, LEAST_DIVISOR), sum > 0.0);
+        point.weights = on_edge(on, t);
+        steps = 0u;
     }
     return best;
 }
 
-// The weights at which the distance is least, on the facet continued beyond its edges. Far outside it stops, since
-// Newton's method would not come back.
-fn stationary(start: vec3<real>) -> vec3<real> {
-    var w = start;
-    for (var step_number = 0u; step_number < FACET_ITERATIONS; step_number += 1u) {
-        let jet = jet_at(w);
-        let a = tangent(jet, TOWARDS_1);
-        let b = tangent(jet, TOWARDS_2);
-        let slope = vec2<real>(dot(jet.point, a), dot(jet.point, b));
-        let metric = vec3<real>(dot(a, a), dot(a, b), dot(b, b));
-        let full = metric + vec3<real>(dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_1)),
-            dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_2)), dot(jet.point, bend(jet, TOWARDS_2, TOWARDS_2)));
-        // Where the distance is not convex, the metric alone leads downhill.
-        let h = select(metric, full, full.x > 0.0 && full.x * full.z > full.y * full.y);
-        let determinant = max(h.x * h.z - h.y * h.y, LEAST_DIVISOR);
-        let step = vec2<real>(h.y * slope.y - h.z * slope.x, h.y * slope.x - h.x * slope.y) / determinant;
-        let u = w.y + step.x;
-        let v = w.z + step.y;
-        w = vec3<real>(1.0 - u - v, u, v);
-        if w.x < -1.0 || w.y < -1.0 || w.z < -1.0 || abs(step.x) + abs(step.y) < FACET_STEP {
-            break;
-        }
-    }
-    return w;
+// The point at t along edge k.
+fn on_edge(k: u32, t: real) -> vec3<real> {
+    return (1.0 - t) * one_hot(k) + t * one_hot((k + 1u) % 3u);
 }
 
-// The closest point of edge k, searched from the point of the edge that is next to `start`.
-fn closest_on_edge(k: u32, start: vec3<real>) -> ClosestPoint {
-    let tail = one_hot(k);
-    let head = one_hot((k + 1u) % 3u);
-    let direction = head - tail;
-    let sum = dot(start, head + tail);
-    var t = select(real(0.5), dot(start, head) / max(sum, LEAST_DIVISOR), sum > 0.0);
-    for (var step_number = 0u; step_number < FACET_ITERATIONS; step_number += 1u) {
-        let jet = jet_at((1.0 - t) * tail + t * head);
-        let along = tangent(jet, direction);
-        let metric = dot(along, along);
-        let full = metric + dot(jet.point, bend(jet, direction, direction));
-        let before = t;
-        t -= dot(jet.point, along) / max(select(metric, full, full > 0.0), LEAST_DIVISOR);
-        t = min(max(t, real(0.0)), real(1.0));
-        if abs(t - before) < FACET_STEP {
-            break;
-        }
-    }
-    var feature = FEATURE_EDGE + k;
-    if t == 0.0 {
-        feature = k;
-    } else if t == 1.0 {
-        feature = (k + 1u) % 3u;
-    }
-    return ClosestPoint((1.0 - t) * tail + t * head, feature);
+// Newton's step of the last two weights towards the least distance.
+fn step_on_face(jet: Jet) -> vec2<real> {
+    let a = tangent(jet, TOWARDS_1);
+    let b = tangent(jet, TOWARDS_2);
+    let slope = vec2<real>(dot(jet.point, a), dot(jet.point, b));
+    let metric = vec3<real>(dot(a, a), dot(a, b), dot(b, b));
+    let full = metric + vec3<real>(dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_1)),
+        dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_2)), dot(jet.point, bend(jet, TOWARDS_2, TOWARDS_2)));
+    // Where the distance is not convex, the metric alone leads downhill.
+    let h = select(metric, full, full.x > 0.0 && full.x * full.z > full.y * full.y);
+    let determinant = max(h.x * h.z - h.y * h.y, LEAST_DIVISOR);
+    return vec2<real>(h.y * slope.y - h.z * slope.x, h.y * slope.x - h.x * slope.y) / determinant;
+}
+
+// Where Newton's step leads from t along edge k.
+fn step_on_edge(jet: Jet, k: u32, t: real) -> real {
+    let direction = along_edge(k);
+    let along = tangent(jet, direction);
+    let metric = dot(along, along);
+    let full = metric + dot(jet.point, bend(jet, direction, direction));
+    let next = t - dot(jet.point, along) / max(select(metric, full, full > 0.0), LEAST_DIVISOR);
+    return min(max(next, real(0.0)), real(1.0));
 }

@@ -56,6 +56,11 @@ fn form(facet: u32, x: vec3<real>) {
     net[14] = control(facet, 14u, x);
 }
 
+// The surface at rest is ready.
+fn need(facet: u32) {}
+
+fn make_ready(local: u32) {}
+
 // Corners of a facet.
 fn triangle_of(facet: u32) -> mat3x3<real> {
     let origin = vec3<real>(0.0);
@@ -65,20 +70,6 @@ fn triangle_of(facet: u32) -> mat3x3<real> {
 // By how much facets stand off their triangles, at most.
 fn bulge() -> real {
     return real(parameters.gap_band);
-}
-
-var<workgroup> least: array<real, WORKGROUP>;
-
-// Least of one number from each invocation, in every one.
-fn least_of(number: real, local: u32) -> real {
-    least[local] = number;
-    workgroupBarrier();
-    var all = least[0];
-    for (var k = 1u; k < WORKGROUP; k += 1u) {
-        all = min(all, least[k]);
-    }
-    workgroupBarrier();
-    return all;
 }
 
 @compute @workgroup_size(WORKGROUP)

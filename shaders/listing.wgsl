@@ -18,19 +18,18 @@ fn begin_list(count: u32, local: u32) {
     workgroupBarrier();
 }
 
-// Place in the list of what this invocation has, if it has something: behind that of the invocations before it. For all
-// invocations together.
-fn place_in_list(is_listed: bool, local: u32) -> u32 {
-    marks[local] = select(0u, 1u, is_listed);
+// Place in the list of what this invocation has, as many entries as `own`: behind those of the invocations before it.
+// For all invocations together.
+fn place_in_list(own: u32, local: u32) -> u32 {
+    marks[local] = own;
     workgroupBarrier();
     var place = listed;
     for (var k = 0u; k < local; k += 1u) {
         place += marks[k];
     }
-    let end = place + marks[local];
     workgroupBarrier();
     if local == WORKGROUP - 1u {
-        listed = end;
+        listed = place + own;
     }
     workgroupBarrier();
     return place;

@@ -28,6 +28,8 @@ fn main(
     words[place] = place;
     words[2u * parameters.room] = parameters.configurations;
     take_place(place);
+    member = list[1u + parameters.first + place];
+    set_word(MEMBER, member);
     // At rest nothing has moved.
     set_scalar(MOVED, real(0.0));
     set_scalar(BULGE, parameters.bulge);

@@ -2,9 +2,9 @@
 // that have touched (twin: src/contact/detection.rs). One workgroup a configuration.
 //
 // A facet matters to a proxy node only where it is no farther than the surface is known to be: d + m, with d its
-// distance at rest and m the most that a point of the surface has moved, or the distance of a corner of the facet that
-// was closest last, where that is now. At rest it was no farther than m beyond. Only the nodes of such facets are
-// displaced, and for as many proxy nodes together as there are invocations.
+// distance at rest and m the most that a point of the surface has moved, and no farther than the facet that was closest
+// last. At rest it was no farther than m beyond. Only the nodes of such facets are displaced, and for as many proxy nodes
+// together as there are invocations.
 
 override WORKGROUP: u32 = 32u;
 
@@ -12,6 +12,14 @@ override WORKGROUP: u32 = 32u;
 var<workgroup> waits: u32;
 
 var<workgroup> shares: array<real, WORKGROUP>;
+
+// Words of a bit for each node that the compliance covers: which are needed, and which are displaced by this trial.
+override NODE_WORDS: u32 = 1u;
+var<workgroup> needed: array<atomic<u32>, NODE_WORDS>;
+var<workgroup> ready: array<u32, NODE_WORDS>;
+
+// Nodes that this invocation has displaced.
+var<private> displaced: u32;
 
 // Farther from the surface at rest than this no proxy node can touch where geometry is frozen: 1/2 |u|^2 <= E <= E(0)
 // in the energy norm, and |u_j|^2 <= trace(C_jj) |u|^2, all along the search.
@@ -40,7 +48,7 @@ fn list_candidates(reach: real, local: u32) -> u32 {
         if node < parameters.proxy_nodes {
             is_candidate = rest_distance(node) - proxy_radius(node) <= reach + parameters.gap_band;
         }
-        let entry = place_in_list(is_candidate, local);
+        let entry = place_in_list(select(0u, 1u, is_candidate), local);
         if is_candidate {
             set_word(at_candidate(entry), node);
         }
@@ -50,94 +58,65 @@ fn list_candidates(reach: real, local: u32) -> u32 {
     return listed;
 }
 
-// Place of a corner of the facet that was closest last to proxy node `node`, or ABSENT.
-fn known_corner(node: u32) -> u32 {
-    let last = word(at_last(node));
-    if last == 0u {
-        return ABSENT;
-    }
-    return carrier(last - 1u, 0u);
-}
-
-// Displacement of the node in `place` by the trial's forces.
-fn displacement_now(place: u32) -> vec3<real> {
-    var sum = vec3<real>(0.0);
-    if place < parameters.covered {
-        let slots = word(SLOTS);
-        for (var slot = 0u; slot < slots; slot += 1u) {
-            let force = vector_at(at_entry_of(1u - word(HALF), slot));
-            sum += moved_by(word(at_place(slot)), force, place);
-        }
-    }
-    return sum;
-}
-
-// Within what distance of proxy node `node`, at x, the closest facet is, or matters.
-fn matters_within(node: u32, x: vec3<real>) -> real {
+// Within what distance of proxy node `node` the closest facet is, or matters.
+fn matters_within(node: u32) -> real {
     let band = parameters.gap_band;
     let moved = scalar(MOVED);
     let rest = rest_distance(node);
-    var farthest = abs(rest) + band + moved;
-    let corner = known_corner(node);
-    if corner != ABSENT {
-        let now = at_rest(corner) + displacement_now(corner);
-        farthest = min(farthest, distance(x, now) + scalar(BULGE) + band);
-    }
+    let farthest = farthest_at_rest(node) + moved;
     // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than
     // that.
     let is_followed = FROZEN || rest <= band || word(at_watched(node)) != 0u;
     return select(min(farthest, max(proxy_radius(node), moved - rest + band)), farthest, is_followed);
 }
 
-// The facet that was closest last to proxy node `node`, at x: a start as good as any, unless it is so far from x that
-// it may not have been displaced.
-fn likely_for(node: u32, x: vec3<real>, within: real) -> u32 {
-    let corner = known_corner(node);
-    if corner == ABSENT || distance(x, at_rest(corner)) > within + scalar(MOVED) {
-        return ABSENT;
+// No node is displaced by this trial. For all invocations together.
+fn begin_displacing(local: u32) {
+    for (var k = local; k < NODE_WORDS; k += WORKGROUP) {
+        // The paper ties nodes wherever they are.
+        let last = min(parameters.covered - min(32u * k, parameters.covered), 32u);
+        atomicStore(&needed[k], select(0u, select((1u << last) - 1u, ~0u, last == 32u), PAPER));
+        ready[k] = 0u;
     }
-    return word(at_last(node)) - 1u;
+    workgroupBarrier();
 }
 
-// Whether what lay in a sphere at rest may matter to one of the points.
-fn matters(sphere: vec4<real>) -> bool {
-    return PAPER || points_near(sphere, atomicLoad(&with_point), scalar(MOVED)) != 0u;
+// Notes that a facet is going to be looked at.
+fn need(facet: u32) {
+    for (var j = 0u; j < parameters.carriers; j += 1u) {
+        let place = carrier(facet, j);
+        if place < parameters.covered {
+            atomicOr(&needed[place / 32u], 1u << (place % 32u));
+        }
+    }
 }
 
-// Lists the covered nodes that matter to the points; returns how many there are. The paper ties nodes wherever they
-// are.
-fn list_nodes(local: u32) -> u32 {
-    let all = parameters.groups;
+// Displaces the nodes of all facets that are going to be looked at. For all invocations together.
+fn make_ready(local: u32) {
     begin_list(0u, local);
-    for (var first = 0u; first < all; first += WORKGROUP) {
-        let group = first + local;
-        let is_listed = group < all && matters(surface[parameters.at_spheres + min(group, all - 1u)]);
-        let entry = place_in_list(is_listed, local);
-        if is_listed {
-            set_word(at_group(entry), group);
+    for (var first = 0u; first < NODE_WORDS; first += WORKGROUP) {
+        var fresh = 0u;
+        if first + local < NODE_WORDS {
+            let wanted = atomicLoad(&needed[first + local]);
+            fresh = wanted & ~ready[first + local];
+            ready[first + local] = wanted;
+        }
+        var entry = place_in_list(countOneBits(fresh), local);
+        for (; fresh != 0u; fresh &= fresh - 1u) {
+            set_word(at_near(entry), 32u * (first + local) + firstTrailingBit(fresh));
+            entry += 1u;
         }
     }
     sync();
-    let groups = listed;
-    passes += ((all + groups * NODES_TOGETHER) / WORKGROUP + 2u) * (1u + 2u * WORKGROUP);
-    begin_list(0u, local);
-    for (var first = 0u; first < groups * NODES_TOGETHER; first += WORKGROUP) {
-        let index = min(first + local, groups * NODES_TOGETHER - 1u);
-        let place = word(at_group(index / NODES_TOGETHER)) * NODES_TOGETHER + index % NODES_TOGETHER;
-        let is_there = first + local == index && place < parameters.covered;
-        let is_listed = is_there && matters(sphere_of(min(place, parameters.covered - 1u)));
-        let entry = place_in_list(is_listed, local);
-        if is_listed {
-            set_word(at_near(entry), place);
-        }
-    }
-    sync();
-    return listed;
+    passes += (NODE_WORDS / WORKGROUP + 1u) * (1u + WORKGROUP + min(listed, 32u))
+        + (listed + 4u * WORKGROUP - 1u) / (4u * WORKGROUP) * (word(SLOTS) + word(SLOTS) / WORKGROUP + 2u);
+    displace(listed, local);
 }
 
 fn displace_node(entry: u32, count: u32, place: u32, displacement: vec3<real>) {
     if entry < count {
         set_vector(at_displacement(place), displacement);
+        displaced += 1u;
     }
 }
 
@@ -158,11 +137,11 @@ fn displace(count: u32, local: u32) {
 }
 
 // Writes the rows of `candidates` proxy nodes: of those that touch or have touched or, where geometry is frozen, have a
-// gap no wider than `reach`. Returns how many nodes were displaced for that.
-fn write_rows(candidates: u32, reach: real, local: u32) -> u32 {
+// gap no wider than `reach`.
+fn write_rows(candidates: u32, reach: real, local: u32) {
     let half = 1u - word(HALF);
     var rows = 0u;
-    var displaced = 0u;
+    begin_displacing(local);
     for (var first = 0u; first < candidates; first += WORKGROUP) {
         var is_row = false;
         var node = 0u;
@@ -172,20 +151,21 @@ fn write_rows(candidates: u32, reach: real, local: u32) -> u32 {
         if first + local < candidates {
             node = word(at_candidate(first + local));
             x = proxy_position(node);
-            within = matters_within(node, x);
-            likely = likely_for(node, x, within);
+            within = matters_within(node);
+            let last = word(at_last(node));
+            if last != 0u {
+                likely = last - 1u;
+            }
         }
         take_point(x, within, local);
-        let near = list_nodes(local);
-        displace(near, local);
-        displaced += near;
-        passes += (2u + near / (4u * WORKGROUP)) * (word(SLOTS) + 2u) + 6u * parameters.carriers + WORKGROUP;
         let closest = closest_facet(scalar(MOVED), likely, local);
         var outward = vec3<real>(0.0);
+        var jet: Jet;
         if closest.facet != ABSENT {
             set_word(at_last(node), closest.facet + 1u);
             outward = pseudonormal(closest.facet, closest.point, x);
-            let is_inside = dot(jet_at(closest.point.weights).point, outward) >= 0.0;
+            jet = jet_at(closest.point.weights);
+            let is_inside = dot(jet.point, outward) >= 0.0;
             let depth = proxy_radius(node) + select(-closest.distance, closest.distance, is_inside);
             is_row = depth > 0.0 || word(at_watched(node)) != 0u || (FROZEN && depth >= -reach);
             if depth > 0.0 {
@@ -193,10 +173,10 @@ fn write_rows(candidates: u32, reach: real, local: u32) -> u32 {
             }
         }
         begin_list(rows, local);
-        let row = place_in_list(is_row, local);
+        let row = place_in_list(select(0u, 1u, is_row), local);
         rows = listed;
         if is_row && row < parameters.contacts {
-            write_row(half, row, node, x, closest.facet, closest.point, outward);
+            write_row(half, row, node, closest.facet, closest.point, jet, outward);
         }
     }
     if local == 0u {
@@ -206,20 +186,26 @@ fn write_rows(candidates: u32, reach: real, local: u32) -> u32 {
             set_word(OVERFLOW, 1u);
         }
     }
-    return displaced;
 }
 
-// Notes what this took; for one invocation.
-fn account(candidates: u32, displaced: u32) {
-    var facets = real(0.0);
-    for (var k = 0u; k < WORKGROUP; k += 1u) {
-        facets += shares[k];
+// Sum of one number from each invocation, in the first one.
+fn total(number: u32, local: u32) -> u32 {
+    begin_list(0u, local);
+    place_in_list(number, local);
+    return listed;
+}
+
+// Notes what this took.
+fn account(candidates: u32, local: u32) {
+    let facets = total(measured, local);
+    let nodes = total(displaced, local);
+    if local == 0u {
+        tally(TRIALS, 1u);
+        tally(CANDIDATES, candidates);
+        tally(FACETS, facets);
+        tally(DISPLACED, nodes);
+        tally(DISPLACED_PAIRS, nodes * word(SLOTS));
     }
-    tally(TRIALS, 1u);
-    tally(CANDIDATES, candidates);
-    tally(FACETS, u32(facets));
-    tally(DISPLACED, displaced);
-    tally(DISPLACED_PAIRS, displaced * word(SLOTS));
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -239,11 +225,7 @@ fn main(
             reach = frozen_reach(local);
         }
         let candidates = list_candidates(reach, local);
-        let displaced = write_rows(candidates, reach, local);
-        shares[local] = real(measured);
-        workgroupBarrier();
-        if local == 0u {
-            account(candidates, candidates + displaced);
-        }
+        write_rows(candidates, reach, local);
+        account(candidates, local);
     }
 }

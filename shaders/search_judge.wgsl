@@ -113,11 +113,11 @@ fn begin_stage(local: u32) {
     }
 }
 
-// Gives every node that carries a row a slot, in the order of rows and nodes, and lists the rows' nodes slot by slot.
+// Gives every node that carries a row a slot, in the order of rows and nodes, and counts the rows that press on it.
 fn occupy(local: u32) {
     let carriers = parameters.carriers;
     for (var slot = local; slot < parameters.support; slot += WORKGROUP) {
-        set_word(at_head(slot), 0u);
+        set_word(at_start(slot), 0u);
     }
     begin_list(slots, local);
     sync();
@@ -141,7 +141,7 @@ fn occupy(local: u32) {
             }
             let known = word(at_slot(select(0u, place, carries)));
             let is_new = carries && known == 0u;
-            var slot = place_in_list(is_new, local);
+            var slot = place_in_list(select(0u, 1u, is_new), local);
             if is_new && slot < parameters.support {
                 set_word(at_slot(place), slot + 1u);
                 set_word(at_place(slot), place);
@@ -151,12 +151,44 @@ fn occupy(local: u32) {
             if j < carriers {
                 let has_slot = carries && slot < parameters.support;
                 set_word(words_at + carriers + j, select(0u, slot, has_slot));
+                var before = NO_PART;
                 if has_slot {
-                    set_word(words_at + 2u * carriers + j, word(at_head(slot)));
-                    set_word(at_head(slot), (row << NODE_BITS) + j + 1u);
+                    before = word(at_start(slot));
+                    set_word(at_start(slot), before + 1u);
                 }
+                set_word(words_at + 2u * carriers + j, before);
             }
             sync();
+        }
+    }
+}
+
+// Lists what rows press on the nodes, slot by slot, each in the order of rows.
+fn list_parts(local: u32) {
+    begin_list(0u, local);
+    for (var first = 0u; first < slots; first += WORKGROUP) {
+        let slot = first + local;
+        var own = 0u;
+        if slot < slots {
+            own = word(at_start(slot));
+        }
+        let start = place_in_list(own, local);
+        if slot < slots {
+            set_word(at_start(slot), start);
+        }
+    }
+    if local == 0u {
+        set_word(at_start(slots), listed);
+    }
+    sync();
+    for (var item = local; item < row_count * parameters.carriers; item += WORKGROUP) {
+        let row = item / parameters.carriers;
+        let j = item % parameters.carriers;
+        let before = word(row_words(row) + ROW_WORDS + 2u * parameters.carriers + j);
+        if before != NO_PART {
+            let weights = numbers(row) + NODE_WEIGHTS + j;
+            set_four(at_part(word(at_start(slot_of(row, j))) + before), vec4<real>(scalar(weights),
+                scalar(weights + parameters.carriers), scalar(weights + 2u * parameters.carriers), real(row)));
         }
     }
 }
@@ -166,7 +198,9 @@ fn balance(local: u32) {
     occupy(local);
     let kc = scalar(STIFFNESS);
     let before = slots;
-    slots = min(listed, parameters.support);
+    let wanted = listed;
+    slots = min(wanted, parameters.support);
+    list_parts(local);
     for (var row = local; row < row_count; row += WORKGROUP) {
         let at = numbers(row);
         let force = -kc * force_over_kc(at) * vector_at(at + NORMAL);
@@ -175,7 +209,7 @@ fn balance(local: u32) {
     sync();
     if local == 0u {
         set_word(SLOTS, slots);
-        if listed > parameters.support {
+        if wanted > parameters.support {
             set_word(OVERFLOW, 1u);
         }
     }
@@ -330,4 +364,5 @@ fn main(
     }
     if is_next(PROBE) { probe(local); }
     if is_next(TANGENT) { load(local); }
+    leave(local);
 }

@@ -88,7 +88,7 @@ fn tie_nodes(local: u32) -> u32 {
     for (var first = 0u; first < rows; first += WORKGROUP) {
         let at = at_numbers(1u, first + local);
         let is_tied = first + local < rows && scalar(at + DEPTH) > 0.0;
-        let k = place_in_list(is_tied, local);
+        let k = place_in_list(select(0u, 1u, is_tied), local);
         if is_tied {
             let node = word(at_row(1u, first + local));
             let point = proxy_position(node) - proxy_radius(node) * vector_at(at + NORMAL);
@@ -114,15 +114,15 @@ fn occupy(ties: u32) {
         var slot = word(at_slot(node));
         if slot == 0u {
             set_word(at_place(used), node);
-            set_word(at_head(used), 0u);
+            set_word(at_start(used), 0u);
             used += 1u;
             slot = used;
             set_word(at_slot(node), slot);
         }
         let at = at_tied_slot(entry / 3u, entry % 3u);
         set_word(at, slot - 1u);
-        set_word(at + 3u, word(at_head(slot - 1u)));
-        set_word(at_head(slot - 1u), entry + 1u);
+        set_word(at + 3u, word(at_start(slot - 1u)));
+        set_word(at_start(slot - 1u), entry + 1u);
     }
     set_word(SLOTS, used);
     set_word(PREVIOUS_TIES, word(TIES));
@@ -132,7 +132,7 @@ fn occupy(ties: u32) {
 // Sum over the ties of a slot of their pulls, and in w their number.
 fn pulls_on(slot: u32) -> vec4<real> {
     var sum = vec4<real>(0.0);
-    var entry = word(at_head(slot));
+    var entry = word(at_start(slot));
     while entry != 0u {
         let k = (entry - 1u) / 3u;
         let j = (entry - 1u) % 3u;
@@ -169,7 +169,7 @@ fn tie(local: u32) {
         advance(after_iteration(square), 16u + 3u * ties + (ties / WORKGROUP + 1u) * parameters.surface_nodes);
         if word(OVERFLOW) != 0u {
             set_word(STATUS, STATUS_OVERFLOW);
-            set_word(PHASE, DONE);
+            phase = DONE;
         }
     }
 }
@@ -357,7 +357,7 @@ fn account(local: u32) {
     }
     if local == 0u {
         set_word(TOUCHES, ties);
-        set_word(PHASE, DONE);
+        phase = DONE;
     }
 }
 
@@ -379,4 +379,5 @@ fn main(
     }
     if is_next(PROJECT) { project(local); }
     if is_next(ACCOUNT) { account(local); }
+    leave(local);
 }

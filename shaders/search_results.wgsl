@@ -3,20 +3,19 @@
 override GATHER_WORKGROUP: u32 = 64u;
 
 @group(0) @binding(0) var<uniform> parameters: SearchParameters;
-@group(0) @binding(1) var<storage, read> list: array<u32>;
-@group(0) @binding(2) var<storage, read_write> words: array<u32>;
-@group(0) @binding(3) var<storage, read_write> reals: array<vec4<real>>;
+@group(0) @binding(1) var<storage, read_write> words: array<u32>;
+@group(0) @binding(2) var<storage, read_write> reals: array<vec4<real>>;
 // Where the touches of each configuration begin; behind the last, where they end.
-@group(0) @binding(4) var<storage, read_write> starts: array<u32>;
+@group(0) @binding(3) var<storage, read_write> starts: array<u32>;
 // Four words a configuration: status, iterations, touches, and two bits: whether there is a tangent, and whether the
 // result may depend on nodes that the compliance does not cover.
-@group(0) @binding(5) var<storage, read_write> records: array<vec4<u32>>;
+@group(0) @binding(4) var<storage, read_write> records: array<vec4<u32>>;
 // Residual, energy, torque and, where it is wanted, the tangent row by row.
-@group(0) @binding(6) var<storage, read_write> amounts: array<real>;
+@group(0) @binding(5) var<storage, read_write> amounts: array<real>;
 // Proxy node, facet and feature of each touch, or by the paper's iteration the object nodes that it is tied to.
-@group(0) @binding(7) var<storage, read_write> touches: array<vec4<u32>>;
+@group(0) @binding(6) var<storage, read_write> touches: array<vec4<u32>>;
 // Weights of the corners and the force on the proxy node, or the force on each of those nodes [N].
-@group(0) @binding(8) var<storage, read_write> presses: array<real>;
+@group(0) @binding(7) var<storage, read_write> presses: array<real>;
 
 // One workgroup over all configurations.
 @compute @workgroup_size(WORKGROUP)
@@ -42,14 +41,14 @@ fn write_record(place: u32) {
     let flags = word(HAS_TANGENT) + 2u * word(IS_DOUBTFUL);
     records[place] = vec4<u32>(word(STATUS), word(ITERATIONS), word(TOUCHES), flags);
     let joints = parameters.joints;
-    let length = 2u + joints + select(0u, joints * joints, parameters.with_tangent != 0u);
+    let length = 2u + joints + select(0u, joints * joints, WITH_TANGENT);
     let first = place * length;
     amounts[first] = scalar(IMBALANCE);
     amounts[first + 1u] = scalar(ENERGY);
     for (var joint = 0u; joint < joints; joint += 1u) {
         amounts[first + 2u + joint] = scalar(at_torque(joint));
     }
-    if parameters.with_tangent != 0u {
+    if WITH_TANGENT {
         for (var k = 0u; k < joints * joints; k += 1u) {
             amounts[first + 2u + joints + k] = scalar(at_tangent(0u, k));
         }

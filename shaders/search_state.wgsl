@@ -14,11 +14,11 @@ override LOOP_BUDGET: u32 = 30000u;
 @group(0) @binding(4) var<storage, read> placed: array<real>;
 // The same in f32; w is the gap to the flat triangles at rest.
 @group(0) @binding(5) var<storage, read> positions: array<vec4<f32>>;
-// Number of configurations in contact plus one, then their numbers.
-@group(0) @binding(6) var<storage, read> list: array<u32>;
 // Places in the section of unfinished configurations, room for as many, their number, then the words of each workspace.
-@group(0) @binding(7) var<storage, read_write> words: array<u32>;
-@group(0) @binding(8) var<storage, read_write> reals: array<vec4<real>>;
+@group(0) @binding(6) var<storage, read_write> words: array<u32>;
+@group(0) @binding(7) var<storage, read_write> reals: array<vec4<real>>;
+// Of each workspace the vectors on its support, four numbers an entry.
+@group(0) @binding(8) var<storage, read_write> vectors: array<vec4<real>>;
 
 // Adds to what the search took; for one invocation.
 fn tally(what: u32, amount: u32) {
@@ -47,19 +47,52 @@ fn at_proxy() -> u32 {
     return 2u * parameters.leaves;
 }
 
-// Signed distance of a proxy node to the flat triangles at rest, known to gap_band.
+// Signed distance of a proxy node to the flat triangles at rest, known to gap_band, or a bound below it.
 fn rest_distance(node: u32) -> real {
     return real(positions[member * parameters.proxy_nodes + node].w) + proxy_radius(node);
 }
 
-// Position at rest of the surface node in `place`.
-fn at_rest(place: u32) -> vec3<real> {
-    return sphere_of(place).xyz;
+// A bound above its distance to the surface at rest.
+fn farthest_at_rest(node: u32) -> real {
+    let gap = real(positions[member * parameters.proxy_nodes + node].w);
+    return select(FAR_AWAY, abs(gap + proxy_radius(node)) + parameters.gap_band, gap <= parameters.known_to);
 }
 
-// A sphere around it: no facet that hangs on the node has a sphere that is nearer to a point.
-fn sphere_of(place: u32) -> vec4<real> {
-    return surface[at_proxy() + parameters.proxy_nodes + place];
+// Position at rest of the surface node in `place`.
+fn at_rest(place: u32) -> vec3<real> {
+    return surface[at_proxy() + parameters.proxy_nodes + place].xyz;
+}
+
+// Where column `entry`, and vector `vector`, of this workspace begin: there is room for as many columns as rows.
+fn column_base(entry: u32) -> u32 {
+    let columns = parameters.contacts * column_length();
+    return place_taken * (columns + (VECTORS + 2u * parameters.joints) * parameters.support) + entry * column_length();
+}
+
+fn column_length() -> u32 {
+    return select(parameters.support, (parameters.support + 3u) / 4u, ISOTROPIC);
+}
+
+fn vector_base(vector: u32) -> u32 {
+    return column_base(parameters.contacts) + vector * parameters.support;
+}
+
+fn vector_entry(vector: u32, slot: u32) -> vec3<real> {
+    return vectors[vector_base(vector) + slot].xyz;
+}
+
+fn put(vector: u32, slot: u32, value: vec3<real>) {
+    vectors[vector_base(vector) + slot] = vec4<real>(value, 0.0);
+}
+
+// Displacement of the support by a unit push of the row that touches in place `entry`: of an isotropic object its size
+// at each node, along the row's normal.
+fn column_entry(entry: u32, slot: u32) -> vec3<real> {
+    return vectors[column_base(entry) + slot].xyz;
+}
+
+fn column_size(entry: u32, slot: u32) -> real {
+    return vectors[column_base(entry) + slot / 4u][slot % 4u];
 }
 
 // Some slots of the support, and the forces on them.
@@ -76,7 +109,7 @@ fn responses(vector: u32, places: vec4<u32>, local: u32) -> array<vec3<real>, 4>
         workgroupBarrier();
         if local < count {
             pressed[local] = word(at_place(first + local));
-            pressing[local] = vector_at(at_entry_of(vector, first + local));
+            pressing[local] = vector_entry(vector, first + local);
         }
         workgroupBarrier();
         for (var k = 0u; k < count; k += 1u) {

@@ -53,9 +53,9 @@ fn precondition(local: u32) {
         var displacement = vector_entry(LEFT_PRODUCT, slot);
         for (var a = 0u; a < taken; a += 1u) {
             if ISOTROPIC {
-                displacement += scalar(at_column(a, slot)) * vector_at(at_reaction(word(at_taken(a))));
+                displacement += column_size(a, slot) * vector_at(at_reaction(word(at_taken(a))));
             } else {
-                displacement += scalar(at_push(a)) * vector_at(at_column(a, slot));
+                displacement += scalar(at_push(a)) * column_entry(a, slot);
             }
         }
         displacement = displacement / stiffening;
@@ -427,7 +427,7 @@ fn account(local: u32) {
 // Whether the compliance covers all facets that may lie as near to proxy node `node` as its closest one.
 fn is_covered(node: u32, moved: real) -> bool {
     let x = proxy_position(node);
-    let reach = abs(rest_distance(node)) + parameters.gap_band + 2.0 * moved;
+    let reach = farthest_at_rest(node) + 2.0 * moved;
     // A compliance that covers all nodes covers all facets.
     var tree = select(1u, 0u, parameters.covered == parameters.surface_nodes);
     while tree != 0u {
@@ -454,8 +454,8 @@ fn main(
         return;
     }
     loop {
-        sync();
-        if word(PHASE) <= TANGENT || word(PHASE) == DONE || word(SPENT) >= LOOP_BUDGET {
+        workgroupBarrier();
+        if phase <= TANGENT || phase == DONE || spent >= LOOP_BUDGET {
             break;
         }
         if is_next(STEP) { begin_step(local); }
@@ -478,4 +478,5 @@ fn main(
         if is_next(PLACE) { place(local); }
         if is_next(ACCOUNT) { account(local); }
     }
+    leave(local);
 }

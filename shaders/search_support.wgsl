@@ -7,6 +7,10 @@
 
 override WORKGROUP: u32 = 32u;
 
+// What the search has to do, and passes through loops in this dispatch, about. The first invocation changes them.
+var<workgroup> phase: u32;
+var<workgroup> spent: u32;
+
 var<workgroup> sums: array<vec3<real>, WORKGROUP>;
 
 // Of the state: which half is its own, where its rows begin, how many there are, and slots in use.
@@ -43,14 +47,6 @@ fn root(square: real) -> real {
 }
 
 // --- Support ---
-
-fn vector_entry(vector: u32, slot: u32) -> vec3<real> {
-    return vector_at(at_entry_of(vector, slot));
-}
-
-fn put(vector: u32, slot: u32, value: vec3<real>) {
-    set_vector(at_entry_of(vector, slot), value);
-}
 
 // product = C vector on the support.
 fn multiply(vector: u32, product: u32, local: u32) {
@@ -183,19 +179,21 @@ fn set_reaction(row: u32, reaction: Variation) {
 
 // Sum of what the rows' reactions press on the node in `slot`.
 fn gather(slot: u32) -> vec3<real> {
+    let end = word(at_start(slot + 1u));
     var sum = vec3<real>(0.0);
-    let carriers = parameters.carriers;
-    var entry = word(at_head(slot));
-    while entry != 0u {
-        let row = (entry - 1u) >> NODE_BITS;
-        let j = (entry - 1u) & ((1u << NODE_BITS) - 1u);
-        let weights = numbers(row) + NODE_WEIGHTS + j;
-        let reaction = at_reaction(row);
-        sum += scalar(weights) * vector_at(reaction) + scalar(weights + carriers) * vector_at(reaction + 4u)
-            + scalar(weights + 2u * carriers) * vector_at(reaction + 8u);
-        entry = word(row_words(row) + ROW_WORDS + 2u * carriers + j);
+    // Four at a time, so that none waits for the one before.
+    for (var entry = word(at_start(slot)); entry < end; entry += 4u) {
+        sum += press(entry, end) + press(entry + 1u, end) + press(entry + 2u, end) + press(entry + 3u, end);
     }
     return sum;
+}
+
+// What the reaction of one row presses there; nothing behind the last entry.
+fn press(entry: u32, end: u32) -> vec3<real> {
+    let part = four_at(at_part(min(entry, end - 1u)));
+    let reaction = at_reaction(u32(part.w));
+    let sum = part.x * vector_at(reaction) + part.y * vector_at(reaction + 4u) + part.z * vector_at(reaction + 8u);
+    return select(vec3<real>(0.0), sum, entry < end);
 }
 
 // Sets the multipliers to the rows' forces, and notes which of them touch.
@@ -235,7 +233,7 @@ fn jacobian(node: u32, joint: u32) -> vec3<real> {
 // What follows an equilibrium; for one invocation.
 fn converged() -> u32 {
     set_word(STATUS, STATUS_CONTACT);
-    return select(ACCOUNT, TANGENT, parameters.with_tangent != 0u);
+    return select(ACCOUNT, TANGENT, WITH_TANGENT);
 }
 
 // Passes through loops that an invocation makes in a phase, about.
@@ -260,15 +258,16 @@ fn go_to(next: u32, now: u32) {
 
 // Sets it, after so many passes through loops; for one invocation.
 fn advance(next: u32, passes: u32) {
-    set_word(PHASE, next);
-    set_word(SPENT, word(SPENT) + passes);
+    phase = next;
+    spent += passes;
 }
 
 // Whether `now` is what the search has to do, and may do in this dispatch; for all invocations together. Nothing but a
 // phase, behind its first barrier, may change what is looked at here.
 fn is_next(now: u32) -> bool {
     sync();
-    let is_now = word(PHASE) == now && word(SPENT) < LOOP_BUDGET;
+    workgroupBarrier();
+    let is_now = phase == now && spent < LOOP_BUDGET;
     if is_now {
         look_up();
     }
@@ -282,10 +281,19 @@ fn resume(index: u32, first: u32, local: u32) -> bool {
         return false;
     }
     if local == 0u {
-        set_word(SPENT, 0u);
-        if word(PHASE) == PLACED {
-            set_word(PHASE, first);
+        spent = 0u;
+        phase = word(PHASE);
+        if phase == PLACED {
+            phase = first;
         }
     }
     return true;
+}
+
+// Leaves a search in the phase in which it is; for all invocations together.
+fn leave(local: u32) {
+    workgroupBarrier();
+    if local == 0u {
+        set_word(PHASE, phase);
+    }
 }

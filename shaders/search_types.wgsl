@@ -8,18 +8,18 @@
 // the paper's iteration, whose nodes are numbered as the object's.
 
 struct SearchParameters {
-    // Configurations of this dispatch.
+    // Configurations of this dispatch, and the place of their first one in the list of those in contact.
     configurations: u32,
+    first: u32,
     joints: u32,
     proxy_nodes: u32,
     surface_nodes: u32,
     triangles: u32,
     // Leaves of the tree of bounding spheres.
     leaves: u32,
-    // Surface nodes that the compliance covers, and groups of NODES_TOGETHER of them.
+    // Surface nodes that the compliance covers.
     covered: u32,
-    groups: u32,
-    // Most rows, slots of the support, and nodes of a facet.
+    // Most rows, slots of the support, and nodes of a facet, in fours.
     contacts: u32,
     support: u32,
     carriers: u32,
@@ -29,12 +29,9 @@ struct SearchParameters {
     words: u32,
     // Configurations that there is room for.
     room: u32,
-    // Whether the tangent is wanted.
-    with_tangent: u32,
-    // Where parts of `surface` begin: control net at rest, masks of control points, spheres of groups of nodes.
+    // Where parts of `surface` begin: control net at rest, masks of control points.
     at_net: u32,
     at_masks: u32,
-    at_spheres: u32,
     // Where parts of `mesh` begin: facets in the order of the leaves, places of each facet's nodes, its shape,
     // and whether the compliance covers it.
     at_order: u32,
@@ -43,8 +40,9 @@ struct SearchParameters {
     at_covered: u32,
     // And the link of each proxy node.
     at_links: u32,
-    // Gaps in f32 are known to this [m].
+    // Gaps in f32 are known to this, if they are no greater than known_to [m].
     gap_band: real,
+    known_to: real,
     // Contact stiffness of the first and of the last stage; of the paper's iteration that of its springs [N/m].
     first_kc: real,
     kc: real,
@@ -70,6 +68,9 @@ override ISOTROPIC: bool = false;
 
 // Whether contact is linearised: its geometry is frozen at rest.
 override FROZEN: bool = false;
+
+// Whether the tangent is wanted.
+override WITH_TANGENT: bool = false;
 
 // Whether equilibria are those of the paper's iteration.
 override PAPER: bool = false;
@@ -120,8 +121,8 @@ const SOLVE_ITERATIONS: u32 = 26u;
 const JUDGED_PAIRS: u32 = 27u;
 const STEPPED_PAIRS: u32 = 28u;
 const ELIMINATIONS: u32 = 29u;
-// Passes through loops in this dispatch.
-const SPENT: u32 = 30u;
+// Number of the configuration in the section.
+const MEMBER: u32 = 30u;
 const HEADER: u32 = 31u;
 
 // Phases: what a search has to do next. It waits for rows where it is PLACED; up to TANGENT search_judge has it, and
@@ -165,8 +166,6 @@ const FOR_TANGENT: u32 = 2u;
 // Numbers of a row in words, its nodes' places and slots aside.
 const ROW_WORDS: u32 = 4u;
 
-const NODE_BITS: u32 = 5u;
-
 // Of each proxy node: whether it has touched; facet that was closest last, plus one.
 fn at_watched(node: u32) -> u32 {
     return HEADER + node;
@@ -176,18 +175,14 @@ fn at_last(node: u32) -> u32 {
     return HEADER + parameters.proxy_nodes + node;
 }
 
-// Proxy nodes that can touch, and groups of nodes that matter to them.
+// Proxy nodes that can touch.
 fn at_candidate(entry: u32) -> u32 {
     return HEADER + 2u * parameters.proxy_nodes + entry;
 }
 
-fn at_group(entry: u32) -> u32 {
-    return HEADER + 3u * parameters.proxy_nodes + entry;
-}
-
-// Places of nodes that matter to them.
+// Places of nodes that are displaced next.
 fn at_near(entry: u32) -> u32 {
-    return at_group(parameters.groups) + entry;
+    return HEADER + 3u * parameters.proxy_nodes + entry;
 }
 
 // Slot of a place, plus one; place of a slot.
@@ -199,8 +194,10 @@ fn at_place(slot: u32) -> u32 {
     return at_slot(parameters.covered) + slot;
 }
 
-// Proxy node, facet, feature and number of nodes of a row; then its nodes' places, their slots, and the entry behind
-// each in the list of its slot, plus one.
+// Proxy node, facet, feature and number of nodes of a row; then its nodes' places, their slots, and how many rows press
+// on each before it, or NO_PART where it does not.
+const NO_PART: u32 = 0xffffffffu;
+
 fn at_row(half: u32, row: u32) -> u32 {
     return at_place(parameters.support) + (half * parameters.contacts + row) * (ROW_WORDS + 3u * parameters.carriers);
 }
@@ -215,9 +212,8 @@ fn at_taken(entry: u32) -> u32 {
     return at_active(parameters.contacts) + entry;
 }
 
-// The first entry of the list of each slot, plus one: entries are numbered row by row, and node by node of a row, of
-// which there are no more than 1 << NODE_BITS.
-fn at_head(slot: u32) -> u32 {
+// The first of the parts of each slot, and behind the last slot their number.
+fn at_start(slot: u32) -> u32 {
     return at_taken(parameters.contacts) + slot;
 }
 
@@ -309,8 +305,7 @@ fn at_push(row: u32) -> u32 {
     return at_reaction(parameters.contacts) + row;
 }
 
-// Of the rows that touch: by how much they are to be deepened; the inverse of the system of their pushes; and the
-// displacement of the support by a unit push of each, of an isotropic object its size at each node.
+// Of the rows that touch: by how much they are to be deepened, and the inverse of the system of their pushes.
 fn at_deepening(entry: u32) -> u32 {
     return at_push(parameters.contacts) + entry;
 }
@@ -319,9 +314,18 @@ fn at_inverse(row: u32, column: u32) -> u32 {
     return at_deepening(parameters.contacts) + row * parameters.contacts + column;
 }
 
-fn at_column(entry: u32, slot: u32) -> u32 {
-    return to_four(at_inverse(parameters.contacts, 0u))
-        + (entry * parameters.support + slot) * select(4u, 1u, ISOTROPIC);
+// What rows press on the nodes, slot by slot: weight and slopes of the node in the row, and the row.
+fn at_part(part: u32) -> u32 {
+    return to_four(at_inverse(parameters.contacts, 0u)) + 4u * part;
+}
+
+// The tangent, row by row; the torque.
+fn at_tangent(row: u32, column: u32) -> u32 {
+    return at_part(parameters.contacts * parameters.carriers) + row * parameters.joints + column;
+}
+
+fn at_torque(joint: u32) -> u32 {
+    return at_tangent(parameters.joints, 0u) + joint;
 }
 
 // Vectors on the support, behind the forces of state and trial.
@@ -344,23 +348,11 @@ const DIRECTION: u32 = 14u;
 const HESSIAN_DIRECTION: u32 = 15u;
 const VECTORS: u32 = 16u;
 
-fn at_entry_of(vector: u32, slot: u32) -> u32 {
-    return to_four(at_column(parameters.contacts, 0u)) + 4u * (vector * parameters.support + slot);
-}
-
-// The load of each joint's motion, and the response to it; the tangent, row by row; the torque.
+// The load of each joint's motion, and the response to it.
 fn load_of(joint: u32) -> u32 {
     return VECTORS + joint;
 }
 
 fn response_to(joint: u32) -> u32 {
     return VECTORS + parameters.joints + joint;
-}
-
-fn at_tangent(row: u32, column: u32) -> u32 {
-    return at_entry_of(VECTORS + 2u * parameters.joints, 0u) + row * parameters.joints + column;
-}
-
-fn at_torque(joint: u32) -> u32 {
-    return at_tangent(parameters.joints, 0u) + joint;
 }

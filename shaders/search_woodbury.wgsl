@@ -8,12 +8,13 @@ fn factorise(local: u32) {
     for (var first = 0u; first < row_count; first += WORKGROUP) {
         let row = first + local;
         let is_taken = row < row_count && is_active(min(row, row_count - 1u));
-        let entry = place_in_list(is_taken, local);
+        let entry = place_in_list(select(0u, 1u, is_taken), local);
         if is_taken {
             set_word(at_taken(entry), row);
         }
     }
     let taken = listed;
+    is_near = taken <= NEAR_ORDER;
     if local == 0u {
         set_word(TAKEN, taken);
     }
@@ -36,9 +37,8 @@ fn factorise(local: u32) {
             deepened += stiffening / (kc * scalar(numbers(word(at_taken(b))) + SHARE));
             set_scalar(at_push(b), deepened);
         }
-        set_scalar(at_inverse(a, b), deepened);
+        set_entry(a, b, deepened);
     }
-    sync();
     invert(taken, local);
     if local == 0u {
         tally(ELIMINATIONS, taken * taken * taken);
@@ -60,14 +60,14 @@ fn write_column(a: u32, slot: u32) {
                 along_row(places + j + 2u, place), along_row(places + j + 3u, place));
             size += dot(four_at(weights + j), effects);
         }
-        set_scalar(at_column(a, slot), size);
+        vectors[column_base(a) + slot / 4u][slot % 4u] = size;
     } else {
         let normal = vector_at(numbers(row) + NORMAL);
         var moved = vec3<real>(0.0);
         for (var j = 0u; j < parameters.carriers; j += 1u) {
             moved += moved_by(word(places + j), scalar(weights + j) * normal, place);
         }
-        set_vector(at_column(a, slot), moved);
+        vectors[column_base(a) + slot] = vec4<real>(moved, 0.0);
     }
 }
 
@@ -83,16 +83,36 @@ fn deepening(a: u32, b: u32) -> real {
     var sum = real(0.0);
     if ISOTROPIC {
         for (var j = 0u; j < parameters.carriers; j += 4u) {
-            sum += dot(four_at(weights + j), vec4<real>(scalar(at_column(a, slot_of(row, j))),
-                scalar(at_column(a, slot_of(row, j + 1u))), scalar(at_column(a, slot_of(row, j + 2u))),
-                scalar(at_column(a, slot_of(row, j + 3u)))));
+            sum += dot(four_at(weights + j), vec4<real>(column_size(a, slot_of(row, j)),
+                column_size(a, slot_of(row, j + 1u)), column_size(a, slot_of(row, j + 2u)),
+                column_size(a, slot_of(row, j + 3u))));
         }
         return sum * dot(normal, vector_at(numbers(word(at_taken(a))) + NORMAL));
     }
     for (var j = 0u; j < parameters.carriers; j += 1u) {
-        sum += scalar(weights + j) * dot(normal, vector_at(at_column(a, slot_of(row, j))));
+        sum += scalar(weights + j) * dot(normal, column_entry(a, slot_of(row, j)));
     }
     return sum;
+}
+
+// Up to this order a system is inverted in the workgroup's own memory.
+const NEAR_ORDER: u32 = 24u;
+var<workgroup> near_inverse: array<real, NEAR_ORDER * NEAR_ORDER>;
+var<private> is_near: bool;
+
+fn entry_of(row: u32, column: u32) -> real {
+    if is_near {
+        return near_inverse[row * NEAR_ORDER + column];
+    }
+    return scalar(at_inverse(row, column));
+}
+
+fn set_entry(row: u32, column: u32, value: real) {
+    if is_near {
+        near_inverse[row * NEAR_ORDER + column] = value;
+    } else {
+        set_scalar(at_inverse(row, column), value);
+    }
 }
 
 // Inverts the system of the pushes in place, by Gauss-Jordan elimination, which a positive definite matrix lets do
@@ -100,12 +120,14 @@ fn deepening(a: u32, b: u32) -> real {
 // among the pushes.
 fn invert(order: u32, local: u32) {
     for (var k = 0u; k < order; k += 1u) {
-        let pivot = 1.0 / max(scalar(at_inverse(k, k)), PIVOT_ROUNDING * scalar(at_push(k)));
+        sync();
+        workgroupBarrier();
+        let pivot = 1.0 / max(entry_of(k, k), PIVOT_ROUNDING * scalar(at_push(k)));
         for (var item = local; item < (order + 3u) / 4u * order; item += WORKGROUP) {
             let row = item / order * 4u;
             let column = item % order;
             if column != k {
-                let share = scalar(at_inverse(k, column)) * pivot;
+                let share = entry_of(k, column) * pivot;
                 eliminate(row, order, column, k, share);
                 eliminate(row + 1u, order, column, k, share);
                 eliminate(row + 2u, order, column, k, share);
@@ -113,21 +135,26 @@ fn invert(order: u32, local: u32) {
             }
         }
         sync();
+        workgroupBarrier();
         for (var j = local; j < order; j += WORKGROUP) {
             if j == k {
-                set_scalar(at_inverse(k, k), pivot);
+                set_entry(k, k, pivot);
             } else {
-                set_scalar(at_inverse(k, j), scalar(at_inverse(k, j)) * pivot);
-                set_scalar(at_inverse(j, k), -scalar(at_inverse(j, k)) * pivot);
+                set_entry(k, j, entry_of(k, j) * pivot);
+                set_entry(j, k, -entry_of(j, k) * pivot);
             }
         }
-        sync();
     }
+    sync();
+    workgroupBarrier();
+    for (var item = local; is_near && item < order * order; item += WORKGROUP) {
+        set_scalar(at_inverse(item / order, item % order), entry_of(item / order, item % order));
+    }
+    sync();
 }
 
 fn eliminate(row: u32, order: u32, column: u32, k: u32, share: real) {
-    let at = at_inverse(row, column);
     if row != k && row < order {
-        set_scalar(at, scalar(at) - scalar(at_inverse(row, k)) * share);
+        set_entry(row, column, entry_of(row, column) - entry_of(row, k) * share);
     }
 }

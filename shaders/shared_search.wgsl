@@ -1,18 +1,19 @@
 // The facets that are closest to points, one point an invocation, which a workgroup finds together: a search by each
 // invocation alone would have all wait for the longest one, and pass through the same spheres.
 //
-// Bounding spheres at rest leave few pairs of a point and a facet, and flat triangles fewer. As many pairs are measured
-// at a time as there are invocations, whosever the point is. Which pairs are measured depends on timing; which facet is
-// closest does not.
+// Bounding spheres at rest leave few pairs of a point and a facet, and flat triangles fewer. Triangles and facets are
+// looked at for as many pairs at a time as there are invocations, whosever the point is. The order of the pairs depends
+// on timing; which facet is closest does not.
 //
-// The stage declares WORKGROUP, which is at most 32; `facet_in_order`; and for facets that are bent their corners,
+// The stage declares WORKGROUP, which is at most 32; `facet_in_order`; `need(facet)`, which notes that a facet is going
+// to be looked at, and `make_ready(local)`, which makes all of these ready; and for facets that are bent their corners,
 // `triangle_of(facet)`, and by how much they stand off their triangles, `bulge()`.
 
 // Facets that share a sphere which is looked at before theirs.
 const CLUSTER: u32 = 32u;
 
-// Most pairs that wait: fewer than are measured together, and each of as many facets with each point.
-override PAIRS: u32 = WORKGROUP * (WORKGROUP + 1u);
+// Most pairs that wait: as many as one look at the spheres may add, of as many facets with each point, and some more.
+override PAIRS: u32 = WORKGROUP * (WORKGROUP + 16u);
 
 // Each invocation's point; w is the distance beyond which no facet matters to it, below zero where there is none.
 var<workgroup> points: array<vec4<real>, WORKGROUP>;
@@ -52,46 +53,49 @@ fn points_near(sphere: vec4<real>, mask: u32, moved: real) -> u32 {
     return found;
 }
 
-// Pairs the facet in place `leaf` of the order with those points of `mask` to which it may be closest.
+// Pairs the facet in place `leaf` of the order with those points of `mask` that its sphere may be near enough to.
 fn add_pairs(leaf: u32, mask: u32, moved: real) {
-    var rest = points_near(surface[parameters.leaves + leaf], mask, moved);
-    if rest == 0u {
+    let found = points_near(surface[parameters.leaves + leaf], mask, moved);
+    if found == 0u {
         return;
     }
     let facet = facet_in_order(leaf);
-    var corners = mat3x3<real>();
-    if SMOOTH {
-        corners = triangle_of(facet);
-    }
-    while rest != 0u {
-        let owner = firstTrailingBit(rest);
-        rest &= rest - 1u;
-        var may_be_closest = closest_so_far[owner] != facet;
-        if SMOOTH && may_be_closest {
-            let point = points[owner];
-            let weights = closest_point(point.xyz, corners[0], corners[1], corners[2]).weights;
-            may_be_closest = distance(corners * weights, point.xyz) <= point.w + bulge();
-        }
-        if may_be_closest {
-            pairs[atomicAdd(&waiting, 1u)] = facet * WORKGROUP + owner;
-        }
+    need(facet);
+    for (var rest = found; rest != 0u; rest &= rest - 1u) {
+        pairs[atomicAdd(&waiting, 1u)] = facet * WORKGROUP + firstTrailingBit(rest);
     }
 }
 
-// Measures the pairs from `first` to `count`, at most one an invocation. Returns the closest facet to this one's point,
+// Whether the facet of a pair may be closer to its point than what was found so far.
+fn may_be_closest(pair: u32) -> bool {
+    let facet = pair / WORKGROUP;
+    let owner = pair % WORKGROUP;
+    if closest_so_far[owner] == facet {
+        return false;
+    }
+    if !SMOOTH {
+        return true;
+    }
+    let point = points[owner];
+    let corners = triangle_of(facet);
+    let weights = closest_point(point.xyz, corners[0], corners[1], corners[2]).weights;
+    return distance(corners * weights, point.xyz) <= point.w + bulge();
+}
+
+// Measures the pairs from `first` to `end`, at most one an invocation. Returns the closest facet to this one's point,
 // which was `best`.
-fn measure(first: u32, count: u32, best: Closest, local: u32) -> Closest {
-    if first + local < count {
+fn measure(first: u32, end: u32, best: Closest, local: u32) -> Closest {
+    if first + local < end {
         let pair = pairs[first + local];
         form(pair / WORKGROUP, points[pair % WORKGROUP].xyz);
-        let point = closest_on_facet();
-        measurements[local] = vec4<real>(point.weights, length(jet_at(point.weights).point));
-        features[local] = point.feature;
+        let found = closest_on_facet();
+        measurements[local] = vec4<real>(found.point.weights, found.distance);
+        features[local] = found.point.feature;
         measured += 1u;
     }
     workgroupBarrier();
     var closest = best;
-    for (var k = first; k < count; k += 1u) {
+    for (var k = first; k < end; k += 1u) {
         let facet = pairs[k] / WORKGROUP;
         let found = measurements[k - first];
         if pairs[k] % WORKGROUP == local && is_closer(found.w, facet, closest) {
@@ -100,6 +104,38 @@ fn measure(first: u32, count: u32, best: Closest, local: u32) -> Closest {
     }
     points[local].w = closest.distance;
     closest_so_far[local] = closest.facet;
+    workgroupBarrier();
+    return closest;
+}
+
+// Measures those of the waiting pairs that flat triangles leave; none waits afterwards. Returns the closest facet to this
+// invocation's point, which was `best`.
+fn measure_waiting(best: Closest, local: u32) -> Closest {
+    make_ready(local);
+    workgroupBarrier();
+    let count = atomicLoad(&waiting);
+    workgroupBarrier();
+    if local == 0u {
+        atomicStore(&waiting, 0u);
+    }
+    for (var first = 0u; first < count; first += WORKGROUP) {
+        let pair = pairs[min(first + local, count - 1u)];
+        workgroupBarrier();
+        if first + local < count && may_be_closest(pair) {
+            pairs[atomicAdd(&waiting, 1u)] = pair;
+        }
+    }
+    workgroupBarrier();
+    let left = atomicLoad(&waiting);
+    workgroupBarrier();
+    if local == 0u {
+        atomicStore(&waiting, 0u);
+    }
+    passes += count / WORKGROUP + 2u + (left + WORKGROUP - 1u) / WORKGROUP * (1u + WORKGROUP + PASSES_TO_MEASURE);
+    var closest = best;
+    for (var first = 0u; first < left; first += WORKGROUP) {
+        closest = measure(first, min(first + WORKGROUP, left), closest, local);
+    }
     return closest;
 }
 
@@ -124,55 +160,47 @@ fn take_point(x: vec3<real>, within: real, local: u32) {
 // measured first. No facet has left its place at rest by more than `moved`. For all invocations together.
 fn closest_facet(moved: real, likely: u32, local: u32) -> Closest {
     if likely != ABSENT {
+        need(likely);
         pairs[atomicAdd(&waiting, 1u)] = likely * WORKGROUP + local;
     }
     let clusters = select(max(parameters.leaves / CLUSTER, 1u), 0u, atomicLoad(&with_point) == 0u);
     let leaves = min(parameters.leaves, CLUSTER);
     var best = none_within(points[local].w);
-    // Pairs are measured once there are so many: those with likely facets at once.
-    var enough = 1u;
     // Cluster, and first leaf of it, that come next; a run of WORKGROUP clusters is looked at together.
     var cluster = 0u;
     var leaf = 0u;
     loop {
-        workgroupBarrier();
-        let count = atomicLoad(&waiting);
-        workgroupBarrier();
-        if count >= enough {
-            let first = max(count, WORKGROUP) - WORKGROUP;
-            best = measure(first, count, best, local);
-            passes += 1u + WORKGROUP + PASSES_TO_MEASURE;
-            if local == 0u {
-                atomicStore(&waiting, first);
-            }
-            continue;
-        }
+        best = measure_waiting(best, local);
         if cluster >= clusters {
             break;
         }
-        if leaf == 0u && cluster % WORKGROUP == 0u {
-            let own = cluster + local;
-            near[local] = 0u;
-            if own < clusters {
-                near[local] = points_near(surface[clusters + own], atomicLoad(&with_point), moved);
+        // Until the spheres of all clusters were looked at, or more pairs might outgrow their room.
+        while cluster < clusters && atomicLoad(&waiting) <= PAIRS - WORKGROUP * WORKGROUP {
+            workgroupBarrier();
+            if leaf == 0u && cluster % WORKGROUP == 0u {
+                let own = cluster + local;
+                near[local] = 0u;
+                if own < clusters {
+                    near[local] = points_near(surface[clusters + own], atomicLoad(&with_point), moved);
+                }
+                workgroupBarrier();
+                passes += WORKGROUP;
+            }
+            let mask = near[cluster % WORKGROUP];
+            passes += 2u + 2u * countOneBits(mask);
+            if mask != 0u && leaf + local < leaves {
+                add_pairs(cluster * leaves + leaf + local, mask, moved);
+            }
+            leaf += WORKGROUP;
+            if mask == 0u || leaf >= leaves {
+                leaf = 0u;
+                cluster += 1u;
+                while cluster % WORKGROUP != 0u && near[cluster % WORKGROUP] == 0u {
+                    cluster += 1u;
+                }
             }
             workgroupBarrier();
-            passes += WORKGROUP;
         }
-        passes += 1u + 2u * WORKGROUP;
-        let mask = near[cluster % WORKGROUP];
-        if mask != 0u && leaf + local < leaves {
-            add_pairs(cluster * leaves + leaf + local, mask, moved);
-        }
-        leaf += WORKGROUP;
-        if mask == 0u || leaf >= leaves {
-            leaf = 0u;
-            cluster += 1u;
-            while cluster % WORKGROUP != 0u && near[cluster % WORKGROUP] == 0u {
-                cluster += 1u;
-            }
-        }
-        enough = select(WORKGROUP, 1u, cluster >= clusters);
     }
     formed = ABSENT;
     return best;

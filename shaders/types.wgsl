@@ -12,6 +12,7 @@ struct Parameters {
     triangles: u32,
     // Leaves of the tree of bounding spheres.
     leaves: u32,
-    // Gaps in f32 are known to this [m].
+    // Gaps in f32 are known to this, if they are no greater than known_to [m].
     gap_band: f32,
+    known_to: f32,
 }

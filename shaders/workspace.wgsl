@@ -1,16 +1,17 @@
-// The workspace of a configuration. The stage declares `words` and `reals` of all of them, and the `list` of
-// configurations in contact. Reals are stored four by four, so that a vector, with which four begin, is read at once.
+// The workspace of a configuration. The stage declares `words` and `reals` of all of them. Reals are stored four by four, so that a vector, with which four begin, is read at once.
 
 var<private> words_base: u32;
 var<private> reals_base: u32;
+var<private> place_taken: u32;
 // Number of the configuration in the section.
 var<private> member: u32;
 
-// Takes up the workspace of the configuration in `place` of the list of those in contact.
+// Takes up the workspace in `place`.
 fn take_place(place: u32) {
     words_base = 2u * parameters.room + 1u + place * parameters.words;
     reals_base = place * parameters.reals;
-    member = list[1u + place];
+    place_taken = place;
+    member = words[words_base + MEMBER];
 }
 
 // Takes up unfinished configuration `index`; false where there is none.
@@ -43,6 +44,10 @@ fn set_scalar(at: u32, value: real) {
 // Four that follow each other from a multiple of four on.
 fn four_at(at: u32) -> vec4<real> {
     return reals[(reals_base + at) / 4u];
+}
+
+fn set_four(at: u32, value: vec4<real>) {
+    reals[(reals_base + at) / 4u] = value;
 }
 
 fn vector_at(at: u32) -> vec3<real> {

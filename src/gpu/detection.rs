@@ -109,7 +109,7 @@ impl Detection {
         let lanes = ("WORKGROUP", f64::from(context.adapter().lanes()));
         Ok(Self {
             kinematics: kernel(precision.of(&shaders::KINEMATICS), WORKGROUP, &[])?,
-            distances: BoundKernel::new(context, (&shaders::DETECTION, WORKGROUP), &[], &flat)?,
+            distances: BoundKernel::new(context, (&shaders::DETECTION, 1), &[], &flat)?,
             smallest: kernel(precision.of(&shaders::GAP), 1, &[lanes, smooth])?,
             compaction: kernel(precision.of(&shaders::COMPACTION), WORKGROUP, &[])?,
             parameters: *parameters,
@@ -162,7 +162,7 @@ impl Detection {
         buffers.list.clear(&mut encoder, list_bytes);
         let dispatches = [
             self.kinematics.dispatch(nodes, motion_bytes + arm_bytes + position_bytes + placed_bytes),
-            self.distances.dispatch(nodes, 2 * position_bytes + flat_bytes),
+            self.distances.dispatch(count, 2 * position_bytes + flat_bytes),
             // Placed nodes are read where they matter.
             self.smallest.dispatch(count, position_bytes + placed_bytes + surface_bytes + gap_bytes),
             self.compaction.dispatch(1, gap_bytes + list_bytes),

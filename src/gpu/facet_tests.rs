@@ -54,7 +54,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     form(id.x, question(16u * id.x));
-    let closest = closest_on_facet();
+    let closest = closest_on_facet().point;
     let at = 14u * id.x;
     answer(at, closest.weights);
     answers[at + 3u] = real(closest.feature);

@@ -16,6 +16,7 @@ pub struct Parameters {
     pub triangles: u32,
     pub leaves: u32,
     pub gap_band: f32,
+    pub known_to: f32,
 }
 
 /// `SearchParameters` of `shaders/search_types.wgsl` in f64 (uniform).
@@ -24,13 +25,13 @@ pub struct Parameters {
 #[expect(missing_docs, reason = "documented where the shader reads them")]
 pub struct SearchParameters {
     pub configurations: u32,
+    pub first: u32,
     pub joints: u32,
     pub proxy_nodes: u32,
     pub surface_nodes: u32,
     pub triangles: u32,
     pub leaves: u32,
     pub covered: u32,
-    pub groups: u32,
     pub contacts: u32,
     pub support: u32,
     pub carriers: u32,
@@ -38,16 +39,15 @@ pub struct SearchParameters {
     pub reals: u32,
     pub words: u32,
     pub room: u32,
-    pub with_tangent: u32,
     pub at_net: u32,
     pub at_masks: u32,
-    pub at_spheres: u32,
     pub at_order: u32,
     pub at_carriers: u32,
     pub at_shapes: u32,
     pub at_covered: u32,
     pub at_links: u32,
     pub gap_band: f64,
+    pub known_to: f64,
     pub first_kc: f64,
     pub kc: f64,
     pub tolerance: f64,
@@ -115,16 +115,17 @@ mod tests {
     #[test]
     fn every_shared_struct_is_laid_out_as_in_wgsl() {
         let expected = [
-            layout!(Parameters: configurations, joints, proxy_nodes, surface_nodes, triangles, leaves, gap_band),
+            layout!(Parameters: configurations, joints, proxy_nodes, surface_nodes, triangles, leaves, gap_band,
+                known_to),
             layout!(FrameParameters: nodes, period, odd, groups),
         ];
         compare(&expected, &reflect(Precision::Single));
         compare(&expected[..1], &reflect(Precision::Double));
         let (name, mut members, size) = layout!(
-            SearchParameters: configurations, joints, proxy_nodes, surface_nodes, triangles, leaves,
-            covered, groups, contacts, support, carriers, max_iterations, reals, words, room, with_tangent,
-            at_net, at_masks, at_spheres, at_order, at_carriers, at_shapes, at_covered, at_links,
-            gap_band, first_kc, kc, tolerance, mobility, bulge_mobility, bulge, least_scale, least_distance,
+            SearchParameters: configurations, first, joints, proxy_nodes, surface_nodes, triangles, leaves,
+            covered, contacts, support, carriers, max_iterations, reals, words, room,
+            at_net, at_masks, at_order, at_carriers, at_shapes, at_covered, at_links,
+            gap_band, known_to, first_kc, kc, tolerance, mobility, bulge_mobility, bulge, least_scale, least_distance,
             softest
         );
         compare(&[(name, members.clone(), size)], &reflect(Precision::Double));

@@ -84,8 +84,9 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     net[0] = question(6u * id.x);
     net[10] = question(6u * id.x + 1u);
     net[14] = question(6u * id.x + 2u);
-    let closest = closest_on_facet();
-    write_row(0u, 0u, 0u, vec3<real>(0.0), 0u, closest, normal_of(jet_at(closest.weights)));
+    let closest = closest_on_facet().point;
+    let jet = jet_at(closest.weights);
+    write_row(0u, 0u, 0u, 0u, closest, jet, normal_of(jet));
     let at = at_numbers(0u, 0u);
     let weights = at + NODE_WEIGHTS;
     let carriers = parameters.carriers;
@@ -148,7 +149,7 @@ fn ask(precision: Precision, questions: &[Question]) -> Vec<Answer> {
         least_distance: 1e-9,
         ..Zeroable::zeroed()
     };
-    (parameters.words, parameters.reals) = (words(&parameters), reals(&parameters, false));
+    (parameters.words, parameters.reals) = (words(&parameters), reals(&parameters));
     let numbers: Vec<f64> =
         questions.iter().flat_map(|q| [q.corners, q.moves].concat()).flat_map(|v| v.to_array()).collect();
     let of = |what, numbers: &[f64]| StorageBuffer::from_slice(&context, what, &precision.encode(numbers)).unwrap();

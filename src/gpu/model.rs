@@ -27,6 +27,10 @@ const GPU_GAP_BAND_PER_JOINT: f64 = 4e-7;
 /// far away) are rounded to f32 by 6e-8 each.
 const GPU_BOUND_SLACK: f64 = 1e-6;
 
+/// Gaps at rest up to which they are all known, relative to the object's extent [1]: what comes into contact as the
+/// surface moves was hardly farther. Where it was the closest facet takes longer to find, no more.
+const KNOWN_PER_EXTENT: f64 = 0.25;
+
 /// Greatest contact stiffness of the energy form in f32, in units of the stiffness of the object's softest node [1]: a
 /// depth is known to about 1e-6 of the object's displacement, a force to this many times that. What is stiffer is
 /// stiffened from there in f64, where nothing moves by more than a thousandth of its displacement.
@@ -88,6 +92,7 @@ impl DeviceModel {
                 triangles: object.triangles.len() as u32,
                 leaves: order.len() as u32,
                 gap_band: (gap_band as f32).next_up(),
+                known_to: (KNOWN_PER_EXTENT * extent) as f32,
             },
             chain: numbers("chain", &joints_and_nodes(model))?,
             rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, extent))?,

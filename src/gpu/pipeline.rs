@@ -16,8 +16,10 @@ use std::sync::Arc;
 /// Bounds on what a device is given.
 #[derive(Clone, Copy, Debug)]
 pub struct BatchCapacity {
-    /// Most configurations placed, tested for contact and solved at a time.
+    /// Most configurations placed and tested for contact at a time.
     pub chunk: usize,
+    /// Most of them in contact that are solved at a time.
+    pub searches: usize,
     /// Most proxy nodes in contact in one configuration, at most 64; more are solved on the CPU.
     pub contacts: usize,
     /// Whether f64 is used where the device has it.
@@ -29,7 +31,7 @@ pub struct BatchCapacity {
 impl Default for BatchCapacity {
     /// Enough to keep a large GPU busy while the host turns to what it has found.
     fn default() -> Self {
-        Self { chunk: 1 << 16, contacts: CONTACTS, double: true, in_flight: 3 }
+        Self { chunk: 1 << 16, searches: 1 << 16, contacts: CONTACTS, double: true, in_flight: 2 }
     }
 }
 
@@ -41,7 +43,7 @@ const SOFTWARE_BUDGET: u64 = 16 << 20;
 
 /// The same for the workspaces of the search: some thousand configurations on a GPU, which fill it, and on one that has
 /// the host's memory.
-const HARDWARE_WORKSPACES: u64 = 2 << 30;
+const HARDWARE_WORKSPACES: u64 = 4 << 30;
 const INTEGRATED_WORKSPACES: u64 = 256 << 20;
 const SOFTWARE_WORKSPACES: u64 = 64 << 20;
 
@@ -58,21 +60,21 @@ impl BatchCapacity {
         Self { chunk: self.chunk.clamp(1, fit(placed)), contacts, ..self }
     }
 
-    /// Cut to what workspaces of so many bytes may take in all.
-    fn for_workspaces(self, context: &Context, bytes: usize) -> Self {
+    /// Cut to what workspaces may take in all, whose parts take so many bytes each and have a binding of their own.
+    fn for_workspaces(self, context: &Context, parts: [u64; 3]) -> Self {
         let budget = match context.adapter() {
             adapter if !adapter.hardware => SOFTWARE_WORKSPACES,
             adapter if adapter.is_integrated() => INTEGRATED_WORKSPACES,
             _ => HARDWARE_WORKSPACES,
         };
-        let budget = budget.min(context.binding_limit()) as usize;
-        let chunk = budget.checked_div(bytes).map_or(self.chunk, |most| self.chunk.min(most).max(1));
-        Self { chunk, ..self }
+        let most = parts.map(|bytes| context.binding_limit() / bytes.max(1)).into_iter().min().unwrap_or(0);
+        let most = most.min(budget / parts.iter().sum::<u64>().max(1)) as usize;
+        Self { searches: self.searches.min(self.chunk).min(most).max(1), ..self }
     }
 
     /// Half of each, contacts aside.
     fn half(self) -> Self {
-        Self { chunk: (self.chunk / 2).max(1), ..self }
+        Self { chunk: (self.chunk / 2).max(1), searches: (self.searches / 2).max(1), ..self }
     }
 }
 
@@ -111,7 +113,7 @@ impl<'a> Pipeline<'a> {
         let room = room.for_workspaces(&context, search.model.workspace());
         let lane = |_| {
             let detection = Detection::new(&context, model, &device, room.chunk)?;
-            let lane = SearchLane::new(&context, &search, &device, &detection, room.chunk)?;
+            let lane = SearchLane::new(&context, &search, &device, &detection, room.searches)?;
             Ok((detection, lane))
         };
         let lanes = (0..room.in_flight.max(1)).map(lane).collect::<Result<_, GpuError>>()?;

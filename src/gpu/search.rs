@@ -26,9 +26,9 @@ const PER_CONFIGURATION: u32 = 64;
 const HARDWARE_LOOP_BUDGET: u32 = 1 << 20;
 const SOFTWARE_LOOP_BUDGET: u32 = 30_000;
 
-/// Rounds of the first submission: the sphere scene takes three steps and the trial at rest. Each submission that
-/// follows makes half as many as have been made.
-const FIRST_ROUNDS: usize = 4;
+/// Rounds of the first submission: the sphere scene takes the trial at rest and four steps at most, and a round of a
+/// search that is done costs next to nothing. Each submission that follows makes half as many as have been made.
+const FIRST_ROUNDS: usize = 6;
 
 /// Words at the beginning of the staging buffer: configurations that are unfinished, and touches.
 const HEAD_BYTES: u64 = 16;
@@ -88,11 +88,13 @@ impl Search {
             flag("ISOTROPIC", model.is_isotropic),
             flag("FROZEN", model.algorithm == Algorithm::Linearised),
             flag("PAPER", model.algorithm == Algorithm::Paper),
+            flag("WITH_TANGENT", model.with_tangent),
         ];
         let kernel = |shaders: &[Shader; 2], overrides: &[(&str, f64)]| {
             Kernel::new(context, model.precision.of(shaders), &[&law, overrides].concat())
         };
-        let detect = kernel(&shaders::SEARCH_DETECT, &[smooth, lanes, budget])?;
+        let nodes = ("NODE_WORDS", f64::from(model.parameters.covered.div_ceil(u32::BITS)));
+        let detect = kernel(&shaders::SEARCH_DETECT, &[smooth, lanes, budget, nodes])?;
         let unfinished = kernel(&shaders::SEARCH_UNFINISHED, &[])?;
         let round = match model.algorithm {
             // Ties are found among all nodes: more invocations share these.
@@ -119,8 +121,8 @@ impl Search {
 
     /// Amounts of one record: residual, energy, torque and, where it is wanted, the tangent.
     fn amounts_each(&self) -> usize {
-        let SearchParameters { joints, with_tangent, .. } = self.model.parameters;
-        (2 + joints + with_tangent * joints * joints) as usize
+        let joints = self.model.parameters.joints as usize;
+        2 + joints + if self.model.with_tangent { joints * joints } else { 0 }
     }
 
     /// Numbers of a touch: see `shaders/search_results.wgsl`.
@@ -139,7 +141,7 @@ impl Search {
 }
 
 impl SearchLane {
-    /// Room for the configurations in contact of what `detection` places, `room` of them.
+    /// For the configurations in contact of what `detection` places, with room for that many at a time.
     pub fn new(
         context: &Context,
         search: &Search,
@@ -151,8 +153,10 @@ impl SearchLane {
         let parameters = SearchParameters { room: room as u32, ..search.model.parameters };
         let buffer = |what, bytes: u64| StorageBuffer::new(context, what, bytes);
         let uniform = StorageBuffer::uniform(context, "parameters of the search", &parameters.encode(*precision))?;
-        let words = buffer("words of the search", 4 * (2 * room + 1 + room * parameters.words as usize) as u64)?;
-        let reals = buffer("reals of the search", (room * search.model.workspace()) as u64)?;
+        let [word_bytes, real_bytes, vector_bytes] = search.model.workspace().map(|bytes| room as u64 * bytes);
+        let words = buffer("words of the search", 4 * (2 * room as u64 + 1) + word_bytes)?;
+        let reals = buffer("reals of the search", real_bytes)?;
+        let vectors = buffer("vectors of the search", vector_bytes)?;
         let starts = buffer("starts of touches", 4 * (room as u64 + 1))?;
         let [record_bytes, amount_bytes, touch_bytes, press_bytes] =
             search.result_bytes(room, parameters.contacts as usize * room);
@@ -174,6 +178,7 @@ impl SearchLane {
             ("list", detection.list()),
             ("words", &words),
             ("reals", &reals),
+            ("vectors", &vectors),
             ("starts", &starts),
             ("records", &records),
             ("amounts", &amounts),
@@ -200,21 +205,42 @@ impl SearchLane {
         })
     }
 
-    /// Submits the search for the first `count` configurations in contact of what was detected.
+    /// Submits the search for the first `count` configurations in contact of what was detected, or for as many of them
+    /// as there is room for.
     pub fn solve(&mut self, context: &Context, search: &Search, count: usize) -> wgpu::SubmissionIndex {
-        let configurations = count as u32;
-        let parameters = SearchParameters { configurations, room: self.room as u32, ..search.model.parameters };
+        self.solve_from(context, search, 0, count)
+    }
+
+    /// The same without the `first` of them, which are solved.
+    fn solve_from(
+        &mut self,
+        context: &Context,
+        search: &Search,
+        first: usize,
+        count: usize,
+    ) -> wgpu::SubmissionIndex {
+        let batch = self.batch(first, count);
+        let configurations = batch as u32;
+        let (room, first) = (self.room as u32, first as u32);
+        let parameters = SearchParameters { configurations, first, room, ..search.model.parameters };
         self.parameters.write(context, &parameters.encode(search.model.precision));
-        self.staged = (self.touches_each * TOUCHES_MARGIN * count as f64).ceil() as usize;
-        self.staged = self.staged.min(count * STAGED_TOUCHES.min(parameters.contacts as usize));
+        self.staged = (self.touches_each * TOUCHES_MARGIN * batch as f64).ceil() as usize;
+        self.staged = self.staged.min(batch * STAGED_TOUCHES.min(parameters.contacts as usize));
         let mut encoder = context.device.create_command_encoder(&Default::default());
-        self.words.clear(&mut encoder, 4 * (2 * self.room as u64 + 1 + count as u64 * u64::from(parameters.words)));
+        self.words.clear(&mut encoder, 4 * (2 * self.room as u64 + 1 + batch as u64 * u64::from(parameters.words)));
         let bytes = 64 * u64::from(configurations * parameters.joints);
         let arm = search.arm.dispatch(&self.arm, configurations.div_ceil(PER_CONFIGURATION), bytes);
         context.record(&mut encoder, [arm]);
-        self.record_rounds(context, search, &mut encoder, count, FIRST_ROUNDS);
-        self.record_results(context, search, &mut encoder, count);
+        self.record_rounds(context, search, &mut encoder, batch, FIRST_ROUNDS);
+        self.record_results(context, search, &mut encoder, batch);
         context.queue.submit([encoder.finish()])
+    }
+
+    /// How many of `count` configurations are solved together behind the `first` ones: those that are left are divided
+    /// evenly.
+    fn batch(&self, first: usize, count: usize) -> usize {
+        let left = count - first;
+        left.div_ceil(left.div_ceil(self.room).max(1))
     }
 
     /// Records rounds of at most `count` unfinished configurations.
@@ -253,8 +279,29 @@ impl SearchLane {
         }
     }
 
-    /// Waits for a submission of [`SearchLane::solve`], and makes more rounds until all `count` are done.
+    /// Waits for a submission of [`SearchLane::solve`], and solves what there was no room for, until all `count` are
+    /// done.
     pub fn found(
+        &mut self,
+        context: &Context,
+        search: &Search,
+        count: usize,
+        ticket: &wgpu::SubmissionIndex,
+    ) -> Result<Found, GpuError> {
+        let mut batch = self.batch(0, count);
+        let mut found = self.finished(context, search, batch, ticket)?;
+        let mut first = batch;
+        while first < count {
+            let ticket = self.solve_from(context, search, first, count);
+            batch = self.batch(first, count);
+            found.extend(self.finished(context, search, batch, &ticket)?);
+            first += batch;
+        }
+        Ok(found)
+    }
+
+    /// Waits for one batch, and makes more rounds until all `count` of it are done.
+    fn finished(
         &mut self,
         context: &Context,
         search: &Search,

@@ -7,10 +7,9 @@ use super::{
     error::GpuError,
     layout::SearchParameters,
     model::{
-        DeviceModel, bounding_spheres, controls, culling_slack, extent, four, leaves, mesh, sphere_around, stiffness,
+        DeviceModel, bounding_spheres, extent, four, leaves, mesh, stiffness,
     },
     precision::Precision,
-    shaders::NODES_TOGETHER,
 };
 use crate::{
     contact::{self, law::depth::MINIMUM_CURVATURE_RADIUS},
@@ -57,9 +56,11 @@ pub(super) struct SearchModel {
     pub surface: StorageBuffer,
     pub mesh: StorageBuffer,
     pub compliance: StorageBuffer,
-    /// Whether the compliance has one number for a pair of nodes, and whether facets are bent.
+    /// Whether the compliance has one number for a pair of nodes, whether facets are bent, and whether the tangent is
+    /// wanted.
     pub is_isotropic: bool,
     pub is_smooth: bool,
+    pub with_tangent: bool,
 }
 
 impl SearchModel {
@@ -84,8 +85,8 @@ impl SearchModel {
             contacts: contacts as u32,
             support: support as u32,
             max_iterations: limits.iterations,
-            with_tangent: u32::from(limits.with_tangent),
             gap_band: device.gap_band,
+            known_to: f64::from(device.parameters.known_to),
             first_kc: limits.first_kc,
             kc: limits.kc,
             tolerance: limits.tolerance,
@@ -98,7 +99,7 @@ impl SearchModel {
             ..parts.parameters
         };
         parameters.words = words(&parameters);
-        parameters.reals = reals(&parameters, is_isotropic);
+        parameters.reals = reals(&parameters);
         let numbers = |what, numbers: &[f64]| StorageBuffer::from_slice(context, what, &precision.encode(numbers));
         Ok(Self {
             precision,
@@ -110,12 +111,15 @@ impl SearchModel {
             compliance: numbers("compliance", &parts.numbering.compliance(model))?,
             is_isotropic,
             is_smooth: device.is_smooth,
+            with_tangent: limits.with_tangent,
         })
     }
 
-    /// Bytes of the reals of one workspace, which are most of it [B].
-    pub fn workspace(&self) -> usize {
-        self.precision.size() * self.parameters.reals as usize
+    /// Bytes of one workspace: of its words, its reals, and the vectors on its support [B].
+    pub fn workspace(&self) -> [u64; 3] {
+        let SearchParameters { words, reals, .. } = self.parameters;
+        let size = self.precision.size() as u64;
+        [4 * u64::from(words), size * u64::from(reals), size * u64::from(vectors(&self.parameters, self.is_isotropic))]
     }
 }
 
@@ -177,21 +181,20 @@ pub(super) fn words(p: &SearchParameters) -> u32 {
     const ROW_WORDS: u32 = 4;
     HEADER
         + 3 * p.proxy_nodes
-        + p.groups
         + 2 * p.covered
         + p.support
         + 2 * p.contacts * (ROW_WORDS + 3 * p.carriers)
         + 2 * p.contacts
         + p.support
+        + 1
 }
 
-/// Reals of a workspace: see there.
-pub(super) fn reals(p: &SearchParameters, is_isotropic: bool) -> u32 {
+/// Reals of a workspace, without the vectors on its support: see there.
+pub(super) fn reals(p: &SearchParameters) -> u32 {
     const SCALARS: u32 = 20;
     const ROW_REALS: u32 = 32;
-    const VECTORS: u32 = 16;
     let to_four = |count: u32| count.next_multiple_of(4);
-    let before_columns = SCALARS
+    let before_parts = SCALARS
         + 8 * p.joints
         + to_four(p.proxy_nodes)
         + 4 * p.covered
@@ -199,9 +202,14 @@ pub(super) fn reals(p: &SearchParameters, is_isotropic: bool) -> u32 {
         + to_four(p.contacts)
         + (12 + 1 + 1) * p.contacts
         + p.contacts * p.contacts;
-    let columns = if is_isotropic { 1 } else { 4 } * p.contacts * p.support;
-    let vectors = 4 * (VECTORS + 2 * p.joints) * p.support;
-    to_four(to_four(to_four(before_columns) + columns) + vectors + p.joints * p.joints + p.joints)
+    to_four(to_four(before_parts) + 4 * p.contacts * p.carriers + p.joints * p.joints + p.joints)
+}
+
+/// Reals of the vectors on the support of a workspace, and of its columns: see `shaders/search_state.wgsl`.
+pub(super) fn vectors(p: &SearchParameters, is_isotropic: bool) -> u32 {
+    const VECTORS: u32 = 16;
+    let column = if is_isotropic { p.support.div_ceil(4) } else { p.support };
+    4 * (p.contacts * column + (VECTORS + 2 * p.joints) * p.support)
 }
 
 /// The contents of the buffers, and where their parts begin.
@@ -226,7 +234,6 @@ impl Parts {
             triangles,
             leaves: leaves(model).len() as u32,
             covered: model.compliance.nodes.len() as u32,
-            groups: model.compliance.nodes.len().div_ceil(NODES_TOGETHER) as u32,
             carriers: carriers as u32,
             ..bytemuck::Zeroable::zeroed()
         };
@@ -234,8 +241,7 @@ impl Parts {
         let mut numbers = bounding_spheres(model, precision);
         numbers
             .extend(model.chain.nodes.iter().zip(&model.shares).map(|(node, share)| [node.radius, *share, 0.0, 0.0]));
-        let spheres = numbering.spheres(model, culling_slack(model, precision));
-        numbers.extend(&spheres);
+        numbers.extend(numbering.nodes.iter().map(|&node| four(at(node), 0.0)));
         parameters.at_net = numbers.len() as u32;
         if let Some(smooth) = &surface.smooth {
             numbers.extend(numbering.nodes.iter().map(|&node| four(at(node) + smooth.offset(node), 0.0)));
@@ -248,8 +254,6 @@ impl Parts {
                 }
             }
         }
-        parameters.at_spheres = numbers.len() as u32;
-        numbers.extend(spheres[..parameters.covered as usize].chunks(NODES_TOGETHER).map(enclosing_sphere));
         let mut mesh = mesh(model);
         parameters.at_order = mesh.len() as u32;
         mesh.extend(leaves(model));
@@ -308,28 +312,6 @@ impl Numbering {
             |&place: &usize| compliance.rows(place).chunks(compliance.order()).flat_map(row).collect::<Vec<f64>>();
         from.par_iter().flat_map_iter(rows).collect()
     }
-
-    /// A sphere around each node, widened by `slack` [m]: no facet that hangs on the node has a sphere that is nearer
-    /// to a point than this one is. Centre and radius, in order of place.
-    fn spheres(&self, model: &contact::Model<'_>, slack: f64) -> Vec<[f64; 4]> {
-        let at = |place: usize| model.surface.positions[self.nodes[place] as usize];
-        let mut radii = vec![0.0_f64; self.nodes.len()];
-        for t in 0..model.object.triangles.len() as u32 {
-            let [x, y, z, radius] = sphere_around(&controls(model, t), slack);
-            for &node in model.surface.carriers(t).0 {
-                let place = self.places[node as usize] as usize;
-                radii[place] = radii[place].max(at(place).distance(DVec3::new(x, y, z)) + radius + slack);
-            }
-        }
-        (0..).zip(radii).map(|(place, radius)| four(at(place), radius)).collect()
-    }
-}
-
-/// A sphere around spheres: centre and radius [m].
-fn enclosing_sphere(spheres: &[[f64; 4]]) -> [f64; 4] {
-    let at = |[x, y, z, _]: &[f64; 4]| DVec3::new(*x, *y, *z);
-    let centre = spheres.iter().map(at).sum::<DVec3>() / spheres.len() as f64;
-    four(centre, spheres.iter().map(|sphere| at(sphere).distance(centre) + sphere[3]).fold(0.0, f64::max))
 }
 
 #[cfg(test)]
@@ -339,7 +321,6 @@ mod tests {
         contact::Model,
         object::{Compliance, Object},
         proxy::Chain,
-        random::Random,
         scene::{ContactSpec, ContactSurface, Material, Scene, SpringKind, SpringSpec},
     };
 
@@ -378,38 +359,6 @@ mod tests {
         // The paper's iteration prefers nodes by their numbers.
         with_model(Algorithm::Paper, SpringKind::Axial, |model, numbering| {
             assert_eq!(numbering.compliance(model), model.compliance.entries);
-        });
-    }
-
-    #[test]
-    fn what_is_near_the_enclosing_sphere_a_facet_is_near_those_of_its_nodes_and_of_their_groups() {
-        with_model(Algorithm::Energy, SpringKind::Isotropic, |model, numbering| {
-            let (mut random, mut near, mut missed) = (Random::new(5), 0, 0);
-            let spheres = numbering.spheres(model, 0.0);
-            let groups: Vec<[f64; 4]> = spheres.chunks(NODES_TOGETHER).map(enclosing_sphere).collect();
-            // By how much a point is outside.
-            let beyond = |[x, y, z, radius]: [f64; 4], point: DVec3| point.distance(DVec3::new(x, y, z)) - radius;
-            for _ in 0..400 {
-                let (point, within) = (0.08 * random.vector(), random.between(0.0, 0.02));
-                for t in 0..model.object.triangles.len() as u32 {
-                    if beyond(sphere_around(&controls(model, t), 0.0), point) > within {
-                        continue;
-                    }
-                    near += 1;
-                    for &node in model.surface.carriers(t).0 {
-                        let place = numbering.places[node as usize] as usize;
-                        for sphere in [spheres[place], groups[place / NODES_TOGETHER]] {
-                            assert!(beyond(sphere, point) <= within + 1e-15, "{sphere:?}");
-                            let [x, y, z, radius] = sphere;
-                            missed += usize::from(beyond([x, y, z, 0.9 * radius], point) > within);
-                        }
-                    }
-                }
-            }
-            assert!(near > 1000 && missed > 0, "{near} were near, smaller spheres missed {missed}");
-            // And they leave something out.
-            let far = spheres.iter().filter(|sphere| beyond(**sphere, DVec3::new(0.0, 0.0, 0.05)) > 0.0).count();
-            assert!(far * 2 > spheres.len(), "{far} of {} are left out", spheres.len());
         });
     }
 }

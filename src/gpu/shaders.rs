@@ -74,6 +74,7 @@ pub(super) const TYPES: &str = include_str!("../../shaders/types.wgsl");
 pub(super) const CLOSEST_POINT: &str = include_str!("../../shaders/closest_point.wgsl");
 pub(super) const MESH: &str = include_str!("../../shaders/mesh.wgsl");
 pub(super) const FACET: &str = include_str!("../../shaders/facet.wgsl");
+const LEAST_OF: &str = include_str!("../../shaders/least_of.wgsl");
 const ROTATION: &str = include_str!("../../shaders/rotation.wgsl");
 const BOUNDING_SPHERES: &str = include_str!("../../shaders/bounding_spheres.wgsl");
 const CLOSEST_FACET: &str = include_str!("../../shaders/closest_facet.wgsl");
@@ -100,7 +101,16 @@ pub static KINEMATICS: [Shader; 2] =
 pub static DETECTION: Shader = stage(
     "detection",
     "main",
-    &[TYPES, CLOSEST_POINT, MESH, FACET, BOUNDING_SPHERES, CLOSEST_FACET, include_str!("../../shaders/detection.wgsl")],
+    &[
+        TYPES,
+        CLOSEST_POINT,
+        MESH,
+        FACET,
+        BOUNDING_SPHERES,
+        CLOSEST_FACET,
+        LEAST_OF,
+        include_str!("../../shaders/detection.wgsl"),
+    ],
     &[&[]],
 );
 
@@ -108,15 +118,12 @@ pub static DETECTION: Shader = stage(
 pub static GAP: [Shader; 2] = in_both(stage(
     "gap",
     "main",
-    &[TYPES, CLOSEST_POINT, MESH, FACET, CLOSEST_FACET, SHARED_SEARCH, include_str!("../../shaders/gap.wgsl")],
+    &[TYPES, CLOSEST_POINT, MESH, FACET, CLOSEST_FACET, SHARED_SEARCH, LEAST_OF, include_str!("../../shaders/gap.wgsl")],
     &[&[], SMOOTH],
 ));
 
 /// List of the configurations in contact.
 pub static COMPACTION: [Shader; 2] = in_both(stage("compaction", "main", &[TYPES, PREFIX_SUM, COMPACT], &[&[]]));
-
-/// Object nodes that the search displaces together.
-pub(super) const NODES_TOGETHER: usize = 32;
 
 /// Facets are of degree four.
 const SMOOTH: &[(&str, f64)] = &[("SMOOTH", 1.0)];
@@ -294,7 +301,6 @@ fn constants(precision: Precision) -> String {
         ("FACET_ITERATIONS", facet::FACET_ITERATIONS),
         ("DAMPING_ATTEMPTS", newton::DAMPING_ATTEMPTS as usize),
         ("NUDGE_HALVINGS", energy::NUDGE_HALVINGS as usize),
-        ("NODES_TOGETHER", NODES_TOGETHER),
     ] {
         text.push_str(&format!("const {name}: u32 = {count}u;\n"));
     }

@@ -46,7 +46,7 @@ impl Found {
     }
 
     /// Adds what was found of other configurations.
-    fn extend(&mut self, other: Self) {
+    pub(super) fn extend(&mut self, other: Self) {
         self.records.extend(other.records);
         self.amounts.extend(other.amounts);
         self.touches.extend(other.touches);
