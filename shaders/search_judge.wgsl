@@ -30,7 +30,7 @@ fn judge(local: u32) {
     }
     let sum = add_up(work, local);
     if local == 0u {
-        go_to(verdict(scalar(TRIAL_ELASTIC) + 0.5 * kc * sum.x, sum.y, kind), JUDGE);
+        go_to(verdict(scalar(TRIAL_ELASTIC) + 0.5 * kc * sum.x, sum.y, kind));
     }
 }
 
@@ -109,7 +109,7 @@ fn begin_stage(local: u32) {
         set_scalar(GROWTH, DAMPING_GROWTH);
         set_scalar(GREATEST, sqrt(2.0 * energy));
         set_scalar(LENGTH, sqrt(2.0 * energy));
-        go_to(BALANCE, STAGE);
+        go_to(BALANCE);
     }
 }
 
@@ -236,7 +236,7 @@ fn balance(local: u32) {
         set_scalar(IMBALANCE, root(sum.x) / scale);
         // Forces of depths that are known to less than the tolerance count as those of the least depth that is.
         set_scalar(RESIDUAL, root(sum.x) / max(scale, kc * parameters.least_scale));
-        go_to(DECIDE, BALANCE);
+        go_to(DECIDE);
     }
 }
 
@@ -291,7 +291,7 @@ fn probe(local: u32) {
     multiply(LEFT_OVER, LEFT_PRODUCT, local);
     if local == 0u {
         begin_solve(FOR_PROBE, real(1.0));
-        go_to(FACTORISE, PROBE);
+        go_to(FACTORISE);
     }
 }
 
@@ -337,7 +337,7 @@ fn load(local: u32) {
     if local == 0u {
         set_word(JOINT, 0u);
         begin_solve(FOR_TANGENT, real(1.0));
-        go_to(FACTORISE, TANGENT);
+        go_to(FACTORISE);
     }
 }
 
@@ -352,6 +352,9 @@ fn main(
     }
     if is_next(JUDGE) { judge(local); }
     loop {
+        // Another half may be the state's now.
+        sync();
+        look_up();
         if is_next(STAGE) { begin_stage(local); }
         if is_next(BALANCE) { balance(local); }
         if !is_next(DECIDE) {
@@ -359,7 +362,7 @@ fn main(
         }
         sync();
         if local == 0u {
-            go_to(decide(), DECIDE);
+            go_to(decide());
         }
     }
     if is_next(PROBE) { probe(local); }

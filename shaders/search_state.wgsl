@@ -65,8 +65,9 @@ fn at_rest(place: u32) -> vec3<real> {
 
 // Where column `entry`, and vector `vector`, of this workspace begin: there is room for as many columns as rows.
 fn column_base(entry: u32) -> u32 {
-    let columns = parameters.contacts * column_length();
-    return place_taken * (columns + (VECTORS + 2u * parameters.joints) * parameters.support) + entry * column_length();
+    let all = VECTORS + select(0u, 2u * parameters.joints, WITH_TANGENT);
+    let length = parameters.contacts * column_length() + all * parameters.support;
+    return place_taken * length + entry * column_length();
 }
 
 fn column_length() -> u32 {

@@ -18,7 +18,7 @@ fn begin_step(local: u32) {
     }
     if local == 0u {
         begin_solve(FOR_STEP, 1.0 + scalar(DAMPING));
-        go_to(FACTORISE, STEP);
+        go_to(FACTORISE);
     }
 }
 
@@ -83,7 +83,7 @@ fn precondition(local: u32) {
         }
         set_word(IS_FIRST, 0u);
         set_scalar(SQUARE, next);
-        go_to(after_iteration(), PRECONDITION);
+        go_to(after_iteration());
     }
 }
 
@@ -159,10 +159,10 @@ fn iterate(local: u32) {
         set_word(LEFT, word(LEFT) - 1u);
         tally(SOLVE_ITERATIONS, 1u);
         if is_convex {
-            go_to(PRODUCT, ITERATE);
+            go_to(PRODUCT);
         } else {
             set_scalar(DESCENT, root(sum.y));
-            go_to(after_negative_curvature(-sum.x / sum.y), ITERATE);
+            go_to(after_negative_curvature(-sum.x / sum.y));
         }
     }
 }
@@ -172,7 +172,7 @@ fn take_product(local: u32) {
     multiply(LEFT_OVER, LEFT_PRODUCT, local);
     sync();
     if local == 0u {
-        go_to(PRECONDITION, PRODUCT);
+        go_to(PRECONDITION);
     }
 }
 
@@ -212,7 +212,7 @@ fn model(local: u32) {
     }
     sum = add_up(sum, local);
     if local == 0u {
-        go_to(after_model(sum.x, sum.y > 0.0, sum.z), MODEL);
+        go_to(after_model(sum.x, sum.y > 0.0, sum.z));
     }
 }
 
@@ -243,7 +243,7 @@ fn restore(local: u32) {
         put(STEP_DISPLACEMENT, slot, vector_entry(PREVIOUS_DISPLACEMENT, slot));
     }
     if local == 0u {
-        go_to(MODEL, RESTORE);
+        go_to(MODEL);
     }
 }
 
@@ -264,7 +264,7 @@ fn go_on(local: u32) {
     multiply(LEFT_OVER, LEFT_PRODUCT, local);
     if local == 0u {
         set_word(PASS, word(PASS) + 1u);
-        go_to(FACTORISE, GO_ON);
+        go_to(FACTORISE);
     }
 }
 
@@ -282,7 +282,7 @@ fn try_step(local: u32) {
     }
     if local == 0u {
         set_word(TRIAL_KIND, STEPPED);
-        go_to(PLACE, TRY);
+        go_to(PLACE);
     }
 }
 
@@ -301,7 +301,7 @@ fn place(local: u32) {
         set_scalar(TRIAL_ELASTIC, elastic);
         set_scalar(MOVED, parameters.mobility * norm + bulging);
         set_scalar(BULGE, parameters.bulge + bulging);
-        go_to(select(PLACED, JUDGE, FROZEN), PLACE);
+        go_to(select(PLACED, JUDGE, FROZEN));
     }
     if FROZEN {
         sync();
@@ -344,7 +344,7 @@ fn nudge(local: u32) {
     }
     if local == 0u {
         set_word(TRIAL_KIND, NUDGED);
-        go_to(PLACE, NUDGE);
+        go_to(PLACE);
     }
 }
 
@@ -358,7 +358,7 @@ fn respond(local: u32) {
     sync();
     if local == 0u {
         begin_solve(FOR_TANGENT, real(1.0));
-        go_to(PRODUCT, RESPOND);
+        go_to(PRODUCT);
     }
 }
 
@@ -385,7 +385,7 @@ fn take_response(local: u32) {
         set_word(JOINT, joint + 1u);
         let is_last = joint + 1u == parameters.joints;
         set_word(HAS_TANGENT, select(0u, 1u, is_last));
-        go_to(select(RESPOND, ACCOUNT, is_last), RESPONDED);
+        go_to(select(RESPOND, ACCOUNT, is_last));
     }
 }
 
@@ -420,7 +420,7 @@ fn account(local: u32) {
     if local == 0u {
         set_word(TOUCHES, u32(sum.x));
         set_word(IS_DOUBTFUL, select(0u, 1u, sum.y > 0.0));
-        go_to(DONE, ACCOUNT);
+        advance(DONE, (row_count / WORKGROUP + 1u) * (parameters.triangles / 4u + 8u * parameters.joints));
     }
 }
 

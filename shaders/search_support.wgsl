@@ -19,6 +19,8 @@ var<private> numbers_base: u32;
 var<private> row_words_base: u32;
 var<private> row_count: u32;
 var<private> slots: u32;
+// Passes through loops that an invocation makes in most phases, at most.
+var<private> usual_passes: u32;
 
 // Looks up what the phases of a state have in common.
 fn look_up() {
@@ -27,6 +29,10 @@ fn look_up() {
     row_words_base = at_row(own, 0u);
     row_count = word(ROWS + own);
     slots = word(SLOTS);
+    let rows = row_count / WORKGROUP + 1u;
+    usual_passes = (slots / WORKGROUP + 1u) * (slots / 2u + row_count + 32u)
+        + (rows + WORKGROUP) * (4u * parameters.carriers + row_count)
+        + parameters.proxy_nodes / WORKGROUP + parameters.support / WORKGROUP;
 }
 
 // Sum of `value` over all invocations, in every one.
@@ -236,24 +242,9 @@ fn converged() -> u32 {
     return select(ACCOUNT, TANGENT, WITH_TANGENT);
 }
 
-// Passes through loops that an invocation makes in a phase, about.
-fn passes_of(now: u32) -> u32 {
-    let runs = slots / WORKGROUP + 1u;
-    let rows = row_count / WORKGROUP + 1u;
-    if now == FACTORISE {
-        let pairs = (row_count * (row_count + slots) / WORKGROUP + 2u) * parameters.carriers;
-        return runs + pairs + row_count * (row_count * (row_count / 4u + 1u) / WORKGROUP + rows + 1u);
-    }
-    if now == ACCOUNT {
-        return rows * (parameters.triangles / 4u + 8u * parameters.joints);
-    }
-    return runs * (slots / 2u + row_count + 32u) + (rows + WORKGROUP) * (4u * parameters.carriers + row_count)
-        + parameters.proxy_nodes / WORKGROUP + parameters.support / WORKGROUP;
-}
-
-// Sets what the search has to do after phase `now`; for one invocation.
-fn go_to(next: u32, now: u32) {
-    advance(next, passes_of(now));
+// Sets what the search has to do next; for one invocation.
+fn go_to(next: u32) {
+    advance(next, usual_passes);
 }
 
 // Sets it, after so many passes through loops; for one invocation.
@@ -267,11 +258,7 @@ fn advance(next: u32, passes: u32) {
 fn is_next(now: u32) -> bool {
     sync();
     workgroupBarrier();
-    let is_now = phase == now && spent < LOOP_BUDGET;
-    if is_now {
-        look_up();
-    }
-    return is_now;
+    return phase == now && spent < LOOP_BUDGET;
 }
 
 // Takes up a search in the phase in which it was left, or in `first` where another stage has placed its trial; for all
@@ -280,6 +267,7 @@ fn resume(index: u32, first: u32, local: u32) -> bool {
     if !take_up(index) {
         return false;
     }
+    look_up();
     if local == 0u {
         spent = 0u;
         phase = word(PHASE);

@@ -43,7 +43,9 @@ fn factorise(local: u32) {
     if local == 0u {
         tally(ELIMINATIONS, taken * taken * taken);
         set_word(IS_FIRST, 1u);
-        go_to(select(PRECONDITION, RESPOND, word(PURPOSE) == FOR_TANGENT), FACTORISE);
+        let pairs = (row_count * (row_count + slots) / WORKGROUP + 2u) * parameters.carriers;
+        let eliminations = row_count * (row_count * (row_count / 4u + 1u) / WORKGROUP + row_count / WORKGROUP + 2u);
+        advance(select(PRECONDITION, RESPOND, word(PURPOSE) == FOR_TANGENT), slots / WORKGROUP + 1u + pairs + eliminations);
     }
 }
 

@@ -47,6 +47,12 @@ impl AdaptiveSize {
         self.now = (wanted.clamp(limits.0, limits.1) as usize).clamp(1, self.most);
     }
 
+    /// No more than there is room to search for, if as large a share of them touches as `touching` of `done`.
+    fn fit(&mut self, touching: usize, done: usize, searches: usize) {
+        let share = touching as f64 / done.max(1) as f64;
+        self.now = self.now.min((FILLED * searches as f64 / share) as usize).max(1);
+    }
+
     /// Half of it, of at most `most`.
     fn halve(&mut self, most: usize) {
         *self = Self { now: (self.now / 2).clamp(1, most.max(1)), most };
@@ -54,7 +60,10 @@ impl AdaptiveSize {
 }
 
 /// First size of sections: nothing is known of the device yet.
-const FIRST_SECTION: usize = 1024;
+const FIRST_SECTION: usize = 4096;
+
+/// Share of the room for searches that a section is to fill [1]: the next one may have a few more that touch.
+const FILLED: f64 = 0.9;
 
 /// A device, and how much it is given at a time.
 pub(super) struct PacedDevice<S> {
@@ -305,6 +314,7 @@ impl<S: Stages> Fleet<'_, S> {
         };
         let time = paced.worked(since);
         paced.section.adapt(count, time);
+        paced.section.fit(detected.touching.len(), count, paced.stages.room().searches);
         let ticket = match detected.touching.len() {
             0 => None,
             count => Some(HostTime::of(&mut self.time.submitting, || paced.stages.solve(lane, count))),
@@ -370,7 +380,7 @@ mod tests {
 
     impl Odd {
         fn new(lanes: usize, section: usize, until_lost: usize, is_mended: bool) -> PacedDevice<Self> {
-            let room = StageRoom { lanes, section };
+            let room = StageRoom { lanes, section, searches: section };
             PacedDevice::new(Self { lanes: vec![Vec::new(); lanes], room, until_lost, is_mended, opened: 1 })
         }
 
@@ -537,5 +547,16 @@ mod tests {
         // As much as three dispatches should take.
         size.adapt(96, DISPATCH_TARGET * 3);
         assert_eq!(size.now, 32);
+    }
+
+    #[test]
+    fn sizes_follow_the_share_that_touches() {
+        let mut size = AdaptiveSize::new(1000, 10_000);
+        size.fit(50, 100, 400);
+        assert_eq!(size.now, 720, "half of them touch: 360 of 400 that there is room for");
+        size.fit(0, 100, 400);
+        assert_eq!(size.now, 720, "nothing touches");
+        size.fit(100, 100, 1);
+        assert_eq!(size.now, 1, "at least one");
     }
 }

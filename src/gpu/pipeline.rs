@@ -31,7 +31,7 @@ pub struct BatchCapacity {
 impl Default for BatchCapacity {
     /// Enough to keep a large GPU busy while the host turns to what it has found.
     fn default() -> Self {
-        Self { chunk: 1 << 16, searches: 1 << 16, contacts: CONTACTS, double: true, in_flight: 2 }
+        Self { chunk: 1 << 16, searches: 1 << 16, contacts: CONTACTS, double: true, in_flight: 3 }
     }
 }
 
@@ -43,7 +43,7 @@ const SOFTWARE_BUDGET: u64 = 16 << 20;
 
 /// The same for the workspaces of the search: some thousand configurations on a GPU, which fill it, and on one that has
 /// the host's memory.
-const HARDWARE_WORKSPACES: u64 = 4 << 30;
+const HARDWARE_WORKSPACES: u64 = 2 << 30;
 const INTEGRATED_WORKSPACES: u64 = 256 << 20;
 const SOFTWARE_WORKSPACES: u64 = 64 << 20;
 
@@ -130,7 +130,7 @@ impl Stages for Pipeline<'_> {
     type Ticket = wgpu::SubmissionIndex;
 
     fn room(&self) -> StageRoom {
-        StageRoom { lanes: self.lanes.len(), section: self.room.chunk }
+        StageRoom { lanes: self.lanes.len(), section: self.room.chunk, searches: self.room.searches }
     }
 
     fn trust(&self) -> Trust {

@@ -119,7 +119,8 @@ impl SearchModel {
     pub fn workspace(&self) -> [u64; 3] {
         let SearchParameters { words, reals, .. } = self.parameters;
         let size = self.precision.size() as u64;
-        [4 * u64::from(words), size * u64::from(reals), size * u64::from(vectors(&self.parameters, self.is_isotropic))]
+        let vectors = vectors(&self.parameters, self.is_isotropic, self.with_tangent);
+        [4 * u64::from(words), size * u64::from(reals), size * u64::from(vectors)]
     }
 }
 
@@ -206,10 +207,11 @@ pub(super) fn reals(p: &SearchParameters) -> u32 {
 }
 
 /// Reals of the vectors on the support of a workspace, and of its columns: see `shaders/search_state.wgsl`.
-pub(super) fn vectors(p: &SearchParameters, is_isotropic: bool) -> u32 {
+pub(super) fn vectors(p: &SearchParameters, is_isotropic: bool, with_tangent: bool) -> u32 {
     const VECTORS: u32 = 16;
     let column = if is_isotropic { p.support.div_ceil(4) } else { p.support };
-    4 * (p.contacts * column + (VECTORS + 2 * p.joints) * p.support)
+    let responses = if with_tangent { 2 * p.joints } else { 0 };
+    4 * (p.contacts * column + (VECTORS + responses) * p.support)
 }
 
 /// The contents of the buffers, and where their parts begin.

@@ -70,6 +70,8 @@ pub struct StageRoom {
     pub lanes: usize,
     /// Most configurations of a section.
     pub section: usize,
+    /// How many of these in contact are solved together: a section with more of them takes several times as long.
+    pub searches: usize,
 }
 
 /// The stages of a device. A section of configurations has a lane: it is placed and tested for contact, and then those
