@@ -188,7 +188,7 @@ fn write_rows(candidates: u32, reach: real, local: u32) {
     }
 }
 
-// Sum of one number from each invocation, in the first one.
+// Sum of one number from each invocation, in every one.
 fn total(number: u32, local: u32) -> u32 {
     begin_list(0u, local);
     place_in_list(number, local);

@@ -1,9 +1,9 @@
 // The facets that are closest to points, one point an invocation, which a workgroup finds together: a search by each
 // invocation alone would have all wait for the longest one, and pass through the same spheres.
 //
-// Bounding spheres at rest leave few pairs of a point and a facet, and flat triangles fewer. Triangles and facets are
-// looked at for as many pairs at a time as there are invocations, whosever the point is. The order of the pairs depends
-// on timing; which facet is closest does not.
+// Bounding spheres at rest leave few facets, each near some of the points, and flat triangles leave few pairs of a point
+// and a facet. As many facets are looked at together as there are invocations, and as many pairs measured, whosever the
+// point is. The order of facets and pairs depends on timing; which facet is closest does not.
 //
 // The stage declares WORKGROUP, which is at most 32; `facet_in_order`; `need(facet)`, which notes that a facet is going
 // to be looked at, and `make_ready(local)`, which makes all of these ready; and for facets that are bent their corners,
@@ -12,8 +12,10 @@
 // Facets that share a sphere which is looked at before theirs.
 const CLUSTER: u32 = 32u;
 
-// Most pairs that wait: as many as one look at the spheres may add, of as many facets with each point, and some more.
-override PAIRS: u32 = WORKGROUP * (WORKGROUP + 16u);
+// Most facets that wait to be looked at, and most pairs that wait to be measured: fewer than are measured together, and
+// each of as many facets with each point.
+override FACETS_TOGETHER: u32 = 8u * WORKGROUP;
+override PAIRS: u32 = WORKGROUP * (WORKGROUP + 1u);
 
 // Each invocation's point; w is the distance beyond which no facet matters to it, below zero where there is none.
 var<workgroup> points: array<vec4<real>, WORKGROUP>;
@@ -22,6 +24,9 @@ var<workgroup> closest_so_far: array<u32, WORKGROUP>;
 // Invocations that have a point; and those whose point is near each of as many clusters: a bit for each.
 var<workgroup> with_point: atomic<u32>;
 var<workgroup> near: array<u32, WORKGROUP>;
+// Facets that wait to be looked at, and a bit for each point that their spheres are near enough to.
+var<workgroup> facets: array<vec2<u32>, FACETS_TOGETHER>;
+var<workgroup> near_facets: atomic<u32>;
 // Pairs that wait to be measured: the facet times WORKGROUP, plus the point's invocation.
 var<workgroup> pairs: array<u32, PAIRS>;
 var<workgroup> waiting: atomic<u32>;
@@ -53,33 +58,34 @@ fn points_near(sphere: vec4<real>, mask: u32, moved: real) -> u32 {
     return found;
 }
 
-// Pairs the facet in place `leaf` of the order with those points of `mask` that its sphere may be near enough to.
-fn add_pairs(leaf: u32, mask: u32, moved: real) {
+// Lists the facet in place `leaf` of the order if its sphere may be near enough to points of `mask`.
+fn list_facet(leaf: u32, mask: u32, moved: real) {
     let found = points_near(surface[parameters.leaves + leaf], mask, moved);
-    if found == 0u {
-        return;
-    }
-    let facet = facet_in_order(leaf);
-    need(facet);
-    for (var rest = found; rest != 0u; rest &= rest - 1u) {
-        pairs[atomicAdd(&waiting, 1u)] = facet * WORKGROUP + firstTrailingBit(rest);
+    if found != 0u {
+        let facet = facet_in_order(leaf);
+        need(facet);
+        facets[atomicAdd(&near_facets, 1u)] = vec2<u32>(facet, found);
     }
 }
 
-// Whether the facet of a pair may be closer to its point than what was found so far.
-fn may_be_closest(pair: u32) -> bool {
-    let facet = pair / WORKGROUP;
-    let owner = pair % WORKGROUP;
-    if closest_so_far[owner] == facet {
-        return false;
+// Pairs a facet with those points of `mask` to which it may be closer than what was found so far.
+fn add_pairs(facet: u32, mask: u32) {
+    var corners = mat3x3<real>();
+    if SMOOTH {
+        corners = triangle_of(facet);
     }
-    if !SMOOTH {
-        return true;
+    for (var rest = mask; rest != 0u; rest &= rest - 1u) {
+        let owner = firstTrailingBit(rest);
+        var may_be_closest = closest_so_far[owner] != facet;
+        if SMOOTH && may_be_closest {
+            let point = points[owner];
+            let weights = closest_point(point.xyz, corners[0], corners[1], corners[2]).weights;
+            may_be_closest = distance(corners * weights, point.xyz) <= point.w + bulge();
+        }
+        if may_be_closest {
+            pairs[atomicAdd(&waiting, 1u)] = facet * WORKGROUP + owner;
+        }
     }
-    let point = points[owner];
-    let corners = triangle_of(facet);
-    let weights = closest_point(point.xyz, corners[0], corners[1], corners[2]).weights;
-    return distance(corners * weights, point.xyz) <= point.w + bulge();
 }
 
 // Measures the pairs from `first` to `end`, at most one an invocation. Returns the closest facet to this one's point,
@@ -108,37 +114,6 @@ fn measure(first: u32, end: u32, best: Closest, local: u32) -> Closest {
     return closest;
 }
 
-// Measures those of the waiting pairs that flat triangles leave; none waits afterwards. Returns the closest facet to this
-// invocation's point, which was `best`.
-fn measure_waiting(best: Closest, local: u32) -> Closest {
-    make_ready(local);
-    workgroupBarrier();
-    let count = atomicLoad(&waiting);
-    workgroupBarrier();
-    if local == 0u {
-        atomicStore(&waiting, 0u);
-    }
-    for (var first = 0u; first < count; first += WORKGROUP) {
-        let pair = pairs[min(first + local, count - 1u)];
-        workgroupBarrier();
-        if first + local < count && may_be_closest(pair) {
-            pairs[atomicAdd(&waiting, 1u)] = pair;
-        }
-    }
-    workgroupBarrier();
-    let left = atomicLoad(&waiting);
-    workgroupBarrier();
-    if local == 0u {
-        atomicStore(&waiting, 0u);
-    }
-    passes += count / WORKGROUP + 2u + (left + WORKGROUP - 1u) / WORKGROUP * (1u + WORKGROUP + PASSES_TO_MEASURE);
-    var closest = best;
-    for (var first = 0u; first < left; first += WORKGROUP) {
-        closest = measure(first, min(first + WORKGROUP, left), closest, local);
-    }
-    return closest;
-}
-
 // Takes x for this invocation's point, to which nothing farther than `within` matters; that is below zero where there
 // is no point. For all invocations together.
 fn take_point(x: vec3<real>, within: real, local: u32) {
@@ -148,6 +123,7 @@ fn take_point(x: vec3<real>, within: real, local: u32) {
     if local == 0u {
         atomicStore(&with_point, 0u);
         atomicStore(&waiting, 0u);
+        atomicStore(&near_facets, 0u);
     }
     workgroupBarrier();
     if within >= 0.0 {
@@ -169,13 +145,43 @@ fn closest_facet(moved: real, likely: u32, local: u32) -> Closest {
     // Cluster, and first leaf of it, that come next; a run of WORKGROUP clusters is looked at together.
     var cluster = 0u;
     var leaf = 0u;
+    // Facets that are listed, and how many of them were looked at.
+    var count = 0u;
+    var looked = 0u;
+    var is_begun = false;
+    make_ready(local);
     loop {
-        best = measure_waiting(best, local);
+        workgroupBarrier();
+        let pairs_waiting = atomicLoad(&waiting);
+        workgroupBarrier();
+        // Pairs are measured once there are so many; the first ones, with likely facets, and the last ones at once.
+        let is_between = is_begun && (looked < count || cluster < clusters);
+        if pairs_waiting >= select(1u, WORKGROUP, is_between) {
+            let first = max(pairs_waiting, WORKGROUP) - WORKGROUP;
+            best = measure(first, pairs_waiting, best, local);
+            passes += 1u + WORKGROUP + PASSES_TO_MEASURE;
+            if local == 0u {
+                atomicStore(&waiting, first);
+            }
+            continue;
+        }
+        if looked < count {
+            if looked + local < count {
+                add_pairs(facets[looked + local].x, facets[looked + local].y);
+            }
+            looked += WORKGROUP;
+            passes += 1u + WORKGROUP;
+            continue;
+        }
         if cluster >= clusters {
             break;
         }
-        // Until the spheres of all clusters were looked at, or more pairs might outgrow their room.
-        while cluster < clusters && atomicLoad(&waiting) <= PAIRS - WORKGROUP * WORKGROUP {
+        if local == 0u {
+            atomicStore(&near_facets, 0u);
+        }
+        workgroupBarrier();
+        // Until the spheres of all clusters were looked at, or more facets might not fit.
+        while cluster < clusters && atomicLoad(&near_facets) <= FACETS_TOGETHER - WORKGROUP {
             workgroupBarrier();
             if leaf == 0u && cluster % WORKGROUP == 0u {
                 let own = cluster + local;
@@ -184,12 +190,12 @@ fn closest_facet(moved: real, likely: u32, local: u32) -> Closest {
                     near[local] = points_near(surface[clusters + own], atomicLoad(&with_point), moved);
                 }
                 workgroupBarrier();
-                passes += WORKGROUP;
+                passes += 2u * WORKGROUP;
             }
             let mask = near[cluster % WORKGROUP];
-            passes += 2u + 2u * countOneBits(mask);
+            passes += 2u + countOneBits(mask);
             if mask != 0u && leaf + local < leaves {
-                add_pairs(cluster * leaves + leaf + local, mask, moved);
+                list_facet(cluster * leaves + leaf + local, mask, moved);
             }
             leaf += WORKGROUP;
             if mask == 0u || leaf >= leaves {
@@ -201,6 +207,10 @@ fn closest_facet(moved: real, likely: u32, local: u32) -> Closest {
             }
             workgroupBarrier();
         }
+        count = atomicLoad(&near_facets);
+        looked = 0u;
+        is_begun = true;
+        make_ready(local);
     }
     formed = ABSENT;
     return best;

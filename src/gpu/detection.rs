@@ -172,7 +172,8 @@ impl Detection {
         context.queue.submit([encoder.finish()])
     }
 
-    /// Waits for a submission of [`Detection::submit`] of `count` configurations.
+    /// Waits for a submission of [`Detection::submit`] of `count` configurations. Of those in contact the device is told
+    /// to begin with the deepest, which take longest: at the end all of it is busy.
     pub fn collect(
         &self,
         context: &Context,
@@ -180,7 +181,7 @@ impl Detection {
         submission: &wgpu::SubmissionIndex,
     ) -> Result<Detected, GpuError> {
         let (gap_bytes, list_bytes) = self.read_bytes(count as u32);
-        self.staging.take(context, submission, gap_bytes + list_bytes, |bytes| {
+        let detected = self.staging.take(context, submission, gap_bytes + list_bytes, |bytes| {
             let (gaps, list) = bytes.split_at(gap_bytes as usize);
             let gaps = self.trust.precision.decode(gaps);
             let list: Vec<u32> = bytemuck::pod_collect_to_vec(list);
@@ -189,7 +190,13 @@ impl Detection {
                 return Err(GpuError::NeverWritten { count: gaps.len() - touching, total: gaps.len() });
             }
             Ok(Detected { touching: list[1..=touching].to_vec(), gaps })
-        })?
+        })?;
+        let mut detected: Detected = detected?;
+        detected.order_by_depth();
+        let list: Vec<u32> =
+            std::iter::once(detected.touching.len() as u32 + 1).chain(detected.touching.iter().copied()).collect();
+        self.buffers.list.write(context, &list);
+        Ok(detected)
     }
 
     /// Bytes of the gaps of `count` configurations, and of the list of those in contact [B].

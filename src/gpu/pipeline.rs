@@ -43,7 +43,7 @@ const SOFTWARE_BUDGET: u64 = 16 << 20;
 
 /// The same for the workspaces of the search: some thousand configurations on a GPU, which fill it, and on one that has
 /// the host's memory.
-const HARDWARE_WORKSPACES: u64 = 2 << 30;
+const HARDWARE_WORKSPACES: u64 = 3 << 30;
 const INTEGRATED_WORKSPACES: u64 = 256 << 20;
 const SOFTWARE_WORKSPACES: u64 = 64 << 20;
 

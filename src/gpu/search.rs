@@ -153,8 +153,9 @@ impl SearchLane {
         let parameters = SearchParameters { room: room as u32, ..search.model.parameters };
         let buffer = |what, bytes: u64| StorageBuffer::new(context, what, bytes);
         let uniform = StorageBuffer::uniform(context, "parameters of the search", &parameters.encode(*precision))?;
+        // The number of the unfinished stands beside their lists.
         let [word_bytes, real_bytes, vector_bytes] = search.model.workspace().map(|bytes| room as u64 * bytes);
-        let words = buffer("words of the search", 4 * (2 * room as u64 + 1) + word_bytes)?;
+        let words = buffer("words of the search", 4 + word_bytes)?;
         let reals = buffer("reals of the search", real_bytes)?;
         let vectors = buffer("vectors of the search", vector_bytes)?;
         let starts = buffer("starts of touches", 4 * (room as u64 + 1))?;
@@ -212,13 +213,7 @@ impl SearchLane {
     }
 
     /// The same without the `first` of them, which are solved.
-    fn solve_from(
-        &mut self,
-        context: &Context,
-        search: &Search,
-        first: usize,
-        count: usize,
-    ) -> wgpu::SubmissionIndex {
+    fn solve_from(&mut self, context: &Context, search: &Search, first: usize, count: usize) -> wgpu::SubmissionIndex {
         let batch = self.batch(first, count);
         let configurations = batch as u32;
         let (room, first) = (self.room as u32, first as u32);

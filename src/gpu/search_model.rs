@@ -6,9 +6,7 @@ use super::{
     context::Context,
     error::GpuError,
     layout::SearchParameters,
-    model::{
-        DeviceModel, bounding_spheres, extent, four, leaves, mesh, stiffness,
-    },
+    model::{DeviceModel, bounding_spheres, extent, four, leaves, mesh, stiffness},
     precision::Precision,
 };
 use crate::{
@@ -115,12 +113,12 @@ impl SearchModel {
         })
     }
 
-    /// Bytes of one workspace: of its words, its reals, and the vectors on its support [B].
+    /// Bytes of one workspace: of its words and its entries in two lists, its reals, and the vectors on its support [B].
     pub fn workspace(&self) -> [u64; 3] {
         let SearchParameters { words, reals, .. } = self.parameters;
         let size = self.precision.size() as u64;
         let vectors = vectors(&self.parameters, self.is_isotropic, self.with_tangent);
-        [4 * u64::from(words), size * u64::from(reals), size * u64::from(vectors)]
+        [4 * u64::from(words + 2), size * u64::from(reals), size * u64::from(vectors)]
     }
 }
 

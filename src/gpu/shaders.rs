@@ -118,7 +118,16 @@ pub static DETECTION: Shader = stage(
 pub static GAP: [Shader; 2] = in_both(stage(
     "gap",
     "main",
-    &[TYPES, CLOSEST_POINT, MESH, FACET, CLOSEST_FACET, SHARED_SEARCH, LEAST_OF, include_str!("../../shaders/gap.wgsl")],
+    &[
+        TYPES,
+        CLOSEST_POINT,
+        MESH,
+        FACET,
+        CLOSEST_FACET,
+        SHARED_SEARCH,
+        LEAST_OF,
+        include_str!("../../shaders/gap.wgsl"),
+    ],
     &[&[], SMOOTH],
 ));
 

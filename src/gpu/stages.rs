@@ -9,8 +9,16 @@ use std::ops::Range;
 pub struct Detected {
     /// Smallest gap of each configuration at rest [m].
     pub gaps: Vec<f64>,
-    /// Numbers of those in contact, ascending.
+    /// Numbers of those in contact, in the order in which they are solved.
     pub touching: Vec<u32>,
+}
+
+impl Detected {
+    /// Puts the deepest first of those in contact; equally deep ones stay as they are.
+    pub(super) fn order_by_depth(&mut self) {
+        let gaps = &self.gaps;
+        self.touching.sort_by(|&a, &b| gaps[a as usize].total_cmp(&gaps[b as usize]));
+    }
 }
 
 /// Results of the kernels for the configurations in contact: see `shaders/search_results.wgsl`.
@@ -43,6 +51,22 @@ impl Found {
             records: self.records[configurations].to_vec(),
             touches: self.touches[touches].to_vec(),
         }
+    }
+
+    /// The same in ascending order of the configurations' `numbers`.
+    fn sorted_by(&self, numbers: &[u32]) -> Self {
+        let mut end = 0;
+        let mut places: Vec<(u32, Range<usize>, Range<usize>)> = Vec::with_capacity(numbers.len());
+        for (place, (&number, count)) in numbers.iter().zip(self.counts()).enumerate() {
+            places.push((number, place..place + 1, end..end + count));
+            end += count;
+        }
+        places.sort_by_key(|(number, ..)| *number);
+        let mut sorted = Self::default();
+        for (_, configuration, touches) in places {
+            sorted.extend(self.part(configuration, touches));
+        }
+        sorted
     }
 
     /// Adds what was found of other configurations.
@@ -114,7 +138,8 @@ pub trait Stages {
 /// Results of a device for a list of configurations, returned at once: a device that takes no time, beside which
 /// what the host does can be measured.
 ///
-/// It knows no configurations: it is to be asked for those of the list, in the same order, as often as one likes.
+/// It knows no configurations: it is to be asked for those of the list, in the same order, as often as one likes. What
+/// touches is in that order, too.
 #[derive(Clone, Debug)]
 pub struct Recorded {
     room: StageRoom,
@@ -141,7 +166,8 @@ impl Recorded {
             touching.iter().for_each(|&member| recorded.is_touching[before + member as usize] = true);
             if !touching.is_empty() {
                 let ticket = stages.solve(0, touching.len());
-                recorded.found.extend(stages.found(0, touching.len(), &ticket)?);
+                let found = stages.found(0, touching.len(), &ticket)?;
+                recorded.found.extend(found.sorted_by(&touching));
             }
         }
         Ok(recorded)

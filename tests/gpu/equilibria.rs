@@ -450,6 +450,9 @@ fn sizes_of_sections_leave_no_trace() {
         let results = solve(BatchCapacity { chunk: 7, in_flight, ..BatchCapacity::default() });
         assert_eq!(format!("{whole:?}"), format!("{results:?}"), "{in_flight} in flight");
     }
+    // Fewer searches together than a section has in contact.
+    let results = solve(BatchCapacity { searches: 3, ..BatchCapacity::default() });
+    assert_eq!(format!("{whole:?}"), format!("{results:?}"), "three searches together");
 }
 
 /// One adapter opened twice is two devices to the solver.
