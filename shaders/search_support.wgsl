@@ -185,21 +185,13 @@ fn set_reaction(row: u32, reaction: Variation) {
 
 // Sum of what the rows' reactions press on the node in `slot`.
 fn gather(slot: u32) -> vec3<real> {
-    let end = word(at_start(slot + 1u));
     var sum = vec3<real>(0.0);
-    // Four at a time, so that none waits for the one before.
-    for (var entry = word(at_start(slot)); entry < end; entry += 4u) {
-        sum += press(entry, end) + press(entry + 1u, end) + press(entry + 2u, end) + press(entry + 3u, end);
+    for (var entry = word(at_start(slot)); entry < word(at_start(slot + 1u)); entry += 1u) {
+        let part = four_at(at_part(entry));
+        let reaction = at_reaction(u32(part.w));
+        sum += part.x * vector_at(reaction) + part.y * vector_at(reaction + 4u) + part.z * vector_at(reaction + 8u);
     }
     return sum;
-}
-
-// What the reaction of one row presses there; nothing behind the last entry.
-fn press(entry: u32, end: u32) -> vec3<real> {
-    let part = four_at(at_part(min(entry, end - 1u)));
-    let reaction = at_reaction(u32(part.w));
-    let sum = part.x * vector_at(reaction) + part.y * vector_at(reaction + 4u) + part.z * vector_at(reaction + 8u);
-    return select(vec3<real>(0.0), sum, entry < end);
 }
 
 // Sets the multipliers to the rows' forces, and notes which of them touch.
