@@ -128,8 +128,8 @@ fn spread(at: u32, facet: u32, counts: array<array<real, 15>, 3>, corners: array
     }
 }
 
-// Writes row `row` of the list `half`: proxy node `node`, with the closest point of facet `facet`, as a jet too, and the
-// outward direction there.
+// Writes row `row` of the list `half`: proxy node `node`, with the closest point of facet `facet`, the jet and the outward
+// direction there.
 fn write_row(half: u32, row: u32, node: u32, facet: u32, point: ClosestPoint, jet: Jet, outward: vec3<real>) {
     var normal = outward;
     var s = dot(outward, jet.point);

@@ -107,8 +107,8 @@ const ON_FACE: u32 = 3u;
 const FOUND: u32 = 4u;
 
 // The same on a bent facet, searched from `start`: where the distance is least on the facet continued beyond its edges
-// or, if that is outside, on the edges beyond which it lies. One loop for all, so that invocations that are on the face and
-// on edges go together, and that the program is short: multiprocessors keep little of it at hand.
+// or, if that is outside, on the edges beyond which it lies. One loop for all, so that invocations that are on the face
+// and on edges go together.
 fn closest_on_bent_facet(start: vec3<real>) -> MeasuredPoint {
     var best = MeasuredPoint(ClosestPoint(start, FEATURE_FACE), FAR_AWAY);
     var on = ON_FACE;

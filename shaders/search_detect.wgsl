@@ -3,8 +3,8 @@
 //
 // A facet matters to a proxy node only where it is no farther than the surface is known to be: d + m, with d its
 // distance at rest and m the most that a point of the surface has moved, and no farther than the facet that was closest
-// last. At rest it was no farther than m beyond. Only the nodes of such facets are displaced, and for as many proxy nodes
-// together as there are invocations.
+// last. At rest it was no farther than m beyond. Only the nodes of such facets are displaced, and for as many proxy
+// nodes together as there are invocations.
 
 override WORKGROUP: u32 = 32u;
 

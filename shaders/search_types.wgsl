@@ -194,10 +194,11 @@ fn at_place(slot: u32) -> u32 {
     return at_slot(parameters.covered) + slot;
 }
 
-// Proxy node, facet, feature and number of nodes of a row; then its nodes' places, their slots, and how many rows press
-// on each before it, or NO_PART where it does not.
+// Where a row does not press on one of its nodes.
 const NO_PART: u32 = 0xffffffffu;
 
+// Proxy node, facet, feature and number of nodes of a row; then its nodes' places, their slots, and how many rows press
+// on each before it, or NO_PART.
 fn at_row(half: u32, row: u32) -> u32 {
     return at_place(parameters.support) + (half * parameters.contacts + row) * (ROW_WORDS + 3u * parameters.carriers);
 }

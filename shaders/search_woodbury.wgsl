@@ -45,7 +45,8 @@ fn factorise(local: u32) {
         set_word(IS_FIRST, 1u);
         let pairs = (row_count * (row_count + slots) / WORKGROUP + 2u) * parameters.carriers;
         let eliminations = row_count * (row_count * (row_count / 4u + 1u) / WORKGROUP + row_count / WORKGROUP + 2u);
-        advance(select(PRECONDITION, RESPOND, word(PURPOSE) == FOR_TANGENT), slots / WORKGROUP + 1u + pairs + eliminations);
+        let next = select(PRECONDITION, RESPOND, word(PURPOSE) == FOR_TANGENT);
+        advance(next, slots / WORKGROUP + 1u + pairs + eliminations);
     }
 }
 

@@ -1,9 +1,9 @@
 // The facets that are closest to points, one point an invocation, which a workgroup finds together: a search by each
 // invocation alone would have all wait for the longest one, and pass through the same spheres.
 //
-// Bounding spheres at rest leave few facets, each near some of the points, and flat triangles leave few pairs of a point
-// and a facet. As many facets are looked at together as there are invocations, and as many pairs measured, whosever the
-// point is. The order of facets and pairs depends on timing; which facet is closest does not.
+// Bounding spheres at rest leave few facets, each near some of the points, and flat triangles leave few pairs of a
+// point and a facet. As many facets are looked at together as there are invocations, and as many pairs measured,
+// whosever the point is. The order of facets and pairs depends on timing; which facet is closest does not.
 //
 // The stage declares WORKGROUP, which is at most 32; `facet_in_order`; `need(facet)`, which notes that a facet is going
 // to be looked at, and `make_ready(local)`, which makes all of these ready; and for facets that are bent their corners,

@@ -1,9 +1,10 @@
-// The workspace of a configuration. The stage declares `words` and `reals` of all of them. Reals are stored four by four, so that a vector, with which four begin, is read at once.
+// The workspace of a configuration. The stage declares `words` and `reals` of all of them. Reals are stored four by
+// four, so that a vector, with which four begin, is read at once.
 
 var<private> words_base: u32;
 var<private> reals_base: u32;
+// Place of the workspace, and number of its configuration in the section.
 var<private> place_taken: u32;
-// Number of the configuration in the section.
 var<private> member: u32;
 
 // Takes up the workspace in `place`.

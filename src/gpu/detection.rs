@@ -172,8 +172,8 @@ impl Detection {
         context.queue.submit([encoder.finish()])
     }
 
-    /// Waits for a submission of [`Detection::submit`] of `count` configurations. Of those in contact the device is told
-    /// to begin with the deepest, which take longest: at the end all of it is busy.
+    /// Waits for a submission of [`Detection::submit`] of `count` configurations, and tells the device to begin with the
+    /// deepest of those in contact. They take longest: so it is busy to the end, and those beside each other are alike.
     pub fn collect(
         &self,
         context: &Context,

@@ -51,8 +51,8 @@ impl Kernel {
             let bounded = !context.adapter().hardware;
             let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: bounded, ..Default::default() };
             // SAFETY: all loops of the shaders end, whatever they read: each counts up to a number, takes a bit off a
-            // word, goes on to the next node of a tree whose nodes are numbered in the order in which it is searched, or
-            // adds up its passes and ends at a limit. All other checks stay.
+            // word, goes on to the next node of a tree whose nodes are numbered in the order in which it is searched,
+            // or adds up its passes and ends at a limit. All other checks stay.
             let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
             let entries: Vec<_> = bindings.iter().map(Binding::layout).collect();
             let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {

@@ -113,7 +113,8 @@ impl SearchModel {
         })
     }
 
-    /// Bytes of one workspace: of its words and its entries in two lists, its reals, and the vectors on its support [B].
+    /// Bytes of one workspace: of its words and its entries in two lists, of its reals, and of the vectors on its
+    /// support [B].
     pub fn workspace(&self) -> [u64; 3] {
         let SearchParameters { words, reals, .. } = self.parameters;
         let size = self.precision.size() as u64;
