@@ -1,6 +1,7 @@
 //! How long each kernel takes on the first adapter, what it moves, and what bounds it: those of a sweep of the sphere
-//! scene, by each algorithm, and those of the object's frame update. Then whole sweeps on that adapter beside the CPU
-//! backend; and what the host does beside the device, with the device itself and with a stand-in that takes no time.
+//! scene, by each algorithm, and those of the object's frame update. Then what the host does beside the device, with the
+//! device itself and with a stand-in that takes no time; how fast the device is once it is busy; and whole sweeps on that
+//! adapter beside the CPU backend.
 //!
 //!     cargo bench --bench kernels
 //!
@@ -67,6 +68,10 @@ const HOST_STRIDE: usize = 16;
 /// Sweeps that the host is timed for beside a device that takes no time: the least counts.
 const HOST_TURNS: usize = 7;
 
+/// Sweeps of the same configurations on one adapter: with the first ones it finds how many it takes at a time, and a GPU
+/// raises its clock.
+const BUSY_TURNS: usize = 16;
+
 /// What is known of the adapter beforehand.
 #[derive(Clone, Copy)]
 struct Adapter {
@@ -89,6 +94,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     for name in SCENES {
         host(name, if hardware { 1 } else { HOST_STRIDE })?;
+        if hardware {
+            busy(name)?;
+        }
     }
     SCENES.iter().try_for_each(|name| compare(name, if hardware { &FINER } else { &FINER[..1] }))
 }
@@ -255,6 +263,25 @@ fn host(name: &str, stride: usize) -> Result<(), Box<dyn Error>> {
         }
     }
     print("what takes no time", least);
+    Ok(())
+}
+
+/// Configurations a second of the adapter, solved again and again in memory: the last four times.
+fn busy(name: &str) -> Result<(), Box<dyn Error>> {
+    let scene = refined(&load(name)?, SWEPT);
+    let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
+    let configurations = sample(&scene);
+    let model = Model::reaching(&object, &chain, scene.contact, &configurations)?;
+    let mut solver = GpuSolver::new(Arc::new(Context::open(AdapterChoice::Any)?), &model)?;
+    let mut rates = Vec::with_capacity(BUSY_TURNS);
+    for _ in 0..BUSY_TURNS {
+        let begin = Instant::now();
+        solver.solve(&configurations)?;
+        rates.push(format!("{:.0}", configurations.len() as f64 / begin.elapsed().as_secs_f64()));
+    }
+    let (count, left) = (configurations.len(), solver.left_to_cpu());
+    println!("\nbusy, {name}: {count} configurations, {left} left to the CPU");
+    println!("  {} a second", rates[BUSY_TURNS - 4..].join(", "));
     Ok(())
 }
 
