@@ -158,7 +158,7 @@ fn sweep(context: &Arc<Context>, scene: &Scene, algorithm: Algorithm, adapter: A
         object.rest.len()
     );
     let count = |kernel: &KernelTime| {
-        let at_rest = ["kinematics", "detection", "gap", "compaction"];
+        let at_rest = ["kinematics", "detection", "gap"];
         let at_rest = at_rest.iter().any(|name| kernel.name.ends_with(name));
         if at_rest { configurations.len() } else { touching }
     };

@@ -48,21 +48,21 @@ fn pseudonormal(facet: u32, point: ClosestPoint, x: vec3<real>) -> vec3<real> {
         var face = facet;
         var there = point.weights;
         var k = 0u;
-        if entry == last {
-            // Once more itself.
-        } else if point.feature < FEATURE_EDGE {
+        let is_last = entry == last;
+        if !is_last && point.feature < FEATURE_EDGE {
             face = around(entry);
             k = place_of_corner(face, node);
             there = one_hot(k);
-        } else if entry == 1u {
+        } else if !is_last && entry == 1u {
             let edge = point.feature - FEATURE_EDGE;
             face = across(facet, edge);
             let back = place_of_corner(face, corner(facet, (edge + 1u) % 3u));
             there = dot(point.weights, one_hot((edge + 1u) % 3u)) * one_hot(back)
                 + dot(point.weights, one_hot(edge)) * one_hot((back + 1u) % 3u);
         }
+        // At the end the facet itself.
         take(face, x);
-        if entry == last {
+        if is_last {
             break;
         }
         let jet = jet_at(there);

@@ -102,7 +102,7 @@ fn closest_on_facet() -> MeasuredPoint {
     return closest_on_bent_facet(flat.weights);
 }
 
-// What the search below is at: on an edge the number of that, on the face, or a point that is found and measured.
+// What the search below looks at next: an edge, by its number; the face; or a point that it has found.
 const ON_FACE: u32 = 3u;
 const FOUND: u32 = 4u;
 

@@ -28,7 +28,7 @@ fn main(
     words[place] = place;
     words[2u * parameters.room] = parameters.configurations;
     take_place(place);
-    member = list[1u + parameters.first + place];
+    member = list[parameters.first + place];
     set_word(MEMBER, member);
     // At rest nothing has moved.
     set_scalar(MOVED, real(0.0));

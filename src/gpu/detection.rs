@@ -64,7 +64,6 @@ pub(super) struct Detection {
     kinematics: BoundKernel,
     distances: BoundKernel,
     smallest: BoundKernel,
-    compaction: BoundKernel,
     /// Bytes that `kinematics`, `distances` and `smallest` read of arm and surface [B].
     model_bytes: [u64; 3],
 }
@@ -87,7 +86,7 @@ impl Detection {
             positions: buffer("proxy positions in f32", 16 * nodes)?,
             placed: buffer("proxy positions", 3 * size * nodes)?,
             gaps: buffer("gaps", size * chunk)?,
-            list: buffer("list of contacts", 4 * (chunk + 1))?,
+            list: buffer("list of contacts", 4 * chunk)?,
         };
         let bindings = [
             ("parameters", &buffers.parameters),
@@ -111,11 +110,10 @@ impl Detection {
             kinematics: kernel(precision.of(&shaders::KINEMATICS), WORKGROUP, &[])?,
             distances: BoundKernel::new(context, (&shaders::DETECTION, 1), &[], &flat)?,
             smallest: kernel(precision.of(&shaders::GAP), 1, &[lanes, smooth])?,
-            compaction: kernel(precision.of(&shaders::COMPACTION), WORKGROUP, &[])?,
             parameters: *parameters,
             trust: Trust { band: device.open_band, precision: *precision },
             kinds: model.chain.joints.iter().map(|joint| joint.kind).collect(),
-            staging: Staging::new(context, buffers.gaps.size() + buffers.list.size())?,
+            staging: Staging::new(context, buffers.gaps.size())?,
             buffers,
             model_bytes: [chain.size(), device.surface_bytes()[0], device.surface_bytes()[1]],
         })
@@ -136,7 +134,7 @@ impl Detection {
         &self.buffers.motions
     }
 
-    /// One more than there are configurations in contact, then their numbers.
+    /// Numbers of the configurations in contact, in the order in which they are solved.
     pub fn list(&self) -> &StorageBuffer {
         &self.buffers.list
     }
@@ -146,67 +144,56 @@ impl Detection {
         self.trust
     }
 
-    /// Submits where the proxy is at each configuration, its smallest gap at rest, and the list of those in contact.
+    /// Submits where the proxy is at each configuration, and its smallest gap at rest.
     pub fn submit(&self, context: &Context, chunk: &[JointVector]) -> wgpu::SubmissionIndex {
         let buffers = &self.buffers;
         let count = chunk.len() as u32;
         self.write_inputs(context, chunk, count);
         let nodes = count * self.parameters.proxy_nodes;
-        let (gap_bytes, list_bytes) = self.read_bytes(count);
+        let gap_bytes = self.gap_bytes(count);
         let position_bytes = 16 * u64::from(nodes);
         let placed_bytes = (3 * self.trust.precision.size()) as u64 * u64::from(nodes);
         let motion_bytes = 2 * gap_bytes * u64::from(self.parameters.joints);
         let [arm_bytes, flat_bytes, surface_bytes] = self.model_bytes;
         let mut encoder = context.device.create_command_encoder(&Default::default());
-        buffers.gaps.clear(&mut encoder, gap_bytes);
-        buffers.list.clear(&mut encoder, list_bytes);
         let dispatches = [
             self.kinematics.dispatch(nodes, motion_bytes + arm_bytes + position_bytes + placed_bytes),
             self.distances.dispatch(count, 2 * position_bytes + flat_bytes),
             // Placed nodes are read where they matter.
             self.smallest.dispatch(count, position_bytes + placed_bytes + surface_bytes + gap_bytes),
-            self.compaction.dispatch(1, gap_bytes + list_bytes),
         ];
         context.record(&mut encoder, dispatches);
-        self.staging.record(&mut encoder, &[(&buffers.gaps, gap_bytes), (&buffers.list, list_bytes)]);
+        self.staging.record(&mut encoder, &[(&buffers.gaps, gap_bytes)]);
         context.queue.submit([encoder.finish()])
     }
 
-    /// Waits for a submission of [`Detection::submit`] of `count` configurations, and tells the device to begin with the
-    /// deepest of those in contact. They take longest: so it is busy to the end, and those beside each other are alike.
+    /// Waits for a submission of [`Detection::submit`] of `count` configurations, and tells the device which of them are in
+    /// contact: the deepest first. These take longest, so that none of them is left at the end; and those that are solved
+    /// together take about as long as each other.
     pub fn collect(
         &self,
         context: &Context,
         count: usize,
         submission: &wgpu::SubmissionIndex,
     ) -> Result<Detected, GpuError> {
-        let (gap_bytes, list_bytes) = self.read_bytes(count as u32);
-        let detected = self.staging.take(context, submission, gap_bytes + list_bytes, |bytes| {
-            let (gaps, list) = bytes.split_at(gap_bytes as usize);
-            let gaps = self.trust.precision.decode(gaps);
-            let list: Vec<u32> = bytemuck::pod_collect_to_vec(list);
-            let touching = gaps.iter().filter(|gap| **gap < 0.0).count();
-            if list[0] as usize != touching + 1 {
-                return Err(GpuError::NeverWritten { count: gaps.len() - touching, total: gaps.len() });
-            }
-            Ok(Detected { touching: list[1..=touching].to_vec(), gaps })
-        })?;
-        let mut detected: Detected = detected?;
-        detected.order_by_depth();
-        let list: Vec<u32> =
-            std::iter::once(detected.touching.len() as u32 + 1).chain(detected.touching.iter().copied()).collect();
-        self.buffers.list.write(context, &list);
+        let decode = |bytes: &[u8]| self.trust.precision.decode(bytes);
+        let gaps = self.staging.take(context, submission, self.gap_bytes(count as u32), decode)?;
+        if count > 0 && gaps.iter().all(|gap| gap.is_nan()) {
+            return Err(GpuError::NeverWritten { count, total: count });
+        }
+        let detected = Detected::deepest_first(gaps);
+        self.buffers.list.write(context, &detected.touching);
         Ok(detected)
     }
 
-    /// Bytes of the gaps of `count` configurations, and of the list of those in contact [B].
-    fn read_bytes(&self, count: u32) -> (u64, u64) {
-        (self.trust.precision.size() as u64 * u64::from(count), 4 * u64::from(count + 1))
+    /// Bytes of the gaps of `count` configurations [B].
+    fn gap_bytes(&self, count: u32) -> u64 {
+        self.trust.precision.size() as u64 * u64::from(count)
     }
 
     /// Tells the device of the `count` configurations of `chunk`.
     fn write_inputs(&self, context: &Context, chunk: &[JointVector], count: u32) {
-        let Buffers { parameters, motions, .. } = &self.buffers;
+        let Buffers { parameters, motions, gaps, .. } = &self.buffers;
         parameters.write(context, &[Parameters { configurations: count, ..self.parameters }]);
         // (cos q, sin q) of every joint, or (q, 0) of a prismatic one: all that kinematics needs.
         let motion = |(&kind, &q): (&JointKind, &f64)| match kind {
@@ -215,5 +202,7 @@ impl Detection {
         };
         let numbers: Vec<f64> = chunk.iter().flat_map(|q| self.kinds.iter().zip(q.iter()).flat_map(motion)).collect();
         motions.write(context, &self.trust.precision.encode(&numbers));
+        // No gap is this where a kernel has written one.
+        gaps.write(context, &self.trust.precision.encode(&vec![f64::NAN; chunk.len()]));
     }
 }

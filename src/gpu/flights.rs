@@ -47,7 +47,7 @@ impl AdaptiveSize {
         self.now = (wanted.clamp(limits.0, limits.1) as usize).clamp(1, self.most);
     }
 
-    /// No more than there is room to search for, if as large a share of them touches as `touching` of `done`.
+    /// Shrinks to what there is room to search for, if the share that touches stays `touching` of `done`.
     fn fit(&mut self, touching: usize, done: usize, searches: usize) {
         let share = touching as f64 / done.max(1) as f64;
         self.now = self.now.min((FILLED * searches as f64 / share) as usize).max(1);

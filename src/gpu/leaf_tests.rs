@@ -399,12 +399,12 @@ fn a_refused_shader_is_an_error_and_the_device_lives_on() {
     let broken = Shader { name: "broken", entry: "nowhere", parts: &[shaders::TYPES], ..shaders::DETECTION };
     let refused = Kernel::new(&context(), &broken, &[]);
     assert!(matches!(refused, Err(GpuError::Refused(_))));
-    let kernel = Kernel::new(&context(), &shaders::COMPACTION[0], &[]).unwrap();
+    let kernel = Kernel::new(&context(), &shaders::KINEMATICS[0], &[]).unwrap();
     let some = StorageBuffer::new(&context(), "some", 4096).unwrap();
-    let Err(GpuError::Refused(missing)) = kernel.bind(&context(), &[("parameters", &some), ("gaps", &some)]) else {
+    let Err(GpuError::Refused(missing)) = kernel.bind(&context(), &[("parameters", &some), ("chain", &some)]) else {
         panic!("a binding is missing");
     };
-    assert!(missing.contains("list"), "{missing}");
+    assert!(missing.contains("motions"), "{missing}");
     assert!(context().check().is_ok());
     let limit = context().binding_limit();
     assert!(matches!(StorageBuffer::new(&context(), "too much", limit + 1), Err(GpuError::TooLarge { .. })));

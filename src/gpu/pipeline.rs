@@ -60,7 +60,7 @@ impl BatchCapacity {
         Self { chunk: self.chunk.clamp(1, fit(placed)), contacts, ..self }
     }
 
-    /// Cut to what workspaces may take in all, whose parts take so many bytes each and have a binding of their own.
+    /// Cut to the memory that workspaces may take. Each part of one takes so many bytes, and has a binding of its own [B].
     fn for_workspaces(self, context: &Context, parts: [u64; 3]) -> Self {
         let budget = match context.adapter() {
             adapter if !adapter.hardware => SOFTWARE_WORKSPACES,

@@ -141,7 +141,7 @@ impl Search {
 }
 
 impl SearchLane {
-    /// For the configurations in contact of what `detection` places, with room for that many at a time.
+    /// Buffers and bindings for what `detection` finds in contact, `room` configurations at a time.
     pub fn new(
         context: &Context,
         search: &Search,
@@ -212,7 +212,7 @@ impl SearchLane {
         self.solve_from(context, search, 0, count)
     }
 
-    /// The same without the `first` of them, which are solved.
+    /// The same for those behind the `first` ones, which are solved already.
     fn solve_from(&mut self, context: &Context, search: &Search, first: usize, count: usize) -> wgpu::SubmissionIndex {
         let batch = self.batch(first, count);
         let configurations = batch as u32;

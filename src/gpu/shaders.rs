@@ -88,7 +88,6 @@ const SEARCH_RESULTS: &str = include_str!("../../shaders/search_results.wgsl");
 pub(super) const WORKSPACE: &str = include_str!("../../shaders/workspace.wgsl");
 pub(super) const LISTING: &str = include_str!("../../shaders/listing.wgsl");
 const PREFIX_SUM: &str = include_str!("../../shaders/prefix_sum.wgsl");
-const COMPACT: &str = include_str!("../../shaders/compaction.wgsl");
 const FRAME_COMMON: &str = include_str!("../../shaders/frame_common.wgsl");
 const FRAME: &str = include_str!("../../shaders/frame.wgsl");
 const FRAME_ITERATIVE: &str = include_str!("../../shaders/frame_iterative.wgsl");
@@ -130,9 +129,6 @@ pub static GAP: [Shader; 2] = in_both(stage(
     ],
     &[&[], SMOOTH],
 ));
-
-/// List of the configurations in contact.
-pub static COMPACTION: [Shader; 2] = in_both(stage("compaction", "main", &[TYPES, PREFIX_SUM, COMPACT], &[&[]]));
 
 /// Facets are of degree four.
 const SMOOTH: &[(&str, f64)] = &[("SMOOTH", 1.0)];
@@ -273,7 +269,6 @@ pub static FRAME_FINISH: Shader = stage("frame_iterative", "finish", &[FRAME_COM
 pub static ALL: &[&[Shader]] = &[
     &KINEMATICS,
     &GAP,
-    &COMPACTION,
     &SEARCH_ARM,
     &SEARCH_DETECT,
     &SEARCH_JUDGE,

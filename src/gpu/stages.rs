@@ -14,10 +14,11 @@ pub struct Detected {
 }
 
 impl Detected {
-    /// Puts the deepest first of those in contact; equally deep ones stay as they are.
-    pub(super) fn order_by_depth(&mut self) {
-        let gaps = &self.gaps;
-        self.touching.sort_by(|&a, &b| gaps[a as usize].total_cmp(&gaps[b as usize]));
+    /// Those with these `gaps`: of those in contact the deepest first, equally deep ones in order.
+    pub(super) fn deepest_first(gaps: Vec<f64>) -> Self {
+        let mut touching: Vec<u32> = (0..).zip(&gaps).filter_map(|(k, gap)| (*gap < 0.0).then_some(k)).collect();
+        touching.sort_by(|&a, &b| gaps[a as usize].total_cmp(&gaps[b as usize]));
+        Self { gaps, touching }
     }
 }
 

@@ -241,7 +241,6 @@ mod tests {
                 "kinematics",
                 "detection",
                 "gap",
-                "compaction",
                 "search_arm",
                 "search_detect",
                 "search_judge",
