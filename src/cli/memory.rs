@@ -3,7 +3,7 @@
 //! Rust lets a program answer a failed allocation where it asks first. Any other one ends the process by `abort`, after
 //! a line with the number of bytes. Here the size is remembered, and the signal of `abort` is answered with what to do
 //! and exit code 1. So is a panic of the standard library where the system refuses memory that is not allocated, as for
-//! the signal stack of a thread that begins.
+//! the signal stack of a thread that begins, and an `abort` of the C library, which allocates for itself.
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -62,10 +62,27 @@ mod answer {
          kept: an unfinished haptize bake or haptize scan goes on with --resume",
     ];
 
-    /// Answers `abort` after a failed allocation. Any other one takes its course.
+    /// What glibc asks the system for where its heap cannot grow in place [bytes] (`MMAP_AS_MORECORE_SIZE`).
+    const HEAP_STEP: usize = 1 << 20;
+
+    /// Whether the system refuses what the C library would ask for.
+    fn is_exhausted() -> bool {
+        let access = libc::PROT_READ | libc::PROT_WRITE;
+        let kind = libc::MAP_PRIVATE | libc::MAP_ANONYMOUS;
+        // SAFETY: two system calls; the pages between them are known to nobody.
+        unsafe {
+            let pages = libc::mmap(std::ptr::null_mut(), HEAP_STEP, access, kind, -1, 0);
+            if pages != libc::MAP_FAILED {
+                libc::munmap(pages, HEAP_STEP);
+            }
+            pages == libc::MAP_FAILED
+        }
+    }
+
+    /// Answers `abort` for want of memory. Any other one takes its course.
     extern "C" fn answer<const JSON: bool>(signal: libc::c_int) {
         let failed = FAILED.load(Ordering::Relaxed);
-        if failed == 0 && !PANICKED.load(Ordering::Relaxed) {
+        if failed == 0 && !PANICKED.load(Ordering::Relaxed) && !is_exhausted() {
             // SAFETY: no memory is involved; `abort` raises the signal again, which now ends the process.
             unsafe { libc::signal(signal, libc::SIG_DFL) };
             return;

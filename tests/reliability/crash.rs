@@ -256,27 +256,45 @@ fn a_full_disk_is_an_error_and_the_bake_continues_when_there_is_room() {
     }
 }
 
+/// Bakes with so many kB of address space. Returns whether that was enough; where it was not, an error of the program
+/// must tell, unless the system finds no room to load the program at all.
+#[cfg(target_os = "linux")]
+fn has_room(folder: &Path, kilobytes: u32) -> bool {
+    let limit = format!("ulimit -v {kilobytes}");
+    let output = limited(folder, &limit);
+    if !output.status.success() {
+        let said = message(&output);
+        assert!(!said.contains("panicked"), "{kilobytes} kB: {said}");
+        let is_told = output.status.code() == Some(1) && said.contains("memory");
+        let loads = run_limited(folder, &["--version"], &limit);
+        assert!(is_told || !loads.status.success(), "{kilobytes} kB: {:?}, {said}", output.status);
+    }
+    output.status.success()
+}
+
 #[test]
 #[cfg(target_os = "linux")]
 fn a_bake_without_memory_ends_and_continues_where_there_is_some() {
     let whole = Undisturbed::new("cpu", 200);
     let mut failures = 0;
     for kilobytes in (40_000..64_000).step_by(3_000) {
-        let output = limited(whole.folder.path(), &format!("ulimit -v {kilobytes}"));
-        let said = message(&output);
-        if output.status.success() {
+        if has_room(whole.folder.path(), kilobytes) {
             std::fs::remove_file(whole.folder.path().join("x.haptize")).unwrap();
         } else {
             failures += 1;
-            assert!(!said.contains("panicked"), "{kilobytes} kB: {said}");
-            // An error of the program, unless the system finds no room to load the program at all.
-            let is_told = output.status.code() == Some(1) && said.contains("memory");
-            let loads = run_limited(whole.folder.path(), &["--version"], &format!("ulimit -v {kilobytes}"));
-            assert!(is_told || !loads.status.success(), "{kilobytes} kB: {:?}, {said}", output.status);
         }
         whole.finish("cpu", &format!("{kilobytes} kB of memory"));
     }
     assert!(failures > 3, "the limits are felt");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn wherever_memory_runs_out_an_error_tells_so() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scene(folder.path(), OBJECTS[0].1, 30);
+    let failures = (46_000..55_000).step_by(20).filter(|kilobytes| !has_room(folder.path(), *kilobytes)).count();
+    assert!(failures > 50, "the limits are felt");
 }
 
 #[test]
