@@ -72,6 +72,14 @@ impl BatchCapacity {
         Self { searches: self.searches.min(self.chunk).min(most).max(1), ..self }
     }
 
+    /// Halved until there is the memory for what `make` makes of it.
+    fn cut_to_memory<T>(self, make: impl Fn(Self) -> Result<T, GpuError>) -> Result<(Self, T), GpuError> {
+        match make(self) {
+            Err(GpuError::OutOfMemory(_)) if self.chunk > 1 => self.half().cut_to_memory(make),
+            made => Ok((self, made?)),
+        }
+    }
+
     /// Half of each, contacts aside.
     fn half(self) -> Self {
         Self { chunk: (self.chunk / 2).max(1), searches: (self.searches / 2).max(1), ..self }
@@ -95,28 +103,21 @@ impl<'a> Pipeline<'a> {
         model: &'a contact::Model<'a>,
         room: BatchCapacity,
     ) -> Result<Self, GpuError> {
-        let mut room = room.within(&context, model);
-        loop {
-            match Self::with_room(Arc::clone(&context), model, room) {
-                Err(GpuError::OutOfMemory(_)) if room.chunk > 1 => room = room.half(),
-                made => return made,
-            }
-        }
-    }
-
-    fn with_room(context: Arc<Context>, model: &'a contact::Model<'a>, room: BatchCapacity) -> Result<Self, GpuError> {
+        let room = room.within(&context, model);
         let bytes = size_of_val(&model.compliance.entries[..]) as u64;
         let in_double = room.double && context.adapter().double && bytes <= context.binding_limit();
         let precision = if in_double { Precision::Double } else { Precision::Single };
         let device = DeviceModel::new(&context, model, precision)?;
         let search = Search::new(&context, SearchModel::new(&context, model, &device, room.contacts)?)?;
         let room = room.for_workspaces(&context, search.model.workspace());
-        let lane = |_| {
-            let detection = Detection::new(&context, model, &device, room.chunk)?;
-            let lane = SearchLane::new(&context, &search, &device, &detection, room.searches)?;
-            Ok((detection, lane))
-        };
-        let lanes = (0..room.in_flight.max(1)).map(lane).collect::<Result<_, GpuError>>()?;
+        let (room, lanes) = room.cut_to_memory(|room| {
+            let lane = |_| {
+                let detection = Detection::new(&context, model, &device, room.chunk)?;
+                let lane = SearchLane::new(&context, &search, &device, &detection, room.searches)?;
+                Ok((detection, lane))
+            };
+            (0..room.in_flight.max(1)).map(lane).collect()
+        })?;
         Ok(Self { context, model, room, search, lanes })
     }
 
@@ -157,5 +158,33 @@ impl Stages for Pipeline<'_> {
         let context = Arc::new(self.context.reopen()?);
         *self = Self::new(context, self.model, self.room.half())?;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    #[test]
+    fn room_is_halved_until_there_is_memory_for_it() {
+        let whole = BatchCapacity { chunk: 1 << 16, searches: 7390, ..BatchCapacity::default() };
+        let tries = Cell::new(0);
+        let up_to = |most: usize| {
+            tries.set(0);
+            whole.cut_to_memory(|room| {
+                tries.set(tries.get() + 1);
+                if room.searches > most { Err(GpuError::OutOfMemory(String::new())) } else { Ok(room.searches) }
+            })
+        };
+        for (most, expected, count) in [(10_000, 7390, 1), (7000, 3695, 2), (1000, 923, 4)] {
+            let (room, made) = up_to(most).unwrap();
+            assert_eq!((room.searches, made, tries.get()), (expected, expected, count));
+            assert_eq!((room.chunk, room.contacts), ((1 << 16) >> (count - 1), CONTACTS));
+        }
+        assert!(matches!(up_to(0), Err(GpuError::OutOfMemory(_))));
+        assert_eq!(tries.get(), 17, "down to one");
+        let lost = whole.cut_to_memory::<()>(|_| Err(GpuError::Lost("unplugged".into())));
+        assert!(matches!(lost, Err(GpuError::Lost(_))), "half of it would not help");
     }
 }
