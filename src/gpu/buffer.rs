@@ -96,13 +96,13 @@ impl StorageBuffer {
         let bytes = (count * size_of::<T>()) as u64;
         let staging = Staging::new(context, bytes)?;
         let mut encoder = context.device.create_command_encoder(&Default::default());
-        staging.record(&mut encoder, &[(self, bytes)]);
+        staging.copy(&mut encoder, 0, self, bytes);
         let submission = context.queue.submit([encoder.finish()]);
         staging.take(context, &submission, bytes, bytemuck::pod_collect_to_vec)
     }
 }
 
-/// A buffer that the host maps, filled from storage buffers one behind the other.
+/// A buffer that the host maps, filled from storage buffers.
 pub struct Staging {
     raw: wgpu::Buffer,
 }
@@ -122,15 +122,6 @@ impl Staging {
             })
         })?;
         Ok(Self { raw })
-    }
-
-    /// Records copies of the first bytes of `sources`, one behind the other.
-    pub fn record(&self, encoder: &mut wgpu::CommandEncoder, sources: &[(&StorageBuffer, u64)]) {
-        let mut offset = 0;
-        for (source, bytes) in sources {
-            encoder.copy_buffer_to_buffer(&source.raw, 0, &self.raw, offset, *bytes);
-            offset += bytes;
-        }
     }
 
     /// Records a copy of the first `bytes` bytes of `source` to `place`.

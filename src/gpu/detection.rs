@@ -163,7 +163,7 @@ impl Detection {
             self.smallest.dispatch(count, position_bytes + placed_bytes + surface_bytes + gap_bytes),
         ];
         context.record(&mut encoder, dispatches);
-        self.staging.record(&mut encoder, &[(&buffers.gaps, gap_bytes)]);
+        self.staging.copy(&mut encoder, 0, &buffers.gaps, gap_bytes);
         context.queue.submit([encoder.finish()])
     }
 
