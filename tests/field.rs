@@ -86,9 +86,8 @@ fn potential_does_with_an_eighth_of_the_grid_points_of_linear() {
     let potential = error(&field(&coarse, &coarse_data, Interpolation::Potential), &exact);
     assert!(potential <= linear, "potential {potential} N m with {ratio} times fewer points than linear's {linear}");
     // On the same grid, too.
-    let gap_field = error(&field(&fine, &fine_data, Interpolation::GapField), &exact);
     let same = error(&field(&fine, &fine_data, Interpolation::Potential), &exact);
-    assert!(same < 0.8 * linear && gap_field < linear, "linear {linear}, gap-field {gap_field}, potential {same}");
+    assert!(same < 0.8 * linear, "linear {linear}, potential {same}");
 }
 
 #[test]
@@ -119,13 +118,10 @@ fn potential_makes_no_energy_around_loops_and_linear_does() {
 fn ball(count: usize) -> Dataset {
     let grid = synthetic::grid(&[(-0.61, 1.2 / (count - 1) as f64, count); 3]);
     let depth = |q: &[f64]| 0.5 - q.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let mut data = Dataset::of_field(grid, |q| {
+    Dataset::of_field(grid, |q| {
         let energy = 2.0 * depth(q).max(0.0).powi(2) * (1.0 + depth(q));
         (push(q), energy, if depth(q) > 0.0 { Status::Contact } else { Status::Free })
-    });
-    let gap = |point: usize| -depth(&data.grid.configuration(point)) as f32;
-    data.gap = Some((0..data.grid.points()).map(gap).collect::<Vec<_>>().into());
-    data
+    })
 }
 
 fn push(q: &[f64]) -> JointVector {
@@ -146,8 +142,7 @@ fn error_falls_with_the_order_of_each_interpolation_where_the_field_is_smooth() 
         let at = |count| error(&TorqueField::interpolated(&ball(count), interpolation, 0.5, &slopes).unwrap(), &exact);
         (at(21) / at(41)).log2()
     };
-    let [linear, gap_field, potential] = Interpolation::ALL.map(order);
+    let [linear, potential] = Interpolation::ALL.map(order);
     assert!((1.2..1.8).contains(&linear), "the kink at the boundary leaves 1.5: {linear}");
-    assert!((1.8..2.3).contains(&gap_field), "{gap_field}");
     assert!((2.4..3.3).contains(&potential), "{potential}");
 }

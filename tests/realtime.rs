@@ -299,7 +299,7 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
         HapticEffects { friction, contact_damping, four_channel: Some(channels), passivity_control: true },
     ];
     let mut touched = 0;
-    for interpolation in [Interpolation::Linear, Interpolation::GapField, Interpolation::Potential] {
+    for interpolation in Interpolation::ALL {
         for inertia in [ProxyInertia::Constant, ProxyInertia::Configuration] {
             for effects in &effects {
                 let gains = HapticsSpec {

@@ -253,7 +253,7 @@ fn interpolation_is_smooth_where_there_is_an_energy_to_interpolate() {
     assert_eq!(interpolation(LEAST), Interpolation::Potential);
     let paper = LEAST.replace("stiffness = 1000", "stiffness = 1000\nalgorithm = \"paper\"");
     assert_eq!(interpolation(&paper), Interpolation::Linear);
-    assert_eq!(interpolation(&format!("{LEAST}[haptics]\ninterpolation = \"gap-field\"")), Interpolation::GapField);
+    assert_eq!(interpolation(&format!("{LEAST}[haptics]\ninterpolation = \"linear\"")), Interpolation::Linear);
     let scan = Rendering::load(dataset("sponge.toml")).unwrap();
     assert_eq!(scan.haptics.interpolation, Interpolation::Linear);
 }

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 
 /// The torque field of a dataset, looked up between grid points as its scene has it felt.
 ///
-/// Field(dataset, interpolation=None): interpolation is "linear", "gap-field" or "potential"; by default the scene's.
+/// Field(dataset, interpolation=None): interpolation is "linear" or "potential"; by default the scene's.
 ///
 /// Each look-up takes a configuration q [rad; m], an array of one entry per joint, or any array of such in its last
 /// axis, and works on all cores. Wrong shapes and numbers that are not finite raise ValueError. Threads may share a

@@ -135,6 +135,32 @@ impl Grid {
         })
     }
 
+    /// Returns the grid lines on which `point` lies, one per joint; further entries are zero.
+    #[must_use]
+    pub fn lines(&self, point: usize) -> [usize; MAX_JOINTS] {
+        let (mut lines, mut rest) = ([0; MAX_JOINTS], point);
+        for (line, axis) in lines.iter_mut().zip(&self.axes).rev() {
+            (*line, rest) = (rest % axis.count, rest / axis.count);
+        }
+        lines
+    }
+
+    /// Returns the point on the grid lines `lines`, one per joint.
+    #[must_use]
+    pub fn point(&self, lines: impl IntoIterator<Item = usize>) -> usize {
+        self.axes.iter().zip(lines).fold(0, |point, (axis, line)| point * axis.count + line)
+    }
+
+    /// Returns the points before and after `point` along each joint, the last joint first.
+    pub fn neighbours(&self, point: usize) -> impl Iterator<Item = [Option<usize>; 2]> {
+        let mut stride = 1;
+        self.axes.iter().rev().map(move |axis| {
+            let (own, line) = (stride, point / stride % axis.count);
+            stride *= axis.count;
+            [(line > 0).then(|| point - own), (line + 1 < axis.count).then(|| point + own)]
+        })
+    }
+
     /// The configuration of the grid's range that is nearest to `q`, joint by joint.
     #[must_use]
     pub fn clamp(&self, q: &JointVector) -> JointVector {
@@ -149,10 +175,8 @@ impl Grid {
     #[must_use]
     pub fn configuration(&self, point: usize) -> JointVector {
         let mut q = JointVector::zeros(self.joints());
-        let mut rest = point;
-        for (axis, value) in self.axes.iter().zip(q.iter_mut()).rev() {
-            *value = axis.coordinate(rest % axis.count);
-            rest /= axis.count;
+        for ((value, axis), line) in q.iter_mut().zip(&self.axes).zip(self.lines(point)) {
+            *value = axis.coordinate(line);
         }
         q
     }
@@ -181,6 +205,20 @@ mod tests {
                 q[0] = f64::NAN;
                 assert_eq!(grid.nearest(&q), None);
             }
+        }
+    }
+
+    #[test]
+    fn points_are_numbered_with_the_last_axis_fastest() {
+        let grid = grid(&[3, 1, 4]);
+        for point in 0..grid.points() {
+            let lines = grid.lines(point);
+            assert_eq!(lines, [point / 4, 0, point % 4, 0, 0, 0]);
+            assert_eq!(grid.point(lines), point);
+            let before = |apart: usize, line: usize| (line > 0).then(|| point - apart);
+            let after = |apart: usize, line: usize, count: usize| (line + 1 < count).then(|| point + apart);
+            let along = |axis: usize, apart, count| [before(apart, lines[axis]), after(apart, lines[axis], count)];
+            assert!(grid.neighbours(point).eq([along(2, 1, 4), [None; 2], along(0, 4, 3)]));
         }
     }
 

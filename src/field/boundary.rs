@@ -18,9 +18,6 @@
 //! of a free point, `1 + g E / G` beyond, E the distance to the points of level 0 or 1. In a cell with a free corner
 //! the level is I_bar, in all others at least 1: the region `s > 0` is exactly the paper's.
 //!
-//! *Boundary of the gap field.* Contact is where the interpolated gap is negative. Points within a king's move of the
-//! boundary are `-gap / |grad gap|` deep, the others follow by marching; all are divided by G.
-//!
 //! *Torque.* The interpolated torque is shortened, in its own direction, to at most s:
 //! `tau_bar = tau min(1, s / |tau|_K)`, the projection of tau onto the ball of radius s. Projections onto a ball move
 //! two points no further apart, nor by more than the change of radius. Where the torque is shortened these changes are
@@ -36,10 +33,6 @@
 use super::stencil::Lattice;
 use crate::{JointVector, MAX_JOINTS};
 use std::{cmp::Reverse, collections::BinaryHeap};
-
-/// Least gap, and least slope of the gap field, that is divided by [m, m/sqrt(J)]: a picometre is far below any depth
-/// that a force belongs to, and gaps are stored in f32, which keeps their relative accuracy down to 1e-38.
-pub const LEAST_GAP: f64 = 1e-12;
 
 /// The layer of one grid.
 #[derive(Clone, Copy, Debug)]
@@ -86,60 +79,20 @@ impl BoundaryLayer {
         if !near.contains(&true) {
             return vec![NOTHING_FREE; free.len()];
         }
-        let origins: Vec<Option<f64>> = near.iter().map(|&near| near.then_some(0.0)).collect();
-        let beyond = self.distances(lattice, &origins, greatest * (lattice.joints() as f64).sqrt());
+        let beyond = self.distances(lattice, &near, greatest * (lattice.joints() as f64).sqrt());
         let steepest = self.steepest(lattice, &beyond);
         let level = |(&free, &beyond): (&bool, &f64)| if free { 0.0 } else { 1.0 + self.density * beyond / steepest };
         free.iter().zip(&beyond).map(level).map(|level| (level - threshold) / self.density).collect()
     }
 
-    /// Depth of each grid point behind the boundary where the interpolated `gap` [m] is zero [sqrt(J)]. `greatest` as
-    /// above.
-    #[must_use]
-    pub fn depths_behind_gap(&self, lattice: &Lattice, gap: &[f64], greatest: f64) -> Vec<f64> {
-        let inside: Vec<bool> = gap.iter().map(|&gap| gap < 0.0).collect();
-        let free: Vec<bool> = inside.iter().map(|inside| !inside).collect();
-        if !free.contains(&true) {
-            return vec![NOTHING_FREE; gap.len()];
-        }
-        let farthest = greatest * (lattice.joints() as f64).sqrt();
-        let depth_of = |sides: [&[bool]; 2]| {
-            // On either side of the boundary: points of the first beside one of the second.
-            let near = beside(lattice, sides[1]);
-            let origin =
-                |point: usize| (sides[0][point] && near[point]).then(|| self.distance_to_zero(lattice, gap, point));
-            let origins: Vec<Option<f64>> = (0..gap.len()).map(origin).collect();
-            self.distances(lattice, &origins, farthest)
-        };
-        let (below, above) = (depth_of([&inside, &free]), depth_of([&free, &inside]));
-        let signed = |point: usize| if inside[point] { below[point] } else { -above[point] };
-        let mut depths: Vec<f64> = (0..gap.len()).map(signed).collect();
-        let steepest = self.steepest(lattice, &depths);
-        depths.iter_mut().for_each(|depth| *depth /= steepest);
-        depths
-    }
-
-    /// Distance of `point` from the zero of `gap` by its gradient there [sqrt(J)]; the steeper side of each axis
-    /// counts.
-    fn distance_to_zero(&self, lattice: &Lattice, gap: &[f64], point: usize) -> f64 {
-        let along = |((count, step, stride), compliance): ((usize, f64, usize), &f64)| {
-            let neighbours = Lattice::neighbours(point, count, stride).into_iter().flatten();
-            let steepest = neighbours.map(|p| ((gap[p] - gap[point]) / step).powi(2)).fold(0.0, f64::max);
-            steepest * compliance
-        };
-        let slope = lattice.lines().zip(self.compliance.iter()).map(along).sum::<f64>().sqrt();
-        gap[point].abs() / slope.max(LEAST_GAP)
-    }
-
-    /// Distance [sqrt(J)] of each grid point, from those that `origins` gives, or `farthest` where that is less.
+    /// Distance [sqrt(J)] of each grid point from those that `origins` marks, or `farthest` where that is less.
     ///
     /// Points are settled in the order of their distance, each from its settled neighbours.
-    fn distances(&self, lattice: &Lattice, origins: &[Option<f64>], farthest: f64) -> Vec<f64> {
-        let mut distance: Vec<f64> = origins.iter().map(|origin| origin.unwrap_or(farthest)).collect();
+    fn distances(&self, lattice: &Lattice, origins: &[bool], farthest: f64) -> Vec<f64> {
+        let mut distance: Vec<f64> = origins.iter().map(|&origin| if origin { 0.0 } else { farthest }).collect();
         // Distances are not negative: their bits are in the same order as they.
-        let given = origins.iter().enumerate().filter_map(|(point, origin)| origin.map(|at| (at, point)));
         let mut queue: BinaryHeap<Reverse<(u64, usize)>> =
-            given.map(|(at, point)| Reverse((at.to_bits(), point))).collect();
+            (0..origins.len()).filter(|&point| origins[point]).map(|point| Reverse((0, point))).collect();
         let mut settled = vec![false; origins.len()];
         while let Some(Reverse((_, point))) = queue.pop() {
             if std::mem::replace(&mut settled[point], true) {
@@ -280,13 +233,9 @@ mod tests {
     fn without_a_free_point_the_layer_never_holds_back() {
         let lattice = Lattice::new(&grid(&[(0.0, 0.1, 4)])).unwrap();
         let layer = BoundaryLayer::new(&lattice, &slope(&[3.0]));
-        for depths in [
-            layer.depths_behind_index(&lattice, &[false; 4], 0.5, 1.0),
-            layer.depths_behind_gap(&lattice, &[-1.0; 4], 1.0),
-        ] {
-            assert_eq!(depths, [NOTHING_FREE; 4]);
-            assert_eq!(layer.share(&[1e9], depths[0]), 1.0);
-        }
+        let depths = layer.depths_behind_index(&lattice, &[false; 4], 0.5, 1.0);
+        assert_eq!(depths, [NOTHING_FREE; 4]);
+        assert_eq!(layer.share(&[1e9], depths[0]), 1.0);
     }
 
     #[test]
@@ -300,30 +249,6 @@ mod tests {
         }
         assert_eq!(layer.share(&[0.0], depths[0]), 1.0);
         assert_eq!(layer.share(&[0.149], depths[1]), 1.0);
-    }
-
-    #[test]
-    fn behind_the_zero_of_a_gap_depth_is_the_distance_from_it() {
-        // A wall across both joints, at slopes of 1 and 4 N m/rad, with a gap that is steeper on one half of the grid.
-        let lattice = Lattice::new(&grid(&[(-0.8, 0.1, 17), (-0.8, 0.1, 17)])).unwrap();
-        let layer = BoundaryLayer::new(&lattice, &slope(&[1.0, 4.0]));
-        let gap = |steep: f64| -> Vec<f64> {
-            let at = |p: usize| (0.1 * (p / 17) as f64 - 0.8, 0.1 * (p % 17) as f64 - 0.8);
-            (0..lattice.points())
-                .map(|p| -(at(p).0 + at(p).1 - 0.03) * if at(p).0 > 0.05 { steep } else { 1.0 })
-                .collect()
-        };
-        let depths = layer.depths_behind_gap(&lattice, &gap(1.0), 1e9);
-        for (p, &depth) in depths.iter().enumerate() {
-            // |n|_* of n = (1, 1) is sqrt(1/1 + 1/4).
-            let exact = -gap(1.0)[p] / 1.25_f64.sqrt();
-            // Divided by its steepness, which is above one at the grid's corners.
-            let ratio = depth / exact;
-            assert!(exact.abs() < 0.2 || (0.6..1.0 + 1e-9).contains(&ratio), "{depth} for {exact}");
-        }
-        let uneven = layer.depths_behind_gap(&lattice, &gap(7.0), 1e9);
-        assert!(layer.steepest(&lattice, &uneven) <= 1.0 + 1e-12);
-        assert!(uneven.iter().zip(&depths).all(|(a, b)| (*a > 0.0) == (*b > 0.0)));
     }
 
     #[test]

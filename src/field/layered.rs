@@ -1,27 +1,17 @@
-//! Multilinear torque behind a boundary layer: the paper's interpolation, and the same with the boundary of the gap
-//! field.
+//! Multilinear torque behind a boundary layer, the paper's interpolation (section 3.1).
 //!
-//! `tau(q) = sum_c w_c tau_c` over the 2^d corners of the cell around q, shortened to the depth below the boundary
-//! (`boundary.rs`). Component by component it is not the gradient of anything: it makes or takes energy around a loop.
-//!
-//! *`linear`* (section 3.1): tau_c = 0 at free points, the boundary where the contact index passes its threshold. Both
-//! the boundary and the torque beside it err with the spacing h.
-//!
-//! *`gap-field`*: the boundary is where the interpolated gap (smallest signed distance of the proxy's nodes to the
-//! surface at rest) is zero, which errs with h^2. There the torque of an object of finite stiffness begins at zero and
-//! grows in proportion to the depth, so that free points beside the boundary take the torque that the contact would
-//! have with their negative depth: `tau_c = s_c gap_c`, s the ratio tau / gap of the nearest points in contact [N]. The
-//! interpolated torque then passes zero at the boundary, where the layer cuts it off, and errs with h^2 in cells that
-//! the boundary crosses, too.
+//! `tau(q) = sum_c w_c tau_c` over the 2^d corners of the cell around q, tau_c = 0 at free points, shortened to the
+//! depth below the boundary (`boundary.rs`), where the contact index passes its threshold. Both the boundary and the
+//! torque beside it err with the spacing h. Component by component it is not the gradient of anything: it makes or takes
+//! energy around a loop.
 //!
 //! Points that were not computed carry the torque of the nearest one that was. So the torque does not end inside the
 //! object where the measurements do: it keeps the value that it has there.
 
-use super::boundary::LEAST_GAP;
 use super::{
     FieldError,
     boundary::BoundaryLayer,
-    points::{Checked, Generations, plausible},
+    points::Checked,
     stencil::{Lattice, Stencil},
 };
 use crate::JointVector;
@@ -49,38 +39,16 @@ impl Layered {
     pub fn linear(data: &Checked<'_>, threshold: f64, slope: &JointVector) -> Result<Self, FieldError> {
         let layer = BoundaryLayer::new(data.lattice, slope);
         let zeros = JointVector::zeros(data.lattice.joints());
-        let mut field = Self::gather(data, layer, |point| Ok(JointVector::from_slice(data.torque(point, &zeros)?)))?;
+        let mut records = Vec::with_capacity(data.points.len() * (data.lattice.joints() + 2));
+        for point in 0..data.points.len() {
+            records.extend_from_slice(data.torque(point, &zeros)?);
+            records.extend([0.0, data.energy(point)?]);
+        }
+        let mut field = Self { layer, records };
         let free: Vec<bool> = data.points.iter().map(|point| !point.touching).collect();
         let depths = field.layer.depths_behind_index(data.lattice, &free, threshold, field.greatest(data));
         field.put_depths(&depths);
         Ok(field)
-    }
-
-    /// Contact where the interpolated gap is negative.
-    pub fn gap_field(data: &Checked<'_>, slope: &JointVector) -> Result<Self, FieldError> {
-        let missing = FieldError::Missing { column: "gap", interpolation: "gap-field" };
-        let column = data.dataset.gap.as_ref().ok_or(missing)?;
-        let gap: Vec<f64> = data.nearest.iter().map(|&source| column[source].into()).collect();
-        gap.iter().zip(data.nearest).try_for_each(|(&gap, &source)| plausible("gap", source, gap))?;
-        let layer = BoundaryLayer::new(data.lattice, slope);
-        let torques = torques_by_gap(data, &gap)?;
-        let mut field = Self::gather(data, layer, |point| Ok(torques[point]))?;
-        let depths = field.layer.depths_behind_gap(data.lattice, &gap, field.greatest(data));
-        field.put_depths(&depths);
-        Ok(field)
-    }
-
-    fn gather(
-        data: &Checked<'_>,
-        layer: BoundaryLayer,
-        torque: impl Fn(usize) -> Result<JointVector, FieldError>,
-    ) -> Result<Self, FieldError> {
-        let mut records = Vec::with_capacity(data.points.len() * (data.lattice.joints() + 2));
-        for point in 0..data.points.len() {
-            records.extend_from_slice(&torque(point)?);
-            records.extend([0.0, data.energy(point)?]);
-        }
-        Ok(Self { layer, records })
     }
 
     /// Largest size of a torque [sqrt(J)].
@@ -134,39 +102,4 @@ impl Layered {
         };
         (0..lattice.points()).map(norm).fold(0.0, f64::max).sqrt()
     }
-}
-
-/// Torque of each point, that of free points from the ratio of torque to gap at the nearest points in contact.
-fn torques_by_gap(data: &Checked<'_>, gap: &[f64]) -> Result<Vec<JointVector>, FieldError> {
-    let zeros = JointVector::zeros(data.lattice.joints());
-    let mut torques = Vec::with_capacity(gap.len());
-    for point in 0..gap.len() {
-        torques.push(JointVector::from_slice(data.torque(point, &zeros)?));
-    }
-    let is_source = |p: usize| data.points[p].in_contact && data.points[p].is_converged() && gap[p] < -LEAST_GAP;
-    let mut ratios = torques.clone();
-    for (point, ratio) in ratios.iter_mut().enumerate() {
-        let scale = if is_source(point) { 1.0 / gap[point] } else { 0.0 };
-        ratio.iter_mut().for_each(|tau| *tau *= scale);
-    }
-    let generations = Generations::new(data.lattice, is_source);
-    for &point in &generations.outwards {
-        // Cells that the boundary crosses have corners of as many steps as there are joints.
-        if generations.steps[point] as usize > data.lattice.joints() {
-            break;
-        }
-        let (mut sum, mut count) = (zeros, 0.0);
-        for (_, _, source) in generations.nearer(data.lattice, point) {
-            sum.iter_mut().zip(ratios[source].iter()).for_each(|(sum, ratio)| *sum += ratio);
-            count += 1.0;
-        }
-        sum.iter_mut().for_each(|ratio| *ratio /= count);
-        ratios[point] = sum;
-        let state = &data.points[point];
-        if state.is_present() && !state.in_contact {
-            torques[point] = sum;
-            torques[point].iter_mut().for_each(|tau| *tau *= gap[point].max(0.0));
-        }
-    }
-    Ok(torques)
 }

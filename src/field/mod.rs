@@ -1,8 +1,7 @@
 //! The contact torque as a function of configuration: interpolation over the dataset's grid (section 3.1).
 //!
-//! Three ways, chosen by the scene ([`Interpolation`]): `linear` and `gap-field` (`layered.rs`) interpolate the torque
-//! and hold it behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient. A
-//! refined dataset is interpolated by its store, in the store's own way (`refined.rs`). All are continuous and without
+//! The scene chooses one of two ways ([`Interpolation`]): `linear` (`layered.rs`) interpolates the torque and holds it
+//! behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient. A refined dataset is interpolated by its store, in the store's own way (`refined.rs`). All are continuous and without
 //! memory. What they share is here: the cell around q, the fade outside the grid (`stencil.rs`), what is said of points
 //! that were not computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is
 //! stored (contact, unconverged, overflowed) and 0 at free points.
@@ -154,7 +153,6 @@ impl TorqueField {
         let data = Checked { lattice: &lattice, dataset, points: &points, nearest: &nearest };
         let interpolant = match interpolation {
             Interpolation::Linear => Interpolant::Layered(Layered::linear(&data, threshold, slope)?),
-            Interpolation::GapField => Interpolant::Layered(Layered::gap_field(&data, slope)?),
             Interpolation::Potential | Interpolation::Direct => Interpolant::Potential(Potential::new(&data)?),
         };
         let on_grid = OnGrid { points, has_energy: dataset.energy.is_some(), interpolant };

@@ -278,8 +278,6 @@ fn a_linear_object_is_rendered_exactly_by_its_gap_and_by_its_potential() {
             match interpolation {
                 // The paper's boundary and the kink behind it: a quarter of a cell's torque.
                 Interpolation::Linear => assert!(worst > 0.02, "{joints} joints: {worst}"),
-                // Gaps are stored in f32.
-                Interpolation::GapField => assert!(worst < 1e-6, "{joints} joints: {worst}"),
                 Interpolation::Potential | Interpolation::Direct => {
                     assert!(worst < 1e-12, "{joints} joints: {worst}");
                 }
@@ -413,7 +411,6 @@ fn interpolations_name_the_column_that_a_dataset_lacks() {
     let refused = |data: &Dataset, interpolation| {
         TorqueField::interpolated(data, interpolation, 0.5, &vector(&[1.0])).err().unwrap().to_string()
     };
-    assert!(refused(&data, Interpolation::GapField).contains("no gap"));
     data.energy = None;
     let message = refused(&data, Interpolation::Potential);
     assert!(message.contains("no energy") && message.contains("interpolation = \"linear\""), "{message}");

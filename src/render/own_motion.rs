@@ -45,11 +45,10 @@ pub(super) fn add(scene: &mut Rendering, dataset: &Dataset) -> Vec<&'static str>
     made
 }
 
-/// Whether `point` is off the first and the last line along `joint`, where there are lines enough.
-fn is_inside(grid: &Grid, strides: &[usize], point: usize, joint: usize) -> bool {
-    let count = grid.axes[joint].count;
+/// Whether line `line` along an axis of `count` lines is neither the first nor the last one, where there are lines enough.
+fn is_inside(count: usize, line: usize) -> bool {
     let border = usize::from(count >= FEWEST_LINES);
-    (border..count - border).contains(&(point / strides[joint] % count))
+    (border..count - border).contains(&line)
 }
 
 /// A direction along a grid line.
@@ -63,8 +62,6 @@ struct Along {
 struct Search<'a> {
     dataset: &'a Dataset,
     grid: &'a Grid,
-    /// Distance between neighbours along each joint, in numbers of points.
-    strides: Vec<usize>,
     /// Torque of load one at each joint [N m or N].
     scale: Vec<f64>,
     /// Points in contact that are tried.
@@ -74,11 +71,8 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(dataset: &'a Dataset, limits: &[f64]) -> Self {
         let (grid, joints) = (&dataset.grid, dataset.grid.joints());
-        let mut strides = vec![1; joints];
-        for joint in (1..joints).rev() {
-            strides[joint - 1] = strides[joint] * grid.axes[joint].count;
-        }
-        let inside = |point: usize| (0..joints).all(|joint| is_inside(grid, &strides, point, joint));
+        let inside =
+            |point: usize| grid.axes.iter().zip(grid.lines(point)).all(|(axis, line)| is_inside(axis.count, line));
         let in_contact = |point: &usize| dataset.status(*point) == Status::Contact && inside(*point);
         let contacts = (0..grid.points()).filter(in_contact).count();
         let every = contacts.div_ceil(TRIALS).max(1);
@@ -86,7 +80,7 @@ impl<'a> Search<'a> {
         let greatest =
             |joint: usize| trials.iter().map(|&point| dataset.torque(point)[joint].abs()).fold(0.0, f64::max);
         let scale = (0..joints).map(|joint| greatest(joint).min(limits[joint] / LOAD)).collect();
-        Self { dataset, grid, strides, scale, trials }
+        Self { dataset, grid, scale, trials }
     }
 
     /// Returns the torque at `point` over the greatest, of the joint where that is greatest [1].
@@ -97,11 +91,10 @@ impl<'a> Search<'a> {
 
     /// Returns the neighbour of `point`, if there is one to go to: at the grid's border the proxy would be held.
     fn next(&self, point: usize, Along { joint, upwards }: Along) -> Option<usize> {
-        let stride = self.strides[joint];
-        let line = point / stride % self.grid.axes[joint].count;
-        let is_last = if upwards { line + 1 == self.grid.axes[joint].count } else { line == 0 };
-        let next = if is_last { None } else { Some(if upwards { point + stride } else { point - stride }) };
-        next.filter(|&next| is_inside(self.grid, &self.strides, next, joint))
+        let mut lines = self.grid.lines(point);
+        let next = if upwards { lines[joint] + 1 } else { lines[joint].checked_sub(1)? };
+        lines[joint] = next;
+        is_inside(self.grid.axes[joint].count, next).then(|| self.grid.point(lines))
     }
 
     /// Returns the free point that is reached from `point` without leaving contact before, and its distance in points.

@@ -89,13 +89,7 @@ fn slab(dataset: &Dataset) -> Vec<usize> {
         *contacts.entry(point / pitch).or_default() += 1;
     }
     let slab = contacts.into_iter().max_by_key(|&(slab, count)| (count, usize::MAX - slab)).map_or(0, |most| most.0);
-    let mut lines = vec![0; axes.len()];
-    let mut rest = slab;
-    for (line, axis) in lines.iter_mut().zip(axes).take(axes.len().saturating_sub(2)).rev() {
-        *line = rest % axis.count;
-        rest /= axis.count;
-    }
-    lines
+    dataset.grid.lines(slab * pitch)[..axes.len()].to_vec()
 }
 
 fn caption(samples: &Samples, dataset: &Dataset, fixed: &[usize], shown: [usize; 2]) -> String {

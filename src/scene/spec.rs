@@ -487,8 +487,6 @@ pub enum ProxyInertia {
 pub enum Interpolation {
     /// Multilinear torque behind the boundary of the contact index (section 3.1).
     Linear,
-    /// Multilinear torque behind the boundary where the gap is zero.
-    GapField,
     /// Minus the gradient of a smoothly interpolated energy: makes no energy around any loop.
     Potential,
     /// The equilibrium itself, solved beside the loop, and its tangent until the next one; where that is late, and in a
@@ -498,14 +496,13 @@ pub enum Interpolation {
 
 impl Interpolation {
     /// All between the points of a grid, from the roughest on.
-    pub const ALL: [Self; 3] = [Self::Linear, Self::GapField, Self::Potential];
+    pub const ALL: [Self; 2] = [Self::Linear, Self::Potential];
 
     /// As the scene names it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
-            Self::GapField => "gap-field",
             Self::Potential => "potential",
             Self::Direct => "direct",
         }

@@ -177,14 +177,10 @@ impl FreeGaps {
 impl Block {
     /// The block of the points `points`, if they make one.
     fn of(grid: &Grid, points: &Range<usize>) -> Option<Self> {
-        let (mut low, mut high) = ([0; MAX_JOINTS], [1; MAX_JOINTS]);
-        let (mut first, mut last) = (points.start, points.end.checked_sub(1)?);
-        for (j, axis) in grid.axes.iter().enumerate().rev() {
-            (low[j], high[j]) = (first % axis.count, last % axis.count + 1);
-            (first, last) = (first / axis.count, last / axis.count);
-        }
+        let last = points.end.checked_sub(1).filter(|&last| last < grid.points())?;
+        let (low, high) = (grid.lines(points.start), grid.lines(last).map(|line| line + 1));
         let ascends = low.iter().zip(&high).all(|(low, high)| low < high);
-        Some(Self { low, high }).filter(|block| ascends && first == 0 && last == 0 && block.points() == points.len())
+        Some(Self { low, high }).filter(|block| ascends && block.points() == points.len())
     }
 
     /// The middle, which lies between points where their number is even.
@@ -287,11 +283,8 @@ impl FreeSpace<'_> {
     /// such points.
     pub(super) fn is_surrounded(&self, proximity: &mut Proximity<'_>, point: usize) -> bool {
         let (mut low, mut high) = ([0; MAX_JOINTS], [1; MAX_JOINTS]);
-        let mut rest = point;
-        for (j, axis) in self.grid.axes.iter().enumerate().rev() {
-            let index = rest % axis.count;
-            (low[j], high[j]) = (index.saturating_sub(1), (index + 2).min(axis.count));
-            rest /= axis.count;
+        for (j, (axis, line)) in self.grid.axes.iter().zip(self.grid.lines(point)).enumerate() {
+            (low[j], high[j]) = (line.saturating_sub(1), (line + 2).min(axis.count));
         }
         self.place(proximity, &Block { low, high }).is_free
     }
@@ -354,12 +347,9 @@ impl FreeSpace<'_> {
         let joints = self.grid.joints();
         let mut index = block.low;
         loop {
-            let mut point = 0;
-            let mut motion = 0.0;
-            for (j, axis) in self.grid.axes.iter().enumerate() {
-                point = point * axis.count + index[j];
-                motion += slopes[j] * (axis.coordinate(index[j]) - centre[j]).abs();
-            }
+            let point = self.grid.point(index);
+            let off = |(j, axis): (usize, &Axis)| slopes[j] * (axis.coordinate(index[j]) - centre[j]).abs();
+            let motion: f64 = self.grid.axes.iter().enumerate().map(off).sum();
             // Rounded towards zero, but not to it: the point is free.
             let bound = ((gap - motion) as f32).next_down().max(f32::MIN_POSITIVE);
             gaps.bounds[point - gaps.first].store(bound.to_bits(), Ordering::Relaxed);

@@ -284,7 +284,7 @@ impl Lattice for UniformGrid<'_, '_> {
     fn neighbours(&self, point: usize) -> impl Iterator<Item = (usize, JointVector)> {
         let mut spacing = JointVector::zeros(self.grid.joints());
         spacing.iter_mut().zip(&self.grid.axes).for_each(|(spacing, axis)| *spacing = axis.step);
-        neighbours(self.grid, point).map(move |n| (n, spacing))
+        self.grid.neighbours(point).flatten().flatten().map(move |n| (n, spacing))
     }
 
     fn status(&self, point: usize) -> Status {
@@ -308,18 +308,6 @@ impl Lattice for UniformGrid<'_, '_> {
     fn replace(&mut self, found: Replaced) {
         self.table.replaced.extend(found);
     }
-}
-
-/// The neighbours of `point` on the grid: the points one step away along an axis.
-fn neighbours(grid: &Grid, point: usize) -> impl Iterator<Item = usize> + '_ {
-    let mut pitch = 1;
-    grid.axes.iter().rev().flat_map(move |axis| {
-        let (own, line) = (pitch, point / pitch % axis.count);
-        pitch *= axis.count;
-        let before = (line > 0).then(|| point - own);
-        let after = (line + 1 < axis.count).then(|| point + own);
-        before.into_iter().chain(after)
-    })
 }
 
 #[cfg(test)]
@@ -353,18 +341,6 @@ mod tests {
         let mut columns = Columns::default();
         energies.iter().for_each(|&energy| columns.push(&equilibrium(energy, -1.0), SHAPE));
         columns
-    }
-
-    #[test]
-    fn neighbours_are_one_step_away() {
-        let grid = synthetic::grid(&[(0.0, 1.0, 2), (0.0, 1.0, 3)]);
-        let of = |point| {
-            let mut found: Vec<_> = neighbours(&grid, point).collect();
-            found.sort_unstable();
-            found
-        };
-        assert_eq!(of(0), [1, 3]);
-        assert_eq!(of(4), [1, 3, 5]);
     }
 
     #[test]

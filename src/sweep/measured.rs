@@ -182,10 +182,8 @@ fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize) -> Vec<
     let mut points = vec![None; draws.len()];
     by_rank.into_iter().zip(of_ranks(grid, table, &ranks)).for_each(|(draw, point)| points[draw] = Some(point));
     let place = |(draw, point): (&Draw, Option<usize>)| {
-        let (mut rest, mut cell) = (point?, vec![0; joints]);
-        for (a, axis) in grid.axes.iter().enumerate().rev() {
-            let line = rest % axis.count;
-            rest /= axis.count;
+        let mut cell = vec![0; joints];
+        for (a, (axis, line)) in grid.axes.iter().zip(grid.lines(point?)).enumerate() {
             cell[a] = line.checked_sub(draw.side >> a & 1).filter(|low| low + 1 < axis.count)?;
         }
         let in_contact = corners(grid, &cell).filter(|&corner| table.status(corner).is_in_contact()).count();
@@ -231,12 +229,9 @@ fn of_ranks(grid: &Grid, table: &Table<'_>, ranks: &[usize]) -> Vec<usize> {
 
 /// Corners of the cell whose lowest corner is on the lines `cell`, ascending.
 fn corners(grid: &Grid, cell: &[usize]) -> impl Iterator<Item = usize> {
-    let counts = grid.counts();
-    let cell = cell.to_vec();
-    (0..1_usize << counts.len()).map(move |sides| {
-        let line = |a: usize| cell[a] + (sides >> (counts.len() - 1 - a) & 1);
-        (0..counts.len()).fold(0, |point, a| point * counts[a] + line(a))
-    })
+    let last = cell.len() - 1;
+    (0..1_usize << cell.len())
+        .map(move |sides| grid.point(cell.iter().enumerate().map(|(a, low)| low + (sides >> (last - a) & 1))))
 }
 
 /// The dataset of the grid lines `lines` along each axis, contacts aside.
@@ -245,16 +240,9 @@ fn window(grid: &Grid, table: &Table<'_>, lines: &[Range<usize>]) -> Dataset {
     for (axis, lines) in part.axes.iter_mut().zip(lines) {
         (axis.start, axis.count) = (axis.coordinate(lines.start), lines.len());
     }
-    let counts = part.counts();
     let (mut torque, mut energy, mut gap, mut status) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for number in 0..part.points() {
-        let (mut rest, mut point, mut pitch) = (number, 0, 1);
-        for (a, axis) in grid.axes.iter().enumerate().rev() {
-            point += (lines[a].start + rest % counts[a]) * pitch;
-            rest /= counts[a];
-            pitch *= axis.count;
-        }
-        let result = table.result(point);
+        let result = table.result(grid.point(lines.iter().zip(part.lines(number)).map(|(lines, k)| lines.start + k)));
         torque.extend_from_slice(&result.torque);
         energy.push(result.energy);
         gap.push(result.gap);

@@ -20,7 +20,7 @@ use super::table::PointResult;
 use crate::{
     JointVector,
     contact::{Backend, Equilibrium, Model, Solver, Solvers, Status, Work},
-    field::{GRADIENT_STEP, LEAST_ENERGY, boundary::LEAST_GAP},
+    field::{GRADIENT_STEP, LEAST_ENERGY},
     scene::{Algorithm, Interpolation, Scene},
     store::{
         Order, Space,
@@ -32,6 +32,10 @@ use crate::{
 /// Depth behind the boundary at which contact is solved for a free node, over its gap [1]. Larger: the slope is that of
 /// deeper contact, of which more nodes touch. Smaller: w is a root of less energy, which errs more.
 const DEPTH_SHARE: f64 = 0.05;
+
+/// Least depth, and least change of the gap over a cell of the base, that counts [m]: a picometre is far below any depth
+/// that a force belongs to.
+const LEAST_GAP: f64 = 1e-12;
 
 /// Farthest boundary that is looked for, in cells of the base along any axis [1]: beyond, no cell of the node holds
 /// contact.

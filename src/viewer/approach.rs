@@ -69,7 +69,7 @@ fn cheapest(dataset: &Dataset, first: usize, last: usize) -> Vec<usize> {
         if so_far > cost[point] {
             continue;
         }
-        for next in neighbours(grid, point) {
+        for next in grid.neighbours(point).flatten().flatten() {
             let step = if dataset.status(next) == Status::Free { 1 } else { CONTACT_COST };
             if so_far + step < cost[next] {
                 (cost[next], before[next]) = (so_far + step, point);
@@ -83,16 +83,6 @@ fn cheapest(dataset: &Dataset, first: usize, last: usize) -> Vec<usize> {
     }
     way.reverse();
     way
-}
-
-/// Returns the points one grid line before and behind `point` along each joint.
-fn neighbours(grid: &Grid, point: usize) -> impl Iterator<Item = usize> {
-    let mut stride = 1;
-    grid.axes.iter().rev().flat_map(move |axis| {
-        let (here, line) = (stride, point / stride % axis.count);
-        stride *= axis.count;
-        [(line > 0).then(|| point - here), (line + 1 < axis.count).then(|| point + here)].into_iter().flatten()
-    })
 }
 
 /// Returns configurations on the line from `from` to `to`, two or more a grid step.

@@ -216,20 +216,13 @@ fn pitch(count: usize, axes: usize) -> usize {
 
 /// Configurations in contact, on every `pitch`th grid line of the first three joints.
 fn points(dataset: &Dataset, others: &[usize], pitch: usize) -> Vec<Point> {
-    let axes = &dataset.grid.axes[..dataset.grid.axes.len().min(3)];
-    let is_on_a_line = |block: &usize| {
-        let mut rest = *block;
-        axes.iter().rev().all(|axis| {
-            let line = rest % axis.count;
-            rest /= axis.count;
-            line.is_multiple_of(pitch)
-        })
-    };
-    let block: usize = dataset.grid.axes.iter().skip(3).map(|axis| axis.count).product();
-    let within = dataset.grid.axes.iter().skip(3).zip(others).fold(0, |point, (axis, line)| point * axis.count + line);
-    (0..dataset.grid.points() / block)
-        .filter(is_on_a_line)
-        .map(|number| number * block + within)
+    let grid = &dataset.grid;
+    let block: usize = grid.axes.iter().skip(3).map(|axis| axis.count).product();
+    let within = grid.point([0; 3].into_iter().chain(others.iter().copied()));
+    (0..grid.points())
+        .step_by(block)
+        .filter(|&first| grid.lines(first).iter().take(3).all(|line| line.is_multiple_of(pitch)))
+        .map(|first| first + within)
         .filter(|&point| dataset.status(point).is_in_contact())
         .map(|point| Point {
             place: place(dataset, &dataset.grid.configuration(point)),

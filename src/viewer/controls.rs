@@ -269,7 +269,6 @@ fn note(ui: &mut Ui, text: String) -> Response {
 fn lacking(interpolation: Interpolation, dataset: &Dataset) -> Option<&'static str> {
     match interpolation {
         Interpolation::Linear => None,
-        Interpolation::GapField => dataset.gap.is_none().then_some("gap"),
         Interpolation::Potential | Interpolation::Direct => dataset.energy.is_none().then_some("energy"),
     }
 }

@@ -283,17 +283,12 @@ fn plane<'a>(grid: &'a Grid, key: &'a Key) -> impl Iterator<Item = ([usize; 2], 
     let rows = if single { 1 } else { grid.axes[up].count };
     (0..rows).rev().flat_map(move |row| {
         (0..grid.axes[across].count).map(move |column| {
-            let point = grid.axes.iter().enumerate().fold(0, |point, (joint, axis)| {
-                let line = if joint == across {
-                    column
-                } else if joint == up {
-                    row
-                } else {
-                    key.lines[joint]
-                };
-                point * axis.count + line
-            });
-            ([column, row], point)
+            let line = |joint: usize| match joint {
+                joint if joint == across => column,
+                joint if joint == up => row,
+                joint => key.lines[joint],
+            };
+            ([column, row], grid.point((0..grid.joints()).map(line)))
         })
     })
 }

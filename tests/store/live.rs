@@ -251,12 +251,7 @@ fn a_solution_followed_is_followed_by_its_tangent_to_second_order() {
 fn a_scene_is_explored_for_its_own_interpolation() {
     let folder = tempfile::tempdir().unwrap();
     let text = include_str!("../scenes/small.toml");
-    for (name, order) in [
-        ("linear", Order::Linear),
-        ("gap-field", Order::Potential),
-        ("potential", Order::Potential),
-        ("direct", Order::Potential),
-    ] {
+    for (name, order) in [("linear", Order::Linear), ("potential", Order::Potential), ("direct", Order::Potential)] {
         let path = folder.path().join(name).with_extension("toml");
         std::fs::write(&path, format!("{text}\n[haptics]\ninterpolation = \"{name}\"\n")).unwrap();
         let kept = folder.path().join(name).with_extension("haptize");

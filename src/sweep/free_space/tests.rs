@@ -103,12 +103,7 @@ fn no_contact_is_missed_and_gaps_near_contact_are_left_to_the_solver() {
                     }
                     None if gap < 0.0 => {
                         touching += 1;
-                        let mut index = vec![0; counts.len()];
-                        let mut rest = point;
-                        for (j, count) in counts.iter().enumerate().rev() {
-                            index[j] = (rest % count) as isize;
-                            rest /= count;
-                        }
+                        let index = grid.lines(point).map(|line| line as isize);
                         for shift in 0..5_isize.pow(counts.len() as u32) {
                             let (mut rest, mut neighbour, mut inside) = (shift, 0, true);
                             for (j, &count) in counts.iter().enumerate() {
