@@ -11,8 +11,20 @@ use std::{
 /// that no account or torque of the haptic loop can become infinite.
 pub(crate) const GREATEST_INPUT: f64 = 1e9;
 
-/// How the text begins that Git LFS leaves in the place of a file that it has not fetched.
-const POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
+/// How files begin that are never what is asked for, and what to do with each.
+const FOREIGN: [(&[u8], &str); 5] = [
+    (
+        b"version https://git-lfs.github.com/spec/",
+        "this is a pointer of Git LFS, not the file itself: run `git lfs pull` in its repository",
+    ),
+    (b"\x28\xb5\x2f\xfd", "it is compressed by zstd: decompress it first, by `zstd -d FILE`"),
+    (b"\x1f\x8b", "it is compressed by gzip: decompress it first, by `gunzip FILE`"),
+    (
+        b"SQLite format 3\0",
+        "it is a database of SQLite, as ROS 2 records in .db3 files: write it as MCAP by `ros2 bag convert`",
+    ),
+    (b"#ROSBAG V2.0", "it is a bag of ROS 1: write it as MCAP by `rosbags-convert --src FILE.bag --dst FOLDER`"),
+];
 
 /// Opens the file at `path`. A folder holds no bytes, a pipe would be waited for, and a device may have no end.
 ///
@@ -23,10 +35,13 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
     if found.is_file() {
         let mut file = File::open(path)?;
         let mut head = Vec::new();
-        file.by_ref().take(POINTER.len() as u64).read_to_end(&mut head)?;
+        let longest = FOREIGN.iter().map(|(start, _)| start.len()).max().unwrap_or(0);
+        file.by_ref().take(longest as u64).read_to_end(&mut head)?;
         file.rewind()?;
-        let what = "this is a pointer of Git LFS, not the file itself: run `git lfs pull` in its repository";
-        return if head == POINTER { Err(io::Error::new(io::ErrorKind::InvalidInput, what)) } else { Ok(file) };
+        return match FOREIGN.iter().find(|(start, _)| head.starts_with(start)) {
+            Some((_, what)) => Err(io::Error::new(io::ErrorKind::InvalidInput, *what)),
+            None => Ok(file),
+        };
     }
     let what = if found.is_dir() {
         "this is a folder: give a file in it"

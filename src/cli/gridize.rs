@@ -145,6 +145,21 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         smooth: arguments.smooth,
     };
     let (dataset, report) = source.gridize(&options)?;
+    if report.inside == 0 {
+        let left_out = match &source.import {
+            Some(import) if !import.dropped.is_empty() => {
+                let dropped: Vec<String> = import.dropped.iter().map(ToString::to_string).collect();
+                format!(" ({})", dropped.join("; "))
+            }
+            _ => String::new(),
+        };
+        return Err(format!(
+            "none of the {} grid points lies between the {} samples{left_out}: give a smaller --step, or a log that \
+             goes through more of the joints' ranges",
+            report.points, report.samples
+        )
+        .into());
+    }
     let held_out = arguments.held_out.map(|share| held_out(&source.samples, &options, share)).transpose()?;
     let against = match arguments.against.as_slice() {
         [] => None,
@@ -299,10 +314,11 @@ fn describe(text: &mut String, source: &Source, dataset: &Dataset, report: &Grid
     }
     writeln!(text, "  in contact   {} points, torque above {:.4}", report.contact_points, report.epsilon)?;
     if source.left_out > 0 {
-        writeln!(text, "  left out     {} rows", source.left_out)?;
+        let rows = if source.left_out == 1 { "row" } else { "rows" };
+        writeln!(text, "  left out     {} {rows}", source.left_out)?;
     }
     for dropped in source.import.iter().flat_map(|import| &import.dropped) {
-        writeln!(text, "               {} {:?}, first at {}", dropped.rows, dropped.reason, dropped.first)?;
+        writeln!(text, "               {dropped}")?;
     }
     let Some(import) = &source.import else { return Ok(()) };
     writeln!(text, "  rows         {} read, {} gaps in time", import.rows, import.gaps)?;

@@ -13,14 +13,17 @@ use std::path::Path;
 /// Returns the motion called `name` in the scene of `dataset`, or that in the file `name`: a table, or joint states in
 /// MCAP, of which `topic` counts.
 pub fn named(setup: &Setup, dataset: &Dataset, name: &str, topic: Option<&str>) -> Result<Motion, Failure> {
-    let joints = setup.chain.joints.len();
+    let joints = &setup.chain.joints;
     let waypoints = match name {
         "press" => &setup.scene.motion.press,
         "scrape" => &setup.scene.motion.scrape,
-        file if is_mcap(Path::new(file)) => return recorded(dataset, Path::new(file), topic),
+        file if is_mcap(Path::new(file)) => return recorded(setup, dataset, Path::new(file), topic),
         file if Path::new(file).exists() => {
             no_topic(topic, file)?;
-            return Ok(Motion::from_csv(Path::new(file), joints)?);
+            let names: Vec<String> = joints.iter().map(|joint| joint.name.clone()).collect();
+            let motion = Motion::from_csv(Path::new(file), &names)?;
+            motion.check_limits(joints).map_err(|error| format!("{file}: {error}"))?;
+            return Ok(motion);
         }
         file => {
             let known = "the scene in the dataset may name the motions `press` and `scrape`; a CSV or MCAP file gives \
@@ -41,7 +44,7 @@ pub fn named(setup: &Setup, dataset: &Dataset, name: &str, topic: Option<&str>) 
             "haptize: note: the scene names no {name}; this one was made from where the dataset is in contact"
         ));
     }
-    Ok(Motion::through(waypoints, joints)?)
+    Ok(Motion::through(waypoints, joints.len())?)
 }
 
 /// Refuses a topic where there are none.
@@ -50,7 +53,7 @@ fn no_topic(topic: Option<&str>, motion: &str) -> Result<(), Failure> {
 }
 
 /// The motion in the MCAP file `file`, of the joints of `dataset`.
-fn recorded(dataset: &Dataset, file: &Path, topic: Option<&str>) -> Result<Motion, Failure> {
+fn recorded(setup: &Setup, dataset: &Dataset, file: &Path, topic: Option<&str>) -> Result<Motion, Failure> {
     let joints: Vec<String> = labels(&dataset.grid).into_iter().map(|joint| joint.name).collect();
     let course = Course::read(file, topic, &joints)?;
     if course.left_out > 0 {
@@ -63,5 +66,9 @@ fn recorded(dataset: &Dataset, file: &Path, topic: Option<&str>) -> Result<Motio
         ));
     }
     let samples: Vec<Waypoint> = course.samples.into_iter().map(|(time, q)| Waypoint { time, q }).collect();
-    Motion::along(samples, joints.len()).map_err(|error| format!("{}: {error}", file.display()).into())
+    let motion = Motion::along(samples, joints.len()).map_err(|error| format!("{}: {error}", file.display()))?;
+    if let Err(error) = motion.check_limits(&setup.chain.joints) {
+        tell(format_args!("haptize: note: {}: {error}; the arm stops at its limits", file.display()));
+    }
+    Ok(motion)
 }

@@ -2,12 +2,14 @@
 //!
 //! Scenes give waypoints, joined by minimum-jerk paths (Flash and Hogan 1985), at rest at each of them:
 //! `q(s) = q_0 + (q_1 - q_0)(10 s^3 - 15 s^4 + 6 s^5)`, s from 0 to 1. Files give samples, joined by straight lines:
-//! one row a sample, comma-separated, time in seconds and then one coordinate per joint.
+//! one row a sample, comma-separated. A header names the columns, `time` and the joints in any order, each with its unit
+//! in brackets or without; other columns are passed over. Without a header a row is the time in seconds and then one
+//! coordinate per joint.
 
 use crate::{
     JointVector,
     input::{self, GREATEST_INPUT},
-    scene::Waypoint,
+    scene::{JointKind, JointSpec, Waypoint},
 };
 use std::{
     io::{self, BufRead, BufReader},
@@ -55,6 +57,22 @@ pub enum MotionError {
         q: JointVector,
         /// Number of joints of the proxy.
         joints: usize,
+    },
+    /// A position is beyond the limits of its joint.
+    #[error("at {time} s joint {joint} is at {position}, beyond its limits [{least}, {greatest}]{hint}")]
+    Limits {
+        /// When [s].
+        time: f64,
+        /// Name of the joint.
+        joint: String,
+        /// Its position [rad or m].
+        position: f64,
+        /// Its least position [rad or m].
+        least: f64,
+        /// Its greatest position [rad or m].
+        greatest: f64,
+        /// What may be the cause, in words, or nothing.
+        hint: &'static str,
     },
     /// The file cannot be read.
     #[error("{}: cannot be read: {source}", .file.display())]
@@ -119,12 +137,14 @@ impl Motion {
         if self.waypoints.is_empty() { Err(MotionError::Empty) } else { Ok(self) }
     }
 
-    /// The motion in the comma-separated `file`, of `joints` joints. Empty lines, lines that begin with # or %, and a
-    /// header line before the first sample are passed over.
+    /// Returns the motion in the comma-separated `file`, of the joints of these names, in their order. Empty lines and
+    /// lines that begin with # or % are passed over.
     ///
     /// # Errors
-    /// When the file cannot be read or a line is not a sample; the error names file and line.
-    pub fn from_csv(file: &Path, joints: usize) -> Result<Self, MotionError> {
+    /// When the file cannot be read, its header does not name each joint once, or a line is not a sample; the error
+    /// names file and line.
+    pub fn from_csv(file: &Path, names: &[String]) -> Result<Self, MotionError> {
+        let joints = names.len();
         let unreadable = |source| MotionError::Read { file: file.into(), source };
         let opened = input::open(file).map_err(unreadable)?;
         if opened.metadata().map_err(unreadable)?.len() > GREATEST_FILE {
@@ -133,7 +153,7 @@ impl Motion {
         let mut reader = BufReader::new(opened);
         let mut waypoints: Vec<Waypoint> = Vec::new();
         let (mut bytes, mut number) = (Vec::new(), 0);
-        let mut header_possible = true;
+        let mut columns: Option<Columns> = None;
         loop {
             bytes.clear();
             if reader.read_until(b'\n', &mut bytes).map_err(unreadable)? == 0 {
@@ -141,24 +161,56 @@ impl Motion {
             }
             number += 1;
             let bad = |what: String| MotionError::Line { file: file.into(), line: number, what, joints };
-            let text = std::str::from_utf8(&bytes).map_err(|_| bad("not text".into()))?.trim();
+            let text = std::str::from_utf8(&bytes).map_err(|_| bad("not text".into()))?;
+            let text = text.trim_start_matches('\u{feff}').trim();
             if text.is_empty() || text.starts_with(['#', '%']) {
                 continue;
             }
-            match sample(text, joints) {
-                Ok(point) if waypoints.last().is_some_and(|last| last.time >= point.time) => {
-                    return Err(bad(format!("time {} s does not come after the line before", point.time)));
+            let Some(columns) = &columns else {
+                let is_header = text.split(',').all(|field| number_in(field).is_none());
+                let found = if is_header { Columns::named(text, names).map_err(bad)? } else { Columns::plain(joints) };
+                if !is_header {
+                    waypoints.push(found.sample(text).map_err(bad)?);
                 }
-                Ok(point) => waypoints.push(point),
-                Err(_) if header_possible && text.split(',').all(|field| number_in(field).is_none()) => {}
-                Err(what) => return Err(bad(what)),
+                columns = Some(found);
+                continue;
+            };
+            let point = columns.sample(text).map_err(bad)?;
+            if waypoints.last().is_some_and(|last| last.time >= point.time) {
+                return Err(bad(format!("time {} s does not come after the line before", point.time)));
             }
-            header_possible = false;
+            waypoints.push(point);
         }
         if waypoints.is_empty() {
             return Err(MotionError::NoSample { file: file.into(), joints });
         }
         Ok(Self { waypoints, smooth: false })
+    }
+
+    /// Checks that the motion keeps within the limits of `joints`.
+    ///
+    /// # Errors
+    /// [`MotionError::Limits`] for the first waypoint that does not.
+    pub fn check_limits(&self, joints: &[JointSpec]) -> Result<(), MotionError> {
+        for point in &self.waypoints {
+            for (&position, joint) in point.q.iter().zip(joints) {
+                let [least, greatest] = joint.limits;
+                if (least..=greatest).contains(&position) {
+                    continue;
+                }
+                let in_degrees = (least..=greatest).contains(&position.to_radians());
+                let hint = match joint.kind {
+                    JointKind::Revolute if in_degrees => ": if the angles are in degrees, give them in radians",
+                    JointKind::Prismatic if (least..=greatest).contains(&(1e-3 * position)) => {
+                        ": if the positions are in millimetres, give them in metres"
+                    }
+                    _ => "",
+                };
+                let (time, joint) = (point.time, joint.name.clone());
+                return Err(MotionError::Limits { time, joint, position, least, greatest, hint });
+            }
+        }
+        Ok(())
     }
 
     /// Number of joints.
@@ -212,21 +264,67 @@ fn number_in(field: &str) -> Option<f64> {
     field.trim().parse().ok()
 }
 
-fn sample(text: &str, joints: usize) -> Result<Waypoint, String> {
-    let fields = text.split(',').count();
-    if fields != joints + 1 {
-        return Err(format!("{fields} numbers"));
+/// The columns of a file that count.
+struct Columns {
+    count: usize,
+    time: usize,
+    /// One per joint.
+    joints: Vec<usize>,
+}
+
+impl Columns {
+    /// Those of a file without a header.
+    fn plain(joints: usize) -> Self {
+        Self { count: joints + 1, time: 0, joints: (1..=joints).collect() }
     }
-    let mut numbers = text.split(',').map(|field| {
-        let value = number_in(field).ok_or_else(|| format!("\"{}\" is not a number", shown(field.trim())))?;
-        if value.abs() <= GREATEST_INPUT { Ok(value) } else { Err(format!("{value} is not a coordinate")) }
-    });
-    let time = numbers.next().unwrap_or(Ok(0.0))?;
-    let mut q = JointVector::zeros(joints);
-    for (x, value) in q.iter_mut().zip(numbers) {
-        *x = value?;
+
+    /// Those that `header` names.
+    fn named(header: &str, joints: &[String]) -> Result<Self, String> {
+        let columns: Vec<(&str, Option<&str>)> = header.split(',').map(heading).collect();
+        let find = |name: &str, units: &[&str]| {
+            let mut found = columns.iter().enumerate().filter(|(_, (known, _))| *known == name);
+            match (found.next(), found.next()) {
+                (Some((_, (_, Some(unit)))), None) if !units.contains(unit) => {
+                    Err(format!("column {name} is in {}, not in {}", shown(unit), units.join(" or ")))
+                }
+                (Some((column, _)), None) => Ok(column),
+                (None, _) => Err(format!(
+                    "no column of the header is called {name}; it names {}",
+                    shown(&columns.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", "))
+                )),
+                _ => Err(format!("several columns are called {name}")),
+            }
+        };
+        let time = find("time", &["s"])?;
+        let joints = joints.iter().map(|joint| find(joint, &["rad", "m"])).collect::<Result<_, _>>()?;
+        Ok(Self { count: columns.len(), time, joints })
     }
-    Ok(Waypoint { time, q })
+
+    fn sample(&self, text: &str) -> Result<Waypoint, String> {
+        let fields: Vec<&str> = text.split(',').collect();
+        if fields.len() != self.count {
+            return Err(format!("{} numbers", fields.len()));
+        }
+        let number = |column: usize| {
+            let field = fields.get(column).map_or("", |field| field.trim());
+            let value = number_in(field).ok_or_else(|| format!("\"{}\" is not a number", shown(field)))?;
+            if value.abs() <= GREATEST_INPUT { Ok(value) } else { Err(format!("{value} is not a coordinate")) }
+        };
+        let mut q = JointVector::zeros(self.joints.len());
+        for (x, &column) in q.iter_mut().zip(&self.joints) {
+            *x = number(column)?;
+        }
+        Ok(Waypoint { time: number(self.time)?, q })
+    }
+}
+
+/// Name and unit of a heading such as `elbow [rad]`.
+fn heading(field: &str) -> (&str, Option<&str>) {
+    let field = field.trim().trim_matches('"').trim();
+    match field.strip_suffix(']').and_then(|field| field.rsplit_once('[')) {
+        Some((name, unit)) => (name.trim(), Some(unit.trim())),
+        None => (field, None),
+    }
 }
 
 /// The beginning of what a file gave, short enough for a message.
@@ -243,10 +341,10 @@ mod tests {
         Waypoint { time, q: JointVector::from_slice(q) }
     }
 
-    fn read(text: &[u8], joints: usize) -> Result<Motion, MotionError> {
+    fn read(text: &[u8]) -> Result<Motion, MotionError> {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(text).unwrap();
-        Motion::from_csv(file.path(), joints)
+        Motion::from_csv(file.path(), &["shoulder".into(), "elbow".into()])
     }
 
     #[test]
@@ -267,7 +365,7 @@ mod tests {
     #[test]
     fn a_file_gives_its_samples_and_lines_between_them() {
         let text = b"# pressed by hand\ntime [s],shoulder [rad],elbow [rad]\n0,1,2\r\n\n0.5, 2 ,4\n1.5,2,-4e0\n";
-        let motion = read(text, 2).unwrap();
+        let motion = read(text).unwrap();
         assert_eq!(*motion.at(0.0).0, [1.0, 2.0]);
         assert_eq!(*motion.at(0.25).0, [1.5, 3.0]);
         assert_eq!(*motion.at(0.25).1, [2.0, 4.0]);
@@ -276,24 +374,60 @@ mod tests {
 
     #[test]
     fn hostile_files_are_refused_with_their_line() {
-        let cases: [(&[u8], &str); 9] = [
+        let cases: [(&[u8], &str); 15] = [
             (b"0,1,2\n1,2\n", ":2: 2 numbers"),
             (b"0,1,2,3\n", ":1: 4 numbers"),
             (b"0,1,2\n0,1,2\n", ":2: time 0 s does not come after"),
             (b"0,1,2\n1,nan,2\n", ":2: NaN is not a coordinate"),
             (b"0,1,2\n1,inf,2\n", ":2: inf is not a coordinate"),
             (b"0,1,2\n1,1e12,2\n", ":2: 1000000000000 is not a coordinate"),
-            (b"time,a,b\ntime,a,b\n", ":2: \"time\" is not a number"),
+            (b"time,shoulder,elbow\ntime,a,b\n", ":2: \"a\" is not a number"),
+            (b"time,a,b\n0,1,2\n", ":1: no column of the header is called shoulder; it names time, a, b"),
+            (b"shoulder,elbow\n1,2\n", ":1: no column of the header is called time"),
+            (b"time,elbow,elbow,shoulder\n0,1,2,3\n", ":1: several columns are called elbow"),
+            (b"time [s],shoulder [deg],elbow [deg]\n0,1,2\n", ":1: column shoulder is in deg, not in rad or m"),
+            (b"time [ms],shoulder,elbow\n0,1,2\n", ":1: column time is in ms, not in s"),
+            (b"time,shoulder,elbow,force\n0,1,2\n", ":2: 3 numbers"),
             (b"0,1,2\n\xff\xfe\n", ":2: not text"),
             (b"1,x,2\n", ":1: \"x\" is not a number"),
         ];
         for (text, expected) in cases {
-            let message = read(text, 2).unwrap_err().to_string();
+            let message = read(text).unwrap_err().to_string();
             assert!(message.contains(expected), "{message}");
         }
-        assert!(matches!(read(b"", 2), Err(MotionError::NoSample { .. })));
-        assert!(matches!(read(b"time,a,b\n", 2), Err(MotionError::NoSample { .. })));
-        assert!(matches!(Motion::from_csv(Path::new("/nowhere.csv"), 2), Err(MotionError::Read { .. })));
+        assert!(matches!(read(b""), Err(MotionError::NoSample { .. })));
+        assert!(matches!(read(b"time,shoulder,elbow\n"), Err(MotionError::NoSample { .. })));
+        assert!(matches!(Motion::from_csv(Path::new("/nowhere.csv"), &[]), Err(MotionError::Read { .. })));
+    }
+
+    #[test]
+    fn columns_are_found_by_the_names_of_the_joints() {
+        let expected = read(b"0,1,2\n1,3,4\n").unwrap();
+        let texts: [&[u8]; 3] = [
+            b"time,elbow,shoulder\n0,2,1\n1,4,3\n",
+            b"\xef\xbb\xbfelbow [rad], force [N], \"shoulder [m]\", time [s]\n2,9,1,0\n4,9,3,1\n",
+            b"# exported\n\nshoulder,time,elbow\n1,0,2\n3,1,4\n",
+        ];
+        for text in texts {
+            assert_eq!(read(text).unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn positions_beyond_the_limits_are_refused_with_what_may_be_the_cause() {
+        let scene =
+            crate::scene::Scene::parse(include_str!("../../datasets/mesh.toml"), Path::new("datasets/mesh.toml"));
+        let mut joints = scene.unwrap().proxy.joints;
+        joints.truncate(2);
+        let middle: Vec<f64> = joints.iter().map(|joint| joint.limits[0].midpoint(joint.limits[1])).collect();
+        let along = |q: [f64; 2]| Motion::along(vec![waypoint(0.0, &middle), waypoint(0.5, &q)], 2).unwrap();
+        assert!(along([joints[0].limits[1], joints[1].limits[0]]).check_limits(&joints).is_ok());
+        let message = |q| along(q).check_limits(&joints).unwrap_err().to_string();
+        let degrees = message([middle[0], middle[1].to_degrees()]);
+        assert!(degrees.starts_with("at 0.5 s joint yaw") && degrees.contains("give them in radians"), "{degrees}");
+        let millimetres = message([1e3 * joints[0].limits[1], middle[1]]);
+        assert!(millimetres.contains("joint lift") && millimetres.contains("give them in metres"), "{millimetres}");
+        assert!(!message([middle[0], 1e3]).contains("give them"));
     }
 
     #[test]

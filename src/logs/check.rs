@@ -111,16 +111,10 @@ fn check_columns(mapping: &Mapping) -> Result<(), Refusal> {
     };
     let of_time = mapping.time.column.iter().map(|column| ("time.column".to_owned(), column.clone()));
     for (key, column) in mapping.joints.iter().enumerate().flat_map(of_joint).chain(of_time) {
-        match column {
-            ColumnName::Number(number) => {
-                refuse(number == 0, &*key, "columns are numbered from 1, not from 0")?;
-                let beyond = mapping.table.columns.is_some_and(|columns| number > columns);
-                refuse(beyond, key, format!("column {number} is beyond table.columns"))?;
-            }
-            ColumnName::Name(name) => {
-                let message = format!("column `{name}` is named, but table.header is not true");
-                refuse(!mapping.table.header, key, message)?;
-            }
+        if let ColumnName::Number(number) = column {
+            refuse(number == 0, &*key, "columns are numbered from 1, not from 0")?;
+            let beyond = mapping.table.columns.is_some_and(|columns| number > columns);
+            refuse(beyond, key, format!("column {number} is beyond table.columns"))?;
         }
     }
     Ok(())

@@ -28,6 +28,7 @@ use crate::{
 use cells::{Cells, Direction};
 use rows::{ReadRowResult, Row, Rows};
 use std::{
+    fmt,
     io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
 };
@@ -70,6 +71,18 @@ pub enum ImportError {
         /// The limit.
         limit: usize,
     },
+    /// Most rows are of no use.
+    #[error("{dropped} of {rows} rows cannot be used ({listed}): {remedy}")]
+    MostDropped {
+        /// Rows that cannot be used.
+        dropped: u64,
+        /// Rows read.
+        rows: u64,
+        /// How many for which reason, and where first.
+        listed: String,
+        /// What to do, in words.
+        remedy: &'static str,
+    },
     /// An MCAP file that cannot be read.
     #[error(transparent)]
     Ros(#[from] RosError),
@@ -103,6 +116,21 @@ pub struct Dropped {
     pub rows: u64,
     /// File and line of the first.
     pub first: String,
+}
+
+impl fmt::Display for Dropped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { reason, rows, first } = self;
+        let (row, has) = if *rows == 1 { ("row", "has") } else { ("rows", "have") };
+        let what = match reason {
+            Reason::Columns => "another number of columns",
+            Reason::NotANumber => "a field that is missing or not a finite number",
+            Reason::RepeatedTime => "the time of the row before",
+            Reason::TimeGoesBack => "a time before that of an earlier row",
+            Reason::Outlier => "a torque far off its neighbours'",
+        };
+        write!(f, "{rows} {row} {has} {what}, first at {first}")
+    }
 }
 
 /// Report of an import.
@@ -164,7 +192,13 @@ pub fn import(
             progress(ImportProgress { bytes: bytes + read, rows });
         })?;
     }
-    import.finish()
+    let remedy = if of_robot {
+        "each message has to give position and effort of all joints: choose joints of one publisher by a column \
+         mapping (--columns)"
+    } else {
+        "correct the log or the mapping, or cut off the part that is not a measurement"
+    };
+    import.finish(remedy)
 }
 
 /// Total size of `files`, for a progress bar [bytes].
@@ -319,7 +353,15 @@ impl<'a> Import<'a> {
         }
     }
 
-    fn finish(mut self) -> Result<Imported, ImportError> {
+    /// `remedy`: what to do where most rows cannot be used.
+    fn finish(mut self, remedy: &'static str) -> Result<Imported, ImportError> {
+        // Rows that repeat a time or hold an outlier are what a sound log has, too.
+        let broken = |dropped: &&Dropped| !matches!(dropped.reason, Reason::RepeatedTime | Reason::Outlier);
+        let dropped: u64 = self.report.dropped.iter().filter(broken).map(|dropped| dropped.rows).sum();
+        let listed = || self.report.dropped.iter().map(Dropped::to_string).collect::<Vec<_>>().join("; ");
+        if 2 * dropped > self.report.rows {
+            return Err(ImportError::MostDropped { dropped, rows: self.report.rows, listed: listed(), remedy });
+        }
         let keep = self.mapping.torque.keep;
         let mut branches = None;
         if keep != Keep::All {
@@ -332,8 +374,9 @@ impl<'a> Import<'a> {
         self.report.samples = self.samples.len();
         if self.samples.is_empty() {
             return Err(ImportError::Nothing(format!(
-                "{} rows were read; see torque.keep, torque.still and torque.cell in the mapping",
-                self.report.rows
+                "{} rows were read ({}); see torque.keep, torque.still and torque.cell in the mapping",
+                self.report.rows,
+                if self.report.dropped.is_empty() { "none was left out".to_owned() } else { listed() }
             )));
         }
         Ok(Imported { samples: self.samples, branches, report: self.report })

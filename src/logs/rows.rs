@@ -127,9 +127,20 @@ impl<'a, R: BufRead> Rows<'a, R> {
     fn line_outcome(&mut self, text: &[u8]) -> Result<Option<ReadRowResult>, ImportError> {
         let delimiter = self.mapping.table.delimiter;
         let Ok(text) = std::str::from_utf8(text) else {
-            return self.refuse(Reason::NotANumber, "the line is not text".to_owned()).map(Some);
+            if self.layout.is_none() {
+                let name = &self.file;
+                return Err(self.error(format!(
+                    "the line is not UTF-8, and it names the columns or counts them: convert the file, for example by \
+                     `iconv -f CP1252 -t UTF-8 {name}`"
+                )));
+            }
+            return self.refuse(Reason::NotANumber, "the line is not UTF-8".to_owned()).map(Some);
         };
         let Some(layout) = &self.layout else {
+            if text.contains('\r') {
+                let what = "lines end by carriage returns alone: convert the file, for example by `tr '\\r' '\\n'`";
+                return Err(self.error(what.to_owned()));
+            }
             let names: Vec<&str> = fields(text, delimiter).collect();
             self.layout = Some(self.layout(&names)?);
             return if self.mapping.table.header { Ok(None) } else { self.line_outcome(text.as_bytes()) };
@@ -212,9 +223,21 @@ impl<'a, R: BufRead> Rows<'a, R> {
                 let hint = names.first().map_or("", |field| self.hint(field));
                 Err(self.error(format!("the mapping names column {number}, the line has {columns}{hint}")))
             }
+            ColumnName::Name(name) if !self.mapping.table.header => {
+                let what = format!("the mapping names the column `{name}`, and says of no line that it names columns");
+                Err(self.error(format!("{what}: set `header = true` in [table], or give the column's number")))
+            }
             ColumnName::Name(name) => {
-                let known = || format!("no column is called `{name}`; there are {}", names.join(", "));
-                names.iter().position(|known| known == name).ok_or_else(|| self.error(known()))
+                let mut found = names.iter().enumerate().filter(|(_, known)| *known == name).map(|(column, _)| column);
+                match (found.next(), found.next()) {
+                    (Some(column), None) => Ok(column),
+                    (None, _) => Err(self.error(format!("no column is called `{name}`; there are {}", listed(names)))),
+                    (Some(first), Some(second)) => Err(self.error(format!(
+                        "columns {} and {} are both called `{name}`: give the number of the one that is meant",
+                        first + 1,
+                        second + 1
+                    ))),
+                }
             }
         };
         let all = |of: fn(&super::mapping::Joint) -> &Quantity| {
@@ -233,10 +256,27 @@ fn converted(quantity: &Quantity, raw: f64) -> f64 {
     quantity.scale * raw + quantity.offset
 }
 
-/// Fields of a line, trimmed of blanks and quotation marks.
+/// The first of `names`, as many as a message has room for.
+fn listed(names: &[&str]) -> String {
+    const MOST_NAMES: usize = 12;
+    const MOST_CHARACTERS: usize = 40;
+    let cut = |name: &&str| name.chars().take(MOST_CHARACTERS).collect::<String>();
+    let mut list = names.iter().take(MOST_NAMES).map(cut).collect::<Vec<_>>().join(", ");
+    if names.len() > MOST_NAMES {
+        list.push_str(&format!(" and {} more", names.len() - MOST_NAMES));
+    }
+    list
+}
+
+/// Fields of a line, trimmed of blanks and quotation marks. Within quotation marks a delimiter is a character like any
+/// other (RFC 4180).
 fn fields(text: &str, delimiter: char) -> impl Iterator<Item = &str> {
     let blank = delimiter == ' ';
-    let split = text.split(move |c: char| if blank { c.is_ascii_whitespace() } else { c == delimiter });
+    let mut quoted = false;
+    let split = text.split(move |c: char| {
+        quoted ^= c == '"';
+        !quoted && if blank { c.is_ascii_whitespace() } else { c == delimiter }
+    });
     split.filter(move |field| !(blank && field.is_empty())).map(|field| field.trim().trim_matches('"'))
 }
 

@@ -15,7 +15,7 @@ fn read(mapping: &str, log: &str) -> Result<(Samples, ImportReport), ImportError
     let mapping = Mapping::parse(mapping, Path::new("map.toml")).unwrap();
     let mut import = Import::new(&mapping);
     import.read(log.as_bytes(), "log.csv", &mut |_, _| {})?;
-    import.finish().map(|imported| (imported.samples, imported.report))
+    import.finish("correct the log").map(|imported| (imported.samples, imported.report))
 }
 
 fn refused(mapping: &str, log: &str) -> String {
@@ -50,8 +50,22 @@ fn columns_are_scaled_and_named() {
 
 #[test]
 fn bad_rows_are_refused_with_their_line_or_dropped_and_counted() {
-    let rows =
-        ["0,1,1", "1,2", "2,nan,1", "3,,1", "3.5,inf,1", "4,0x1,1", "5,1,1,1", "6,3,1", "6,4,1", "5.5,1,1", "7,5,1"];
+    let rows = [
+        "0,1,1",
+        "1,2",
+        "2,nan,1",
+        "3,,1",
+        "3.5,inf,1",
+        "4,0x1,1",
+        "5,1,1,1",
+        "6,3,1",
+        "6,4,1",
+        "5.5,1,1",
+        "7,5,1",
+        "8,6,1",
+        "9,7,1",
+        "10,8,1",
+    ];
     let log = rows.join("\n");
     for (bad, line, what) in
         [(1, 2, "2 columns where 3"), (2, 2, "`nan`"), (3, 2, "``"), (5, 2, "`0x1`"), (9, 2, "time goes back")]
@@ -64,7 +78,7 @@ fn bad_rows_are_refused_with_their_line_or_dropped_and_counted() {
     assert!(refused(TWO, "0,\"1\",1\n1,1 5,1").contains("log.csv:2"));
     let dropping = format!("[table]\nbad_rows = \"drop\"\n{TWO}");
     let (samples, report) = read(&dropping, &log).unwrap();
-    assert_eq!(samples.configurations, [1.0, 3.0, 5.0]);
+    assert_eq!(samples.configurations, [1.0, 3.0, 5.0, 6.0, 7.0, 8.0]);
     let dropped: Vec<_> = report.dropped.iter().map(|d| (d.reason, d.rows, d.first.as_str())).collect();
     assert_eq!(
         dropped,
@@ -75,7 +89,34 @@ fn bad_rows_are_refused_with_their_line_or_dropped_and_counted() {
             (Reason::TimeGoesBack, 1, "log.csv:10")
         ]
     );
-    assert_eq!(report.rows, 11);
+    assert_eq!(report.rows, 14);
+    let error = refused(&dropping, &rows[..11].join("\n"));
+    assert!(error.contains("7 of 11 rows cannot be used (2 rows have another number of columns, first at"), "{error}");
+    // The clock is set back once: all that follows comes before the first row.
+    let error = refused(&dropping, "1790000000,1,1\n0,1,1\n1,2,1\n2,3,1\n");
+    assert!(error.contains("3 rows have a time before that of an earlier row, first at log.csv:2"), "{error}");
+}
+
+#[test]
+fn a_header_names_each_column_once_in_utf_8() {
+    let named = "[table]\nheader = true\nbad_rows = \"drop\"\n[time]\ncolumn = \"t\"\n[[joint]]\nname = \"a\"\n\
+                 position = { column = \"x, y\" }\ntorque = { column = \"f\" }\n";
+    let read = |log: &[u8]| {
+        let mapping = Mapping::parse(named, Path::new("map.toml")).unwrap();
+        let mut import = Import::new(&mapping);
+        import.read(log, "log.csv", &mut |_, _| {})?;
+        import.finish("correct the log").map(|imported| imported.samples.configurations)
+    };
+    let refused = |log: &[u8]| read(log).err().unwrap().to_string();
+    assert_eq!(read(b"t,\"x, y\",\"note, or none\",f\n0,1,\"a, b\",2\n1,3,,4\n").unwrap(), [1.0, 3.0]);
+    assert!(refused(b"t,\"x, y\",f,f\n0,1,2,3\n").contains("log.csv:1: columns 3 and 4 are both called `f`"));
+    assert!(refused(b"t,\"x, y\",f,\xb0\n0,1,2,3\n").contains("log.csv:1: the line is not UTF-8"));
+    assert!(refused(b"t,\"x, y\",f\r0,1,2\r1,2,3\r").contains("carriage returns"));
+    let many: Vec<String> = (0..3000).map(|column| format!("column {column}")).collect();
+    let error = refused(many.join(",").as_bytes());
+    assert!(error.contains("column 11 and 2988 more") && error.len() < 400, "{error}");
+    // The same column may be left unnamed where it is not asked for.
+    assert_eq!(read(b"t,\"x, y\",,,f\n0,1,9,9,2\n").unwrap(), [1.0]);
 }
 
 #[test]
@@ -97,6 +138,7 @@ fn binary_files_and_other_text_are_refused_in_small_memory() {
     assert!(error.contains("x.bin:1") && error.contains("not a table"), "{error}");
     assert!(refused(TWO, "only one column\n").contains("column 2"));
     assert!(refused(TWO, "").contains("no row was kept"));
+    assert!(refused(&TWO.replacen("column = 2", "column = \"x\"", 1), "0,1,2\n").contains("`header = true`"));
 }
 
 #[test]
@@ -106,7 +148,6 @@ fn mappings_that_cannot_be_are_refused_with_the_line_and_the_key() {
         assert!(error.starts_with(&format!("map.toml:{place}: ")) && error.contains(expected), "{to:?}: {error}");
     };
     bad("column = 2", "column = 0", "6:23", "from 1");
-    bad("column = 2", "column = \"x\"", "6:23", "table.header");
     bad("[time]", "[table]\ncolumns = 2\n[time]", "9:21", "column 3 is beyond table.columns");
     bad("column = 2", "column = 2, scale = 0.0", "6:34", "other than zero");
     bad("column = 2", "column = 2, offset = inf", "6:35", "offset");

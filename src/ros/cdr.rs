@@ -6,6 +6,9 @@
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 const BIG_ENDIAN: [u8; 2] = [0, 0];
 
+/// How a message begins that was compressed by zstd.
+const ZSTD: [u8; 2] = [0x28, 0xb5];
+
 /// Bytes before the body, from which alignment is counted.
 const HEADER: usize = 4;
 
@@ -62,6 +65,10 @@ impl<'a> Decoder<'a> {
         match [header[0], header[1]] {
             order if order == BIG_ENDIAN => Ok(Self { body, at: 0, big_endian: true }),
             order if order == LITTLE_ENDIAN[..2] => Ok(Self { body, at: 0, big_endian: false }),
+            ZSTD => {
+                Err("it is compressed by zstd by itself: write messages without compression by `ros2 bag convert`"
+                    .into())
+            }
             other => Err(format!("encoding {other:?} is not plain CDR")),
         }
     }
@@ -93,8 +100,12 @@ impl<'a> Decoder<'a> {
         String::from_utf8(text.to_vec()).map_err(|_| "a name is not text".into())
     }
 
-    pub fn strings(&mut self) -> Result<Vec<String>, String> {
+    /// A sequence of at most `most` strings.
+    pub fn strings(&mut self, most: usize) -> Result<Vec<String>, String> {
         let count = self.u32()?;
+        if count as usize > most {
+            return Err(format!("it names {count} joints, more than {most}"));
+        }
         // Each takes four bytes at least.
         if count as usize > self.body.len() / 4 {
             return Err("it ends too early".into());

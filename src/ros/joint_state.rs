@@ -63,7 +63,7 @@ impl JointState {
         let state = Self {
             stamp: u64::from(seconds) * NANOSECONDS + u64::from(nanoseconds),
             frame: decoder.string()?,
-            names: decoder.strings()?,
+            names: decoder.strings(super::MOST_JOINTS)?,
             position: decoder.f64s()?,
             velocity: decoder.f64s()?,
             effort: decoder.f64s()?,

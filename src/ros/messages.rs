@@ -110,7 +110,10 @@ impl Messages {
 
 /// The error of a file whose records are not as long as they say.
 fn damaged(path: &Path) -> RosError {
-    let what = "a record is shorter than it says: the file is damaged; record it again".to_owned();
+    let what =
+        "a record is shorter than it says: the file is damaged: what is whole comes back by `mcap recover IN.mcap -o \
+                OUT.mcap`"
+            .to_owned();
     RosError::Mcap { file: path.to_owned(), what }
 }
 

@@ -22,6 +22,9 @@ use std::path::PathBuf;
 /// Name of the message type.
 const TYPE: &str = "sensor_msgs/msg/JointState";
 
+/// Most joints of a topic: ten times as many as those of a humanoid with hands.
+const MOST_JOINTS: usize = 1 << 10;
+
 /// How its schema and its messages are encoded.
 const SCHEMA_ENCODING: &str = "ros2msg";
 const MESSAGE_ENCODING: &str = "cdr";

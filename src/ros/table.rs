@@ -5,17 +5,14 @@
 //! empty field, which the import drops or refuses as its mapping says. Time is the message's stamp; if all stamps are
 //! zero, the time at which it was logged.
 
-use super::{JointState, RosError, TYPE, messages::Messages};
+use super::{JointState, MOST_JOINTS, RosError, TYPE, messages::Messages};
 use crate::{csv::plain, input};
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     fmt::Write as _,
     io::{self, Read},
     path::Path,
 };
-
-/// Most joints of a topic: ten times as many as those of a humanoid with hands.
-const MOST_JOINTS: usize = 1 << 10;
 
 /// A topic of joint states.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -50,6 +47,8 @@ pub struct JointStateTable {
     messages: Messages,
     topic: String,
     joints: Vec<String>,
+    /// Number of each joint.
+    numbers: BTreeMap<String, usize>,
     stamped: bool,
     number: u64,
     text: String,
@@ -63,23 +62,40 @@ impl JointStateTable {
     /// [`RosError`] if the file cannot be read, the topic is not there or not unique, or a message is none.
     pub fn open(path: &Path, topic: Option<&str>) -> Result<Self, RosError> {
         let topic = chosen(path, topic)?;
-        let (mut joints, mut known, mut stamped, mut number) = (Vec::new(), BTreeSet::new(), false, 0);
+        let (mut joints, mut numbers, mut stamped, mut number) = (Vec::new(), BTreeMap::new(), false, 0);
+        let mut has_effort = false;
         for message in Messages::open(path)? {
             let (name, _, bytes) = message?;
             if name == topic {
                 number += 1;
                 let state = decode(path, &topic, number, &bytes)?;
                 stamped |= state.stamp > 0;
+                has_effort |= state.effort.iter().any(|effort| effort.is_finite());
+                let mut refused = None;
                 for joint in state.names {
-                    if known.insert(joint.clone()) {
+                    if joint.trim().is_empty() {
+                        refused =
+                            Some("it has a joint without a name: name it where the message is published".to_owned());
+                    }
+                    if !numbers.contains_key(&joint) {
+                        numbers.insert(joint.clone(), joints.len());
                         joints.push(joint);
                     }
                 }
                 if joints.len() > MOST_JOINTS {
-                    let what = format!("its messages name more than {MOST_JOINTS} joints");
+                    refused = Some(format!("its messages name more than {MOST_JOINTS} joints"));
+                }
+                if let Some(what) = refused {
                     return Err(RosError::Message { file: path.to_owned(), topic, number, what });
                 }
             }
+        }
+        if !has_effort {
+            let what = format!(
+                "none of the {number} messages of {topic} gives an effort, and a torque is made of it: record from a \
+                 driver that publishes efforts"
+            );
+            return Err(RosError::Mcap { file: path.to_owned(), what });
         }
         let mut text = "time".to_owned();
         for joint in &joints {
@@ -88,7 +104,7 @@ impl JointStateTable {
             }
         }
         text.push('\n');
-        Ok(Self { messages: Messages::open(path)?, topic, joints, stamped, number: 0, text, read: 0 })
+        Ok(Self { messages: Messages::open(path)?, topic, joints, numbers, stamped, number: 0, text, read: 0 })
     }
 
     /// Returns the names of all joints.
@@ -117,11 +133,16 @@ impl JointStateTable {
         let nanoseconds = if self.stamped { state.stamp } else { logged };
         (self.read, self.text) = (0, String::new());
         let _ = write!(self.text, "{}.{:09}", nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
-        for joint in &self.joints {
-            let place = state.names.iter().position(|name| name == joint);
+        let mut places = vec![None; self.joints.len()];
+        for (place, name) in state.names.iter().enumerate().rev() {
+            if let Some(&joint) = self.numbers.get(name) {
+                places[joint] = Some(place);
+            }
+        }
+        for place in places {
             for values in [&state.position, &state.velocity, &state.effort] {
                 self.text.push(',');
-                if let Some(value) = place.and_then(|place| values.get(place)) {
+                if let Some(value) = place.and_then(|place: usize| values.get(place)) {
                     let _ = write!(self.text, "{value}");
                 }
             }

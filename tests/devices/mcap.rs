@@ -82,8 +82,57 @@ fn drop_outs_are_counted_and_efforts_become_contact_torques() {
     let mapping = Mapping::of_joint_states(&["x".to_owned()], "/joint_states", -1.0);
     let imported = import(&mapping, &[path], &mut |_| ()).unwrap();
     assert_eq!(imported.report.samples, 48);
+    let dropped = &imported.report.dropped[0];
+    assert_eq!(
+        dropped.to_string().split(',').next(),
+        Some("2 rows have a field that is missing or not a finite number")
+    );
     assert_eq!(imported.report.dropped[0].rows, 2);
     assert!(imported.samples.torques.iter().all(|torque| *torque == -0.5));
+}
+
+#[test]
+fn joint_states_of_which_no_torque_can_be_made_are_refused_with_the_cause() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |states: Vec<(&str, JointState)>, joints: &[&str]| {
+        let path = file(folder.path(), "log.mcap", &states);
+        let joints: Vec<String> = joints.iter().map(|joint| (*joint).to_owned()).collect();
+        let mapping = Mapping::of_joint_states(&joints, "/joint_states", -1.0);
+        import(&mapping, &[path], &mut |_| ()).unwrap_err().to_string()
+    };
+    let states = |effort: &'static [f64], names: fn(u32) -> &'static str| -> Vec<(&'static str, JointState)> {
+        let state = |k: u32| state(u64::from(k), &[names(k)], &[0.01 * f64::from(k)], effort);
+        (0..50).map(|k| ("/joint_states", state(k))).collect()
+    };
+    for effort in [&[][..], &[f64::NAN]] {
+        let error = refused(states(effort, |_| "x"), &["x"]);
+        assert!(error.contains("none of the 50 messages of /joint_states gives an effort"), "{error}");
+    }
+    // Two publishers, each of its own joint.
+    let error = refused(states(&[0.5], |k| ["arm", "gripper"][k as usize % 2]), &["arm", "gripper"]);
+    assert!(error.contains("50 of 50 rows cannot be used") && error.contains("--columns"), "{error}");
+    assert!(refused(states(&[0.5], |_| " "), &["x"]).contains("a joint without a name"));
+    let mut many = state(0, &["x"; 1025], &[], &[]);
+    many.frame = "base".to_owned();
+    assert!(refused(vec![("/joint_states", many)], &["x"]).contains("it names 1025 joints, more than 1024"));
+}
+
+#[test]
+fn recordings_of_other_kinds_are_named_with_the_program_that_converts_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let mapping = Mapping::of_joint_states(&["x".to_owned()], "/joint_states", -1.0);
+    let starts: [(&[u8], &str); 4] = [
+        (b"\x28\xb5\x2f\xfd\x00\x50", "zstd -d"),
+        (b"\x1f\x8b\x08", "gunzip"),
+        (b"SQLite format 3\0\x10", "ros2 bag convert"),
+        (b"#ROSBAG V2.0\nE", "rosbags-convert"),
+    ];
+    for (start, remedy) in starts {
+        let path = folder.path().join("recording");
+        fs::write(&path, start).unwrap();
+        let error = import(&mapping, &[path], &mut |_| ()).unwrap_err().to_string();
+        assert!(error.contains(remedy), "{error}");
+    }
 }
 
 /// A file of `states` of one topic in chunks that `compress` compresses, which are said to hold `size` bytes.
@@ -341,7 +390,8 @@ fn a_plan_goes_out_as_a_trajectory_that_rests_at_every_point() {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/sponge.toml");
     let (fine, told) = haptize(path, &["scan", scene.to_str().unwrap(), "--plan-out", "plan.csv", "--dwell", "0.5"]);
     assert!(fine, "{told}");
-    let motion = haptize::device::Motion::from_csv(&path.join("plan.csv"), 3).unwrap();
+    let names: Vec<String> = labels(&chain).into_iter().map(|joint| joint.name).collect();
+    let motion = haptize::device::Motion::from_csv(&path.join("plan.csv"), &names).unwrap();
     assert_eq!(motion.duration(), Trajectory::new(&plan, scene_speed(), 0.5).duration());
     let (fine, told) = haptize(path, &["scan", scene.to_str().unwrap(), "--plan-out", "plan.csv", "--dwell", "-1"]);
     assert!(!fine && told.contains("dwell"), "{told}");

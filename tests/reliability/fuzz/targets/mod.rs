@@ -248,7 +248,7 @@ pub const MOTIONS: Target = Target {
     mutate: mutate::text,
     run: |file, input| {
         write(file, input);
-        match Motion::from_csv(file, 2) {
+        match Motion::from_csv(file, &["a".into(), "b".into()]) {
             Ok(motion) => {
                 let finite = [-1.0, 0.0, 0.4, 1e9].iter().all(|time| motion.at(*time).0.iter().all(|q| q.is_finite()));
                 assert!(finite, "a motion leaves the finite numbers");
