@@ -1,4 +1,4 @@
-//! Comma-separated text as it is written: the one way of all tables.
+//! Comma-separated text: the one way in which all tables are written, and the fields of a line that is read.
 
 use std::{
     fmt::Display,
@@ -65,4 +65,58 @@ pub(crate) fn quoted(text: &str) -> String {
 /// Returns a name without the characters that structure a table, for readers that know no quotes.
 pub(crate) fn plain(name: &str) -> String {
     name.replace([',', '"', '\n', '\r'], "_")
+}
+
+/// Returns the fields of a line, trimmed of blanks and quotation marks. Between quotation marks a delimiter is a character
+/// like any other (RFC 4180). A blank as delimiter takes any run of blanks and tabs.
+pub(crate) fn fields(text: &str, delimiter: char) -> impl Iterator<Item = &str> {
+    let blank = delimiter == ' ';
+    let parts = move |c: char| if blank { c.is_ascii_whitespace() } else { c == delimiter };
+    let mut rest = Some(text);
+    let split = std::iter::from_fn(move || {
+        let text = rest?;
+        let begin = end_of_quotation(text);
+        let end = text[begin..].find(parts).map(|at| begin + at);
+        rest = end.map(|end| &text[end + text[end..].chars().next().map_or(0, char::len_utf8)..]);
+        Some(text[..end.unwrap_or(text.len())].trim().trim_matches('"'))
+    });
+    split.filter(move |field| !(blank && field.is_empty()))
+}
+
+/// Where the quotation ends with which `text` begins; 0 where there is none, or no end of it.
+fn end_of_quotation(text: &str) -> usize {
+    let blanks = text.len() - text.trim_start().len();
+    let Some(quoted) = text[blanks..].strip_prefix('"') else { return 0 };
+    // A doubled mark stands for itself.
+    let mut from = 0;
+    while let Some(at) = quoted[from..].find('"') {
+        from += at + 1;
+        if !quoted[from..].starts_with('"') {
+            return blanks + 1 + from;
+        }
+        from += 1;
+    }
+    0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quotation_marks_hold_a_field_together() {
+        let cases: [(&str, char, &[&str]); 8] = [
+            ("a, \"b, c\" ,d", ',', &["a", "b, c", "d"]),
+            ("\"a \"\"b, c\"\"\",d", ',', &["a \"\"b, c", "d"]),
+            ("5\" probe,1,2\" probe,3", ',', &["5\" probe", "1", "2\" probe", "3"]),
+            ("\"open,1", ',', &["open", "1"]),
+            ("", ',', &[""]),
+            (",", ',', &["", ""]),
+            (" 1 \t 2  3", ' ', &["1", "2", "3"]),
+            ("a│b│", '│', &["a", "b", ""]),
+        ];
+        for (text, delimiter, expected) in cases {
+            assert_eq!(fields(text, delimiter).collect::<Vec<_>>(), expected, "{text}");
+        }
+    }
 }

@@ -13,7 +13,7 @@ use haptize::{
     JointVector, MAX_JOINTS,
     contact::Model,
     dataset::{Dataset, Provenance},
-    device::{Device, HandError, Motion, Pointer, SimulatedHand},
+    device::{Applied, Device, Halt, HandError, Motion, Pointer, Reading, Scheduler, SimulatedHand},
     field::TorqueField,
     proxy::Chain,
     render::{
@@ -23,7 +23,7 @@ use haptize::{
         live::{Followed, Live, LiveEnds},
         realtime::{self, Ends, HapticLoop, Options},
         recording::Recording,
-        session::{Driver, Plan},
+        session::{Driver, Plan, SessionError},
         setup::{Setup, labels},
     },
     scene::{
@@ -37,7 +37,10 @@ use haptize::{
     },
 };
 use std::{
-    sync::Arc,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+    },
     time::{Duration, Instant},
 };
 use synthetic::{grid, half_space};
@@ -113,6 +116,68 @@ fn the_real_time_loop_allocates_nothing() {
 }
 
 /// While a simulated hand is still nobody waits for ticks: they are all there afterwards, a period apart.
+/// A device whose maker's library calls the loop, at a rate of its own.
+struct Called {
+    hand: SimulatedHand,
+    rate: f64,
+    /// Size of the torque that it was given last [N m].
+    last: Arc<Mutex<f64>>,
+}
+
+impl Device for Called {
+    fn read(&mut self, elapsed: f64) -> Reading {
+        self.hand.read(elapsed)
+    }
+
+    fn apply(&mut self, torque: &JointVector) -> Applied {
+        *self.last.lock().unwrap() = torque.norm();
+        self.hand.apply(torque)
+    }
+
+    fn scheduler(&self) -> Option<Arc<dyn Scheduler>> {
+        Some(Arc::new(Rate(self.rate)))
+    }
+}
+
+struct Rate(f64);
+
+impl Scheduler for Rate {
+    fn run(&self, tick: &mut (dyn FnMut() -> bool + Send)) -> Result<(), Halt> {
+        while tick() {
+            std::thread::sleep(Duration::from_secs_f64(1.0 / self.0));
+        }
+        Ok(())
+    }
+
+    fn rate(&self) -> f64 {
+        self.0
+    }
+}
+
+#[test]
+fn a_maker_s_library_that_calls_at_another_rate_is_refused_and_the_last_torque_of_a_session_is_zero() {
+    let haptics = build(&object(1));
+    let rate = 1.0 / haptics.period();
+    let called = |rate: f64, last: &Arc<Mutex<f64>>| Called { hand: hand(1), rate, last: Arc::clone(last) };
+    let last = Arc::new(Mutex::new(0.0));
+    for other in [0.5 * rate, 2.0 * rate, 1.001 * rate] {
+        let refused = HapticLoop::new(&haptics, &mut called(other, &last), None).err().unwrap();
+        assert!(matches!(refused, SessionError::Rate { device, .. } if device == other), "{refused}");
+        assert!(refused.to_string().contains(&format!("rate = {other}")), "{refused}");
+    }
+    let mut device = called(rate, &last);
+    let scheduler = device.scheduler().unwrap();
+    let (mut body, _ends) = HapticLoop::new(&haptics, &mut device, None).unwrap();
+    // Into the object, and no farther.
+    let (most, pushed) = (Instant::now() + Duration::from_secs(20), AtomicBool::new(false));
+    let refused = body.called_by(scheduler.as_ref(), |_| {
+        pushed.fetch_or(*last.lock().unwrap() > 0.0, Ordering::Relaxed);
+        !pushed.load(Ordering::Relaxed) && Instant::now() < most
+    });
+    assert!(refused.is_empty() && pushed.into_inner(), "{refused:?}");
+    assert_eq!(*last.lock().unwrap(), 0.0);
+}
+
 #[test]
 fn no_tick_is_missed_that_is_done_in_arrears() {
     let data = object(3);

@@ -120,11 +120,12 @@ pub unsafe extern "C" fn hz_field_torque(field: *const hz_field, q: *const f64, 
         // SAFETY: as the caller promises.
         let Some(field) = (unsafe { field.as_ref() }) else { return hz_code::HZ_ARGUMENT };
         let joints = field.field.joints();
-        // SAFETY: as the caller promises.
+        // SAFETY: as the caller promises. `q` is copied before anything is written: it may lie where `tau` does.
+        let q = unsafe { configuration(q, joints) };
+        // SAFETY: as the caller promises; nothing borrows `q` any more.
         let Some(tau) = (unsafe { outcome::slice_mut(tau, joints) }) else { return hz_code::HZ_ARGUMENT };
         tau.fill(0.0);
-        // SAFETY: as the caller promises.
-        let Some(q) = (unsafe { configuration(q, joints) }) else { return hz_code::HZ_ARGUMENT };
+        let Some(q) = q else { return hz_code::HZ_ARGUMENT };
         let sample = field.field.sample(&q);
         tau.copy_from_slice(&sample.torque);
         code(sample.status())

@@ -199,17 +199,17 @@ pub unsafe extern "C" fn hz_loop_tick(
         // SAFETY: as the caller promises.
         let Some(of) = (unsafe { r#loop.as_mut() }) else { return hz_code::HZ_ARGUMENT };
         let joints = of.haptics.joints();
-        // SAFETY: as the caller promises.
+        // SAFETY: as the caller promises. `y` is copied before anything is written: it may lie where `tau` does.
+        let y = unsafe { outcome::slice(y, joints) }.map(JointVector::from_slice);
+        // SAFETY: as the caller promises; nothing borrows `y` any more.
         let Some(tau) = (unsafe { outcome::slice_mut(tau, joints) }) else { return hz_code::HZ_ARGUMENT };
         tau.fill(0.0);
         // SAFETY: as the caller promises.
-        let (Some(y), info) = (unsafe { (outcome::slice(y, joints), outcome::structure(tick)) }) else {
-            return hz_code::HZ_ARGUMENT;
-        };
+        let (Some(position), info) = (y, unsafe { outcome::structure(tick) }) else { return hz_code::HZ_ARGUMENT };
         if !of.started || (info.is_none() && !tick.is_null()) {
             return hz_code::HZ_ARGUMENT;
         }
-        let inputs = Inputs { position: JointVector::from_slice(y), age, elapsed: dt, interval: dt };
+        let inputs = Inputs { position, age, elapsed: dt, interval: dt };
         let output = of.haptics.tick(&mut of.state, &inputs);
         tau.copy_from_slice(&output.torque);
         if let Some(info) = info {

@@ -65,6 +65,11 @@ fn look_ups_are_those_of_the_library_and_allocate_nothing() {
         let code = assert_no_alloc(|| unsafe { hz_field_torque(opened, q.as_ptr(), tau.as_mut_ptr()) });
         let expected = library.sample(&q);
         assert_eq!(tau, *expected.torque);
+        // The torque may take the place of the configuration.
+        let mut both = q;
+        let place = both.as_mut_ptr();
+        assert_eq!(unsafe { hz_field_torque(opened, place, place) }, code);
+        assert_eq!(both, tau);
         let outside = (0..2).any(|a| q[a] > greatest[a]);
         assert_eq!(code, if outside { hz_code::HZ_OUTSIDE } else { hz_code::HZ_OK }, "{q:?}");
         let again = assert_no_alloc(|| unsafe { hz_field_sample(opened, q.as_ptr(), &raw mut sample) });

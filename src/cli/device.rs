@@ -79,7 +79,7 @@ fn examine(arguments: &Check) -> Result<Report, Failure> {
     if !(arguments.seconds > 0.0 && arguments.seconds <= LONGEST) {
         return Err(format!("cannot check for {} s: give --seconds between 0 and {LONGEST}", arguments.seconds).into());
     }
-    let stop = interrupt::stop_flag();
+    let stop = interrupt::stop_flag_of_device();
     let (key, input) = Key::new();
     let hardware = open(&arguments.device, None)?;
     let mut guard =

@@ -9,6 +9,7 @@ use crate::{
     MAX_JOINTS,
     dataset::Dataset,
     gridize::{GridizeOptions, GridizeReport, Interpolation, Samples, gridize},
+    input,
     logs::{ImportProgress, ImportReport, Imported, Mapping, import, total_size},
     report::{
         self,
@@ -229,6 +230,10 @@ fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
         return Ok(Some(mapping));
     }
     let Some(log) = arguments.logs.first().filter(|log| is_mcap(log)) else {
+        // A recording of another kind says what to do.
+        for log in &arguments.logs {
+            input::open(log).map_err(|error| format!("{}: cannot be read: {error}", log.display()))?;
+        }
         return if topic.is_some() {
             Err("--topic is of MCAP files, and the first log is none".into())
         } else {

@@ -47,13 +47,19 @@ pub fn listen(json: bool, resumes: bool) -> Result<(), Failure> {
     ctrlc::set_handler(move || {
         SINCE.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(Instant::now);
         let is_first = !STOP.swap(true, Ordering::Relaxed);
-        if is_first && IS_STOPPABLE.load(Ordering::Relaxed) {
+        let leave = move || {
             thread::sleep(GRACE);
-            if !IS_STOPPABLE.load(Ordering::Relaxed) {
-                return;
+            if IS_STOPPABLE.load(Ordering::Relaxed) {
+                end(json, resumes);
             }
+        };
+        // In a thread of its own, so that this one hears the next signal. Where there is none work ends at once.
+        let is_given_time = is_first
+            && IS_STOPPABLE.load(Ordering::Relaxed)
+            && thread::Builder::new().name("grace".into()).spawn(leave).is_ok();
+        if !is_given_time {
+            end(json, resumes);
         }
-        end(json, resumes);
     })
     .map_err(|error| {
         format!(
@@ -70,6 +76,13 @@ pub fn stop_flag() -> &'static AtomicBool {
     STOP.store(false, Ordering::Relaxed);
     IS_STOPPABLE.store(true, Ordering::Relaxed);
     &STOP
+}
+
+/// Returns [`stop_flag`] for work that drives a device: from now on every signal that would end or stop the program, and
+/// that a program may answer, raises it, so that zero torque goes out first. Ctrl-\\ and Ctrl-Z are among them.
+pub fn stop_flag_of_device() -> &'static AtomicBool {
+    hear_all();
+    stop_flag()
 }
 
 /// Whether a signal came so long ago that what may be left out is left.
@@ -102,14 +115,42 @@ fn end(json: bool, resumes: bool) {
 /// Signals that the program was started to ignore, of those that are listened for.
 #[cfg(unix)]
 fn ignored() -> Vec<libc::c_int> {
-    let is_ignored = |signal: &libc::c_int| {
-        // SAFETY: zero is valid for each of its numbers.
-        let mut action: libc::sigaction = unsafe { std::mem::zeroed() };
-        // SAFETY: `action` is valid for writing, and no action is given to be set.
-        let known = unsafe { libc::sigaction(*signal, std::ptr::null(), &raw mut action) } == 0;
-        known && action.sa_sigaction == libc::SIG_IGN
-    };
-    [libc::SIGINT, libc::SIGTERM, libc::SIGHUP].into_iter().filter(is_ignored).collect()
+    [libc::SIGINT, libc::SIGTERM, libc::SIGHUP].into_iter().filter(|signal| is_ignored(*signal)).collect()
+}
+
+#[cfg(unix)]
+fn is_ignored(signal: libc::c_int) -> bool {
+    // SAFETY: zero is valid for each of its numbers.
+    let mut action: libc::sigaction = unsafe { std::mem::zeroed() };
+    // SAFETY: `action` is valid for writing, and no action is given to be set.
+    let known = unsafe { libc::sigaction(signal, std::ptr::null(), &raw mut action) } == 0;
+    known && action.sa_sigaction == libc::SIG_IGN
+}
+
+/// Takes the other signals that end or stop a program for SIGTERM.
+#[cfg(unix)]
+fn hear_all() {
+    const OTHERS: [libc::c_int; 11] = [
+        libc::SIGQUIT,
+        libc::SIGTSTP,
+        libc::SIGTTIN,
+        libc::SIGTTOU,
+        libc::SIGUSR1,
+        libc::SIGUSR2,
+        libc::SIGALRM,
+        libc::SIGVTALRM,
+        libc::SIGPROF,
+        libc::SIGXCPU,
+        libc::SIGXFSZ,
+    ];
+    extern "C" fn terminate(_: libc::c_int) {
+        // SAFETY: the call may be made in a signal handler.
+        unsafe { libc::kill(libc::getpid(), libc::SIGTERM) };
+    }
+    for signal in OTHERS.into_iter().filter(|signal| !is_ignored(*signal)) {
+        // SAFETY: the handler calls nothing that may not be called in one.
+        unsafe { libc::signal(signal, terminate as extern "C" fn(libc::c_int) as libc::sighandler_t) };
+    }
 }
 
 /// Ignores `signals`.
@@ -127,3 +168,7 @@ fn ignored() {}
 
 #[cfg(not(unix))]
 fn ignore(_: &()) {}
+
+/// Elsewhere than on Unix there are no other signals.
+#[cfg(not(unix))]
+fn hear_all() {}

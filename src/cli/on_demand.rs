@@ -96,7 +96,7 @@ impl Exploring {
             played
         });
         if played.is_ok() || self.on_demand.blocks() > before {
-            self.on_demand.dataset().save(self.file.as_path())?;
+            self.on_demand.save(self.file.as_path())?;
         }
         played
     }
@@ -111,7 +111,7 @@ impl Exploring {
             if !is_last && (began < due || blocks == kept) {
                 continue;
             }
-            let saved = self.on_demand.dataset().save(self.file.as_path());
+            let saved = self.on_demand.save(self.file.as_path());
             if is_last {
                 let what = saved.map_or_else(|error| error.to_string(), |()| format!("kept in {file}"));
                 return tell(format_args!("haptize: {blocks} blocks explored, {what}"));

@@ -105,7 +105,8 @@ impl Earlier {
 /// Checks that a file of `kind` may be written to `output` by a command that reads `inputs`.
 ///
 /// # Errors
-/// When `output` is one of the inputs, by whatever name, is there and no regular file, holds something of another kind,
+/// When `output` is one of the inputs, by whatever name, is there and no regular file, may not be read or written to, holds
+/// something of another kind,
 /// or lies in a folder that cannot be written to.
 pub fn check<'a>(output: &Path, kind: Kind, inputs: impl IntoIterator<Item = &'a Path>) -> Result<Earlier, Failure> {
     let refused = |why: &str| format!("{}: {why}; nothing is written: name another file", output.display());
@@ -115,9 +116,16 @@ pub fn check<'a>(output: &Path, kind: Kind, inputs: impl IntoIterator<Item = &'a
     if inputs.into_iter().any(|input| is_same(output, input)) {
         return Err(refused("this is also an input, which would be lost").into());
     }
+    if there.permissions().readonly() {
+        return Err(
+            refused("there is a file already that may not be written to (chmod u+w lets it be replaced)").into()
+        );
+    }
     let mut start = Vec::new();
-    let read = File::open(&file).and_then(|file| file.take(512).read_to_end(&mut start));
-    if read.is_ok() && !start.is_empty() && !kind.is(output, &start) {
+    File::open(&file)
+        .and_then(|file| file.take(512).read_to_end(&mut start))
+        .map_err(|error| refused(&format!("there is a file already that cannot be read ({error})")))?;
+    if !start.is_empty() && !kind.is(output, &start) {
         return Err(refused(&format!("there is a file already that is not {}", kind.name())).into());
     }
     Ok(Earlier(Some((there.len(), there.modified().unwrap_or(SystemTime::UNIX_EPOCH)))))

@@ -323,7 +323,7 @@ fn drive(
     if hold_key {
         tell(format_args!("haptize: torque only while the space bar is held"));
     }
-    let stop = interrupt::stop_flag();
+    let stop = interrupt::stop_flag_of_device();
     let mut graphics = setup.graphics(dataset)?;
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
     // Last of all: the motors go on. They go off before anything is drawn.

@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     use crate::viewer::{self, DeviceChoice, Picture, Start};
     let device = arguments.device.clone().map(|address| {
-        let (hold_key, stop) = (arguments.hold_key, interrupt::stop_flag());
+        let (hold_key, stop) = (arguments.hold_key, interrupt::stop_flag_of_device());
         DeviceChoice { address, hold_key, stop }
     });
     if let (Some(scene), Some(kept)) = (&arguments.file, &arguments.on_demand) {

@@ -154,6 +154,8 @@ impl Replacement {
 
     /// Lets it take its name.
     pub fn finish(self) -> io::Result<()> {
+        #[cfg(unix)]
+        take_over(&self.path, self.temporary.as_file())?;
         self.temporary.as_file().sync_all()?;
         self.temporary.persist(&self.path).map_err(|error| error.error)?;
         // The new name is to survive a power cut, too. The file is in its place by now, so that a folder that may not
@@ -162,6 +164,20 @@ impl Replacement {
         let _ = File::open(folder(&self.path)).and_then(|folder| folder.sync_all());
         Ok(())
     }
+}
+
+/// Gives `file` the permissions of the file at `path`, where there is one, and its owner and group as far as the system
+/// lets.
+#[cfg(unix)]
+fn take_over(path: &Path, file: &File) -> io::Result<()> {
+    use std::os::unix::fs::{MetadataExt, fchown};
+    let Ok(earlier) = fs::metadata(path) else { return Ok(()) };
+    let made = file.metadata()?;
+    if (made.uid(), made.gid()) != (earlier.uid(), earlier.gid()) {
+        // Only the superuser may give a file away; its permissions are then those of the new owner's file.
+        let _ = fchown(file, Some(earlier.uid()), Some(earlier.gid()));
+    }
+    file.set_permissions(earlier.permissions())
 }
 
 /// The folder of the file at `path`.

@@ -208,12 +208,16 @@ pub(crate) fn may_be_dataset(start: &[u8]) -> bool {
 /// Checks that a dataset written to `path` replaces a dataset, an empty file, or none.
 ///
 /// # Errors
-/// [`Error::Occupied`] when a file of another kind is there.
+/// [`Error::Occupied`] when a file of another kind is there, [`Error::Write`] when it cannot be read.
 pub(crate) fn check_place(path: &Path) -> Result<(), Error> {
     let mut start = Vec::new();
-    let is_file = fs::metadata(path).is_ok_and(|there| there.is_file());
-    let read = is_file && File::open(path).and_then(|file| file.take(PAGE as u64).read_to_end(&mut start)).is_ok();
-    if read && !start.is_empty() && !may_be_dataset(&start) {
+    if fs::metadata(path).is_ok_and(|there| there.is_file()) {
+        // What cannot be read may be anything.
+        File::open(path)
+            .and_then(|file| file.take(PAGE as u64).read_to_end(&mut start))
+            .map_err(|source| Error::Write { path: path.into(), source })?;
+    }
+    if !start.is_empty() && !may_be_dataset(&start) {
         return Err(Error::Occupied { path: path.into() });
     }
     Ok(())
@@ -229,10 +233,10 @@ impl Dataset {
         let target = target.into();
         check_place(target.path())?;
         check::check(self).map_err(|reason| Error::Inconsistent { path: target.path().into(), reason })?;
-        if let Some(store) = &self.refinement {
-            return store::file::save(self, store, target);
-        }
         let heading = Heading { grid: &self.grid, provenance: &self.provenance, scene: &self.scene };
+        if let Some(store) = &self.refinement {
+            return store::file::save(store, heading, self.surface.as_ref(), target);
+        }
         write_file(target, heading, tensors(self))
     }
 }

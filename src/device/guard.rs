@@ -104,10 +104,10 @@ impl Guard {
         Ok(guard)
     }
 
-    /// Lowers the clamps to `share` of the device's limits, at most [`LIMIT_SHARE`].
+    /// Lowers each clamp to `share` of the device's limit, at most [`LIMIT_SHARE`], where that is less.
     pub fn limit_to(&mut self, share: f64) {
         for (most, limit) in self.most.iter_mut().zip(self.limits.effort.iter()) {
-            *most = share.clamp(0.0, LIMIT_SHARE) * limit;
+            *most = most.min(share.clamp(0.0, LIMIT_SHARE) * limit);
         }
     }
 

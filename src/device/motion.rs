@@ -8,6 +8,7 @@
 
 use crate::{
     JointVector,
+    csv::{fields, plain},
     input::{self, GREATEST_INPUT},
     scene::{JointKind, JointSpec, Waypoint},
 };
@@ -167,7 +168,7 @@ impl Motion {
                 continue;
             }
             let Some(columns) = &columns else {
-                let is_header = text.split(',').all(|field| number_in(field).is_none());
+                let is_header = fields(text, ',').all(|field| number_in(field).is_none());
                 let found = if is_header { Columns::named(text, names).map_err(bad)? } else { Columns::plain(joints) };
                 if !is_header {
                     waypoints.push(found.sample(text).map_err(bad)?);
@@ -280,9 +281,10 @@ impl Columns {
 
     /// Those that `header` names.
     fn named(header: &str, joints: &[String]) -> Result<Self, String> {
-        let columns: Vec<(&str, Option<&str>)> = header.split(',').map(heading).collect();
+        let columns: Vec<(&str, Option<&str>)> = fields(header, ',').map(heading).collect();
         let find = |name: &str, units: &[&str]| {
-            let mut found = columns.iter().enumerate().filter(|(_, (known, _))| *known == name);
+            // Tables of haptize hold plain names.
+            let mut found = columns.iter().enumerate().filter(|(_, (known, _))| plain(known) == plain(name));
             match (found.next(), found.next()) {
                 (Some((_, (_, Some(unit)))), None) if !units.contains(unit) => {
                     Err(format!("column {name} is in {}, not in {}", shown(unit), units.join(" or ")))
@@ -301,12 +303,12 @@ impl Columns {
     }
 
     fn sample(&self, text: &str) -> Result<Waypoint, String> {
-        let fields: Vec<&str> = text.split(',').collect();
+        let fields: Vec<&str> = fields(text, ',').collect();
         if fields.len() != self.count {
             return Err(format!("{} numbers", fields.len()));
         }
         let number = |column: usize| {
-            let field = fields.get(column).map_or("", |field| field.trim());
+            let field = fields.get(column).copied().unwrap_or_default();
             let value = number_in(field).ok_or_else(|| format!("\"{}\" is not a number", shown(field)))?;
             if value.abs() <= GREATEST_INPUT { Ok(value) } else { Err(format!("{value} is not a coordinate")) }
         };
@@ -320,10 +322,9 @@ impl Columns {
 
 /// Name and unit of a heading such as `elbow [rad]`.
 fn heading(field: &str) -> (&str, Option<&str>) {
-    let field = field.trim().trim_matches('"').trim();
-    match field.strip_suffix(']').and_then(|field| field.rsplit_once('[')) {
+    match field.strip_suffix(']').and_then(|field| field.rsplit_once(" [")) {
         Some((name, unit)) => (name.trim(), Some(unit.trim())),
-        None => (field, None),
+        None => (field.trim(), None),
     }
 }
 

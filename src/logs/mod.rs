@@ -99,6 +99,8 @@ pub enum Reason {
     Columns,
     /// A field that is missing or not a finite number.
     NotANumber,
+    /// No position and no torque at all, as where another part of a robot speaks.
+    Absent,
     /// The time stamp of the row before.
     RepeatedTime,
     /// A time before that of the row before.
@@ -125,6 +127,7 @@ impl fmt::Display for Dropped {
         let what = match reason {
             Reason::Columns => "another number of columns",
             Reason::NotANumber => "a field that is missing or not a finite number",
+            Reason::Absent => "no position and no torque",
             Reason::RepeatedTime => "the time of the row before",
             Reason::TimeGoesBack => "a time before that of an earlier row",
             Reason::Outlier => "a torque far off its neighbours'",
@@ -355,8 +358,8 @@ impl<'a> Import<'a> {
 
     /// `remedy`: what to do where most rows cannot be used.
     fn finish(mut self, remedy: &'static str) -> Result<Imported, ImportError> {
-        // Rows that repeat a time or hold an outlier are what a sound log has, too.
-        let broken = |dropped: &&Dropped| !matches!(dropped.reason, Reason::RepeatedTime | Reason::Outlier);
+        let is_sound = |reason| matches!(reason, Reason::Absent | Reason::RepeatedTime | Reason::Outlier);
+        let broken = |dropped: &&Dropped| !is_sound(dropped.reason);
         let dropped: u64 = self.report.dropped.iter().filter(broken).map(|dropped| dropped.rows).sum();
         let listed = || self.report.dropped.iter().map(Dropped::to_string).collect::<Vec<_>>().join("; ");
         if 2 * dropped > self.report.rows {

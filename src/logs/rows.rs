@@ -4,7 +4,7 @@ use super::{
     ImportError, Reason,
     mapping::{BadRows, ColumnName, Mapping, Quantity},
 };
-use crate::JointVector;
+use crate::{JointVector, csv::fields};
 use std::io::{BufRead, Read};
 
 /// Longest line that is read [bytes]; a binary file has no line ends.
@@ -152,9 +152,11 @@ impl<'a, R: BufRead> Rows<'a, R> {
         slots.iter_mut().zip(wanted).for_each(|(slot, column)| *slot = *column);
         let mut columns = 0;
         let mut bad: Option<(usize, &str)> = None;
+        let mut is_absent = true;
         for (column, field) in fields(text, delimiter).enumerate() {
             columns += 1;
             for (value, _) in found.iter_mut().zip(slots).filter(|(_, slot)| *slot == column) {
+                is_absent &= field.is_empty() || layout.time == Some(column);
                 match number(field, self.mapping.table.decimal) {
                     Some(x) => *value = x,
                     None => bad = bad.or(Some((column, field))),
@@ -164,6 +166,9 @@ impl<'a, R: BufRead> Rows<'a, R> {
         if columns != layout.columns {
             let message = format!("{columns} columns where {} are expected", layout.columns);
             return self.refuse(Reason::Columns, message).map(Some);
+        }
+        if is_absent {
+            return self.refuse(Reason::Absent, "the line holds no position and no torque".to_owned()).map(Some);
         }
         if let Some((column, field)) = bad {
             let message = format!("column {} holds `{field}`, not a finite number{}", column + 1, self.hint(field));
@@ -266,18 +271,6 @@ fn listed(names: &[&str]) -> String {
         list.push_str(&format!(" and {} more", names.len() - MOST_NAMES));
     }
     list
-}
-
-/// Fields of a line, trimmed of blanks and quotation marks. Within quotation marks a delimiter is a character like any
-/// other (RFC 4180).
-fn fields(text: &str, delimiter: char) -> impl Iterator<Item = &str> {
-    let blank = delimiter == ' ';
-    let mut quoted = false;
-    let split = text.split(move |c: char| {
-        quoted ^= c == '"';
-        !quoted && if blank { c.is_ascii_whitespace() } else { c == delimiter }
-    });
-    split.filter(move |field| !(blank && field.is_empty())).map(|field| field.trim().trim_matches('"'))
 }
 
 /// A finite number written with `decimal`.

@@ -12,8 +12,8 @@ pub enum Fault {
     /// The device reports another number of joints than the dataset has.
     #[error("the device reports another number of joints than the dataset has: take the device that the scene is for")]
     Joints,
-    /// The device's position is too old.
-    #[error("the device's position is too old: check its connection")]
+    /// The device's position is too old, or comes from the future.
+    #[error("the device's position is too old or its age is negative: check its connection and the clocks")]
     Stale,
     /// The time between two ticks is too long, or not a positive number.
     #[error(

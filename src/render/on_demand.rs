@@ -5,10 +5,11 @@ use crate::{
     JointVector,
     contact::Model,
     dataset::{Dataset, Error as DatasetError, Grid, Provenance, Surface},
+    memory::{self, Shortage},
     object::{Object, ObjectError},
     proxy::Chain,
     scene::{Interpolation, Scene, SceneError},
-    store::{Order, Space, SpaceError, Store},
+    store::{Order, Space, SpaceError, Store, base_memory},
     sweep::{
         CpuBackend, NoEnergy, SceneObjectError,
         ahead::{Ahead, Follower, Solution, Solved, Whereabouts, follow},
@@ -89,6 +90,11 @@ pub enum OnDemandError {
     /// A thread that solves ended.
     #[error("the thread that solves contact ended; please report this")]
     Ended,
+    /// The grid is larger than the memory that is left.
+    #[error(
+        "the scene's grid has too many points: {0}; or give a coarser one, which levels refine where the proxy goes"
+    )]
+    Memory(Shortage),
 }
 
 /// Work done for a session.
@@ -123,6 +129,7 @@ impl OnDemand {
         let object = build_object(&scene)?;
         let chain = Chain::new(&scene.proxy);
         let grid = grid_of(&scene);
+        memory::check(base_memory(&grid)).map_err(OnDemandError::Memory)?;
         let provenance = CpuBackend::provenance(&scene);
         let mut store = Store::new(Space::new(&grid, levels)?, order_of(&scene), 0);
         if file.exists() {
@@ -157,6 +164,16 @@ impl OnDemand {
         let surface = Some(Surface::of(&self.object));
         let (grid, text) = (self.grid.clone(), self.scene.text.clone());
         Dataset::refined(Arc::clone(&self.store), grid, surface, text, self.provenance.clone())
+    }
+
+    /// Writes everything known so far to `file`, as a dataset. Nothing is made at the points of the grid: the memory that it
+    /// takes is that of what is written.
+    ///
+    /// # Errors
+    /// As [`Dataset::save`].
+    pub fn save(&self, file: &Path) -> Result<(), DatasetError> {
+        let surface = Surface::of(&self.object);
+        self.store.save(&self.grid, Some(&surface), &self.scene.text, &self.provenance, file)
     }
 
     /// Begins to solve around `start` and wherever the loop then goes that has the [`Live`]. Returns once the levels

@@ -40,6 +40,10 @@ const RECORDER_PERIOD: Duration = Duration::from_millis(5);
 /// How often the graphics thread looks for the first tick.
 const FIRST_TICK_PERIOD: Duration = Duration::from_millis(1);
 
+/// Relative difference of two rates of which one is the inverse of a period that is the inverse of the other [1]: each
+/// division rounds once.
+const SAME_RATE: f64 = 2.0 * f64::EPSILON;
+
 /// The haptic thread's body: everything that a tick touches, allocated beforehand.
 pub struct HapticLoop<'session> {
     driver: Driver<'session>,
@@ -54,7 +58,7 @@ pub struct HapticLoop<'session> {
     /// When the last tick began; none before the first.
     last: Option<Duration>,
     /// Number of the next deadline.
-    next: u32,
+    next: u64,
     missed: u64,
     unrecorded: u64,
     clear: Arc<AtomicBool>,
@@ -90,12 +94,19 @@ impl<'session> HapticLoop<'session> {
     /// A loop with its first deadline now; with `live` over contact that is solved meanwhile.
     ///
     /// # Errors
-    /// As [`Driver::new`], or when there is no memory.
+    /// As [`Driver::new`], when the device's own thread calls at another rate than that of `haptics`, or when there is no
+    /// memory.
     pub fn new(
         haptics: &'session Haptics,
         device: &'session mut dyn Device,
         live: Option<Live>,
     ) -> Result<(Self, Ends), SessionError> {
+        if let Some(rate) = device.scheduler().map(|scheduler| scheduler.rate()) {
+            let scene = 1.0 / haptics.period();
+            if (rate - scene).abs() > SAME_RATE * scene {
+                return Err(SessionError::Rate { device: rate, scene });
+            }
+        }
         let driver = Driver::new(haptics, device, live)?;
         let (recorder, ticks) = rtrb::RingBuffer::new(RING);
         let (late, late_ticks) = rtrb::RingBuffer::new(LATE_RING);
@@ -150,7 +161,7 @@ impl<'session> HapticLoop<'session> {
         wait();
         let now = clock::now();
         loop {
-            let deadline = self.began + self.period * self.next;
+            let deadline = self.deadline(self.next);
             if deadline > now {
                 return;
             }
@@ -162,7 +173,7 @@ impl<'session> HapticLoop<'session> {
     pub const ARREARS: Duration = Duration::from_secs(1);
 
     fn tick_after(&mut self, spins: bool) {
-        let deadline = self.began + self.period * self.next;
+        let deadline = self.deadline(self.next);
         let now = clock::wait_until(deadline, spins);
         self.tick_at(now, deadline);
     }
@@ -172,7 +183,7 @@ impl<'session> HapticLoop<'session> {
     pub fn tick_now(&mut self) {
         let now = clock::now();
         let deadline = self.last.map_or(now, |last| (last + self.period).min(now));
-        self.began = deadline.saturating_sub(self.period * self.next);
+        self.began = deadline.saturating_sub(times(self.period, self.next));
         self.tick_at(now, deadline);
     }
 
@@ -186,9 +197,18 @@ impl<'session> HapticLoop<'session> {
             }
             return refused;
         };
+        self.called_by(scheduler.as_ref(), goes_on)
+    }
+
+    /// Ticks as `scheduler` calls, while `goes_on`, and commands zero torque in its last call. Returns what stopped it.
+    pub fn called_by(&mut self, scheduler: &dyn Scheduler, goes_on: impl Fn(&Self) -> bool + Sync) -> Vec<String> {
         let run = scheduler.run(&mut || {
             self.tick_now();
-            goes_on(self)
+            let goes_on = goes_on(self);
+            if !goes_on {
+                self.driver.let_go();
+            }
+            goes_on
         });
         run.err().map(|halt| format!("the device's own thread stopped: {halt}")).into_iter().collect()
     }
@@ -202,17 +222,15 @@ impl<'session> HapticLoop<'session> {
             let _ = self.late.push(LateTick { at: now, by, processor: clock::processor() });
         }
         // The next deadline that is at least half a period away.
-        let mut skipped = 0;
-        while self.began + self.period * (self.next + 1 + skipped) < now + self.period / 2 {
-            skipped += 1;
-        }
-        self.missed += u64::from(skipped);
+        let behind = (now + self.period / 2).saturating_sub(self.deadline(self.next + 1));
+        let skipped = behind.as_nanos().div_ceil(self.period.as_nanos().max(1)) as u64;
+        self.missed += skipped;
         self.next += 1 + skipped;
         let elapsed = self.last.map_or(self.period, |last| now.saturating_sub(last));
         if self.last.is_some() {
             self.interval.record(elapsed);
         }
-        let interval = (self.began + self.period * self.next).saturating_sub(now);
+        let interval = self.deadline(self.next).saturating_sub(now);
         self.last = Some(now);
         if self.clear.swap(false, Ordering::Acquire) {
             self.driver.clear_fault();
@@ -226,10 +244,21 @@ impl<'session> HapticLoop<'session> {
         }
     }
 
+    /// Deadline `number`, in time since the clock's origin.
+    fn deadline(&self, number: u64) -> Duration {
+        self.began + times(self.period, number)
+    }
+
     /// Whether `ticks` deadlines have come, or the device has stopped for good.
     fn is_over(&self, ticks: usize) -> bool {
         self.next as usize >= ticks || self.stopped
     }
+}
+
+/// `count` periods. Unlike `Duration * u32` it does not run out within a session of some weeks.
+fn times(period: Duration, count: u64) -> Duration {
+    let nanoseconds = period.as_nanos() * u128::from(count);
+    Duration::new((nanoseconds / 1_000_000_000) as u64, (nanoseconds % 1_000_000_000) as u32)
 }
 
 /// What a session against the clock is run with. By default nothing ends it early, its dataset does not change, and

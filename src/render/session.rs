@@ -35,6 +35,17 @@ pub enum SessionError {
     /// An effect needs contact forces that are solved meanwhile, and nobody solves them.
     #[error("the session cannot start: friction and contact damping need contact forces, and nobody solves them")]
     NoForces,
+    /// The device's own thread calls at another rate than the scene's.
+    #[error(
+        "the session cannot start: the device's own thread calls {device} times a second, and the scene's loop runs at \
+         {scene} Hz: set rate = {device} in [haptics] of the scene, and bake it again"
+    )]
+    Rate {
+        /// The device's [Hz].
+        device: f64,
+        /// The scene's [Hz].
+        scene: f64,
+    },
     /// The object cannot be drawn.
     #[error(transparent)]
     Graphics(#[from] GraphicsError),
@@ -121,6 +132,11 @@ impl<'session> Driver<'session> {
     #[must_use]
     pub fn start(&self) -> &JointVector {
         &self.start
+    }
+
+    /// Commands zero torque: the last that a device hears of a session.
+    pub fn let_go(&mut self) {
+        self.device.apply(&JointVector::zeros(self.haptics.joints()));
     }
 
     /// One tick, `elapsed` after the one before and `interval` before the next [s]: read, compute, apply. Answers with

@@ -64,7 +64,8 @@ impl Watchdog {
     /// The first fault of the inputs.
     pub fn check(&self, inputs: &Inputs, before: &JointVector) -> Result<(), Fault> {
         self.check_position(&inputs.position)?;
-        if inputs.age > GREATEST_POSITION_AGE || inputs.age.is_nan() {
+        // A position from the future tells of clocks of which one is wrong. False for what is not a number.
+        if !(0.0..=GREATEST_POSITION_AGE).contains(&inputs.age) {
             return Err(Fault::Stale);
         }
         if !(is_interval(inputs.elapsed) && is_interval(inputs.interval)) {
@@ -118,6 +119,19 @@ pub fn is_interval(seconds: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_position_of_an_age_that_cannot_be_is_stale() {
+        let watchdog = Watchdog::new(1e-3, JointVector::from_slice(&[1.0]));
+        let at = JointVector::zeros(1);
+        let check = |age| watchdog.check(&Inputs { position: at, age, elapsed: 1e-3, interval: 1e-3 }, &at);
+        for age in [0.0, -0.0, 1e-3, GREATEST_POSITION_AGE] {
+            assert_eq!(check(age), Ok(()), "{age}");
+        }
+        for age in [-1e-9, -1.0, f64::NEG_INFINITY, f64::NAN, f64::INFINITY, 0.0101] {
+            assert_eq!(check(age), Err(Fault::Stale), "{age}");
+        }
+    }
 
     /// Time until persistent overruns are found, and the mean then [s]; none within a minute.
     fn found(period: f64, time: impl Fn(usize) -> f64) -> Option<(f64, f64)> {

@@ -4,7 +4,7 @@ use super::RosError;
 use std::{borrow::Cow, io::Read, path::Path};
 
 /// Longest record or chunk that is read [bytes]: a chunk of a recorder's is a few MiB.
-pub(super) const LONGEST_RECORD: u64 = 1 << 28;
+pub(super) const LONGEST_RECORD: u64 = 1 << 26;
 
 /// A chunk as the file holds it.
 pub(super) struct Chunk<'a> {
@@ -35,7 +35,9 @@ impl<'a> Chunk<'a> {
             )));
         }
         let broken = |what: &dyn std::fmt::Display| {
-            refuse(format!("a compressed chunk cannot be read ({what}): the file is damaged; record it again"))
+            refuse(format!(
+                "a compressed chunk cannot be read ({what}): the file is damaged: what is whole comes back by `mcap recover IN.mcap -o OUT.mcap`"
+            ))
         };
         let taken = |reader: &mut dyn Read| {
             let mut records = Vec::new();
@@ -67,8 +69,8 @@ impl<'a> Chunk<'a> {
         let calculated = if self.checksum == 0 { 0 } else { crc32fast::hash(&records) };
         if calculated != self.checksum {
             return Err(refuse(format!(
-                "the checksum of a chunk is {:08x}, that of its records {calculated:08x}: the file is damaged; \
-                 record it again",
+                "the checksum of a chunk is {:08x}, that of its records {calculated:08x}: the file is damaged: \
+                 what is whole comes back by `mcap recover IN.mcap -o OUT.mcap`",
                 self.checksum
             )));
         }

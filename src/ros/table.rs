@@ -71,24 +71,21 @@ impl JointStateTable {
                 let state = decode(path, &topic, number, &bytes)?;
                 stamped |= state.stamp > 0;
                 has_effort |= state.effort.iter().any(|effort| effort.is_finite());
-                let mut refused = None;
-                for joint in state.names {
-                    if joint.trim().is_empty() {
-                        refused =
-                            Some("it has a joint without a name: name it where the message is published".to_owned());
-                    }
+                for joint in state.names.into_iter().filter(|joint| !joint.trim().is_empty()) {
                     if !numbers.contains_key(&joint) {
                         numbers.insert(joint.clone(), joints.len());
                         joints.push(joint);
                     }
                 }
                 if joints.len() > MOST_JOINTS {
-                    refused = Some(format!("its messages name more than {MOST_JOINTS} joints"));
-                }
-                if let Some(what) = refused {
+                    let what = format!("its messages name more than {MOST_JOINTS} joints");
                     return Err(RosError::Message { file: path.to_owned(), topic, number, what });
                 }
             }
+        }
+        if joints.is_empty() {
+            let what = format!("no message of {topic} names a joint: give the joints names where they are published");
+            return Err(RosError::Mcap { file: path.to_owned(), what });
         }
         if !has_effort {
             let what = format!(

@@ -318,12 +318,7 @@ impl Body {
                         }
                     }
                     Some(scheduler) => {
-                        let run = scheduler.run(&mut || {
-                            body.tick_now();
-                            goes_on()
-                        });
-                        let stopped = run.err().map(|halt| format!("the device's own thread stopped: {halt}"));
-                        drop(refuse.send(stopped.into_iter().collect()));
+                        drop(refuse.send(body.called_by(scheduler.as_ref(), |_| goes_on())));
                     }
                 }
             }

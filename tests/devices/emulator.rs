@@ -33,6 +33,8 @@ pub enum Fault {
     Late(u32),
     /// No reply.
     Mute,
+    /// Goes on with the same reply.
+    Flood,
     /// Bytes that are no reply.
     Noise,
     /// Another device's reply.
@@ -139,6 +141,8 @@ impl<F: Firmware + 'static> Emulator<F> {
                 }
                 Fault::Late(ticks) => self.queue.push((ticks, reply)),
                 Fault::Mute => {}
+                // Not more than a pseudo-terminal holds.
+                Fault::Flood => self.line.send(&reply.repeat(3000 / reply.len())),
                 Fault::Noise => {
                     self.line.send(&[5, 0xff, 0xff, 0xff, 0x7f, b'[', b'x', b']', b'\n'][..reply.len().min(9)])
                 }

@@ -354,7 +354,7 @@ fn a_signal_ends_the_torque_within_two_ticks_and_the_session_keeps_its_files() {
     let path = folder.path();
     std::fs::write(path.join("s.toml"), SLIDES).unwrap();
     assert_eq!(haptize(path, &["bake", "s.toml", "-o", "s.haptize", "--backend", "cpu"]).status.code(), Some(0));
-    for signal in [Signal::INT, Signal::TERM] {
+    for signal in [Signal::INT, Signal::TERM, Signal::QUIT, Signal::TSTP, Signal::USR1] {
         let (mut ticks, begin) = (Vec::new(), Instant::now());
         while begin.elapsed() < LONGEST_UNREST && !ticks.iter().any(|ticks| *ticks <= 2) {
             ticks.extend(pushed_after(path, signal));

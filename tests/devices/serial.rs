@@ -171,6 +171,7 @@ fn check_line<F: Firmware + 'static>(open: fn() -> (Emulator<F>, Guard), middle:
         (Fault::Mute, vec![Halt::Stale]),
         (Fault::Late(8), vec![Halt::Stale]),
         (Fault::Noise, vec![Halt::Stale, Halt::Garbage]),
+        (Fault::Flood, vec![Halt::Stale, Halt::Garbage]),
         (Fault::OtherDevice, vec![Halt::Stale, Halt::WrongDevice]),
     ];
     for (fault, reasons) in lasting {

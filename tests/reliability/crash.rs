@@ -7,6 +7,10 @@ use crate::{
     fuzz::Random,
     program::{BLOCK, OBJECTS, command, message, succeed, write_scene},
 };
+use haptize::{
+    dataset::{Axis, Grid, Provenance},
+    store::{Order, Space, Store},
+};
 use std::{
     path::Path,
     process::{Command, Output, Stdio},
@@ -306,6 +310,12 @@ fn other_commands_without_memory_end_with_an_error_of_one_json_object() {
     // Larger than what is allowed below: known before anything is read.
     let large = std::fs::File::create(folder.join("large.haptize")).unwrap();
     large.set_len(1 << 32).unwrap();
+    // Some kilobytes whose base has eight million points.
+    let axis = |name: &str| Axis { name: name.into(), unit: "rad".into(), start: 0.0, step: 0.01, count: 200 };
+    let grid = Grid { axes: ["a", "b", "c"].map(axis).to_vec() };
+    let store = Store::new(Space::new(&grid, 2).unwrap(), Order::Potential, 0);
+    store.save(&grid, None, "", &Provenance::default(), &folder.join("sparse.haptize")).unwrap();
+    assert!(std::fs::metadata(folder.join("sparse.haptize")).unwrap().len() < 20_000);
     let sphere = |edge: &str, springs: &str| {
         let object = format!(
             "sphere = {{ radius = 0.04, edge = {edge} }}\nsprings = {{ kind = \"{springs}\", stiffness = 300.0 }}"
@@ -317,6 +327,7 @@ fn other_commands_without_memory_end_with_an_error_of_one_json_object() {
     for (arguments, expected) in [
         (&["play", "large.haptize"][..], "4295 MB of memory are needed"),
         (&["info", "large.haptize"], "4295 MB of memory are needed"),
+        (&["info", "sparse.haptize"], "296 MB of memory are needed"),
         (&["play", "x.haptize", "--seconds", "3600"], "ticks"),
         (&["play", "x.haptize", "--seconds", "0.1"], "memory"),
         (&["inspect", "dense.toml", "--q=0,0"], "MB of compliance"),

@@ -243,6 +243,28 @@ fn a_place_that_cannot_be_written_is_told_before_the_work() {
     assert_eq!(names(home.path()), before);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_file_that_is_replaced_keeps_its_permissions_and_a_read_only_one_stays() {
+    use std::{fs::Permissions, os::unix::fs::PermissionsExt};
+    let home = home();
+    let bake = ["bake", "scene.toml", "-o", "x.haptize", "--backend", "cpu"];
+    let export = ["export", "x.haptize", "--format", "csv", "-o", "x.csv"];
+    succeed(home.path(), &export);
+    for (name, again) in [("x.haptize", &bake[..]), ("x.csv", &export)] {
+        let file = home.path().join(name);
+        for mode in [0o600, 0o640, 0o664] {
+            std::fs::set_permissions(&file, Permissions::from_mode(mode)).unwrap();
+            succeed(home.path(), again);
+            assert_eq!(std::fs::metadata(&file).unwrap().permissions().mode() & 0o7777, mode, "{name}");
+        }
+        std::fs::set_permissions(&file, Permissions::from_mode(0o444)).unwrap();
+        let before = std::fs::read(&file).unwrap();
+        refused(home.path(), again, "may not be written to");
+        assert!(std::fs::read(&file).unwrap() == before);
+    }
+}
+
 /// The rename has been done by then: that the folder cannot be read, and so not flushed, is no failure.
 #[cfg(target_os = "linux")]
 #[test]

@@ -32,9 +32,10 @@ use super::{Nodes, Order, Space, Store, record::slope, record::width};
 use crate::{
     contact::Status,
     dataset::{
-        Dataset, Error, Grid, Heading, Kind, Provenance, Surface, Target, Tensor, read::Container, surface_tensors,
-        write_container,
+        Dataset, Error, Grid, Heading, Kind, Provenance, Surface, Target, Tensor, check_place, read::Container,
+        surface_tensors, write_container,
     },
+    memory,
 };
 use serde::{Deserialize, Serialize};
 use std::{path::Path, sync::Arc};
@@ -47,6 +48,33 @@ pub(in crate::dataset) const FORMAT: &str = "haptize store 1";
 struct Shape {
     levels: u32,
     order: Order,
+}
+
+/// Memory that [`Dataset::refined`] takes for the points of `grid` [bytes].
+#[must_use]
+pub fn base_memory(grid: &Grid) -> usize {
+    let row = grid.joints() * size_of::<f64>() + size_of::<f64>() + size_of::<f32>() + size_of::<u8>();
+    grid.points().saturating_mul(row)
+}
+
+impl Store {
+    /// Writes the refined dataset over this store, replacing the file `target` whole or not at all. Arguments as in
+    /// [`Dataset::refined`], of which nothing is made at the points of `grid`.
+    ///
+    /// # Errors
+    /// As [`Dataset::save`].
+    pub fn save<'a>(
+        &self,
+        grid: &Grid,
+        surface: Option<&Surface>,
+        scene: &str,
+        provenance: &Provenance,
+        target: impl Into<Target<'a>>,
+    ) -> Result<(), Error> {
+        let target = target.into();
+        check_place(target.path())?;
+        save(self, Heading { grid, provenance, scene }, surface, target)
+    }
 }
 
 impl Dataset {
@@ -72,7 +100,7 @@ impl Dataset {
             let nodes = block.nodes();
             let there = space.nodes(0, &place).filter(|(at, _)| nodes.present >> at & 1 == 1);
             for ((row, record), (_, node)) in nodes.records.chunks_exact(wide).enumerate().zip(there) {
-                let point = grid.axes.iter().zip(node).fold(0, |point, (axis, k)| point * axis.count + k as usize);
+                let point = grid.point(node.map(|k| k as usize));
                 let root = f64::from(record[0]).max(0.0);
                 energy[point] = 0.5 * root * root;
                 (gap[point], status[point]) = (nodes.gap[row], nodes.status[row]);
@@ -100,8 +128,13 @@ impl Dataset {
     }
 }
 
-/// Writes `dataset`, which `store` refines, replacing the file `target` whole or not at all.
-pub(in crate::dataset) fn save(dataset: &Dataset, store: &Store, target: Target<'_>) -> Result<(), Error> {
+/// Writes the dataset that `store` refines, replacing the file `target` whole or not at all.
+pub(in crate::dataset) fn save(
+    store: &Store,
+    heading: Heading<'_>,
+    surface: Option<&Surface>,
+    target: Target<'_>,
+) -> Result<(), Error> {
     let shape = Shape { levels: store.space.levels(), order: store.order };
     let shape = serde_json::to_string(&shape)
         .map_err(|error| Error::Inconsistent { path: target.path().into(), reason: error.to_string() })?;
@@ -120,19 +153,21 @@ pub(in crate::dataset) fn save(dataset: &Dataset, store: &Store, target: Target<
         Tensor::new::<f32>("node_gap", vec![gap.len()], bytemuck::cast_slice(&gap)),
         Tensor::new::<u8>("node_status", vec![status.len()], &status),
     ];
-    tensors.extend(dataset.surface.iter().flat_map(surface_tensors));
-    let heading = Heading { grid: &dataset.grid, provenance: &dataset.provenance, scene: &dataset.scene };
+    tensors.extend(surface.into_iter().flat_map(surface_tensors));
     write_container(target, Kind { format: FORMAT, store: Some(&shape) }, heading, tensors)
 }
 
 /// Makes a dataset of a file whose header and checksum are sound.
 pub(in crate::dataset) fn decode(path: &Path, file: Container) -> Result<Dataset, Error> {
-    read(file).map_err(|reason| Error::Damaged { path: path.into(), reason })
+    let damaged = |reason| Error::Damaged { path: path.into(), reason };
+    let (grid, provenance) = file.heading().map_err(damaged)?;
+    // A file of some kilobytes may have a base of gigabytes.
+    memory::check(base_memory(&grid)).map_err(|shortage| Error::Memory { path: path.into(), shortage })?;
+    read(file, grid, provenance).map_err(damaged)
 }
 
 /// `Err` says what is wrong.
-fn read(mut file: Container) -> Result<Dataset, String> {
-    let (grid, provenance) = file.heading()?;
+fn read(mut file: Container, grid: Grid, provenance: Provenance) -> Result<Dataset, String> {
     let scene = file.text("scene")?.to_owned();
     let shape: Shape = serde_json::from_str(file.text("store")?).map_err(|error| format!("store: {error}"))?;
     let space = Space::new(&grid, shape.levels).map_err(|error| error.to_string())?;

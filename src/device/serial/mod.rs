@@ -8,6 +8,8 @@
 //! since the last one are no positions: such lines have no check sum.
 
 #[cfg(unix)]
+mod abort;
+#[cfg(unix)]
 mod port;
 #[cfg(not(unix))]
 #[path = "no_port.rs"]
@@ -15,6 +17,10 @@ mod port;
 mod two_diy;
 mod wooden_haptics;
 
+#[cfg(unix)]
+pub use abort::stop_all;
+#[cfg(not(unix))]
+pub use port::stop_all;
 pub use port::{Port, ports};
 pub use two_diy::{TwoDiy, Version};
 pub use wooden_haptics::WoodenHaptics;
@@ -41,6 +47,10 @@ const LATEST_REPLY: f64 = 0.05;
 
 /// Longest message of any protocol [bytes].
 const LONGEST: usize = 128;
+
+/// Most bytes that are taken in a tick: the longest replies to all requests that are remembered. More: a line that floods
+/// holds up the loop. What is left when they have come is dropped, so that the last position ages, and torque goes.
+const MOST_RECEIVED: usize = REMEMBERED * LONGEST;
 
 /// The reading by a protocol of the bytes that have come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +86,8 @@ pub trait Protocol: Send {
 /// A device that speaks `P` on a serial line.
 pub struct SerialDevice<P> {
     protocol: P,
+    /// Dropped before the port.
+    _stop: Option<port::StopOnAbort>,
     port: Port,
     place: String,
     received: [u8; LONGEST],
@@ -106,8 +118,11 @@ impl<P: Protocol> SerialDevice<P> {
     /// In words, if nothing valid answers in time.
     fn start(protocol: P, port: Port, place: &str) -> Result<Self, String> {
         let joints = protocol.limits().effort.len();
+        let mut zero = [0; LONGEST];
+        let length = protocol.request(&JointVector::zeros(joints), &mut zero);
         let mut device = Self {
             protocol,
+            _stop: port.stop_on_abort(&zero[..length]),
             port,
             place: place.to_owned(),
             received: [0; LONGEST],
@@ -162,10 +177,17 @@ impl<P: Protocol> SerialDevice<P> {
         self.asked.iter_mut().for_each(|asked| *asked += elapsed);
         self.latest.age += elapsed;
         self.silence += elapsed;
+        let mut taken = 0;
         loop {
             let count = self.port.receive(&mut self.received[self.length..])?;
             if count == 0 {
                 break;
+            }
+            taken += count;
+            if taken > MOST_RECEIVED {
+                // A device answers, and does not go on by itself.
+                self.refuse(Halt::Garbage);
+                return Ok(false);
             }
             self.length += count;
             if self.length == LONGEST {

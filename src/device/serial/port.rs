@@ -1,5 +1,6 @@
 //! A serial line of Unix: opened raw and for this program alone, read and written without waiting.
 
+pub(super) use super::abort::StopOnAbort;
 use crate::device::Halt;
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
@@ -9,7 +10,7 @@ use rustix::{
 use std::{
     fs::{self, File, OpenOptions},
     io::{ErrorKind, Read, Write},
-    os::unix::fs::OpenOptionsExt,
+    os::{fd::AsRawFd, unix::fs::OpenOptionsExt},
 };
 
 /// An open line.
@@ -69,6 +70,11 @@ impl Port {
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
             Err(_) => Err(Halt::Unplugged),
         }
+    }
+
+    /// Lets [`super::stop_all`] write `message`. The result is to be dropped before the port.
+    pub(super) fn stop_on_abort(&self, message: &[u8]) -> Option<StopOnAbort> {
+        StopOnAbort::new(self.0.as_raw_fd(), message)
     }
 
     /// Waits until something has come, for `seconds` at most.

@@ -28,8 +28,8 @@ use std::{
         Arc,
         atomic::{AtomicBool, AtomicU64, Ordering},
     },
-    thread,
-    time::Duration,
+    thread::{self, Thread},
+    time::{Duration, Instant},
 };
 
 /// An error, returned by value: twelve bytes.
@@ -340,6 +340,8 @@ struct Session<'a> {
     calls: AtomicU64,
     over: AtomicBool,
     panic: Option<Box<dyn Any + Send>>,
+    /// The thread that waits for the end.
+    waiting: Thread,
 }
 
 unsafe extern "C" fn called(session: *mut c_void) -> c_uint {
@@ -357,7 +359,9 @@ unsafe extern "C" fn called(session: *mut c_void) -> c_uint {
             Ok(false) => {}
             Err(panic) => (*session).panic = Some(panic),
         }
+        let waiting = (*session).waiting.clone();
         (*session).over.store(true, Ordering::Release);
+        waiting.unpark();
     }
     CALLBACK_DONE
 }
@@ -368,7 +372,8 @@ impl Scheduler for Api {
     }
 
     fn run(&self, tick: &mut (dyn FnMut() -> bool + Send)) -> Result<(), Halt> {
-        let mut session = Session { tick, calls: AtomicU64::new(0), over: AtomicBool::new(false), panic: None };
+        let (calls, over, waiting) = (AtomicU64::new(0), AtomicBool::new(false), thread::current());
+        let mut session = Session { tick, calls, over, panic: None, waiting };
         let place = &raw mut session;
         // SAFETY: the session outlives the callback: this returns once `over` is set, which is the callback's last act,
         // or after the scheduler, and with it the callback, has been stopped.
@@ -377,7 +382,12 @@ impl Scheduler for Api {
         // SAFETY: both fields are atomic.
         let (calls, over) = unsafe { (&(*place).calls, &(*place).over) };
         while !over.load(Ordering::Acquire) {
-            thread::sleep(LONGEST_SILENCE);
+            let begin = Instant::now();
+            while !over.load(Ordering::Acquire)
+                && let Some(rest) = LONGEST_SILENCE.checked_sub(begin.elapsed())
+            {
+                thread::park_timeout(rest);
+            }
             let now = calls.load(Ordering::Relaxed);
             if now == seen && !over.load(Ordering::Acquire) {
                 // SAFETY: the functions take numbers. Stopping joins the scheduler's thread.
