@@ -2,7 +2,7 @@
 //
 // The stage declares `parameters` and `mesh`, which holds, one behind the other, three corners a triangle, three
 // neighbours a triangle (across edge k), the starts of the lists of triangles around each node (one more than there are
-// nodes), and those lists; where the compliance leaves out surface nodes, the place of each among those that it covers.
+// nodes), and those lists.
 
 // No triangle, node or place.
 const ABSENT: u32 = 0xffffffffu;

@@ -3,7 +3,7 @@
 //!
 //! A [`scene`] says what is touched with what. An [`object`] deforms, a [`proxy`] moves its joints (it may come from a
 //! robot's file, [`urdf`]), and their equilibrium ([`contact`]) at every point of a grid over the joint angles q gives
-//! a [`dataset`] ([`haptize`], on the CPU or through [`gpu`]): the joint torque tau(q), the stored energy U(q) and the
+//! a [`dataset`] ([`sweep`], on the CPU or through [`gpu`]): the joint torque tau(q), the stored energy U(q) and the
 //! contact forces. [`render`] looks torques up in it, a thousand times a second, for the hand or log that [`device`]
 //! stands for; [`report`] draws what came out. Data flows one way: a room knows only the rooms above it in the list
 //! below.
@@ -68,27 +68,33 @@ pub mod scene;
 
 pub mod object;
 pub mod proxy;
-pub mod urdf;
 
 pub mod contact;
-pub mod fixtures;
 
 pub mod gpu;
-
-pub mod ros;
+pub mod urdf;
 
 pub mod dataset;
 pub use dataset::store;
+
 pub mod field;
-pub mod gridize;
-pub mod logs;
-pub mod scan;
+pub mod fixtures;
+
 pub mod sweep;
 
+pub mod ros;
+
+pub mod gridize;
+
+pub mod logs;
+pub mod scan;
+
 pub mod device;
+
 pub mod render;
 
 pub mod report;
+
 pub mod studies;
 
 #[cfg(feature = "viewer")]

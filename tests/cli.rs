@@ -237,6 +237,34 @@ fn bake_info_and_export_tell_the_same() {
 }
 
 #[test]
+fn a_bake_that_touches_nothing_fails_and_says_how_far_the_object_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let axis = "start = 0.0, stop = 0.28, count = 8";
+    std::fs::write(folder.path().join("up.toml"), changed(axis, "start = -0.28, stop = -0.1, count = 8")).unwrap();
+    let bake =
+        |more: &[&str]| haptize(folder.path(), &[&["bake", "up.toml", "--backend", "cpu", "--json"], more].concat());
+    let output = bake(&[]);
+    let (told, message): (Value, String) = (serde_json::from_slice(&output.stdout).unwrap(), text(&output.stderr));
+    assert_eq!((output.status.code(), told["contact_points"].as_u64()), (Some(1), Some(0)), "{message}");
+    // The tip turns up about (-0.1, 0, 0.06) by 0.1 rad at least: from above the ball's top at z = 0.05.
+    let tip = 0.06 + 0.1 * 0.1_f64.sin() - 0.05;
+    let clearance = &told["clearance"];
+    assert!((clearance["gap"].as_f64().unwrap() - tip).abs() < 1e-4, "{told}");
+    assert_eq!((clearance["node"].as_u64(), clearance["q"][0].as_f64()), (Some(0), Some(-0.1)), "{told}");
+    let way = clearance["motion"][2].as_f64().unwrap();
+    assert!((way - tip).abs() < 1e-4, "{told}");
+    for words in ["nothing touches", "contact node 0", "moving the object by", "haptize reach", "--allow-free"] {
+        assert!(message.contains(words), "{words}: {message}");
+    }
+    assert_eq!(bake(&["--allow-free"]).status.code(), Some(0));
+    let motion = "0,-0.2\n0.1,-0.15\n";
+    std::fs::write(folder.path().join("way.csv"), motion).unwrap();
+    let played = haptize(folder.path(), &["play", "up.haptize", "--motion", "way.csv"]);
+    assert_eq!(played.status.code(), Some(0), "{}", text(&played.stderr));
+    assert!(text(&played.stderr).contains("nothing touches"), "{}", text(&played.stderr));
+}
+
+#[test]
 fn the_demo_needs_nothing_and_leaves_dataset_traces_and_figures() {
     let folder = tempfile::tempdir().unwrap();
     let program = env!("CARGO_BIN_EXE_haptize");

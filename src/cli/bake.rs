@@ -5,7 +5,7 @@ use super::{
     output::{self, Kind},
     reach, refine,
     shard::ShardChoice,
-    watch::{describe, warn, watched},
+    watch::{describe, touches, warn, watched},
 };
 use crate::{
     scene::{Algorithm, Scene},
@@ -61,6 +61,9 @@ pub struct Arguments {
     /// Maximum number of grid points that --max-error may choose.
     #[arg(long, default_value_t = 2_000_000, value_name = "POINTS")]
     max_points: usize,
+    /// Take it for success that the arm touches the object at no grid point.
+    #[arg(long)]
+    allow_free: bool,
     /// Solve one of N shards, counted from 0, into a file of its own: "3/64"; "auto/64" takes the number from the
     /// environment of the job scheduler. An unfinished shard is continued, a whole one left as it is. `haptize merge`
     /// puts them together.
@@ -68,7 +71,7 @@ pub struct Arguments {
     shard: Option<ShardChoice>,
 }
 
-/// Haptizes the scene. Ctrl-C leaves a part that `--resume` continues.
+/// Haptizes the scene. Exit code 1 where nothing touches, unless that is allowed. Ctrl-C leaves a part that `--resume` continues.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut scene = Scene::load(&arguments.scene)?;
     if let Some(algorithm) = arguments.algorithm {
@@ -106,8 +109,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut text = String::new();
     describe(&mut text, &output, &report, None)?;
     earlier.tell(&mut text, &mut json);
-    // Every point was solved and says what became of it: that is the whole work.
-    Ok(Report { text, json, whole: true })
+    // Every point was solved and says what became of it: that is the whole work, if anything touches.
+    let whole = touches(&report, &output, arguments.allow_free, &mut json)?;
+    Ok(Report { text, json, whole })
 }
 
 /// Solves one shard.

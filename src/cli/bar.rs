@@ -29,8 +29,11 @@ impl Bar {
     /// Returns a bar of so many `unit`, without a length yet, drawn as `template` says.
     pub fn new(unit: &'static str, template: &str) -> Self {
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let bar = ProgressBar::hidden().with_style(style);
+        // Without a length it could not be lengthened.
+        bar.set_length(0);
         Self {
-            bar: ProgressBar::hidden().with_style(style),
+            bar,
             unit,
             begun: AtomicBool::new(false),
             last_line: (!stderr().is_terminal()).then(|| Mutex::new(Instant::now())),
@@ -86,5 +89,19 @@ impl Bar {
         let message = if message.is_empty() { message } else { format!(", {message}") };
         let (unit, left) = (self.unit, self.bar.eta().as_secs());
         tell(format_args!("haptize: {done} of {length} {unit}{message}, about {left} s left"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bar_is_as_long_as_all_that_was_added() {
+        let bar = Bar::new("points", "{pos}/{len}");
+        bar.lengthen(3);
+        bar.step();
+        bar.lengthen(4);
+        assert_eq!((bar.bar.position(), bar.bar.length()), (1, Some(7)));
     }
 }

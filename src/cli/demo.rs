@@ -71,7 +71,7 @@ pub fn run() -> Result<Report, Failure> {
         writeln!(text, "  force        at most {force:.2} N on a node of the object, at most {nodes} nodes at once")?;
     }
     write!(text, "press, as fast as it goes: ")?;
-    played::describe(&mut text, &press)?;
+    played::describe(&mut text, &press, &played.trace.joints)?;
     if let Some(timing) = &played.timing {
         writeln!(text, "press against the clock, {:.0} ticks and {rate:.0} frames a second:", scene.haptics.rate)?;
         played::describe_timing(&mut text, timing)?;

@@ -5,7 +5,7 @@ use crate::{
     contact::MeshRipple,
     dataset::{Axis, Dataset, MeasuredError, Refinement, Summary},
     object::Skin,
-    scene::{Material, ObjectSpec, Rendering, SkinSpec},
+    scene::{Material, ObjectSpec, Rendering, SkinSpec, arm_note},
 };
 use glam::DVec3;
 use std::{
@@ -141,8 +141,12 @@ pub fn error(text: &mut String, measured: Option<&MeasuredError>, aim: Option<f6
     for (number, line) in measured.lines().iter().enumerate() {
         writeln!(text, "  {:<12} {line}", if number == 0 { "error" } else { "" })?;
     }
-    let MeasuredError { configurations, left_out, torque, .. } = measured;
-    write!(text, "  {:<12} of the rms torque, {torque:.4} N m, at {configurations} random configurations", "")?;
+    let MeasuredError { configurations, left_out, torque, lever_arm, .. } = measured;
+    if *configurations == 0 {
+        return Ok(());
+    }
+    let arm = arm_note(*lever_arm);
+    write!(text, "  {:<12} of the rms torque, {torque:.4} N m{arm}, at {configurations} random configurations", "")?;
     if *left_out > 0 {
         write!(text, "; {left_out} left out, which did not converge")?;
     }

@@ -8,7 +8,7 @@ use crate::{
     field::TorqueField,
     object::Object,
     proxy::Chain,
-    scene::{Algorithm, AxisSpec, GRID_STEP_SLACK, GridSpec, JointSpec, Scene},
+    scene::{self, Algorithm, AxisSpec, GRID_STEP_SLACK, GridSpec, Scene},
     sweep::{Inspection, build_object},
 };
 use clap::ValueEnum;
@@ -202,8 +202,7 @@ fn describe(text: &mut String, inspection: &Inspection, chain: &Chain) -> fmt::R
 
 /// Writes joint efforts, each with its unit.
 fn efforts(values: &[f64], chain: &Chain) -> String {
-    let one = |(value, joint): (&f64, &JointSpec)| format!("{} {value:.5} {}", joint.name, joint.kind.effort_unit());
-    values.iter().zip(&chain.joints).map(one).collect::<Vec<_>>().join(", ")
+    scene::efforts(values, chain.joints.iter().map(|joint| (joint.name.as_str(), joint.kind.unit())))
 }
 
 /// Least weight that is printed: smaller ones would read zero [1].

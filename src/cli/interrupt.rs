@@ -40,8 +40,11 @@ static SINCE: Mutex<Option<Instant>> = Mutex::new(None);
 /// Whether there is work that looks at [`STOP`].
 static IS_STOPPABLE: AtomicBool = AtomicBool::new(false);
 
+/// Whether what is done lies on the disk, so that it can be continued.
+static IS_KEPT: AtomicBool = AtomicBool::new(false);
+
 /// Listens for signals from now on. With `json` the end by a signal is reported on standard output, too; with `resumes`
-/// that `--resume` continues the work.
+/// that `--resume` continues the work, once it [is kept](kept).
 pub fn listen(json: bool, resumes: bool) -> Result<(), Failure> {
     let ignored = ignored();
     ctrlc::set_handler(move || {
@@ -85,6 +88,11 @@ pub fn stop_flag_of_device() -> &'static AtomicBool {
     stop_flag()
 }
 
+/// From now on what is done lies on the disk.
+pub fn kept() {
+    IS_KEPT.store(true, Ordering::Relaxed);
+}
+
 /// Whether a signal came so long ago that what may be left out is left.
 pub fn is_late() -> bool {
     let since = *SINCE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -101,6 +109,7 @@ fn end(json: bool, resumes: bool) {
     discard_unfinished();
     let (told, done) = mpsc::channel();
     let speak = move || {
+        let resumes = resumes && IS_KEPT.load(Ordering::Relaxed);
         let kept = if resumes { "; what is done is kept: --resume continues it" } else { "" };
         last_words(&format!("interrupted{kept}"), json);
         let _ = told.send(());

@@ -31,9 +31,13 @@ pub struct Arguments {
     /// the points in contact, at least 100 and at most 1000.
     #[arg(long, value_name = "COUNT")]
     measure_error: Option<usize>,
+    /// Take it for success that the arm touches the object at no grid point.
+    #[arg(long)]
+    allow_free: bool,
 }
 
-/// Merges, where no shard is missing. Exit code 1 and the numbers of the missing ones otherwise.
+/// Merges, where no shard is missing; exit code 1 and the numbers of the missing ones otherwise. Exit code 1, too,
+/// where nothing touches, unless that is allowed.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let output = &arguments.output;
     let inputs = arguments.parts.iter().map(PathBuf::as_path);
@@ -59,7 +63,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     json["missing"] = "".into();
     let mut text = describe(output, &merged)?;
     earlier.tell(&mut text, &mut json);
-    Ok(Report { text, json, whole: true })
+    let whole = watch::touches(&merged.report, output, arguments.allow_free, &mut json)?;
+    Ok(Report { text, json, whole })
 }
 
 /// Returns the message about missing shards.

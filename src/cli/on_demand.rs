@@ -6,6 +6,7 @@ use super::{
     tell,
 };
 use crate::{
+    dataset::Grid,
     device::Device,
     render::{
         graphics::Graphics,
@@ -15,6 +16,7 @@ use crate::{
         session::Plan,
         trace::Tick,
     },
+    scene::efforts,
     store::space::MAX_LEVELS,
 };
 use serde_json::json;
@@ -164,7 +166,7 @@ impl Explored {
     }
 
     /// For people.
-    pub fn describe(&self, text: &mut String) -> fmt::Result {
+    pub fn describe(&self, text: &mut String, grid: &Grid) -> fmt::Result {
         let Self { done: on_demand::Explored { answers, solved, levels, .. }, start } = self;
         let percent = |part: u64| 100.0 * part as f64 / answers.ticks.max(1) as f64;
         writeln!(
@@ -195,9 +197,9 @@ impl Explored {
         )?;
         writeln!(
             text,
-            "  passed over  {} changes, at most {:.4} N m; {:.3} mJ given, {:.3} mJ taken",
+            "  passed over  {} changes, at most {}; {:.3} mJ given, {:.3} mJ taken",
             answers.changes,
-            answers.greatest_change,
+            efforts(&answers.greatest_change, grid.axes.iter().map(|axis| (axis.name.as_str(), axis.unit.as_str()))),
             1e3 * answers.given,
             1e3 * answers.taken
         )

@@ -9,6 +9,7 @@ use super::{
     playback_report::PlaybackReport,
     played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, play_timed, traced, unwritten, write},
     tell,
+    watch::warn_of_free_space,
 };
 use crate::{
     dataset::{self, Dataset, replace_file},
@@ -109,6 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if let Some(advice) = &setup.advice {
         tell(format_args!("haptize: note: {advice}"));
     }
+    let clearance = if exploring.is_some() { None } else { warn_of_free_space(&dataset)? };
     let mut told = None;
     let (played, ticks) = traced(&dataset, &folder, |on_tick| match &arguments.replay {
         Some(file) => {
@@ -152,6 +154,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     let outcome = Outcome::of(&played, told.is_some());
     let mut json = outcome.json(arguments, &setup)?;
+    json["clearance"] = serde_json::to_value(clearance)?;
     felt.tell(&mut json);
     json["files"] = files.iter().map(|file| Value::from(file.display().to_string())).collect();
     let mut text = told.unwrap_or_default();
@@ -217,14 +220,14 @@ impl<'a> Outcome<'a> {
         felt: &PlaybackReport,
     ) -> Result<(), Failure> {
         let Self { played, summary, tally, fault, .. } = self;
-        describe(text, summary)?;
+        describe(text, summary, &played.trace.joints)?;
         if summary.held > 0 {
             let stiffness = border_stiffness(&setup.scene.haptics, &dataset.grid);
             writeln!(text, "  border       holds the device with the coupling's stiffness Kvc: {stiffness}")?;
         }
         felt.describe(text)?;
         if let Some(explored) = &played.explored {
-            explored.describe(text)?;
+            explored.describe(text, &dataset.grid)?;
         }
         if let Some((time, reason)) = fault {
             writeln!(text, "  fault        at {time:.4} s the torque went to zero: {reason}; play again to clear it")?;

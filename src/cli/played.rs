@@ -2,7 +2,7 @@
 
 use super::{Failure, interrupt, on_demand::Explored, tell, telling_faults};
 use crate::{
-    dataset::{Dataset, Replacement, discard_unfinished, replace_file},
+    dataset::{Dataset, JointLabel, Replacement, discard_unfinished, replace_file},
     device::Device,
     render::{
         graphics::Graphics,
@@ -15,6 +15,7 @@ use crate::{
         trace::{Summary, Tick, TickTable, Trace},
     },
     report,
+    scene::effort_norms,
 };
 use std::{
     fmt::{self, Write},
@@ -133,10 +134,11 @@ fn exchanged(joules: f64) -> String {
     format!("{verb} {:.2} mJ", 1e3 * joules.abs())
 }
 
-/// Describes what was felt, for people.
-pub fn describe(text: &mut String, s: &Summary) -> fmt::Result {
+/// Describes what was felt along `joints`, for people.
+pub fn describe(text: &mut String, s: &Summary, joints: &[JointLabel]) -> fmt::Result {
+    let sizes = |torque: f64, force: f64| effort_norms([torque, force], joints.iter().map(|joint| joint.unit.as_str()));
     writeln!(text, "{:.2} s, {} ticks, {:.0} % in contact", s.seconds, s.ticks, 100.0 * s.contact_share)?;
-    write!(text, "  contact      torque at most {:.4} N m", s.max_contact_torque)?;
+    write!(text, "  contact      at most {}", sizes(s.max_contact_torque, s.max_contact_force))?;
     // What was measured, and a store, do not say how many nodes of the object are in contact.
     match s.max_contact_nodes {
         0 => writeln!(text)?,
@@ -144,12 +146,13 @@ pub fn describe(text: &mut String, s: &Summary) -> fmt::Result {
     }
     writeln!(
         text,
-        "  steepest     {:.4} N m in a millisecond on the proxy, {:.4} on the device",
-        s.max_contact_torque_step, s.max_device_torque_step
+        "  steepest     {} in a millisecond on the proxy, {} on the device",
+        sizes(s.max_contact_torque_step, s.max_contact_force_step),
+        sizes(s.max_device_torque_step, s.max_device_force_step)
     )?;
     writeln!(
         text,
-        "  energy       interpolation {}, sample-and-hold {}; the balance closes to {:.0e} (relative)",
+        "  energy       time step and interpolation {}, sample-and-hold {}; the balance closes to {:.0e} (relative)",
         exchanged(s.leak),
         exchanged(s.hold_gain),
         s.max_relative_account_residual
@@ -201,7 +204,13 @@ pub fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
     }
     if late > late_beside_steal {
         let own = late - late_beside_steal;
-        write!(text, "; {own} by this system: give the loop real-time priority (haptize doctor) or an idle core")?;
+        // Who has the priority already is not told to give it.
+        let remedy = if timing.refused.is_empty() {
+            "give the loop an idle core"
+        } else {
+            "give the loop real-time priority (haptize doctor) or an idle core"
+        };
+        write!(text, "; {own} by this system: {remedy}")?;
     }
     writeln!(text)
 }

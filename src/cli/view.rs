@@ -41,9 +41,9 @@ pub struct Arguments {
     /// The picture in dark colours.
     #[arg(long, requires = "screenshot")]
     dark: bool,
-    /// The motion that the picture shows.
-    #[arg(long, default_value = "press", requires = "screenshot")]
-    motion: String,
+    /// The motion that the picture shows, press or scrape; by default the press, where there is one.
+    #[arg(long, requires = "screenshot", value_parser = ["press", "scrape"])]
+    motion: Option<String>,
     /// When in that motion the picture is taken [s].
     #[arg(long, default_value_t = 2.2, requires = "screenshot")]
     time: f64,

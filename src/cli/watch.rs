@@ -2,8 +2,9 @@
 
 use super::{Failure, bar::Bar, info, interrupt, tell};
 use crate::{
+    dataset::Dataset,
     scene::Scene,
-    sweep::{BackendChoice, Bake, Bounds, Footprint, Forecast, Iterations, Lowered, Progress, SweepReport},
+    sweep::{BackendChoice, Bake, Bounds, Clearance, Footprint, Forecast, Iterations, Lowered, Progress, SweepReport},
 };
 use std::{
     fmt::{self, Write},
@@ -22,6 +23,7 @@ pub fn watched<T, E: Into<Failure>>(
     let mut announced = false;
     let mut progress = |progress: Progress| {
         if !std::mem::replace(&mut announced, true) {
+            interrupt::kept();
             announce(&progress);
         }
         let message = format!("{} in contact, {:.0}/s", progress.contact_points, progress.rate);
@@ -37,6 +39,40 @@ pub fn watched<T, E: Into<Failure>>(
 /// Prints the warnings of a bake on standard error.
 pub fn warn(report: &SweepReport) {
     report.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
+}
+
+/// What a dataset is that touches nothing, and what to do about it.
+const FREE: &str = "nothing touches: at none of the grid's points does the arm meet the object";
+
+/// Says where contact is to be looked for.
+const REMEDY: &str = "`haptize reach SCENE` prints a grid over the contact within the joint limits";
+
+/// Warns of `dataset` if arm and object touch at no grid point, and returns their least gap.
+pub fn warn_of_free_space(dataset: &Dataset) -> Result<Option<Clearance>, Failure> {
+    let clearance = Clearance::of(dataset)?;
+    if let Some(clearance) = &clearance {
+        tell(format_args!("haptize: {FREE}; {clearance}. {REMEDY}"));
+    }
+    Ok(clearance)
+}
+
+/// Warns of the dataset of `report`, just baked into `file`, if nothing touches. Returns whether that is no failure.
+pub fn touches(
+    report: &SweepReport,
+    file: &Path,
+    allow_free: bool,
+    json: &mut serde_json::Value,
+) -> Result<bool, Failure> {
+    if report.contact_points > 0 {
+        return Ok(true);
+    }
+    json["clearance"] = serde_json::to_value(warn_of_free_space(&Dataset::load(file)?)?)?;
+    if !allow_free {
+        tell(format_args!(
+            "haptize: the dataset is whole, and its torque is zero everywhere; --allow-free takes that for success"
+        ));
+    }
+    Ok(allow_free)
 }
 
 /// Describes what was baked into `file`, for people; `aim`: the rms error over the rms torque that was asked for, if
@@ -123,13 +159,16 @@ fn announce(progress: &Progress) {
     ));
     let Some(Forecast { contact_fraction, seconds, sampled, .. }) = forecast else { return };
     let time = seconds.map(|seconds| seconds * points.saturating_sub(*done) as f64 / *points as f64);
-    let time = time.map_or(String::new(), |seconds| format!(", solved in about {}", duration(seconds)));
+    let time = time.map_or(String::new(), |seconds| {
+        format!(
+            ", solved from rest in about {}, without the search for lower equilibria and the measurement of the error \
+             that follow: they can take several times as long",
+            duration(seconds)
+        )
+    });
     let percent = 100.0 * contact_fraction;
     let digits = if percent < 1.0 { 2 } else { 0 };
-    tell(format_args!(
-        "haptize: predicted from {sampled} of them: {percent:.digits$} % in contact{time}; finding lower equilibria and \
-         measuring accuracy come on top"
-    ));
+    tell(format_args!("haptize: predicted from a sample of {sampled}: {percent:.digits$} % in contact{time}"));
 }
 
 /// Writes a time as people say it: `0.4 s`, `35 s`, `12 min`, `7.5 h`.

@@ -25,7 +25,7 @@ pub use backend::{Backend, CHUNKS_IN_FLIGHT, Work};
 pub(crate) use equilibrium::energy::RESIDUAL_FLOOR;
 pub use mesh_ripple::MeshRipple;
 pub use model::{Model, MotionBound};
-pub use proximity::Proximity;
+pub use proximity::{NearestNode, Proximity};
 pub use solver::Solver;
 pub(crate) use solvers::{SHARE, Solvers};
 

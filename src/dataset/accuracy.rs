@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Errors of the torque at random configurations, against the lowest equilibrium that is found there directly: in the
 /// cells of a uniform grid that have a corner in contact, or anywhere in the range of a store. Torques are Euclidean
-/// norms over the joints; a prismatic joint's force counts with an arm of 0.1 m.
+/// norms over the joints, in which the forces of sliding joints count with an arm.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredError {
     /// Random configurations, solved directly.
@@ -13,6 +13,9 @@ pub struct MeasuredError {
     pub left_out: usize,
     /// Rms of the torque at the configurations [N m].
     pub torque: f64,
+    /// Arm with which the forces of sliding joints count [m]; absent where no joint slides.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lever_arm: Option<f64>,
     /// Interpolation that the scene names.
     pub interpolation: String,
     /// Errors of each interpolation.
@@ -90,6 +93,7 @@ mod tests {
         let measured = MeasuredError {
             configurations: 3,
             torque: 10.0,
+            lever_arm: None,
             interpolation: "potential".into(),
             errors: vec![error, other],
             left_out: 0,

@@ -54,8 +54,8 @@ pub enum GpuError {
         /// The limit [B].
         limit: u64,
     },
-    /// Only a part of a large object's compliance is formed, beyond which nobody would see the paper's iteration
-    /// go.
+    /// Only a part of a large object's compliance is formed, and whether the paper's iteration leaves that part is not
+    /// checked.
     #[error(
         "the GPU takes objects of at most {limit} surface nodes, not {nodes}, by the paper's iteration. Use --backend \
          cpu for this scene"
@@ -79,7 +79,7 @@ pub enum GpuError {
         "the GPU left {count} of {total} results unwritten. Use --backend cpu, and report this with `haptize doctor`"
     )]
     NeverWritten {
-        /// Results still poisoned.
+        /// Results whose records are still zero.
         count: usize,
         /// Results asked for.
         total: usize,

@@ -216,6 +216,16 @@ mod tests {
     }
 
     #[test]
+    fn the_words_that_count_are_those_of_the_shader() {
+        let shader = include_str!("../../shaders/search_types.wgsl");
+        let word = |name: &str| -> usize {
+            let (_, rest) = shader.split_once(&format!("const {name}: u32 = ")).unwrap();
+            rest.split_once("u;").unwrap().0.parse().unwrap()
+        };
+        assert_eq!(COUNTED, word("TRIALS")..word("MEMBER"));
+    }
+
+    #[test]
     fn every_kernel_of_a_sweep_is_timed_and_none_that_nobody_asks_for() {
         let (scene, contexts) = sphere();
         let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));

@@ -7,8 +7,8 @@
 //! 3.1). Terms of effects that the scene does not name stay zero.
 //!
 //! *Passivity observers* (Hannaford and Ryu 2002) watch what the loop can still create, which lies outside this
-//! balance. At the object's port, [`Accounts::created`]: a torque field that is not exactly a gradient gives more than
-//! was stored. At the device's port, [`Accounts::device_port`]: the torque that is held between two ticks gives more
+//! balance. At the object's port, [`Accounts::created`]: a torque that is held for a time step, and a torque field that
+//! is not exactly a gradient, give more than was stored. At the device's port, [`Accounts::device_port`]: the torque that is held between two ticks gives more
 //! than the hand put in ([`Accounts::hold_gain`]), which the device's own damping has to take.
 //!
 //! The device's end of the coupling moves in two ways. When y jumps from y_{k-1} to y_k with the proxy at x_k, the
@@ -57,8 +57,8 @@ pub struct Accounts {
     /// Energy stored in the object at the first tick. If the dataset does not hold it: zero if the loop began out of
     /// contact; else nothing is known until contact first ends, and what was given by then is taken for it.
     pub first_stored: Option<f64>,
-    /// Energy that the contact torque gave beyond what the object had stored, field_work + U - U_0; zero for datasets
-    /// without energy.
+    /// Energy that the contact torque gave beyond what the object had stored, field_work + U - U_0: made by the time
+    /// step, and by interpolation unless that has a potential; zero for datasets without energy.
     pub leak: f64,
     /// Energy that the device's port took in: minus the sum of (torque on the device) . (device displacement).
     pub port_work: f64,

@@ -1,4 +1,4 @@
-//! Contact that is solved while it is felt: the loop's end of `haptize/ahead`.
+//! Contact that is solved while it is felt: the loop's end of `sweep/ahead`.
 //!
 //! The loop publishes where the proxy is and goes, and feels what is there: the equilibrium solved at the proxy and its
 //! tangent, if the scene asks for that (`direct`) and it comes in time; else the store, with the finest level that is
@@ -13,7 +13,7 @@
 
 use super::{accounts::Accounts, passage::Passage};
 use crate::{
-    JointVector,
+    JointVector, MAX_JOINTS,
     contact::{NodeForce, Status},
     field::{Flags, Sample, TorqueField},
     store::{Store, space::MAX_LEVELS},
@@ -88,8 +88,8 @@ pub struct Answers {
     pub coarser_in_contact: u64,
     /// Ticks at which the function had changed where the proxy was.
     pub changes: u64,
-    /// Greatest change of the torque that was passed over [N m or N].
-    pub greatest_change: f64,
+    /// Greatest change of the torque that was passed over, by joint [N m or N].
+    pub greatest_change: [f64; MAX_JOINTS],
     /// Energy given by passing over, and taken [J].
     pub given: f64,
     /// [J]
@@ -201,9 +201,9 @@ impl Live {
         if let Some(last) = last {
             if last.source != source.id() {
                 let (now, _) = source.at(&last.place);
-                let change = last.torque.iter().zip(now.torque.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-                answers.changes += u64::from(change > 0.0);
-                answers.greatest_change = answers.greatest_change.max(change);
+                answers.changes += u64::from(last.torque != now.torque);
+                let changes = last.torque.iter().zip(now.torque.iter()).map(|(a, b)| (a - b).abs());
+                answers.greatest_change.iter_mut().zip(changes).for_each(|(most, change)| *most = most.max(change));
                 passage.take((&last.torque, last.energy), (&now.torque, now.energy));
             }
             passage.go(&last.place, x);

@@ -11,7 +11,7 @@
 //! - Encoder, per joint, if its step Delta is given: `K <= 2 fc / Delta`, fc the device's dry friction (Diolaiti,
 //!   Niemeyer, Barbagli and Salisbury 2006; Abbott and Okamura 2005).
 
-use crate::{dataset::JointLabel, field::TorqueField, scene::HapticsSpec};
+use crate::{JointVector, dataset::JointLabel, field::TorqueField, scene::HapticsSpec};
 use serde::Serialize;
 
 /// A gain and its passivity bound. Beyond it the loop runs, and may create energy.
@@ -88,13 +88,31 @@ pub fn damped(spec: &HapticsSpec, field: &TorqueField) -> HapticsSpec {
     for (damping, slope) in damped.proxy_damping.iter_mut().zip(spec.boundary_slope.iter()) {
         *damping = damping.max(slope / (spec.rate * spec.passivity_factor));
     }
-    let mut slopes = damped.proxy_damping;
-    slopes.iter_mut().enumerate().for_each(|(joint, slope)| *slope = greatest_slope(&damped, joint));
-    let ratio = field.relative_stiffness(&slopes);
+    let [object, both] = relative_stiffness(&damped, field);
+    let ratio = object.max(both);
     if ratio > 1.0 && ratio.is_finite() {
         damped.proxy_damping.iter_mut().for_each(|damping| *damping *= ratio * (1.0 + ROUNDING));
     }
     damped
+}
+
+/// Greatest passive slope at each joint (N m/rad).
+fn greatest_slopes(spec: &HapticsSpec) -> JointVector {
+    let mut slopes = spec.proxy_damping;
+    slopes.iter_mut().enumerate().for_each(|(joint, slope)| *slope = greatest_slope(spec, joint));
+    slopes
+}
+
+/// Stiffness of the dataset's torque over mu bv / T, and that of boundary layer and object together over 2 bv / T, zero
+/// where there is no layer (1).
+fn relative_stiffness(spec: &HapticsSpec, field: &TorqueField) -> [f64; 2] {
+    let slopes = greatest_slopes(spec);
+    let object = field.relative_stiffness(&slopes);
+    if field.is_potential() {
+        return [object, 0.0];
+    }
+    let layer = spec.boundary_slope.iter().zip(slopes.iter()).map(|(slope, safe)| slope / safe).fold(0.0, f64::max);
+    [object, 0.5 * spec.passivity_factor * object.hypot(layer)]
 }
 
 /// Keeps a bound that is met exactly from being exceeded by rounding [1].
@@ -115,17 +133,36 @@ pub fn advice(spec: &HapticsSpec, field: &TorqueField, bounds: &[Bound]) -> Opti
     let passive = damped(spec, field);
     let mut remedies = Vec::new();
     if passive.proxy_damping != spec.proxy_damping {
-        remedies.push(format!("proxy_damping = {}", list(passive.proxy_damping.iter().copied())));
+        let damping = passive.proxy_damping.iter().zip(spec.proxy_damping.iter());
+        let damping = damping.map(|(safe, own)| if safe > own { at_least(*safe) } else { *own });
+        remedies.push(format!("proxy_damping = {}", list(damping)));
     }
     let stiffness = |joint| spec.coupling_stiffness[joint] + handed_stiffness(spec, joint);
-    if (0..joints).any(|joint| stiffness(joint) > wall_bound(spec, joint)) {
-        let damping =
-            |joint| (0.5 * stiffness(joint) / spec.rate + spec.coupling_damping[joint]).max(spec.device_damping[joint]);
-        remedies.push(format!("device_damping = {} if the device has that much", list((0..joints).map(damping))));
+    // Damping helps where no encoder's step stands in the way.
+    let mut alternatives = Vec::new();
+    if (0..joints).any(|joint| stiffness(joint) > wall_bound(spec, joint))
+        && (0..joints).all(|joint| spec.encoder_step[joint] <= 0.0 || stiffness(joint) <= encoder_bound(spec, joint))
+    {
+        let damping = (0..joints).map(|joint| {
+            let least = 0.5 * stiffness(joint) / spec.rate + spec.coupling_damping[joint];
+            if stiffness(joint) > wall_bound(spec, joint) { at_least(least) } else { spec.device_damping[joint] }
+        });
+        alternatives.push(format!("device_damping = {} if the device has that much", list(damping)));
     }
-    if (0..joints).any(|joint| spec.coupling_stiffness[joint] > greatest_stiffness(spec, joint)) {
-        let least = |joint: usize| spec.coupling_stiffness[joint].min(greatest_stiffness(spec, joint));
-        remedies.push(format!("or else coupling_stiffness = {}", list((0..joints).map(least))));
+    let greatest = |joint| greatest_stiffness(spec, joint);
+    if (0..joints).any(|joint| spec.coupling_stiffness[joint] > greatest(joint)) {
+        let least = (0..joints).map(|joint| {
+            let own = spec.coupling_stiffness[joint];
+            if own > greatest(joint) { at_most(greatest(joint)) } else { own }
+        });
+        if (0..joints).all(|joint| greatest(joint) > 0.0) {
+            alternatives.push(format!("coupling_stiffness = {}", list(least)));
+        } else if alternatives.is_empty() {
+            alternatives.push("less coupling_damping, or more device_damping: no coupling_stiffness is passive".into());
+        }
+    }
+    if !alternatives.is_empty() {
+        remedies.push(alternatives.join("; or else "));
     }
     Some(format!(
         "the gains are not passive, so the loop may create energy: {} is {:.4}, at most {:.4} is safe{others}. Set in \
@@ -137,10 +174,37 @@ pub fn advice(spec: &HapticsSpec, field: &TorqueField, bounds: &[Bound]) -> Opti
     ))
 }
 
+/// Digits that an advised gain has.
+const DIGITS: i32 = 4;
+
+/// The least number of [`DIGITS`] digits that is beyond `bound`, a lower bound, by more than rounding.
+fn at_least(bound: f64) -> f64 {
+    to_digits(bound * (1.0 + ADVICE_ROUNDING), f64::ceil)
+}
+
+/// The greatest number of [`DIGITS`] digits that is below `bound`, an upper bound, by more than rounding.
+fn at_most(bound: f64) -> f64 {
+    to_digits(bound * (1.0 - ADVICE_ROUNDING), f64::floor)
+}
+
+/// `value` with [`DIGITS`] digits, rounded by `round`.
+fn to_digits(value: f64, round: fn(f64) -> f64) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    let shift = DIGITS - 1 - value.abs().log10().floor() as i32;
+    // Divided by a whole power of ten, the number reads as it is meant.
+    let power = 10.0_f64.powi(shift.abs());
+    if shift >= 0 { round(value * power) / power } else { round(value / power) * power }
+}
+
+/// Keeps an advised gain from being beyond its bound by the rounding of the sums on both sides [1]: much more than
+/// some eps, much less than its digits.
+const ADVICE_ROUNDING: f64 = 1e-9;
+
 /// Writes numbers as the scene takes them: one for all joints, or a list.
 fn list(values: impl Iterator<Item = f64>) -> String {
-    // Rounded away from the bound by less than a part in a thousand.
-    let texts: Vec<String> = values.map(|value| format!("{}", (value * 1.0005 * 1e4).ceil() / 1e4)).collect();
+    let texts: Vec<String> = values.map(|value| value.to_string()).collect();
     match texts.split_first() {
         Some((first, rest)) if rest.iter().all(|text| text == first) => first.clone(),
         _ => format!("[{}]", texts.join(", ")),
@@ -152,18 +216,17 @@ fn list(values: impl Iterator<Item = f64>) -> String {
 pub fn bounds(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) -> Vec<Bound> {
     let period = 1.0 / spec.rate;
     let mut found = Vec::new();
-    let mut safe_slopes = spec.proxy_damping;
     for (a, joint) in joints.iter().enumerate().take(field.joints()) {
         let (torque, angle) = if joint.unit == "m" { ("N", "m") } else { ("N m", "rad") };
         let slope = greatest_slope(spec, a);
-        safe_slopes[a] = slope;
         found.push(Bound {
             what: format!("boundary slope Ks of joint {}", joint.name),
             value: spec.boundary_slope[a],
             safe: slope,
             remedy: format!(
-                "lower Ks to {slope:.4} {torque}/{angle}, or raise the proxy's damping bv to {:.4} {torque} s/{angle}",
-                spec.boundary_slope[a] * period / spec.passivity_factor
+                "lower Ks to {} {torque}/{angle}, or raise the proxy's damping bv to {} {torque} s/{angle}",
+                at_most(slope),
+                at_least(spec.boundary_slope[a] * period / spec.passivity_factor)
             ),
         });
         let stiffness = spec.coupling_stiffness[a] + handed_stiffness(spec, a);
@@ -177,9 +240,8 @@ pub fn bounds(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) ->
             value: stiffness,
             safe: wall_bound(spec, a),
             remedy: format!(
-                "lower it, or give the device a damping bd of {:.4} {torque} s/{angle} (a hand on the device adds to \
-                 it)",
-                0.5 * stiffness * period + spec.coupling_damping[a]
+                "lower it, or give the device a damping bd of {} {torque} s/{angle} (a hand on the device adds to it)",
+                at_least(0.5 * stiffness * period + spec.coupling_damping[a])
             ),
         });
         if spec.encoder_step[a] > 0.0 {
@@ -188,29 +250,30 @@ pub fn bounds(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) ->
                 value: stiffness,
                 safe: encoder_bound(spec, a),
                 remedy: format!(
-                    "lower it, or take an encoder of {:.2e} {angle} for the device's friction of {:.4} {torque}",
-                    2.0 * spec.device_friction[a] / stiffness,
+                    "lower it, or take an encoder of {:e} {angle} for the device's friction of {} {torque}",
+                    at_most(2.0 * spec.device_friction[a] / stiffness),
                     spec.device_friction[a]
                 ),
             });
         }
     }
-    if safe_slopes.iter().all(|slope| *slope > 0.0) {
-        let ratio = field.relative_stiffness(&safe_slopes);
+    if greatest_slopes(spec).iter().all(|slope| *slope > 0.0) {
+        let [object, both] = relative_stiffness(spec, field);
         found.push(Bound {
             what: "stiffness of the dataset's torque over mu bv / T".into(),
-            value: ratio,
+            value: object,
             safe: 1.0,
-            remedy: format!("raise the proxy's damping bv {ratio:.2}-fold, or keep to a slope Ks that is passive"),
+            remedy: format!(
+                "raise the proxy's damping bv {}-fold, or keep to a slope Ks that is passive",
+                at_least(object)
+            ),
         });
         if !field.is_potential() {
-            let slopes = spec.boundary_slope.iter().zip(safe_slopes.iter()).map(|(slope, safe)| slope / safe);
-            let both = 0.5 * spec.passivity_factor * ratio.hypot(slopes.fold(0.0, f64::max));
             found.push(Bound {
                 what: "stiffness of layer and object together over 2 bv / T".into(),
                 value: both,
                 safe: 1.0,
-                remedy: format!("raise the proxy's damping bv {both:.2}-fold, or lower the slope Ks"),
+                remedy: format!("raise the proxy's damping bv {}-fold, or lower the slope Ks", at_least(both)),
             });
         }
     }

@@ -75,7 +75,8 @@ pub struct Trace {
     pub shown: Vec<f64>,
 }
 
-/// Key figures of a session.
+/// Key figures of a session. Sizes of torques are norms over the joints that turn, those of forces over the joints that
+/// slide: together they would have no unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// Ticks recorded.
@@ -86,21 +87,29 @@ pub struct Summary {
     pub contact_share: f64,
     /// Most object nodes in contact at once.
     pub max_contact_nodes: u32,
-    /// Largest size of the contact torque [N m].
+    /// Largest contact torque, over the joints that turn [N m].
     pub max_contact_torque: f64,
+    /// Largest contact force, over the joints that slide [N].
+    pub max_contact_force: f64,
     /// Largest change of the contact torque from tick to tick, per millisecond [N m/ms].
     pub max_contact_torque_step: f64,
-    /// Largest size of the torque on the device [N m].
+    /// Largest change of the contact force from tick to tick, per millisecond [N/ms].
+    pub max_contact_force_step: f64,
+    /// Largest torque on the device, over the joints that turn [N m].
     pub max_device_torque: f64,
+    /// Largest force on the device, over the joints that slide [N].
+    pub max_device_force: f64,
     /// Largest change of the torque on the device from tick to tick, per millisecond [N m/ms].
     pub max_device_torque_step: f64,
+    /// Largest change of the force on the device from tick to tick, per millisecond [N/ms].
+    pub max_device_force_step: f64,
     /// Largest residual of the energy accounts [J].
     pub max_account_residual: f64,
     /// The same over the energy that the whole session exchanged [1].
     pub max_relative_account_residual: f64,
     /// Least that proxy and coupling had absorbed at any tick [J]: not below zero but for rounding.
     pub min_absorbed: f64,
-    /// Energy that the contact torque gave beyond what was stored, at the last tick [J].
+    /// Energy that the contact torque gave beyond what was stored, by time step and interpolation, at the last tick [J].
     pub leak: f64,
     /// Energy made by holding the device's torque between ticks, at the last tick [J].
     pub hold_gain: f64,
@@ -140,8 +149,8 @@ impl Trace {
         s.halted = self.ticks.iter().filter(|tick| tick.applied.halt.is_some()).count();
         for tick in &self.ticks {
             s.max_contact_nodes = s.max_contact_nodes.max(tick.contact_nodes);
-            s.max_contact_torque = s.max_contact_torque.max(tick.contact_torque.norm());
-            s.max_device_torque = s.max_device_torque.max(tick.device_torque.norm());
+            raise([&mut s.max_contact_torque, &mut s.max_contact_force], self.sizes(&tick.contact_torque));
+            raise([&mut s.max_device_torque, &mut s.max_device_force], self.sizes(&tick.device_torque));
             let residual = tick.accounts.residual().abs();
             s.max_account_residual = s.max_account_residual.max(residual);
             s.min_absorbed = s.min_absorbed.min(tick.accounts.absorbed());
@@ -149,11 +158,15 @@ impl Trace {
         for pair in self.ticks.windows(2) {
             let milliseconds = 1e3 * (pair[1].time - pair[0].time);
             if milliseconds > 0.0 {
-                let step = |a: &JointVector, b: &JointVector| distance(a, b) / milliseconds;
-                s.max_contact_torque_step =
-                    s.max_contact_torque_step.max(step(&pair[0].contact_torque, &pair[1].contact_torque));
-                s.max_device_torque_step =
-                    s.max_device_torque_step.max(step(&pair[0].device_torque, &pair[1].device_torque));
+                let step = |of: fn(&Tick) -> &JointVector| {
+                    let mut change = *of(&pair[1]);
+                    change.iter_mut().zip(of(&pair[0]).iter()).for_each(|(b, a)| *b = (*b - a) / milliseconds);
+                    self.sizes(&change)
+                };
+                let contact = [&mut s.max_contact_torque_step, &mut s.max_contact_force_step];
+                raise(contact, step(|tick| &tick.contact_torque));
+                let device = [&mut s.max_device_torque_step, &mut s.max_device_force_step];
+                raise(device, step(|tick| &tick.device_torque));
             }
         }
         if let (Some(first), Some(last)) = (self.ticks.first(), self.ticks.last()) {
@@ -167,6 +180,15 @@ impl Trace {
             s.port_work = last.accounts.port_work;
         }
         s
+    }
+
+    /// Norms of `effort` over the joints that turn [N m], and over those that slide [N].
+    fn sizes(&self, effort: &JointVector) -> [f64; 2] {
+        let mut squares = [0.0; 2];
+        for (effort, joint) in effort.iter().zip(&self.joints) {
+            squares[usize::from(joint.unit == "m")] += effort * effort;
+        }
+        squares.map(f64::sqrt)
     }
 
     /// Writes all ticks as CSV ([`TickTable`]).
@@ -242,9 +264,9 @@ impl<W: Write> TickTable<W> {
     }
 }
 
-/// Euclidean distance of two vectors of the same length.
-fn distance(a: &JointVector, b: &JointVector) -> f64 {
-    a.iter().zip(b.iter()).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+/// Raises each of `most` to what it is at least.
+fn raise(most: [&mut f64; 2], least: [f64; 2]) {
+    most.into_iter().zip(least).for_each(|(most, least)| *most = most.max(least));
 }
 
 #[cfg(test)]
@@ -284,6 +306,21 @@ mod tests {
         assert_eq!(summary.max_contact_torque_step, 0.25);
         assert_eq!(summary.max_contact_torque, 0.5);
         assert!((summary.contact_share - 2.0 / 3.0).abs() < f64::EPSILON);
+    }
+
+    #[test]
+    fn torques_and_forces_are_apart() {
+        let mut ticks = vec![tick(0.0, 0.0), tick(0.001, 0.0)];
+        ticks[1].contact_torque = JointVector::from_slice(&[3.0, 0.3, 0.4]);
+        ticks[1].device_torque = JointVector::from_slice(&[-2.0, 0.0, 0.1]);
+        ticks[0].contact_torque = JointVector::zeros(3);
+        ticks[0].device_torque = JointVector::zeros(3);
+        let joints = ["m", "rad", "rad"].map(|unit| JointLabel { name: unit.into(), unit: unit.into() });
+        let s = Trace { joints: joints.into(), ticks, ..Trace::default() }.summary();
+        assert_eq!((s.max_contact_torque, s.max_contact_force), (0.5, 3.0));
+        assert_eq!((s.max_contact_torque_step, s.max_contact_force_step), (0.5, 3.0));
+        assert_eq!((s.max_device_torque, s.max_device_force), (0.1, 2.0));
+        assert_eq!((s.max_device_torque_step, s.max_device_force_step), (0.1, 2.0));
     }
 
     #[test]

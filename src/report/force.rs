@@ -119,11 +119,18 @@ pub fn force(felt: &[EndForce], trace: &Trace) -> Canvas {
             })
             .collect(),
     };
-    let angles = trace.joints.iter().enumerate().map(|(number, label)| {
-        let points = trace.ticks.iter().map(|tick| (tick.time, tick.proxy[number])).collect();
-        curve(number, format!("q{} {}", press::subscript(number + 1), label.name), points)
-    });
-    lanes.push(lane("Proxy configuration [rad]".to_owned(), angles.collect(), 130.0));
+    for unit in ["rad", "m"] {
+        let joints = trace.joints.iter().enumerate().filter(|(_, joint)| joint.unit == unit);
+        let curves: Vec<Curve> = joints
+            .map(|(number, label)| {
+                let points = trace.ticks.iter().map(|tick| (tick.time, tick.proxy[number])).collect();
+                curve(number, format!("q{} {}", press::subscript(number + 1), label.name), points)
+            })
+            .collect();
+        if !curves.is_empty() {
+            lanes.push(lane(format!("Proxy configuration [{unit}]"), curves, 130.0));
+        }
+    }
     Stack {
         headline: "Force felt at the end of the proxy".to_owned(),
         across: "Time [s]".to_owned(),
@@ -137,6 +144,7 @@ pub fn force(felt: &[EndForce], trace: &Trace) -> Canvas {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataset::JointLabel;
     use crate::scene::{JointKind, JointSpec, ProxyNodeSpec, ProxySpec};
 
     #[test]
@@ -180,5 +188,19 @@ mod tests {
         assert_eq!(held.axis, 'z');
         assert!((held.mean + 2.08).abs() < 1e-3 && (held.variation - 0.02 / 2.08).abs() < 1e-3, "{held:?}");
         assert!(EndForce { contact: None, ..force }.held().is_none());
+    }
+
+    #[test]
+    fn a_panel_has_one_unit() {
+        let one = |unit: &str| JointLabel { name: unit.into(), unit: unit.into() };
+        let felt = EndForce { name: "felt".into(), forces: vec![(0.0, DVec3::X), (1.0, DVec3::Y)], contact: None };
+        for (units, panels) in [(&["rad", "rad"][..], &["[rad]"][..]), (&["m", "rad"], &["[rad]", "[m]"])] {
+            let joints = units.iter().map(|unit| one(unit)).collect();
+            let svg = force(std::slice::from_ref(&felt), &Trace { joints, ..Trace::default() }).svg();
+            for unit in ["[rad]", "[m]"] {
+                let title = format!("Proxy configuration {unit}");
+                assert_eq!(svg.contains(&title), panels.contains(&unit), "{units:?}: {unit}");
+            }
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Figures of a bake and of a press, drawn without a display, a GPU or a system font.
 //!
 //! [`canvas`] is the paper sheet (SVG, and the same sheet rasterised to PNG), [`plot`] draws charts and heat maps on
-//! it, [`raster`] draws solid bodies. The figures themselves are functions of the library's types; none of them knows
+//! it, [`raster`] draws solid bodies; [`prediction`] holds a dataset against measurements, for a figure and for
+//! `haptize gridize`. The figures themselves are functions of the library's types; none of them knows
 //! how the data came about.
 
 pub mod canvas;

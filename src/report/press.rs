@@ -85,7 +85,8 @@ pub fn energy(trace: &Trace) -> Canvas {
         ),
     ];
     if knows_energy {
-        lanes.push(lane("Created by interpolating the torque [mJ]", &[("", |accounts| accounts.leak)]));
+        lanes
+            .push(lane("Created at the object by time step and interpolation [mJ]", &[("", |accounts| accounts.leak)]));
     }
     stack("Energy accounts of proxy and coupling", trace, lanes)
 }

@@ -262,13 +262,25 @@ fn pitch(dataset: &Dataset, axis: usize) -> usize {
 }
 
 /// Whether the chain has revolute and prismatic joints.
-pub(super) fn is_mixed(dataset: &Dataset) -> bool {
+#[must_use]
+pub fn is_mixed(dataset: &Dataset) -> bool {
     let kind = |unit: &str| dataset.grid.axes.iter().any(|axis| axis.unit == unit);
     kind("rad") && kind("m")
 }
 
+/// What [`torque_size`] is, with its unit.
+#[must_use]
+pub fn torque_size_label(dataset: &Dataset) -> String {
+    match dataset.grid.axes.first().map_or("N m", |axis| axis.effort_unit()) {
+        _ if is_mixed(dataset) => "torque of turning joints [N m]".into(),
+        "N" => "force [N]".into(),
+        unit => format!("torque [{unit}]"),
+    }
+}
+
 /// Size of the torque at a grid point: of the revolute joints where there are both kinds [N m], else of all.
-pub(super) fn torque_size(dataset: &Dataset, point: usize) -> f64 {
+#[must_use]
+pub fn torque_size(dataset: &Dataset, point: usize) -> f64 {
     let mixed = is_mixed(dataset);
     let counted = dataset.torque(point).iter().zip(&dataset.grid.axes).filter(|(_, axis)| !mixed || axis.unit == "rad");
     counted.map(|(torque, _)| torque * torque).sum::<f64>().sqrt()

@@ -3,8 +3,8 @@
 //! device gives way while it is held, holds on where it is let go, and is measured there, so that no row contains the
 //! hand's own torque.
 //!
-//! Everything here drives a [`Rig`]. The one that ships is [`simulated`]: it touches no real object, and every log and
-//! dataset made with it says so.
+//! Everything here drives a [`Rig`]: the [`simulated`] one, which touches no real object, and every log and dataset made
+//! with it says so; or a device's (`device/rig.rs`).
 
 mod control;
 mod log;
@@ -304,14 +304,15 @@ impl<'a> Driver<'a> {
     fn check(&mut self, output: &PdOutput) -> Result<(), String> {
         let limits = &self.spec.limits;
         let joints = &self.chain.joints;
-        for (joint, name) in joints.iter().map(|joint| &joint.name).enumerate() {
+        for (joint, (name, kind)) in joints.iter().map(|joint| (&joint.name, joint.kind)).enumerate() {
+            let (unit, effort) = (kind.unit(), kind.effort_unit());
             let (torque, most) = (output.torque[joint].abs(), limits.torque[joint]);
             if torque > most {
-                return Err(format!("the torque of joint `{name}` is {torque:.3}, its limit is {most} N m"));
+                return Err(format!("the effort of joint `{name}` is {torque:.3}, its limit is {most} {effort}"));
             }
             let (speed, most) = (output.speed[joint].abs(), limits.speed);
             if speed > most {
-                return Err(format!("the speed of joint `{name}` is {speed:.3}, the limit is {most} rad/s"));
+                return Err(format!("the speed of joint `{name}` is {speed:.3}, the limit is {most} {unit}/s"));
             }
         }
         self.chain.pose(&self.reading.position, &mut self.pose);

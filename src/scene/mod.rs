@@ -7,6 +7,7 @@ mod check;
 mod convert;
 mod device;
 mod effects;
+mod effort;
 mod error;
 mod file;
 mod gains;
@@ -19,6 +20,7 @@ pub(crate) mod text;
 
 pub use device::DeviceSpec;
 pub use effects::{EFFECTS, Effect, Tuning};
+pub use effort::{arm_note, effort_norms, effort_unit, efforts, lever_arm};
 pub use error::{Diagnostic, SceneError};
 pub use gains::GainError;
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
@@ -28,7 +30,7 @@ pub use spec::{
     FrictionSpec, GREATEST_INTERVAL, GRID_LINE, GRID_STEP_SLACK, GraphicsEffects, GraphicsSpec, GridSpec, GroundNodes,
     GroundSpec, HandSpec, HapticEffects, HapticsSpec, InclusionPlace, InclusionSpec, Interpolation, JointKind,
     JointSpec, LEVER_ARM, MAX_CONTACT_NODES, Material, MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec,
-    Shape, SkinSpec, SpringKind, SpringSpec, StiffeningSpec, THRESHOLD, Waypoint, effort_unit,
+    Shape, SkinSpec, SpringKind, SpringSpec, StiffeningSpec, THRESHOLD, Waypoint,
 };
 
 pub(crate) use inertia::positive_semidefinite;

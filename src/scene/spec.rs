@@ -251,14 +251,8 @@ impl JointKind {
     /// Unit of the torque, or force, that acts along it.
     #[must_use]
     pub fn effort_unit(self) -> &'static str {
-        effort_unit(self.unit())
+        super::effort_unit(self.unit())
     }
-}
-
-/// Returns the unit of what acts along a coordinate in `unit`: a torque, or a force where that is a length.
-#[must_use]
-pub fn effort_unit(unit: &str) -> &'static str {
-    if unit == "m" { "N" } else { "N m" }
 }
 
 /// A contact node of a link.

@@ -11,8 +11,11 @@ use std::{
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SweepError {
-    /// The grid is none.
-    #[error("the scene's grid: {0}; correct [[grid.axes]] in the scene")]
+    /// The scene has no grid.
+    #[error("the scene leaves the grid out; `haptize reach SCENE --write` finds one and writes it there")]
+    NoGrid,
+    /// Invalid grid.
+    #[error("the scene's grid: {0}; correct `axes` of [grid] in the scene")]
     Grid(String),
     /// The columns do not fit in memory.
     #[error("the grid's {points} points need {} MB of memory ({source}); take a coarser grid, or haptize into a file \

@@ -43,7 +43,7 @@ pub struct Forecast {
     /// The results on disk while they are collected, with the forces from which lower equilibria are searched for
     /// [bytes].
     pub part: usize,
-    /// Points that were sampled.
+    /// Random points that were sampled; some may have been drawn twice.
     pub sampled: usize,
 }
 
@@ -69,13 +69,14 @@ impl Sweep<'_> {
             return Ok(());
         }
         let mut random = Random::new(SEED);
+        let most = DRAWN.min(points);
         let free_space = self.free_space();
         let mut free_space = free_space.as_ref().map(|free_space| (free_space, free_space.proximity()));
         let (mut sampled, mut touching, mut contacts, mut touches) = (0, 0, 0, 0);
         let (mut solving, start) = (0.0, Instant::now());
         for _ in 0..PORTIONS {
             let mut portion = Vec::new();
-            while portion.len() < PORTION && sampled < DRAWN && start.elapsed().as_secs_f64() < LONGEST {
+            while portion.len() < PORTION && sampled < most && start.elapsed().as_secs_f64() < LONGEST {
                 let point = (random.between(0.0, points as f64) as usize).min(points - 1);
                 let is_free =
                     free_space.as_mut().is_some_and(|(space, proximity)| space.is_surrounded(proximity, point));

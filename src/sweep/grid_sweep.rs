@@ -444,8 +444,7 @@ impl<'a> Sweep<'a> {
 
 /// Checks that `scene` has a grid.
 pub(super) fn check_given(scene: &Scene) -> Result<(), SweepError> {
-    let reason = "the scene leaves it out; `haptize reach SCENE --write` finds one and writes it there";
-    if scene.grid.axes.is_empty() { Err(SweepError::Grid(reason.into())) } else { Ok(()) }
+    if scene.grid.axes.is_empty() { Err(SweepError::NoGrid) } else { Ok(()) }
 }
 
 /// CRC-32 of all that contact knows of `object`.

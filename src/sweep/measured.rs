@@ -18,7 +18,7 @@ use crate::{
     dataset::{Dataset, Grid, InterpolationError, MeasuredError},
     field::{FieldError, TorqueField},
     random::Random,
-    scene::{Interpolation, LEVER_ARM},
+    scene::{Interpolation, LEVER_ARM, lever_arm},
 };
 use rayon::prelude::*;
 use std::{
@@ -118,6 +118,7 @@ impl ErrorCheck<'_> {
             configurations: exact.len(),
             left_out: places.len() - exact.len(),
             interpolation: self.interpolation.name().to_owned(),
+            lever_arm: lever_arm(grid.axes.iter().map(|axis| axis.unit.as_str())),
             torque: (squares / exact.len().max(1) as f64).sqrt(),
             errors: errors.collect::<Result<_, FieldError>>()?,
         }))

@@ -5,6 +5,7 @@ mod assembly;
 mod bake;
 mod choice;
 mod chunks;
+mod clearance;
 mod columns;
 mod cpu;
 mod direct;
@@ -39,6 +40,7 @@ pub(crate) use bake::{model_of, sweep_of};
 #[cfg(feature = "viewer")]
 pub(crate) use choice::is_worth_a_gpu;
 pub use choice::{BackendChoice, BackendError, ChosenBackend, OTHER_ADAPTER, remedied};
+pub use clearance::Clearance;
 pub use cpu::CpuBackend;
 pub use direct::{Direct, DirectError};
 pub use error::SweepError;

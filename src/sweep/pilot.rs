@@ -20,7 +20,7 @@ use crate::{
     field::{FieldError, TorqueField},
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{ContactSpec, Interpolation, Scene, SceneError},
+    scene::{ContactSpec, Interpolation, Scene, SceneError, arm_note},
 };
 use serde::Serialize;
 use std::{fmt, str::FromStr, sync::atomic::AtomicBool, time::Instant};
@@ -118,6 +118,9 @@ pub struct Pilot {
     pub relative: f64,
     /// Rms of the torque [N m].
     pub torque: f64,
+    /// As in [`MeasuredError`](crate::dataset::MeasuredError::lever_arm) (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lever_arm: Option<f64>,
     /// Random configurations, and those in contact.
     pub configurations: usize,
     /// See `configurations`.
@@ -254,6 +257,7 @@ impl Pilot {
             aim,
             relative: aim / torque,
             torque,
+            lever_arm: reference.lever_arm,
             configurations: reference.exact.len(),
             in_contact: reference.in_contact,
             prospects: prospects(&trials, SPACING_SHARE * aim, joints),
@@ -312,7 +316,8 @@ impl Pilot {
     /// Why no grid of at most `limit` points was chosen, and what to do.
     #[must_use]
     pub fn refusal(&self, limit: usize) -> String {
-        let aim = format!("an rms error of {:.2e} N m, {} % of the rms torque", self.aim, percent(self.relative));
+        let arm = arm_note(self.lever_arm);
+        let aim = format!("an rms error of {:.2e} N m{arm}, {} % of the rms torque", self.aim, percent(self.relative));
         let Some(finest) = self.trials.first() else { return format!("{aim}, is out of reach: no grid was tried") };
         let tried = self.trials.iter().filter(|trial| trial.points == finest.points);
         let tried = tried.min_by(|a, b| a.rms.total_cmp(&b.rms)).unwrap_or(finest);

@@ -5,7 +5,7 @@ use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},
     random::Random,
-    scene::{Algorithm, ContactSpec, JointKind, LEVER_ARM, Scene},
+    scene::{Algorithm, ContactSpec, JointKind, LEVER_ARM, Scene, lever_arm},
 };
 
 /// Relative residual to which the reference of an accuracy study is solved [1]: three decades below the scenes' own
@@ -33,6 +33,8 @@ pub(crate) struct Reference {
     /// rms of its own error [N m].
     pub error: f64,
     levers: JointVector,
+    /// As in [`MeasuredError`](crate::dataset::MeasuredError::lever_arm) (m).
+    pub lever_arm: Option<f64>,
 }
 
 /// There is nothing to compare with.
@@ -79,6 +81,7 @@ impl Reference {
             torque: 0.0,
             error: 0.0,
             levers,
+            lever_arm: lever_arm(scene.proxy.joints.iter().map(|joint| joint.kind.unit())),
         };
         let mut rough = Vec::new();
         for ((q, equilibrium), other) in drawn.into_iter().zip(converged).zip(rougher) {

@@ -251,10 +251,10 @@ impl Viewer {
                             session.controls.keep(before);
                         }
                         self.session = Some(session);
+                        self.plots.reset();
                     }
                     Err(reason) => self.error = Some(reason),
                 }
-                self.plots.reset();
             }
         }
     }
@@ -275,13 +275,22 @@ impl Viewer {
         })
     }
 
-    /// Plays motion `name` of the scene, if it has one, from its beginning, where hand and proxy are put.
+    /// Plays motion `name` of what is open, or its press, if it has one, from its beginning, where hand and proxy are
+    /// put.
     ///
     /// # Errors
-    /// In words, when the loop cannot be started.
-    pub fn begin_motion(&mut self, name: &str) -> Result<(), String> {
-        let number = self.motion(name);
-        number.zip(self.session.as_mut()).map_or(Ok(()), |(number, session)| session.begin(number))
+    /// In words, when there is no motion `name`, or the loop cannot be started.
+    pub fn begin_motion(&mut self, name: Option<&str>) -> Result<(), String> {
+        let Some(session) = &mut self.session else { return Err("nothing is open".into()) };
+        let names = session.feel.guide().names();
+        match (names.iter().position(|known| *known == name.unwrap_or("press")), name) {
+            (Some(number), _) => session.begin(number),
+            (None, None) => Ok(()),
+            (None, Some(name)) => {
+                let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+                Err(format!("there is no motion \"{name}\" to show; the motions of what is open: {known}"))
+            }
+        }
     }
 
     fn motion(&self, name: &str) -> Option<usize> {

@@ -9,7 +9,15 @@ use super::{
     slices::gradient,
     theme::{self, COLOUR_BAR, FINE_GAP, GAP, HAIRLINE, ROUNDING},
 };
-use crate::{JointVector, contact::Status, dataset::Dataset, report::colour::ColourMap};
+use crate::{
+    JointVector,
+    contact::Status,
+    dataset::Dataset,
+    report::{
+        colour::ColourMap,
+        slices::{torque_size, torque_size_label},
+    },
+};
 use eframe::egui::{self, Align2, Color32, Pos2, Rect, Sense, Stroke, Ui, vec2};
 use glam::{Vec2, Vec3};
 
@@ -60,7 +68,7 @@ impl Cloud {
     pub fn new(dataset: &Dataset) -> Self {
         let contact = || (0..dataset.grid.points()).filter(|&point| dataset.status(point).is_in_contact());
         let trusted = contact().filter(|&point| !dataset.status(point).is_failed());
-        let high = trusted.map(|point| size(dataset, point)).fold(0.0, f64::max);
+        let high = trusted.map(|point| torque_size(dataset, point)).fold(0.0, f64::max);
         let axes = &dataset.grid.axes;
         let others: usize = axes.iter().skip(3).map(|axis| axis.count).product();
         Self { camera: home(), points: None, pitch: pitch(contact().count() / others, axes.len().min(3)), high }
@@ -134,11 +142,10 @@ impl Cloud {
             let at = rect.left_top() + vec2(GAP, GAP);
             painter.text(at, Align2::LEFT_TOP, note, theme::small(), ui.visuals().weak_text_color());
         }
-        let unit = theme::units(grid.axes.iter().map(|axis| axis.effort_unit().to_owned()));
         let bar = Rect::from_min_size(rect.right_top() + BAR_AT, vec2(BAR_WIDTH, COLOUR_BAR));
         gradient(&painter, bar, map, true);
         let (text, small) = (ui.visuals().text_color(), theme::small());
-        let title = format!("torque [{unit}]");
+        let title = torque_size_label(dataset);
         painter.text(bar.center_top() + vec2(0.0, -FINE_GAP), Align2::CENTER_BOTTOM, title, small.clone(), text);
         painter.text(bar.left_bottom() + vec2(0.0, FINE_GAP), Align2::CENTER_TOP, "0", small.clone(), text);
         painter.text(
@@ -194,10 +201,6 @@ fn home() -> Camera {
 }
 
 /// Size of the torque of a grid point [N m].
-fn size(dataset: &Dataset, point: usize) -> f64 {
-    dataset.torque(point).iter().map(|tau| tau * tau).sum::<f64>().sqrt()
-}
-
 /// Returns where a configuration lies in the box from -1 to 1; missing joints in its middle, or on its floor.
 fn place(dataset: &Dataset, q: &JointVector) -> Vec3 {
     let mut place = Vec3::new(0.0, 0.0, if dataset.grid.joints() < 3 { -1.0 } else { 0.0 });
@@ -226,7 +229,7 @@ fn points(dataset: &Dataset, others: &[usize], pitch: usize) -> Vec<Point> {
         .filter(|&point| dataset.status(point).is_in_contact())
         .map(|point| Point {
             place: place(dataset, &dataset.grid.configuration(point)),
-            torque: size(dataset, point),
+            torque: torque_size(dataset, point),
             status: dataset.status(point),
         })
         .collect()

@@ -26,15 +26,15 @@ pub struct Picture {
     pub scale: f32,
     /// Dark colours.
     pub dark: bool,
-    /// Name of the motion that is played.
-    pub motion: String,
+    /// Name of the motion that is played; by default the press, where there is one.
+    pub motion: Option<String>,
     /// When the picture is taken, since the motion began [s].
     pub time: f64,
 }
 
 impl Default for Picture {
     fn default() -> Self {
-        Self { size: theme::WINDOW, scale: 1.5, dark: false, motion: "press".into(), time: 2.2 }
+        Self { size: theme::WINDOW, scale: 1.5, dark: false, motion: None, time: 2.2 }
     }
 }
 
@@ -79,7 +79,7 @@ pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), V
     if let Some(error) = viewer.error() {
         return Err(ViewError::Open(error.to_owned()));
     }
-    viewer.begin_motion(&picture.motion).map_err(ViewError::Open)?;
+    viewer.begin_motion(picture.motion.as_deref()).map_err(ViewError::Open)?;
     viewer.advance(FRAME, &egui);
     for _ in 0..(picture.time / FRAME).ceil() as usize {
         if viewer.time_in_motion().is_some_and(|(time, duration)| time < picture.time.min(duration) - 0.5 * FRAME) {

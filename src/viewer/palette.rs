@@ -26,7 +26,7 @@ pub struct Palette {
     pub here: Color32,
     /// Points that are not to be trusted.
     pub flagged: Color32,
-    /// Points where nothing is touched.
+    /// Points where nothing is touched: far from the colour of a small torque, so that the edge of contact shows.
     pub free: Color32,
     /// Points without data.
     pub absent: Color32,
@@ -82,8 +82,8 @@ pub fn of(visuals: &Visuals) -> Palette {
             axis: hex(0x6b_75_82),
             here: hex(0x22_2b_36),
             flagged: hex(0xd0_1c_55),
-            free: hex(0xee_f1_f4),
-            absent: hex(0xd3_d8_de),
+            free: hex(0xc8_d0_d9),
+            absent: hex(0x8f_99_a5),
             good: hex(0x00_80_5c),
             bad: hex(0xc2_52_00),
         }

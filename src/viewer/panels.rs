@@ -23,7 +23,7 @@ use crate::{
 };
 use eframe::egui::{
     self, Align, Button, CentralPanel, Color32, Frame, Grid, Label, Layout, Panel, ProgressBar, RichText, ScrollArea,
-    Slider, TextStyle, Ui, vec2,
+    Slider, TextStyle, TextWrapMode, Ui, vec2,
 };
 use std::path::Path;
 
@@ -92,83 +92,64 @@ impl Viewer {
         }
     }
 
-    /// Shows which adapter draws, and how the loop is doing.
+    /// Shows which adapter draws, and how the loop is doing. In a narrow window what stands last is cut off, and nothing
+    /// lies on anything else; a fault stands first.
     fn status(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
-            let adapter = self.context.adapter();
-            let rate = self.frame_rate.map_or_else(String::new, |rate| format!(", {rate:.0} frames/s"));
-            let drawn = format!("drawn by {} ({}){rate}", short(&adapter.name), adapter.kind);
-            ui.label(RichText::new(drawn).weak().small()).on_hover_text(format!(
-                "{adapter}\nAnother adapter draws and computes where {ADAPTER_VARIABLE} is set to a part of its name \
-                 or to its address before haptize starts; haptize doctor lists them"
-            ));
-            let Some(session) = &mut self.session else { return };
-            if let Some(tick) = session.history.last() {
-                ui.separator();
-                let mut contact = contact(tick, session.loaded.knows_nodes());
-                let held = tick.flags.contains(Flags::HELD);
-                let colour = if held { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
-                if held {
-                    let gains = &session.controls.tuning.haptics;
-                    contact += &format!(", Kvc {}", border_stiffness(gains, &session.loaded.dataset.grid));
-                }
-                ui.colored_label(colour, RichText::new(contact).small());
-                ui.separator();
-                let units = session.loaded.dataset.grid.axes.iter().map(|axis| axis.effort_unit().to_owned());
-                let sizes = theme::by_unit(units).into_iter().map(|(unit, joints)| {
-                    let size = joints.iter().map(|&joint| tick.contact_torque[joint].powi(2)).sum::<f64>().sqrt();
-                    format!("{} {} {unit}", if unit == "N" { "force" } else { "torque" }, number(size))
-                });
-                ui.label(RichText::new(sizes.collect::<Vec<_>>().join(", ")).small());
-                if let (Some(answers), Some(on_demand)) = (session.feel.answers(), &session.loaded.on_demand) {
-                    ui.separator();
-                    let coarser = 100.0 * answers.coarser as f64 / answers.ticks.max(1) as f64;
-                    let text = format!("{} blocks solved, {coarser:.1} % coarser than wanted", on_demand.blocks());
-                    ui.label(RichText::new(text).small()).on_hover_text(
-                        "Contact is solved ahead of the motion. Ticks that came before the finest level was there were \
-                         answered by a coarser one",
-                    );
-                }
-                if let Some(fault) = tick.fault {
-                    ui.separator();
-                    ui.colored_label(ui.visuals().error_fg_color, RichText::new(fault.to_string()).small());
-                    if ui.small_button("Clear fault").clicked() {
-                        session.feel.clear_fault();
-                    }
-                }
-                if let (Some(halt), Some(_)) = (tick.applied.halt, &session.lead) {
-                    ui.separator();
-                    let what = format!("no torque: {halt}");
-                    ui.colored_label(ui.visuals().error_fg_color, RichText::new(what).small());
-                }
-            }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                if let Some(job) = &self.job {
-                    progress(ui, job, PROGRESS);
-                    ui.label(RichText::new(&job.title).small());
-                    return;
-                }
-                let coming = [
-                    (session.is_retuning(), "The loop is made anew …"),
-                    (self.scene.is_redrawing(), "The object is set up anew …"),
-                ];
-                if let Some((_, what)) = coming.into_iter().find(|(is_coming, _)| *is_coming) {
-                    ui.spinner();
-                    ui.label(RichText::new(what).small());
-                    return;
-                }
-                let jitter = session.history.jitter().percentiles();
-                let cost = session.history.cost().percentiles();
-                if cost.count > 0 && self.pace == TickSource::Clock {
-                    let words = format!("tick {} µs, jitter {} µs at 99 %", number(cost.p50), number(jitter.p99));
-                    let refused = session.history.refused();
-                    let label = ui.label(RichText::new(words).small());
-                    if !refused.is_empty() {
-                        label.on_hover_text(refused.join("\n"));
+                self.progress_or_punctuality(ui);
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                    ui.style_mut().wrap_mode = Some(TextWrapMode::Truncate);
+                    if let Some(session) = &mut self.session {
+                        faults(ui, session);
                     }
-                }
+                    self.drawn_by(ui);
+                    if let Some(session) = &mut self.session {
+                        felt(ui, session);
+                    }
+                });
             });
         });
+    }
+
+    /// The adapter, and how many frames a second.
+    fn drawn_by(&self, ui: &mut Ui) {
+        let adapter = self.context.adapter();
+        let rate = self.frame_rate.map_or_else(String::new, |rate| format!(", {rate:.0} frames/s"));
+        let drawn = format!("drawn by {} ({}){rate}", short(&adapter.name), adapter.kind);
+        ui.label(RichText::new(drawn).weak().small()).on_hover_text(format!(
+            "{adapter}\nAnother adapter draws and computes where {ADAPTER_VARIABLE} is set to a part of its name or to \
+             its address before haptize starts; haptize doctor lists them"
+        ));
+    }
+
+    /// What is under way; otherwise how punctual the loop is.
+    fn progress_or_punctuality(&self, ui: &mut Ui) {
+        let Some(session) = &self.session else { return };
+        if let Some(job) = &self.job {
+            progress(ui, job, PROGRESS);
+            ui.label(RichText::new(&job.title).small());
+            return;
+        }
+        let coming = [
+            (session.is_retuning(), "The loop is made anew …"),
+            (self.scene.is_redrawing(), "The object is set up anew …"),
+        ];
+        if let Some((_, what)) = coming.into_iter().find(|(is_coming, _)| *is_coming) {
+            ui.spinner();
+            ui.label(RichText::new(what).small());
+            return;
+        }
+        let jitter = session.history.jitter().percentiles();
+        let cost = session.history.cost().percentiles();
+        if cost.count > 0 && self.pace == TickSource::Clock {
+            let words = format!("tick {} µs, jitter {} µs at 99 %", number(cost.p50), number(jitter.p99));
+            let refused = session.history.refused();
+            let label = ui.label(RichText::new(words).small());
+            if !refused.is_empty() {
+                label.on_hover_text(refused.join("\n"));
+            }
+        }
     }
 
     fn panels(&mut self, ui: &mut Ui) {
@@ -379,6 +360,54 @@ fn progress(ui: &mut Ui, job: &Job, width: f32) {
         ProgressBar::new(share).desired_width(width).desired_height(PROGRESS_HEIGHT).text(RichText::new(text).small());
     ui.add(bar);
     cancel(ui);
+}
+
+/// Why there is no torque, if there is none.
+fn faults(ui: &mut Ui, session: &mut Session) {
+    let Some(&Tick { fault, applied, .. }) = session.history.last() else { return };
+    let colour = ui.visuals().error_fg_color;
+    if let Some(fault) = fault {
+        // First, so that it can be hit however long the reason.
+        if ui.small_button("Clear fault").clicked() {
+            session.feel.clear_fault();
+        }
+        ui.colored_label(colour, RichText::new(fault.to_string()).small());
+        ui.separator();
+    }
+    if let (Some(halt), Some(_)) = (applied.halt, &session.lead) {
+        ui.colored_label(colour, RichText::new(format!("no torque: {halt}")).small());
+        ui.separator();
+    }
+}
+
+/// What is touched, how hard, and how much of it is solved.
+fn felt(ui: &mut Ui, session: &mut Session) {
+    let Some(tick) = session.history.last() else { return };
+    ui.separator();
+    let mut contact = contact(tick, session.loaded.knows_nodes());
+    let held = tick.flags.contains(Flags::HELD);
+    let colour = if held { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
+    if held {
+        let gains = &session.controls.tuning.haptics;
+        contact += &format!(", Kvc {}", border_stiffness(gains, &session.loaded.dataset.grid));
+    }
+    ui.colored_label(colour, RichText::new(contact).small());
+    ui.separator();
+    let units = session.loaded.dataset.grid.axes.iter().map(|axis| axis.effort_unit().to_owned());
+    let sizes = theme::by_unit(units).into_iter().map(|(unit, joints)| {
+        let size = joints.iter().map(|&joint| tick.contact_torque[joint].powi(2)).sum::<f64>().sqrt();
+        format!("{} {} {unit}", if unit == "N" { "force" } else { "torque" }, number(size))
+    });
+    ui.label(RichText::new(sizes.collect::<Vec<_>>().join(", ")).small());
+    if let (Some(answers), Some(on_demand)) = (session.feel.answers(), &session.loaded.on_demand) {
+        ui.separator();
+        let coarser = 100.0 * answers.coarser as f64 / answers.ticks.max(1) as f64;
+        let text = format!("{} blocks solved, {coarser:.1} % coarser than wanted", on_demand.blocks());
+        ui.label(RichText::new(text).small()).on_hover_text(
+            "Contact is solved ahead of the motion. Ticks that came before the finest level was there were answered by \
+             a coarser one",
+        );
+    }
 }
 
 fn bar(ui: &Ui) -> Frame {

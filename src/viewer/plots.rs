@@ -166,7 +166,7 @@ impl Plots {
                 ]
             });
             let what = if unit == "N" { "force" } else { "torque" };
-            self.lines(ui, history, &format!("{what} [{unit}]"), lines.collect());
+            self.lines(ui, history, &format!("{what} [{unit}]"), lines.collect(), &[]);
         });
     }
 
@@ -182,7 +182,7 @@ impl Plots {
                     (format!("{name} device"), joint, true, get(|tick| &tick.device, joint)),
                 ]
             });
-            self.lines(ui, history, &format!("q [{unit}]"), lines.collect());
+            self.lines(ui, history, &format!("q [{unit}]"), lines.collect(), &[]);
         });
     }
 
@@ -210,7 +210,7 @@ impl Plots {
         } else {
             absent(ui, "Nodes in contact are not stored: this dataset holds torques, no contact forces.");
         }
-        self.lines(ui, history, "contacts [1]", lines);
+        self.lines(ui, history, "contacts [1]", lines, &[0.0, 1.0]);
     }
 
     fn energy(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
@@ -224,14 +224,25 @@ impl Plots {
         ];
         if loaded.dataset.energy.is_some() {
             accounts.insert(0, account("stored in the object", 0, |tick| tick.accounts.stored));
-            accounts.push(account("leak of interpolation", 5, |tick| tick.accounts.leak));
+            accounts.push(account("made by time step and interpolation", 5, |tick| tick.accounts.leak));
         } else {
-            absent(ui, "The object's energy is not stored: what it holds and what interpolation leaks are not known.");
+            absent(
+                ui,
+                "The object's energy is not stored: what it holds and what time step and interpolation make is not known.",
+            );
         }
-        self.lines(ui, history, "energy [mJ]", accounts);
+        self.lines(ui, history, "energy [mJ]", accounts, &[]);
     }
 
-    fn lines(&self, ui: &mut Ui, history: &History, label: &str, lines: Vec<(String, usize, bool, Get<'_>)>) {
+    /// Draws `lines` over time; the axis up has the values `always`, and spans [`LEAST_SPAN`] at least.
+    fn lines(
+        &self,
+        ui: &mut Ui,
+        history: &History,
+        label: &str,
+        lines: Vec<(String, usize, bool, Get<'_>)>,
+        always: &[f64],
+    ) {
         let dark = ui.visuals().dark_mode;
         names(ui, label, &lines);
         let end = history.last().map_or(0.0, |tick| tick.time);
@@ -242,6 +253,14 @@ impl Plots {
             plot = plot.default_x_bounds(end - self.seconds, end).auto_bounds([false, true]).allow_drag(false);
         }
         let bounds = (end - self.seconds).max(0.0)..=end.max(self.seconds);
+        let values = || lines.iter().flat_map(|(.., get)| ticks.iter().map(|tick| get(tick)));
+        let (least, greatest) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        for value in always {
+            plot = plot.include_y(*value);
+        }
+        if greatest - least < LEAST_SPAN {
+            plot = plot.include_y(least - 0.5 * LEAST_SPAN).include_y(greatest + 0.5 * LEAST_SPAN);
+        }
         plot.show(ui, |plot| {
             if !paused {
                 plot.set_plot_bounds_x(bounds);
@@ -288,6 +307,10 @@ impl Plots {
         Ok(format!("wrote {}", names.join(", ")))
     }
 }
+
+/// Least span of an axis up, in its unit: a micronewton metre, a micrometre, a nanojoule, and less, is noise that
+/// nobody feels, and is not magnified.
+const LEAST_SPAN: f64 = 1e-6;
 
 /// Says what the dataset does not hold.
 fn absent(ui: &mut Ui, what: &str) {

@@ -194,31 +194,50 @@ const MARKS: f64 = 6.0;
 /// Least distance of two marks over the least distance of grid lines [1]: room for a line of small letters.
 const LEGIBLE: f64 = 2.0;
 
+/// Leads from each of the steps 1, 2, 5 and 10 to the one below it [1].
+const FINER: f64 = 0.39;
+
 /// Returns the marks of an axis up: 1, 2 or 5 times a power of ten apart, so that every range has several with their
 /// numbers.
 #[must_use]
 pub fn marks(input: GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
-    let rough = ((high - low) / MARKS).max(LEGIBLE * input.base_step_size);
+    let mut rough = ((high - low) / MARKS).max(LEGIBLE * input.base_step_size);
     if !(rough > 0.0 && rough.is_finite()) {
         return Vec::new();
     }
-    let power = 10.0_f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= rough);
-    let step = step.unwrap_or(rough);
-    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
-    (first..=last).map(|k| GridMark { value: k as f64 * step, step_size: step }).collect()
+    loop {
+        let power = 10.0_f64.powf(rough.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= rough);
+        let step = step.unwrap_or(rough);
+        let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+        // A low plot has two numbers, too: a single one tells no scale.
+        if last > first || step <= (high - low) / MARKS {
+            return (first..=last).map(|k| GridMark { value: k as f64 * step, step_size: step }).collect();
+        }
+        rough = FINER * step;
+    }
 }
 
 /// Writes the number at a mark with the digits that tell it from the next one.
 #[must_use]
 pub fn mark_number(mark: GridMark, _: &std::ops::RangeInclusive<f64>) -> String {
-    if mark.value != 0.0 && mark.step_size < 1e-4 {
-        return format!("{:.0e}", mark.value);
+    let (value, step) = (mark.value + 0.0, mark.step_size);
+    // Rounded: a step of 0.001 has a logarithm beside -3.
+    let decade = |x: f64| (x.abs().log10() + 1e-9).floor();
+    if value == 0.0 {
+        "0".into()
+    } else if value.abs() < LEAST_DECIMAL {
+        let digits = (decade(value) - decade(step)).max(0.0) as usize;
+        format!("{value:.digits$e}")
+    } else {
+        let decimals = (-decade(step)).max(0.0) as usize;
+        format!("{value:.decimals$}")
     }
-    let decimals = (-mark.step_size.log10()).ceil().max(0.0) as usize;
-    format!("{:.decimals$}", mark.value + 0.0)
 }
+
+/// Numbers below are written with a power of ten.
+const LEAST_DECIMAL: f64 = 1e-4;
 
 /// Gives `ctx` type and spacing.
 pub fn apply(ctx: &egui::Context) {
@@ -259,8 +278,17 @@ mod tests {
                     mark.value
                 );
             }
+            assert!(numbers.iter().all(|number| number.len() < 9), "{numbers:?}");
             numbers.dedup();
             assert_eq!(numbers.len(), count);
+        }
+    }
+
+    #[test]
+    fn a_low_plot_has_two_numbers() {
+        for (low, high) in [(-0.2, 3.1), (0.0, 0.95), (-1.0, 1.0), (3.0, 3.4)] {
+            let marks = marks(GridInput { bounds: (low, high), base_step_size: high - low });
+            assert!(marks.len() >= 2, "{low} to {high}: {} marks", marks.len());
         }
     }
 }

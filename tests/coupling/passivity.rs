@@ -13,6 +13,7 @@ use haptize::{
     },
     scene::{HapticsSpec, Interpolation, Waypoint},
 };
+use std::collections::BTreeMap;
 
 /// What the port has given beyond what it took, at most, in ten seconds in a hand that presses 10 mm deep [J].
 fn given_in_a_hand(setup: &Setup) -> f64 {
@@ -155,4 +156,62 @@ fn a_layer_and_an_object_that_keep_their_bounds_may_break_the_one_of_both_togeth
     let of_slopes: Vec<&str> =
         exceeded.iter().map(|bound| bound.what.as_str()).filter(|what| !what.contains("coupling")).collect();
     assert_eq!(of_slopes, ["stiffness of layer and object together over 2 bv / T"]);
+}
+
+/// The gains that `advice` asks for, by their keys: with `choice`, the second of two alternatives.
+fn advised(advice: &str, choice: bool) -> BTreeMap<String, String> {
+    let remedies = advice.split("Set in [haptics]: ").nth(1).unwrap();
+    let mut gains = BTreeMap::new();
+    for remedy in remedies.split("; ") {
+        let alternative = remedy.strip_prefix("or else ");
+        if choice && alternative.is_some() {
+            gains.remove("device_damping");
+        }
+        if alternative.is_none() || choice {
+            let (key, value) = alternative.unwrap_or(remedy).split_once(" = ").unwrap();
+            gains.insert(key.to_owned(), value.split(" if ").next().unwrap().to_owned());
+        }
+    }
+    gains
+}
+
+#[test]
+fn gains_that_are_advised_are_passive() {
+    let (mut state, mut refused) = (7_u64, 0);
+    for scene in 0..60 {
+        let mut list = |low: f64, high: f64| {
+            let mut value = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                low * (high / low).powf((state >> 11) as f64 / (1_u64 << 53) as f64)
+            };
+            format!("[{}, {}]", value(), value())
+        };
+        let mut gains: BTreeMap<String, String> = [
+            ("boundary_slope", 100.0, 1e5),
+            ("proxy_damping", 0.1, 100.0),
+            ("coupling_stiffness", 100.0, 1e5),
+            ("coupling_damping", 1e-3, 1.0),
+            ("device_damping", 1.5, 10.0),
+        ]
+        .map(|(key, low, high)| (key.to_owned(), list(low, high)))
+        .into();
+        gains.insert("interpolation".into(), ["\"linear\"", "\"potential\""][scene % 2].into());
+        gains.insert("passivity_factor".into(), ["1.0", "1.9"][scene / 2 % 2].into());
+        if scene % 3 == 0 {
+            gains.insert("encoder_step".into(), "[0.0, 1e-4]".into());
+            gains.insert("device_friction".into(), "[0.0, 0.05]".into());
+        }
+        let advice = |gains: &BTreeMap<String, String>| {
+            let lines: String = gains.iter().map(|(key, value)| format!("{key} = {value}\n")).collect();
+            setup(&format!("[haptics]\n{lines}")).unwrap().advice
+        };
+        let Some(first) = advice(&gains) else { continue };
+        refused += 1;
+        for choice in [false, true] {
+            let mut followed = gains.clone();
+            followed.extend(advised(&first, choice));
+            assert_eq!(advice(&followed), None, "{first}");
+        }
+    }
+    assert!(refused > 40, "{refused} of the scenes needed advice");
 }

@@ -8,6 +8,8 @@
 
 #![cfg(unix)]
 
+mod architecture;
+
 use rayon::prelude::*;
 use std::{
     fmt::Write,

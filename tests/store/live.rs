@@ -127,7 +127,8 @@ fn what_arrives_while_it_is_felt_makes_no_jump_and_no_energy_from_nowhere() {
         changes += answers.changes;
         // Without the passage the torque would jump by as much, which is far more than any motion changes it by in a
         // tick.
-        assert!(answers.greatest_change > 3.0 * steepest, "{steepest} N m in a tick, {answers:?}");
+        let greatest = answers.greatest_change.into_iter().fold(0.0, f64::max);
+        assert!(greatest > 3.0 * steepest, "{steepest} N m in a tick, {answers:?}");
         assert!(answers.given > 0.0 && answers.taken > 0.0, "{answers:?}");
     }
     assert!(changes > 20, "{changes}");

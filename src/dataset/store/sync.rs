@@ -1,5 +1,5 @@
 //! The atomics of [`super::directory`], and the orders in which its readers and writers use them. A checker of
-//! interleavings includes that file with atomics of its own (`tests/store/interleavings.rs`).
+//! interleavings includes that file with atomics of its own (`tests/store/interleavings/`).
 
 pub(super) use std::sync::atomic::{AtomicPtr, Ordering};
 

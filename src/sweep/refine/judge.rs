@@ -67,6 +67,7 @@ impl Judge {
             configurations: errors.len(),
             left_out: self.0.left_out,
             torque: self.0.torque,
+            lever_arm: self.0.lever_arm,
             interpolation: interpolation.name().to_owned(),
             errors: vec![InterpolationError::of(interpolation.name(), errors)],
         }
