@@ -486,6 +486,32 @@ fn no_output_destroys_an_input() {
     assert_eq!(haptize(folder.path(), &["bake", "finger.toml"]).status.code(), Some(0), "its own output is replaced");
 }
 
+/// What is solved at a configuration does not depend on the grid, and a scene need not have one.
+#[test]
+fn inspect_solves_a_scene_without_a_grid_as_one_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("with.toml"), FINGER).unwrap();
+    let without = changed("[grid]\naxes = [{ start = 0.0, stop = 0.28, count = 8 }]\n", "");
+    std::fs::write(folder.path().join("without.toml"), without).unwrap();
+    let inspect = |scene: &str, q: &str| {
+        let output = haptize(folder.path(), &["inspect", scene, q, "--json"]);
+        (output.status.code(), serde_json::from_slice::<Value>(&output.stdout).unwrap())
+    };
+    let (with, without) = (inspect("with.toml", "--q=0.2").1, inspect("without.toml", "--q=0.2").1);
+    assert!(with["torque"][0].as_f64().unwrap().abs() > 1e-3, "it touches: {with}");
+    assert_eq!(with, without);
+    let (code, beyond) = inspect("without.toml", "--q=0.6");
+    assert!(code == Some(0) && beyond["warnings"][0].as_str().unwrap().contains("limits"), "{beyond}");
+    for (scene, q, expected) in [
+        ("without.toml", "--q=50%", "no [grid]"),
+        ("with.toml", "--q=0.1,50%", "--q must be 1 finite numbers"),
+        ("without.toml", "--q=0.1,0.2", "--q must be 1 finite numbers"),
+    ] {
+        let (code, told) = inspect(scene, q);
+        assert!(code == Some(1) && told["error"].as_str().unwrap().contains(expected), "{q}: {told}");
+    }
+}
+
 /// Every failure, that of the command line too, is one JSON object where that is asked for.
 #[test]
 fn every_failure_is_one_json_object() {

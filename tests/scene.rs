@@ -297,6 +297,12 @@ const BROKEN: &[Broken] = &[
     ("stiffness = 1000", "stiffness = 1000\nmax_iterations = 0", "max_iterations", &["at least 1"]),
     ("stiffness = 1000", "stiffness = 1000\nalgorithm = \"magic\"", "magic", &["`energy`", "`paper`", "`linearised`"]),
     ("stiffness = 1000", "stiffness = 1000\nupdates = 2", "updates = 2", &["linearised"]),
+    (
+        "stiffness = 1000",
+        "stiffness = 1000\nalgorithm = \"linearised\"\nupdates = 4294967295",
+        "updates = 4294967295",
+        &["at most 1000", "energy"],
+    ),
     ("stiffness = 1000", "stiffness = 1000\nsurface = \"round\"", "round", &["facets", "smooth"]),
     (
         "stiffness = 1000",

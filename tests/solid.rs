@@ -202,6 +202,69 @@ fn springs_may_run_along_tetrahedra() {
     assert!(inner > 7, "node {middle} is joined to {inner} nodes");
 }
 
+/// Young's moduli of the whole solid count where its group or another one that holds it is named.
+#[test]
+fn a_tetrahedron_may_be_in_several_physical_volumes() {
+    let inclusion = |region: u32, young: f64| haptize::scene::InclusionSpec {
+        place: haptize::scene::InclusionPlace::Region(region),
+        young,
+        poisson: POISSON,
+    };
+    let material = |inclusions: Vec<haptize::scene::InclusionSpec>| {
+        Material::Elastic(ElasticSpec { young: YOUNG, poisson: POISSON, cell: None, inclusions })
+    };
+    let pull = |object: &Object| -> f64 {
+        let forces = forces(object, stretch);
+        object.rest.iter().zip(&forces).filter(|(x, _)| x.z > 0.199).map(|(_, force)| force.z).sum()
+    };
+    let plain = msh("2.2");
+    let once = build(plain.as_bytes(), elastic(None)).unwrap();
+    // As Gmsh writes it: the elements of the second group behind those of the first, with the same numbers.
+    let elements: Vec<&str> = plain.lines().filter(|line| line.contains(" 4 2 0 1 ")).collect();
+    let of_group = |group: i32| -> String {
+        elements.iter().map(|line| line.replace(" 4 2 0 1 ", &format!(" 4 2 {group} 1 ")) + "\n").collect()
+    };
+    let head = plain.split("\n2 4 2").next().unwrap().replace("$Elements\n49", "$Elements\n97");
+    let twice = format!("{head}\n{}{}$EndElements\n", of_group(1), of_group(-2));
+    let entities = "$Entities\n1 0 1 1\n1 0 0 0 0\n5 0 0 0\n1 1 1 0 0\n1 0 0 0 1 1 1 2 1\n-2 1 5\n$EndEntities\n$Nodes";
+    let partitioned =
+        "$PartitionedEntities\n2\n1\n7 1\n0 0 0 1\n1 3 4 2\n1 2 0 0 0 1 1 1 2 1 -2 0\n$EndPartitionedEntities\n$Nodes";
+    let four = |section: &str| msh("4.1").replacen("$Nodes", section, 1);
+    for (name, text) in [
+        ("twice", twice.clone()),
+        ("cp1252", twice.replace("\"block\"", "\"blöck\"")),
+        ("entities over lines", four(entities)),
+        ("partitioned", four(partitioned)),
+    ] {
+        let mut bytes = text.into_bytes();
+        if name == "cp1252" {
+            let at = bytes.iter().position(|byte| *byte == 0xc3).unwrap();
+            bytes.remove(at);
+        }
+        let object = build(&bytes, elastic(None)).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!((object.rest.len(), object.triangles.len()), (once.rest.len(), once.triangles.len()), "{name}");
+        for (inclusions, times) in [(vec![inclusion(1, 3.0 * YOUNG)], 3.0), (vec![inclusion(2, 5.0 * YOUNG)], 5.0)] {
+            let stiff = build(&bytes, material(inclusions)).unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert!((pull(&stiff) / (times * pull(&once)) - 1.0).abs() < 1e-12, "{name}, {times} times");
+        }
+    }
+    let both = vec![inclusion(2, 5.0 * YOUNG), inclusion(1, 3.0 * YOUNG)];
+    let error = build(twice.as_bytes(), material(both)).unwrap_err();
+    assert!(error.contains("no part of the solid"), "the later one covers the earlier: {error}");
+    let parametric = plain.replace("$Nodes", "$ParametricNodes").replace("$EndNodes", "$EndParametricNodes");
+    let parametric = parametric.replace("10 0 0 0\n", "10 0 0 0 2 1 0.5 0.5\n");
+    assert_eq!(build(parametric.as_bytes(), elastic(None)).unwrap().rest, once.rest);
+}
+
+#[test]
+fn a_file_that_is_not_from_gmsh_is_not_quoted() {
+    for content in ["root:$6$secret:1:\n", "\u{feff}root:$6$secret:1:\n", "$root secret\n", "\n\nsecret"] {
+        let error = build(content.as_bytes(), elastic(None)).unwrap_err();
+        assert!(error.contains("line ") && !error.contains("secret") && !error.contains("root"), "{error}");
+    }
+    assert!(build(format!("\u{feff}{}", msh("4.1")).as_bytes(), elastic(None)).is_ok());
+}
+
 #[test]
 fn damaged_files_are_refused_with_the_line_and_never_panic() {
     for (version, from, to, expected) in [
@@ -213,7 +276,12 @@ fn damaged_files_are_refused_with_the_line_and_never_panic() {
         ("2.2", "\n2 4 2 0 1 10", "\n2 4 2 0 1 99", "line 41: there is no node 99"),
         ("2.2", "\n2 4 2 0 1 10", "\n2 4 1 0 1 10", "line 41: a tetrahedron must have four nodes"),
         ("4.1", "3 1 0 27", "3 1 0 9223372036854775807", "not such a number as belongs here"),
-        ("4.1", "3 1 4 48", "3 1 11 48", "it has no tetrahedra"),
+        ("4.1", "3 1 4 48", "3 1 11 48", "48 tetrahedra of ten nodes (type 11)"),
+        ("4.1", "3 1 4 48", "2 1 2 48", "no tetrahedra of four nodes, but 49 triangles (type 2)"),
+        ("2.2", "\n2 4 2 0 1 10", "\n2 5 2 0 1 10", "1 hexahedra (type 5) beside 47 tetrahedra"),
+        ("2.2", "\n2 4 2 0 1 10", "\n2 6 2 0 1 10", "1 prisms (type 6)"),
+        ("2.2", "\n2 4 2 0 1 10", "\n2 7 2 0 1 10", "1 pyramids (type 7)"),
+        ("4.1", "2 1 2 1\n", "3 2 7 1\n", "1 pyramids (type 7) beside 48 tetrahedra"),
         ("4.1", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n", "", "line 5: $Nodes comes before $MeshFormat"),
     ] {
         let text = msh(version);

@@ -52,11 +52,11 @@ enum Coordinate {
 }
 
 impl Coordinate {
-    /// Returns the coordinate on `axis` [rad or m].
-    fn on(self, axis: &AxisSpec) -> f64 {
+    /// Returns the coordinate [rad or m]; none for a fraction where there is no axis.
+    fn on(self, axis: Option<&AxisSpec>) -> Option<f64> {
         match self {
-            Self::Absolute(q) => q,
-            Self::Fraction(part) => axis.start + part * (axis.count - 1) as f64 * axis.step,
+            Self::Absolute(q) => Some(q),
+            Self::Fraction(part) => axis.map(|axis| axis.start + part * (axis.count - 1) as f64 * axis.step),
         }
     }
 }
@@ -74,10 +74,18 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let (scene, object, dataset) = read(&arguments.file)?;
     let chain = Chain::new(&scene.proxy);
     let given = &arguments.q;
-    let q: &Vec<f64> = &given.iter().zip(&scene.grid.axes).map(|(q, axis)| q.on(axis)).collect();
-    if given.len() != chain.joints.len() || !q.iter().all(|x| x.is_finite()) {
-        let names: Vec<_> = chain.joints.iter().map(|joint| joint.name.as_str()).collect();
-        return Err(format!("--q must be {} finite numbers: {}", names.len(), names.join(",")).into());
+    let names: Vec<_> = chain.joints.iter().map(|joint| joint.name.as_str()).collect();
+    let wrong = || format!("--q must be {} finite numbers: {}", names.len(), names.join(","));
+    if given.len() != names.len() {
+        return Err(wrong().into());
+    }
+    let q: Option<Vec<f64>> = given.iter().enumerate().map(|(k, q)| q.on(scene.grid.axes.get(k))).collect();
+    let q = &q.ok_or_else(|| {
+        let file = arguments.file.display();
+        format!("a percentage in --q is a part of the grid's range, and {file} has no [grid]: give it in rad or m")
+    })?;
+    if !q.iter().all(|x| x.is_finite()) {
+        return Err(wrong().into());
     }
     let warnings = outside(&chain, &scene.grid, q);
     warnings.iter().for_each(|warning| tell(format_args!("haptize: note: {warning}")));
@@ -155,15 +163,17 @@ fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
 /// Returns a sentence for each joint of `q` beyond its limits or beyond the grid, where nothing is looked up.
 fn outside(chain: &Chain, grid: &GridSpec, q: &[f64]) -> Vec<String> {
     let mut found = Vec::new();
-    for ((joint, axis), &q) in chain.joints.iter().zip(&grid.axes).zip(q) {
+    for (k, (joint, &q)) in chain.joints.iter().zip(q).enumerate() {
         let [least, greatest] = joint.limits;
-        let last = axis.start + (axis.count - 1) as f64 * axis.step;
         let (name, unit) = (&joint.name, joint.kind.unit());
-        let slack = GRID_STEP_SLACK * axis.step;
         if q < least || q > greatest {
             found.push(format!("{name} = {q} {unit} is beyond the joint's limits, {least} to {greatest}"));
-        } else if q < axis.start - slack || q > last + slack {
-            found.push(format!("{name} = {q} {unit} is beyond the grid, {:.4} to {last:.4}", axis.start));
+        } else if let Some(axis) = grid.axes.get(k) {
+            let last = axis.start + (axis.count - 1) as f64 * axis.step;
+            let slack = GRID_STEP_SLACK * axis.step;
+            if q < axis.start - slack || q > last + slack {
+                found.push(format!("{name} = {q} {unit} is beyond the grid, {:.4} to {last:.4}", axis.start));
+            }
         }
     }
     found

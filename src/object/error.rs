@@ -234,7 +234,7 @@ pub enum SurfaceDefect {
     /// An edge with a triangle on one side only.
     #[error(
         "the surface is open: edge {} to {} has a triangle on one side only ({triangle}); there are {edges} such \
-         edges: close the holes", .nodes[0], .nodes[1]
+         edges: close the holes, or merge vertices by distance", .nodes[0], .nodes[1]
     )]
     Open {
         /// The two ends of one such edge.

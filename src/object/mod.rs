@@ -33,7 +33,7 @@ pub use compliance::Compliance;
 pub use error::{ObjectError, SurfaceDefect};
 pub use factor::{Factor, FactorError};
 pub(crate) use icosphere::generate as icosphere;
-pub(crate) use import::read as read_surface;
+pub(crate) use import::{MOST_METRES, length, read as read_surface};
 pub use settled::settled;
 pub use skin::Skin;
 pub use stiffening::Stiffening;
@@ -42,7 +42,7 @@ pub use topology::Topology;
 
 use crate::{
     memory,
-    scene::{ElasticSpec, Material, ObjectSpec, Shape},
+    scene::{ElasticSpec, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape},
 };
 use glam::{DMat3, DVec3};
 use skin::Laplacian;
@@ -107,7 +107,18 @@ impl Object {
                 }
                 Body::shell(shell)
             }
-            Shape::Tetrahedra { file, scale, centre } => import::read_tetrahedra(file, *scale, *centre, &mut warnings)?,
+            Shape::Tetrahedra { file, scale, centre } => {
+                let inclusions = match &spec.material {
+                    Material::Elastic(elastic) => &elastic.inclusions[..],
+                    _ => &[],
+                };
+                let region = |inclusion: &InclusionSpec| match inclusion.place {
+                    InclusionPlace::Region(region) => Some(region),
+                    InclusionPlace::Sphere { .. } => None,
+                };
+                let wanted: Vec<u32> = inclusions.iter().filter_map(region).collect();
+                import::read_tetrahedra(file, *scale, *centre, &wanted, &mut warnings)?
+            }
         };
         Self::assemble(spec, body, warnings)
     }

@@ -1,10 +1,7 @@
 //! Text files that people write: scenes, robots, mappings of columns.
 
 use crate::input;
-use std::{
-    io::{ErrorKind, Read},
-    path::Path,
-};
+use std::{io::Read, path::Path};
 
 /// Longest text that is read [bytes]: a hundred times as long as the longest robot file in public collections.
 const MAX_BYTES: u64 = 1 << 24;
@@ -14,16 +11,22 @@ const MAX_BYTES: u64 = 1 << 24;
 /// # Errors
 /// When it cannot be read, is no text, or is longer than [`MAX_BYTES`]: why, and what to do.
 pub(crate) fn read(path: &Path) -> Result<String, String> {
-    let mut text = String::new();
-    let read = input::open(path).and_then(|stream| stream.take(MAX_BYTES + 1).read_to_string(&mut text));
-    match read {
-        Ok(_) if text.len() as u64 > MAX_BYTES => {
-            Err(format!("it is longer than {MAX_BYTES} bytes, which no file of this kind is; check the path"))
-        }
-        Ok(_) => Ok(text),
-        Err(error) if error.kind() == ErrorKind::InvalidData => {
-            Err("it is no text, but a dataset or another binary file; give the text file that it was made from".into())
-        }
-        Err(error) => Err(format!("{error}; check the path and its permissions")),
+    let mut bytes = Vec::new();
+    let read = input::open(path).and_then(|stream| stream.take(MAX_BYTES + 1).read_to_end(&mut bytes));
+    read.map_err(|error| format!("{error}; check the path and its permissions"))?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(format!("it is longer than {MAX_BYTES} bytes, which no file of this kind is; check the path"));
     }
+    String::from_utf8(bytes).map_err(|error| {
+        let bytes = error.as_bytes();
+        if [b"\xff\xfe", b"\xfe\xff"].iter().any(|mark| bytes.starts_with(*mark)) {
+            return "it is UTF-16, not UTF-8: convert it with `iconv -f UTF-16 -t UTF-8`".into();
+        }
+        if bytes.contains(&0) {
+            return "it is no text, but a dataset or another binary file; give the text file that it was made from"
+                .into();
+        }
+        let line = bytes[..error.utf8_error().valid_up_to()].iter().filter(|byte| **byte == b'\n').count() + 1;
+        format!("line {line} is not UTF-8: convert it with iconv, if it is Latin-1 `iconv -f ISO-8859-1 -t UTF-8`")
+    })
 }

@@ -200,6 +200,9 @@ const LEAST_RANGE: f64 = 1e-4;
 /// Most names in a message.
 const MOST_LISTED: usize = 20;
 
+/// Most notes on a robot: more than anybody reads, and each counts the lines before its own.
+const MOST_NOTES: usize = 200;
+
 /// Returns the names, with commas; those of long lists are left out at the end.
 fn listed<'a>(names: impl Iterator<Item = &'a String>) -> String {
     let names: Vec<&str> = names.map(String::as_str).collect();
@@ -226,7 +229,12 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     fn note(&mut self, span: &std::ops::Range<usize>, message: String) {
-        self.notes.push(Note { line: self.robot.source().line(span.start), message });
+        if self.notes.len() < MOST_NOTES {
+            self.notes.push(Note { line: self.robot.source().line(span.start), message });
+        } else if self.notes.len() == MOST_NOTES {
+            let message = format!("there is more to note than these {MOST_NOTES} lines, which are all that are told");
+            self.notes.push(Note { line: self.robot.source().line(span.start), message });
+        }
     }
 
     /// Returns all that does not move against `link`, which is at `place` in the root's frame.
@@ -239,7 +247,7 @@ impl Builder<'_> {
                 let joint = &self.robot.joints[number];
                 if let Some(motion) = self.held.get(&number) {
                     open.push((joint.child, place * joint.origin * *motion));
-                } else if !self.way.contains(&number) {
+                } else if self.notes.len() <= MOST_NOTES && !self.way.contains(&number) {
                     let message = format!(
                         "joint {:?} moves beside the chain: link {:?} and what it carries are left out; --lock \
                          {}=VALUE keeps them",

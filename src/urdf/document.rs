@@ -9,6 +9,10 @@ use std::{ops::Range, path::Path};
 /// Most XML nodes of a file: a hundred times as many as those robots have.
 const MAX_NODES: u32 = 1 << 20;
 
+/// Most attributes of an element, and namespaces of a file: ten times as many as robots have. The parser compares each
+/// with all others.
+const MAX_ATTRIBUTES: usize = 100;
+
 /// Largest size of any number [m, rad, kg, kg m^2, N m]: beyond every robot in SI units.
 const LARGEST: f64 = 1e6;
 
@@ -43,12 +47,34 @@ impl<'a> Source<'a> {
         if self.path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xacro")) {
             return Err(self.error(0..0, XACRO));
         }
+        self.check_attributes()?;
         let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
         let document = Document::parse_with_options(self.text, options).map_err(|error| self.xml_error(&error))?;
         let is_xacro = |node: &Node<'_, '_>| node.tag_name().namespace().is_some_and(|uri| uri.contains("xacro"));
         match document.descendants().find(is_xacro) {
             Some(node) => Err(self.error(node.range(), XACRO)),
             None => Ok(document),
+        }
+    }
+
+    /// Refuses what the parser would take very long for. No value of an attribute holds a `<`, so an element's are
+    /// between its own and the next.
+    fn check_attributes(&self) -> Result<(), UrdfError> {
+        let mut start = 0;
+        for element in self.text.split_inclusive('<') {
+            let values = element.split('=').skip(1).filter(|value| value.trim_start().starts_with(['"', '\'']));
+            if values.count() > MAX_ATTRIBUTES {
+                let message = format!("an element has more than {MAX_ATTRIBUTES} attributes, which no robot has");
+                return Err(self.error(start..start, message));
+            }
+            start += element.len();
+        }
+        match self.text.match_indices("xmlns").nth(MAX_ATTRIBUTES) {
+            Some((place, name)) => {
+                let message = format!("the file declares more than {MAX_ATTRIBUTES} namespaces, which no robot has");
+                Err(self.error(place..place + name.len(), message))
+            }
+            None => Ok(()),
         }
     }
 

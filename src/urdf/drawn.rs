@@ -34,8 +34,15 @@ pub fn drawn_shapes(robot: &Robot, arm: &Arm, packages: Option<&Path>) -> (Vec<L
                 }
                 Some(_) => {}
                 None => match Surface::of(shape, &robot.source(), packages) {
-                    Ok(surface) => add(&mut merged, surface),
-                    Err(error) => notes.push(note(robot, shape, &error.to_string())),
+                    Ok(surface) => {
+                        notes.extend(surface.oversize(shape).map(|message| note(robot, shape, message)));
+                        add(&mut merged, surface);
+                    }
+                    Err(error) => {
+                        let error = error.to_string().replace('\n', " ");
+                        let message = format!("a shape of a link that does not move is not drawn: {error}");
+                        notes.push(note(robot, shape, message));
+                    }
                 },
             }
         }
@@ -67,8 +74,7 @@ fn least_size(form: &LinkForm) -> f64 {
     }
 }
 
-fn note(robot: &Robot, shape: &Placed, error: &str) -> Note {
-    let message = format!("a shape of a link that does not move is not drawn: {}", error.replace('\n', " "));
+fn note(robot: &Robot, shape: &Placed, message: String) -> Note {
     Note { line: robot.source().line(shape.span.start), message }
 }
 

@@ -57,9 +57,11 @@ pub fn sample(robot: &Robot, arm: &Arm, spacing: f64, packages: Option<&Path>) -
     let too_many = |count: f64| {
         // In tenths of a millimetre, a little wider than would do.
         let wider = (1.05e4 * spacing * (count / MAX_CONTACT_NODES as f64).sqrt()).ceil() / 1e4;
+        let shapes = arm.joints.iter().flat_map(|joint| &joint.shapes);
+        let oversize = shapes.zip(surfaces.iter().flatten()).find_map(|(shape, surface)| surface.oversize(shape));
+        let remedy = oversize.unwrap_or_else(|| format!("give --spacing {wider} or more"));
         refuse(format!(
-            "a spacing of {spacing} m makes {count:.0} contact nodes, and a scene takes {MAX_CONTACT_NODES}: give \
-             --spacing {wider} or more"
+            "a spacing of {spacing} m makes {count:.0} contact nodes, and a scene takes {MAX_CONTACT_NODES}: {remedy}"
         ))
     };
     // Twice as many are refused before anything is sampled.

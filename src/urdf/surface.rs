@@ -52,6 +52,18 @@ impl Surface {
         Ok(surface)
     }
 
+    /// Returns what is told of a mesh too long for a link: it was drawn in millimetres.
+    pub fn oversize(&self, shape: &Placed) -> Option<String> {
+        let Geometry::Mesh { file, .. } = &shape.geometry else { return None };
+        let length = object::length(&self.nodes);
+        (length > object::MOST_METRES).then(|| {
+            format!(
+                "the mesh {file:?} is {length:.0} m long: if its coordinates are millimetres, give \
+                 scale=\"0.001 0.001 0.001\" in its <mesh>"
+            )
+        })
+    }
+
     /// Returns corners of a triangle [m].
     pub fn corners(&self, triangle: [u32; 3]) -> [DVec3; 3] {
         triangle.map(|node| self.nodes[node as usize])

@@ -103,7 +103,10 @@ fn messages_name_the_file_and_what_helps() {
     };
     variant("ground.toml", "ground = { stiffness = 50.0 }", "ground = { stiffness = 50.0, below = -9.0 }");
     variant("huge.toml", "start = -0.02", "start = -1e300");
-    std::fs::write(path("empty.csv"), "time,a,b\n").unwrap();
+    std::fs::write(path("empty.csv"), "time,slide,press\n").unwrap();
+    std::fs::write(path("latin.toml"), b"# A remark\nname = \"W\xfcrfel\"\n").unwrap();
+    std::fs::write(path("latin.urdf"), b"<robot>\n<link name=\"W\xfcrfel\"/></robot>").unwrap();
+    std::fs::write(path("wide.toml"), [0xff, 0xfe, b'a', 0]).unwrap();
     std::fs::write(path("bytes.csv"), [0xff, 0xfe, 0, 1, 2]).unwrap();
     forge(home.path(), "broken.haptize", |dataset| dataset.scene = "name = 3".into());
     for (arguments, expected, not) in [
@@ -111,6 +114,13 @@ fn messages_name_the_file_and_what_helps() {
         (&["play", "x.haptize", "--motion", "empty.csv"], "empty.csv: holds no sample", "waypoint"),
         (&["bake", "none.toml"], "check the path", "room"),
         (&["bake", "x.haptize", "-o", "y.haptize"], "x.haptize: cannot read the scene: it is no text", "UTF-8"),
+        (
+            &["bake", "latin.toml"],
+            "latin.toml: cannot read the scene: line 2 is not UTF-8: convert it with iconv",
+            "binary",
+        ),
+        (&["import", "latin.urdf", "--tip", "a"], "latin.urdf: cannot read the robot: line 2 is not UTF-8", "binary"),
+        (&["gridize", "empty.csv", "--columns", "wide.toml", "--step", "1"], "it is UTF-16, not UTF-8", "binary"),
         (&["import", "x.haptize", "--tip", "a"], "x.haptize: cannot read the robot: it is no text", "UTF-8"),
         (
             &["gridize", "empty.csv", "--columns", "x.haptize", "--step", "1"],

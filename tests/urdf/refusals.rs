@@ -119,6 +119,27 @@ fn hostile_xml_is_refused_soon() {
     assert!(refusal(&circle).contains("circle"), "{}", refusal(&circle));
     assert!(refusal(&format!("<robot>{}", "<a>".repeat(100_000))).contains("not well-formed"));
     assert!(refusal(&format!("<robot>{}</robot>", "<a/>".repeat(2 << 20))).contains("not well-formed"));
+    // What the parser compares by pairs.
+    let many = |attribute: &str| (0..100_000).map(|k| format!(" {attribute}{k} = \"\"")).collect::<String>();
+    let began = std::time::Instant::now();
+    for attributes in [many("a"), many("xmlns:n"), many("a").replace(" = \"\"", "='<'")] {
+        let message = refusal(&format!("<robot>\n<link name=\"base\"{attributes}/></robot>"));
+        assert!(message.contains(":2:"), "{message}");
+    }
+    let declared: String = (0..2000).map(|k| format!("<a xmlns:n{k}=\"u{k}\">")).collect();
+    assert!(refusal(&format!("<robot>{declared}")).contains("namespaces"));
+    // Each joint beside the chain is noted with its line.
+    let beside: String = (0..30_000)
+        .map(|k| {
+            format!(
+                "<link name=\"s{k}\"/>\n<joint name=\"b{k}\" type=\"continuous\"><parent link=\"arm\"/>\
+                 <child link=\"s{k}\"/></joint>\n"
+            )
+        })
+        .collect();
+    let star = arm(&PLAIN.replace("</robot>", &format!("{beside}</robot>")), "hand", &[]).unwrap().1;
+    assert!(star.notes.len() < 300 && star.notes.iter().any(|note| note.message.contains("more to note")));
+    assert!(began.elapsed().as_secs() < 20, "{:?}", began.elapsed());
     let chain: String = (0..2000)
         .map(|k| format!("<link name=\"l{k}\"/>{}", joint(&format!("l{k}"), &format!("l{}", k + 1))))
         .collect();
@@ -155,6 +176,25 @@ fn requests_that_do_not_fit_the_robot_name_what_does() {
     // No shapes, no contact.
     let (robot, bare) = arm(&seven, "l7", &[("j3", 0.5)]).unwrap();
     assert!(sample(&robot, &bare, 0.01, None).unwrap_err().to_string().contains("<collision>"));
+}
+
+#[test]
+fn a_mesh_in_millimetres_is_told_with_its_length_and_scale() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("plate.obj"), "v 0 0 0\nv 100 0 0\nv 0 80 0\nf 1 2 3\n").unwrap();
+    let text = PLAIN.replace("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"plate.obj\"/>");
+    let told = |text: &str, spacing: f64| {
+        let robot = Robot::parse(text.to_owned(), folder.path().join("robot.urdf")).unwrap();
+        let arm = haptize::urdf::Arm::new(&robot, "hand", &[]).unwrap();
+        let notes = haptize::urdf::drawn_shapes(&robot, &arm, None).1;
+        (sample(&robot, &arm, spacing, None).map(|nodes| nodes.spacing).map_err(|error| error.to_string()), notes)
+    };
+    let (refused, notes) = told(&text, 0.005);
+    let refused = refused.unwrap_err();
+    assert!(refused.contains("100 m long") && refused.contains("scale=\"0.001 0.001 0.001\""), "{refused}");
+    assert!(notes.len() == 1 && notes[0].line == 3 && notes[0].message.contains("100 m long"), "{notes:?}");
+    let (taken, notes) = told(&text.replace("<mesh ", "<mesh scale=\"0.001 0.001 0.001\" "), 0.005);
+    assert!(taken.is_ok() && notes.is_empty(), "{taken:?} {notes:?}");
 }
 
 #[test]

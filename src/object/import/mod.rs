@@ -1,6 +1,6 @@
 //! Surfaces from mesh files (OBJ, STL and PLY, chosen by the file's extension), and tetrahedra from Gmsh files.
 //!
-//! Polygons are cut into triangle fans. Nodes at exactly the same point become one node (an STL file has no others),
+//! Polygons are cut into triangles. Nodes at exactly the same point become one node (an STL file has no others),
 //! and faces that are left with fewer than three are dropped. Nodes keep the order of a PLY file; in OBJ and STL files
 //! they are numbered in the order in which triangles first name them, and nodes that no triangle names are dropped.
 //! Coordinates become `scale * coordinate + centre`.
@@ -9,14 +9,20 @@ mod boundary;
 mod msh;
 mod obj;
 mod ply;
+mod polygon;
+mod stl;
+mod text;
 
 use super::{Body, ObjectError, topology::place};
 use crate::input;
 use glam::DVec3;
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::BufReader;
 use std::path::Path;
+
+/// Longest object that is meant in metres [m]: what is longer was drawn in millimetres.
+pub(crate) const MOST_METRES: f64 = 10.0;
 
 /// Nodes and triangles as a reader finds them.
 type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
@@ -33,7 +39,7 @@ pub(crate) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<St
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let reader = match extension.as_str() {
         "obj" => obj::read,
-        "stl" => read_stl,
+        "stl" => stl::read,
         "ply" => ply::read,
         _ => return Err(ObjectError::Format { file: file.to_owned() }),
     };
@@ -51,22 +57,25 @@ pub(crate) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<St
         warnings.push(format!("{file}: {dropped} of {faces} faces had two corners in one place and were left out"));
     }
     nodes.iter_mut().for_each(|node| *node = scale * *node + centre);
+    warnings.extend(oversize(file, scale, &nodes));
     Ok((nodes, triangles))
 }
 
-/// Reads the tetrahedra in a Gmsh file.
+/// Reads the tetrahedra in a Gmsh file. `wanted`: the physical volumes that the scene names, in its order.
 pub(super) fn read_tetrahedra(
     file: &Path,
     scale: f64,
     centre: DVec3,
+    wanted: &[u32],
     warnings: &mut Vec<String>,
 ) -> Result<Body, ObjectError> {
     if !(scale > 0.0 && scale.is_finite()) {
         return Err(ObjectError::Parameter { name: "scale", value: scale, range: "positive and finite" });
     }
     let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
-    let mesh = msh::read(&mut BufReader::new(open(file)?)).map_err(unreadable)?;
+    let mesh = msh::read(&mut BufReader::new(open(file)?), wanted).map_err(unreadable)?;
     let nodes: Vec<DVec3> = mesh.nodes.iter().map(|node| scale * *node + centre).collect();
+    warnings.extend(oversize(file, scale, &nodes));
     let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra);
     let ordered = Body { regions: mesh.regions, ..ordered };
     if turned > 0 {
@@ -74,6 +83,24 @@ pub(super) fn read_tetrahedra(
         warnings.push(format!("{file}: {turned} of {all} tetrahedra were numbered inside out and were turned"));
     }
     Ok(ordered)
+}
+
+/// Greatest extent of `nodes` along an axis [m].
+pub(crate) fn length(nodes: &[DVec3]) -> f64 {
+    let end = |pick: fn(DVec3, DVec3) -> DVec3| nodes.iter().copied().reduce(pick).unwrap_or_default();
+    (end(DVec3::max) - end(DVec3::min)).max_element()
+}
+
+/// A warning where the scale was forgotten.
+fn oversize(file: &Path, scale: f64, nodes: &[DVec3]) -> Option<String> {
+    let length = length(nodes);
+    (length > MOST_METRES).then(|| {
+        format!(
+            "{}: the object is {length:.0} m long with scale = {scale}: if its coordinates are millimetres, give \
+             scale = 0.001",
+            file.display()
+        )
+    })
 }
 
 /// Opens a file of bounded length.
@@ -85,14 +112,6 @@ fn open(file: &Path) -> Result<File, ObjectError> {
         return Err(unreadable(format!("it has more than {MAX_BYTES} bytes")));
     }
     Ok(stream)
-}
-
-fn read_stl(stream: &mut (impl Read + Seek)) -> Result<Surface, String> {
-    let mesh = stl_io::read_stl(stream).map_err(|error| error.to_string())?;
-    node_number(mesh.vertices.len())?;
-    let nodes = mesh.vertices.iter().map(|v| DVec3::from_array(v.0.map(f64::from))).collect();
-    let triangles = mesh.faces.iter().map(|face| face.vertices.map(|node| node as u32)).collect();
-    Ok((nodes, triangles))
 }
 
 /// `count` as a node number: files with more nodes than that are refused.

@@ -1,12 +1,16 @@
 //! Tetrahedra from Gmsh files, ASCII of versions 2.2 and 4.1.
 //!
-//! Read are `$MeshFormat`, `$Nodes`, the physical volumes in `$Entities` (4.1) and the elements of type 4 (tetrahedra
-//! of four nodes) in `$Elements`; points, lines and triangles, which Gmsh writes for boundaries, and all other sections
-//! are read past. The surface is what it always is: the faces that belong to one tetrahedron only. Every error names
-//! the line. Nothing is reserved for what a file announces before it is there.
+//! Read are `$MeshFormat`, `$Nodes` (or `$ParametricNodes`), the physical volumes in `$Entities` and
+//! `$PartitionedEntities` (4.1) and the elements of type 4 (tetrahedra of four nodes) in `$Elements`; points, lines and
+//! triangles, which Gmsh writes for boundaries, and all other sections are read past, and other volume elements are
+//! refused. A tetrahedron that is written once for each of its physical volumes counts once. The surface is what it
+//! always is: the faces that belong to one tetrahedron only. Every error names the line. Nothing is reserved for what a
+//! file announces before it is there.
 
+use super::text;
 use glam::DVec3;
-use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 use std::io::BufRead;
 
 /// Nodes and tetrahedra, corners by position in `nodes`.
@@ -18,49 +22,141 @@ pub(super) struct Mesh {
 }
 
 /// Tetrahedra as they come.
-#[derive(Default)]
-struct Tetrahedra {
+struct Tetrahedra<'a> {
     corners: Vec<[u32; 4]>,
     regions: Vec<u32>,
+    /// Their numbers, by their corners in ascending order.
+    numbers: HashMap<[u32; 4], usize>,
     /// Physical volume of each volume of the geometry (version 4.1), by Gmsh's tags.
     volumes: HashMap<i64, u32>,
+    /// Elements of other types, by Gmsh's numbers of these.
+    others: BTreeMap<u64, u64>,
+    /// Physical volumes that the scene names, the one that counts before others last.
+    wanted: &'a [u32],
+}
+
+impl Tetrahedra<'_> {
+    fn add(&mut self, corners: [u32; 4], region: u32) {
+        let mut key = corners;
+        key.sort_unstable();
+        match self.numbers.entry(key) {
+            Entry::Occupied(number) => {
+                let known = &mut self.regions[*number.get()];
+                *known = choice(&[*known, region], self.wanted);
+            }
+            Entry::Vacant(free) => {
+                free.insert(self.corners.len());
+                self.corners.push(corners);
+                self.regions.push(region);
+            }
+        }
+    }
+
+    /// Refuses a mesh of which the tetrahedra are not the whole.
+    fn check(&self) -> Result<(), String> {
+        let volumes: Vec<(u64, u64)> =
+            self.others.iter().map(|(kind, count)| (*kind, *count)).filter(|(kind, _)| !is_boundary(*kind)).collect();
+        let listed = |of: &[(u64, u64)]| {
+            of.iter()
+                .map(|(kind, count)| format!("{count} {} (type {kind})", name(*kind)))
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
+        if !volumes.is_empty() {
+            return Err(format!(
+                "its volume has {} beside {} tetrahedra of four nodes, which alone are read: mesh all of it with \
+                 tetrahedra of first order (gmsh -3 -order 1, without Recombine and layers)",
+                listed(&volumes),
+                self.corners.len()
+            ));
+        }
+        if self.corners.is_empty() {
+            let others: Vec<(u64, u64)> = self.others.iter().map(|(kind, count)| (*kind, *count)).collect();
+            let only = if others.is_empty() { String::new() } else { format!(", but {}", listed(&others)) };
+            return Err(format!(
+                "it has no tetrahedra of four nodes{only}: mesh the volume in first order (gmsh -3 -order 1); where \
+                 there are physical groups, Gmsh saves only what is in one"
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// The group that counts of those that hold a tetrahedron: of those in `wanted` the last, else the first that is one.
+fn choice(groups: &[u32], wanted: &[u32]) -> u32 {
+    let named = wanted.iter().rev().find(|wanted| groups.contains(wanted));
+    named.or_else(|| groups.iter().find(|group| **group != 0)).copied().unwrap_or(0)
 }
 
 /// Gmsh's number for a tetrahedron of four nodes.
 const TETRAHEDRON: u64 = 4;
 
-/// Reads a file; errors begin with the number of the line.
-pub(super) fn read(stream: &mut impl BufRead) -> Result<Mesh, String> {
-    let mut lines = Lines { stream, number: 0, text: String::new() };
+/// Is that Gmsh's number for a point, a line, a triangle, a quadrangle or a polygon, of any order?
+fn is_boundary(kind: u64) -> bool {
+    matches!(kind, 1..=3 | 8..=10 | 15 | 16 | 20..=28 | 34 | 36..=70 | 84..=86 | 133..=135 | 138)
+}
+
+/// What Gmsh's manual calls the commonest types.
+fn name(kind: u64) -> &'static str {
+    match kind {
+        1 | 8 => "lines",
+        2 | 9 => "triangles",
+        3 | 10 | 16 => "quadrangles",
+        5 | 12 | 17 => "hexahedra",
+        6 | 13 | 18 => "prisms",
+        7 | 14 | 19 => "pyramids",
+        11 => "tetrahedra of ten nodes",
+        15 => "points",
+        _ => "elements",
+    }
+}
+
+/// Reads a file; errors begin with the number of the line. `wanted`: the physical volumes that the scene names, in its
+/// order.
+pub(super) fn read(stream: &mut impl BufRead, wanted: &[u32]) -> Result<Mesh, String> {
+    let mut lines = Lines { stream, number: 0, text: String::new(), at: 0 };
     let mut version = None;
     let mut nodes = Nodes::default();
-    let mut tetrahedra = Tetrahedra::default();
+    let mut tetrahedra = Tetrahedra {
+        corners: Vec::new(),
+        regions: Vec::new(),
+        numbers: HashMap::new(),
+        volumes: HashMap::new(),
+        others: BTreeMap::new(),
+        wanted,
+    };
     while lines.next()? {
-        match lines.text.as_str() {
-            "$MeshFormat" => version = Some(format(&mut lines)?),
-            "$Nodes" => match version.ok_or_else(|| lines.error("$Nodes comes before $MeshFormat"))? {
-                Version::Two => nodes_2(&mut lines, &mut nodes)?,
-                Version::Four => nodes_4(&mut lines, &mut nodes)?,
-            },
-            "$Elements" => match version.ok_or_else(|| lines.error("$Elements comes before $MeshFormat"))? {
-                Version::Two => elements_2(&mut lines, &nodes, &mut tetrahedra)?,
-                Version::Four => elements_4(&mut lines, &nodes, &mut tetrahedra)?,
-            },
-            "$Entities" => match version.ok_or_else(|| lines.error("$Entities comes before $MeshFormat"))? {
-                Version::Two => skip(&mut lines)?,
-                Version::Four => entities(&mut lines, &mut tetrahedra.volumes)?,
-            },
-            section if section.starts_with('$') => skip(&mut lines)?,
+        let section = lines.text.clone();
+        if section == "$MeshFormat" {
+            version = Some(format(&mut lines)?);
+            continue;
+        }
+        // What is no Gmsh file is not quoted: a scene may come from anyone, and name any file.
+        let Some(version) = version else {
+            match section.as_str() {
+                "$Nodes" | "$ParametricNodes" | "$Entities" | "$PartitionedEntities" | "$Elements" => {
+                    return Err(format!("line {}: {section} comes before $MeshFormat", lines.number));
+                }
+                section if section.starts_with('$') => skip(&mut lines)?,
+                _ => return Err(format!("line {}: no $MeshFormat comes first: it is no Gmsh file", lines.number)),
+            }
+            continue;
+        };
+        match (section.as_str(), version) {
+            ("$Nodes" | "$ParametricNodes", Version::Two) => nodes_2(&mut lines, &mut nodes)?,
+            ("$Nodes", Version::Four) => nodes_4(&mut lines, &mut nodes)?,
+            ("$Elements", Version::Two) => elements_2(&mut lines, &nodes, &mut tetrahedra)?,
+            ("$Elements", Version::Four) => elements_4(&mut lines, &nodes, &mut tetrahedra)?,
+            ("$Entities" | "$PartitionedEntities", Version::Four) => entities(&mut lines, &mut tetrahedra)?,
+            _ if section.starts_with('$') => skip(&mut lines)?,
             _ => return Err(lines.error("this is no section of a Gmsh file")),
         }
     }
     if version.is_none() {
         return Err("it has no $MeshFormat: it is no Gmsh file".to_owned());
     }
+    tetrahedra.check()?;
     let Tetrahedra { corners: tetrahedra, mut regions, .. } = tetrahedra;
-    if tetrahedra.is_empty() {
-        return Err("it has no tetrahedra of four nodes: mesh the volume in first order (gmsh -3 -order 1)".to_owned());
-    }
     if regions.iter().all(|region| *region == 0) {
         regions.clear();
     }
@@ -105,21 +201,25 @@ struct Lines<'a, R> {
     number: usize,
     /// Without white space at its ends.
     text: String,
+    /// Where the next word begins that [`Lines::word`] gives.
+    at: usize,
 }
 
 impl<R: BufRead> Lines<'_, R> {
     /// Goes on to the next line that is not empty; false at the end.
     fn next(&mut self) -> Result<bool, String> {
+        let mut bytes = Vec::new();
         loop {
+            bytes.clear();
             self.text.clear();
+            self.at = 0;
             self.number += 1;
-            let length = self.stream.read_line(&mut self.text).map_err(|error| self.error(&error.to_string()))?;
-            if length == 0 {
+            let read = self.stream.read_until(b'\n', &mut bytes);
+            if read.map_err(|error| self.error(&error.to_string()))? == 0 {
                 return Ok(false);
             }
-            let trimmed = self.text.trim();
-            if !trimmed.is_empty() {
-                self.text = trimmed.to_owned();
+            text::decode(&bytes).trim().clone_into(&mut self.text);
+            if !self.text.is_empty() {
                 return Ok(true);
             }
         }
@@ -128,6 +228,17 @@ impl<R: BufRead> Lines<'_, R> {
     /// Goes on to a line that must be there.
     fn require(&mut self) -> Result<(), String> {
         if self.next()? { Ok(()) } else { Err(self.error("the file ends within a section")) }
+    }
+
+    /// The next number, on this line or on one of the next.
+    fn word<T: std::str::FromStr>(&mut self) -> Result<T, String> {
+        while self.text[self.at..].trim_start().is_empty() {
+            self.require()?;
+        }
+        let rest = self.text[self.at..].trim_start();
+        let word = rest.split_ascii_whitespace().next().unwrap_or_default();
+        self.at = self.text.len() - rest.len() + word.len();
+        word.parse().map_err(|_| self.error(&format!("{word:?} is not such a number as belongs here")))
     }
 
     fn end(&mut self, section: &str) -> Result<(), String> {
@@ -184,24 +295,56 @@ fn skip(lines: &mut Lines<'_, impl BufRead>) -> Result<(), String> {
     }
 }
 
-/// `points curves surfaces volumes`, then one line for each; that of a volume has its tag, six bounds, the number of
-/// its physical volumes and these, of which the first counts.
-fn entities(lines: &mut Lines<'_, impl BufRead>, volumes: &mut HashMap<i64, u32>) -> Result<(), String> {
-    lines.require()?;
-    let ([points, curves, surfaces, count], _) = lines.numbers::<u64, 4>()?;
-    for _ in 0..points.saturating_add(curves).saturating_add(surfaces) {
-        lines.require()?;
+/// `points curves surfaces volumes`, then a record for each: its tag; where the mesh is partitioned, the dimension and
+/// tag of what it is a part of and its partitions; its place or its six bounds; its physical groups; and, except for
+/// points, what bounds it. Where the mesh is partitioned, numbers of partitions and of ghost entities, and these, come
+/// first. Each list begins with its length. A record may go on on the next line.
+fn entities(lines: &mut Lines<'_, impl BufRead>, tetrahedra: &mut Tetrahedra<'_>) -> Result<(), String> {
+    let end = format!("$End{}", &lines.text[1..]);
+    let is_partitioned = lines.text == "$PartitionedEntities";
+    fn list(lines: &mut Lines<'_, impl BufRead>) -> Result<Vec<i64>, String> {
+        let count: u64 = lines.word()?;
+        (0..count).map(|_| lines.word()).collect()
     }
-    for _ in 0..count {
-        lines.require()?;
-        if lines.number_at::<u64>(7)? > 0 {
-            volumes.insert(lines.number_at(0)?, lines.number_at(8)?);
+    lines.require()?;
+    if is_partitioned {
+        let _partitions: u64 = lines.word()?;
+        for _ in 0..lines.word::<u64>()? {
+            (lines.word::<i64>()?, lines.word::<i64>()?);
         }
     }
-    lines.end("$EndEntities")
+    let counts: [u64; 4] = [lines.word()?, lines.word()?, lines.word()?, lines.word()?];
+    for (dimension, count) in counts.into_iter().enumerate() {
+        for _ in 0..count {
+            let tag: i64 = lines.word()?;
+            if is_partitioned {
+                (lines.word::<i64>()?, lines.word::<i64>()?);
+                list(lines)?;
+            }
+            for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                lines.word::<f64>()?;
+            }
+            let groups = list(lines)?;
+            if dimension > 0 {
+                list(lines)?;
+            }
+            if dimension == 3 {
+                let groups: Result<Vec<u32>, String> = groups.into_iter().map(|group| region(lines, group)).collect();
+                tetrahedra.volumes.insert(tag, choice(&groups?, tetrahedra.wanted));
+            }
+        }
+    }
+    lines.end(&end)
 }
 
+/// The number of a physical group: negative where Gmsh has turned its elements.
+fn region(lines: &Lines<'_, impl BufRead>, group: i64) -> Result<u32, String> {
+    u32::try_from(group.unsigned_abs()).map_err(|_| lines.error("the number of a physical group is too large"))
+}
+
+/// `nodes`, then lines of a number, a position and, where nodes are parametric, more.
 fn nodes_2(lines: &mut Lines<'_, impl BufRead>, nodes: &mut Nodes) -> Result<(), String> {
+    let end = format!("$End{}", &lines.text[1..]);
     lines.require()?;
     let ([count], _) = lines.numbers::<u64, 1>()?;
     for _ in 0..count {
@@ -210,7 +353,7 @@ fn nodes_2(lines: &mut Lines<'_, impl BufRead>, nodes: &mut Nodes) -> Result<(),
         let position = [lines.number_at(1)?, lines.number_at(2)?, lines.number_at(3)?];
         nodes.add(lines, tag, position)?;
     }
-    lines.end("$EndNodes")
+    lines.end(&end)
 }
 
 /// `blocks nodes least greatest`, then blocks: `dimension entity parametric nodes`, their tags, their positions.
@@ -234,7 +377,11 @@ fn nodes_4(lines: &mut Lines<'_, impl BufRead>, nodes: &mut Nodes) -> Result<(),
     lines.end("$EndNodes")
 }
 
-fn elements_2(lines: &mut Lines<'_, impl BufRead>, nodes: &Nodes, tetrahedra: &mut Tetrahedra) -> Result<(), String> {
+fn elements_2(
+    lines: &mut Lines<'_, impl BufRead>,
+    nodes: &Nodes,
+    tetrahedra: &mut Tetrahedra<'_>,
+) -> Result<(), String> {
     lines.require()?;
     let ([count], _) = lines.numbers::<u64, 1>()?;
     for _ in 0..count {
@@ -247,13 +394,14 @@ fn elements_2(lines: &mut Lines<'_, impl BufRead>, nodes: &Nodes, tetrahedra: &m
                 return Err(lines.error("a tetrahedron must have four nodes"));
             }
             // The first label is the physical volume.
-            let region = if labels > 0 { lines.number_at(3)? } else { 0 };
+            let region = if labels > 0 { region(lines, lines.number_at(3)?)? } else { 0 };
             let mut tags = [0; 4];
             for (k, tag) in tags.iter_mut().enumerate() {
                 *tag = lines.number_at(first + k)?;
             }
-            tetrahedra.corners.push(nodes.corners(lines, tags)?);
-            tetrahedra.regions.push(region);
+            tetrahedra.add(nodes.corners(lines, tags)?, region);
+        } else {
+            *tetrahedra.others.entry(kind).or_default() += 1;
         }
     }
     lines.end("$EndElements")
@@ -261,22 +409,28 @@ fn elements_2(lines: &mut Lines<'_, impl BufRead>, nodes: &Nodes, tetrahedra: &m
 
 /// `blocks elements least greatest`, then blocks: `dimension entity type elements`, and lines of a number and the
 /// nodes.
-fn elements_4(lines: &mut Lines<'_, impl BufRead>, nodes: &Nodes, tetrahedra: &mut Tetrahedra) -> Result<(), String> {
+fn elements_4(
+    lines: &mut Lines<'_, impl BufRead>,
+    nodes: &Nodes,
+    tetrahedra: &mut Tetrahedra<'_>,
+) -> Result<(), String> {
     lines.require()?;
     let ([blocks], _) = lines.numbers::<u64, 1>()?;
     for _ in 0..blocks {
         lines.require()?;
         let ([_, entity, kind, count], _) = lines.numbers::<i64, 4>()?;
+        let kind = kind.unsigned_abs();
         let region = tetrahedra.volumes.get(&entity).copied().unwrap_or(0);
         for _ in 0..count {
             lines.require()?;
-            if kind == TETRAHEDRON as i64 {
+            if kind == TETRAHEDRON {
                 let ([_, tags @ ..], all) = lines.numbers::<u64, 5>()?;
                 if all != 5 {
                     return Err(lines.error("a tetrahedron must have four nodes"));
                 }
-                tetrahedra.corners.push(nodes.corners(lines, tags)?);
-                tetrahedra.regions.push(region);
+                tetrahedra.add(nodes.corners(lines, tags)?, region);
+            } else {
+                *tetrahedra.others.entry(kind).or_default() += 1;
             }
         }
     }

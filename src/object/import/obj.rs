@@ -1,60 +1,73 @@
-//! Surfaces from Wavefront OBJ files: lines `v x y z` and `f a b c ..`. All other lines are read past.
+//! Surfaces from Wavefront OBJ files: lines `v x y z` and `f a b c ..`, which a backslash at the end joins with the next
+//! one. What stands behind a `#` and all other lines are read past.
 //!
 //! A corner of a face is the number of a vertex, from 1, or counted back from the last one so far, from -1. What
 //! follows it behind a slash (texture and normal) has no meaning here.
 
-use super::{Surface, node_number};
+use super::{Surface, node_number, polygon, text};
 use glam::DVec3;
-use std::io::BufRead;
+use std::io::Read;
 
 /// Nodes in the order in which faces first name them, and triangles; errors begin with the number of the line.
-pub(super) fn read(stream: &mut impl BufRead) -> Result<Surface, String> {
-    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
-    let (mut bytes, mut corners, mut line) = (Vec::new(), Vec::new(), 0);
-    loop {
-        bytes.clear();
-        line += 1;
-        if stream.read_until(b'\n', &mut bytes).map_err(|error| error.to_string())? == 0 {
-            break;
+pub(super) fn read(stream: &mut impl Read) -> Result<Surface, String> {
+    let text = text::read(stream)?;
+    let (mut positions, mut faces) = (Vec::new(), Vec::new());
+    let mut lines = text::lines(&text);
+    while let Some((line, text)) = lines.next() {
+        let statement = statement(text);
+        if !matches!(statement.split_ascii_whitespace().next(), Some("v" | "f")) {
+            continue;
         }
-        let text = String::from_utf8_lossy(&bytes);
-        let bad = |what: &str| format!("line {line}: {what}: {:?}", text.trim().chars().take(60).collect::<String>());
-        let mut words = text.split_ascii_whitespace();
-        match words.next() {
-            Some("v") => {
-                let mut position = [0.0; 3];
-                for coordinate in &mut position {
-                    let word = words.next().and_then(|word| word.parse().ok());
-                    *coordinate = word.ok_or_else(|| bad("a vertex has three coordinates"))?;
-                }
-                positions.push(DVec3::from_array(position));
-                node_number(positions.len())?;
-            }
-            Some("f") => {
-                corners.clear();
-                for word in words {
-                    let number = corner(word, positions.len()).ok_or_else(|| bad("a face has numbers of vertices"))?;
-                    corners.push(number);
-                }
-                if corners.len() < 3 {
-                    return Err(bad("a face has at least three corners"));
-                }
-                triangles.extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]]));
-            }
-            _ => (),
+        let mut statement = statement.to_owned();
+        while statement.ends_with('\\') {
+            statement.pop();
+            statement.push(' ');
+            statement.push_str(lines.next().map_or("", |(_, text)| self::statement(text)));
         }
+        let bad = |what: &str| format!("line {line}: {what}: {:?}", statement.chars().take(60).collect::<String>());
+        let mut words = statement.split_ascii_whitespace();
+        if words.next() == Some("v") {
+            let mut position = [0.0; 3];
+            for coordinate in &mut position {
+                let word = words.next().and_then(|word| word.parse().ok());
+                *coordinate = word.ok_or_else(|| bad("a vertex has three coordinates"))?;
+            }
+            positions.push(DVec3::from_array(position));
+            node_number(positions.len())?;
+        } else {
+            let corners: Option<Vec<u32>> = words.map(|word| corner(word, positions.len())).collect();
+            let corners = corners.ok_or_else(|| bad("a face has numbers of vertices"))?;
+            if corners.len() < 3 {
+                return Err(bad("a face has at least three corners"));
+            }
+            faces.push((line, corners));
+        }
+    }
+    if positions.is_empty() && faces.is_empty() {
+        return Err("it has no `v` and no `f` lines: it is not an OBJ text; export the mesh again".to_owned());
+    }
+    let mut triangles = Vec::new();
+    for (line, face) in faces {
+        if let Some(corner) = face.iter().find(|corner| **corner as usize >= positions.len()) {
+            let number = u64::from(*corner) + 1;
+            return Err(format!("line {line}: a face names vertex {number}, of {}", positions.len()));
+        }
+        triangles.extend(polygon::cut(&face, &positions).map_err(|reason| format!("line {line}: {reason}"))?);
     }
     let mut numbers = vec![None; positions.len()];
     let mut nodes = Vec::new();
     for corner in triangles.as_flattened_mut() {
-        let known = numbers.get_mut(*corner as usize);
-        let known = known.ok_or_else(|| format!("a face names vertex {}, of {}", *corner + 1, positions.len()))?;
-        *corner = *known.get_or_insert_with(|| {
+        *corner = *numbers[*corner as usize].get_or_insert_with(|| {
             nodes.push(positions[*corner as usize]);
             nodes.len() as u32 - 1
         });
     }
     Ok((nodes, triangles))
+}
+
+/// The line without a remark.
+fn statement(line: &str) -> &str {
+    line.split('#').next().unwrap_or_default().trim()
 }
 
 /// Number of the vertex that `word` names, from 0, behind `before` vertices.

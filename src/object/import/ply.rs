@@ -2,9 +2,9 @@
 //!
 //! That reader panics on a number in the header that is no `u64`, and reserves memory for as many entries as a file
 //! announces. So what is announced is held against what can be there before it is called: element counts against the
-//! file's length, list lengths against the line (text) or by the type of their count (binary).
+//! file's length, list lengths against the line (text) or the bytes that are left (binary).
 
-use super::{Surface, node_number};
+use super::{Surface, node_number, polygon};
 use glam::DVec3;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyType, ScalarType};
@@ -16,7 +16,7 @@ pub(super) fn read(stream: &mut BufReader<File>) -> Result<Surface, String> {
     let length = stream.get_ref().metadata().map_err(|error| error.to_string())?.len();
     let text = header_text(stream)?;
     let header = Parser::<PlyVertex>::new().read_header(&mut &text[..]).map_err(|error| error.to_string())?;
-    let (mut nodes, mut triangles) = (Vec::new(), Vec::new());
+    let (mut nodes, mut faces) = (Vec::new(), Vec::new());
     for (name, element) in &header.elements {
         if element.count as u64 > length {
             return Err(format!("it announces {} {name} elements, more than it has bytes", element.count));
@@ -26,20 +26,20 @@ pub(super) fn read(stream: &mut BufReader<File>) -> Result<Surface, String> {
                 nodes
                     .extend(elements::<PlyVertex>(stream, element, &header)?.into_iter().map(|vertex| vertex.position));
             }
-            "face" => {
-                for face in elements::<PlyFace>(stream, element, &header)? {
-                    let corners = face.corners.ok_or("a face has no node numbers, or negative ones")?;
-                    if corners.len() < 3 {
-                        return Err(format!("a face has {} nodes", corners.len()));
-                    }
-                    triangles.extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]]));
-                }
-            }
+            "face" => faces.extend(elements::<PlyFace>(stream, element, &header)?),
             // Other elements are read past.
             _ => drop(elements::<PlyFace>(stream, element, &header)?),
         }
     }
     node_number(nodes.len())?;
+    let mut triangles = Vec::new();
+    for (number, face) in faces.into_iter().enumerate() {
+        let cut = match face.corners {
+            Some(corners) => polygon::cut(&corners, &nodes),
+            None => Err("it has no node numbers, or negative ones".to_owned()),
+        };
+        triangles.extend(cut.map_err(|reason| format!("face {number}, counted from 0: {reason}"))?);
+    }
     Ok((nodes, triangles))
 }
 
@@ -77,14 +77,16 @@ fn elements<E: PropertyAccess>(
 ) -> Result<Vec<E>, String> {
     let parser = Parser::<E>::new();
     if header.encoding != Encoding::Ascii {
-        let bounded = |kind: &PropertyType| match kind {
-            PropertyType::Scalar(_) => true,
-            PropertyType::List(count, _) => matches!(count, ScalarType::UChar | ScalarType::UShort),
-        };
-        if !element.properties.values().all(|property| bounded(&property.data_type)) {
-            return Err("lists must have counts of type uchar or ushort".to_owned());
+        let mut elements = Vec::new();
+        for _ in 0..element.count {
+            let bytes = binary_element(stream, element, header.encoding)?;
+            let read = match header.encoding {
+                Encoding::BinaryBigEndian => parser.read_big_endian_element(&mut &bytes[..], element),
+                _ => parser.read_little_endian_element(&mut &bytes[..], element),
+            };
+            elements.push(read.map_err(|error| error.to_string())?);
         }
-        return parser.read_payload_for_element(stream, element, header).map_err(|error| error.to_string());
+        return Ok(elements);
     }
     let mut elements = Vec::new();
     let mut line = String::new();
@@ -98,6 +100,48 @@ fn elements<E: PropertyAccess>(
         elements.push(parser.read_ascii_element(&line, element).map_err(|error| error.to_string())?);
     }
     Ok(elements)
+}
+
+/// The bytes of the next element; nothing is reserved for what its lists announce before it is there.
+fn binary_element(stream: &mut impl Read, element: &ElementDef, encoding: Encoding) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    let mut take = |length: u64| {
+        let start = bytes.len();
+        let read = stream.by_ref().take(length).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+        if read as u64 == length {
+            Ok(bytes[start..].to_vec())
+        } else {
+            Err(format!("it ends within a {}", element.name))
+        }
+    };
+    for property in element.properties.values() {
+        match &property.data_type {
+            PropertyType::Scalar(kind) => drop(take(size(kind))?),
+            PropertyType::List(count, kind) => {
+                let mut digits = take(size(count))?;
+                if encoding == Encoding::BinaryBigEndian {
+                    digits.reverse();
+                }
+                let is_signed = matches!(count, ScalarType::Char | ScalarType::Short | ScalarType::Int);
+                if is_signed && digits.last().is_some_and(|digit| *digit > i8::MAX as u8) {
+                    return Err(format!("a {} announces a negative number of entries", element.name));
+                }
+                let count = digits.iter().rev().fold(0, |count: u64, digit| count << 8 | u64::from(*digit));
+                take(count.saturating_mul(size(kind)))?;
+            }
+        }
+    }
+    Ok(bytes)
+}
+
+/// Bytes of a number.
+fn size(kind: &ScalarType) -> u64 {
+    match kind {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
 }
 
 /// Does the line have an entry for each property, and for each entry that its lists announce?
@@ -130,11 +174,17 @@ impl PropertyAccess for PlyVertex {
             "z" => 2,
             _ => return,
         };
-        match property {
-            Property::Float(value) => self.position[axis] = value.into(),
-            Property::Double(value) => self.position[axis] = value,
-            _ => {}
-        }
+        self.position[axis] = match property {
+            Property::Float(value) => value.into(),
+            Property::Double(value) => value,
+            Property::Char(value) => value.into(),
+            Property::UChar(value) => value.into(),
+            Property::Short(value) => value.into(),
+            Property::UShort(value) => value.into(),
+            Property::Int(value) => value.into(),
+            Property::UInt(value) => value.into(),
+            _ => return,
+        };
     }
 }
 

@@ -94,11 +94,21 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
     })
 }
 
+/// Most updates of linearised contact [1]: far more than where it settles, and still milliseconds for a configuration.
+const MAX_UPDATES: u32 = 1000;
+
 fn updates(checker: &Checker<'_>, table: &ContactTable) -> Result<u32, SceneError> {
     let Some(value) = &table.updates else { return Ok(0) };
     if table.algorithm != Some(Algorithm::Linearised) {
         let reason = "updates acts on linearised contact, whose geometry is frozen: \
                       add algorithm = \"linearised\", or leave it out";
+        return Err(checker.error(value.span(), reason));
+    }
+    if *value.get_ref() > MAX_UPDATES {
+        let reason = format!(
+            "updates is {}: it must be at most {MAX_UPDATES}; where it does not settle with fewer, take algorithm = \"energy\"",
+            value.get_ref()
+        );
         return Err(checker.error(value.span(), reason));
     }
     Ok(*value.get_ref())
