@@ -161,7 +161,7 @@ fn announce(progress: &Progress) {
     let time = seconds.map(|seconds| seconds * points.saturating_sub(*done) as f64 / *points as f64);
     let time = time.map_or(String::new(), |seconds| {
         format!(
-            ", solved from rest in about {}, without the search for lower equilibria and the measurement of the error \
+            ", solved from rest in about {}, without the search for lower equilibria and the measurement of accuracy \
              that follow: they can take several times as long",
             duration(seconds)
         )

@@ -109,7 +109,8 @@ pub struct Summary {
     pub max_relative_account_residual: f64,
     /// Least that proxy and coupling had absorbed at any tick [J]: not below zero but for rounding.
     pub min_absorbed: f64,
-    /// Energy that the contact torque gave beyond what was stored, by time step and interpolation, at the last tick [J].
+    /// Energy that the contact torque gave beyond what was stored, by time step and interpolation, up to the last tick
+    /// [J].
     pub leak: f64,
     /// Energy made by holding the device's torque between ticks, at the last tick [J].
     pub hold_gain: f64,
