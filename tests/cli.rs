@@ -362,6 +362,9 @@ fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
         (&["finger.haptize", "--replay", "altered.csv"], "altered.csv: the session differs from tick 1"),
         (&["finger.haptize", "--record", "no/such/folder.csv"], "folder.csv"),
         (&["finger.haptize", "-o", "nan.csv"], "nan.csv"),
+        (&["finger.haptize", "-o", "unplayed", "--beside", "none.haptize"], "none.haptize"),
+        (&["finger.haptize", "-o", "unplayed", "--beside", "nan.csv"], "nan.csv"),
+        (&["finger.haptize", "-o", "unplayed", "--beside", "finger.haptize"], "three joints"),
     ] {
         let output = haptize(folder.path(), &[&["play"], arguments].concat());
         let message = text(&output.stderr);
@@ -369,6 +372,8 @@ fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
         assert!(message.starts_with("haptize: ") && message.contains(expected), "{arguments:?}: {message}");
         assert!(output.stdout.is_empty(), "{arguments:?}");
     }
+    // Nothing was played before the refusal.
+    assert!(!folder.path().join("unplayed/trace.csv").exists());
     let both = haptize(folder.path(), &["play", "finger.haptize", "--replay", "r.csv", "--realtime"]);
     assert_eq!(both.status.code(), Some(2));
 }

@@ -2,7 +2,7 @@
 //!
 //! Rust lets a program answer a failed allocation where it asks first. Any other one ends the process by `abort`, after
 //! a line with the number of bytes. Here the size is remembered, and the signal of `abort` is answered with what to do
-//! and exit code 1; before that, devices on serial lines are told to let go. So is a panic of the standard library where the system refuses memory that is not allocated, as for
+//! and exit code 1. So is a panic of the standard library where the system refuses memory that is not allocated, as for
 //! the signal stack of a thread that begins, and an `abort` of the C library, which allocates for itself.
 
 use std::{
@@ -44,6 +44,7 @@ unsafe impl GlobalAlloc for Remembering {
 #[cfg(unix)]
 mod answer {
     use super::{FAILED, Ordering};
+    use crate::device::serial;
     use rustix::stdio::{stderr, stdout};
     use std::{os::fd::BorrowedFd, sync::atomic::AtomicBool};
 
@@ -79,14 +80,16 @@ mod answer {
         }
     }
 
-    /// Answers `abort` for want of memory. Any other one takes its course.
+    /// Answers `abort` for want of memory. Any other one takes its course. Zero torque goes out before.
     extern "C" fn answer<const JSON: bool>(signal: libc::c_int) {
-        // Whatever is said takes longer than a hand should be pushed.
-        crate::device::serial::stop_all();
+        serial::let_go();
         let failed = FAILED.load(Ordering::Relaxed);
         if failed == 0 && !PANICKED.load(Ordering::Relaxed) && !is_exhausted() {
-            // SAFETY: no memory is involved; `abort` raises the signal again, which now ends the process.
-            unsafe { libc::signal(signal, libc::SIG_DFL) };
+            // SAFETY: no memory is involved; the signal ends the process as this returns, whoever raised it.
+            unsafe {
+                libc::signal(signal, libc::SIG_DFL);
+                libc::raise(signal);
+            }
             return;
         }
         while ANSWERED.swap(true, Ordering::Relaxed) {

@@ -25,6 +25,7 @@ mod accuracy;
 mod bake;
 mod bar;
 mod completions;
+mod crash;
 mod demo;
 mod device;
 mod doctor;
@@ -188,6 +189,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => return usage(&error),
     };
     memory::tell_shortage(line.json);
+    crash::let_go_first();
     // What refines a grid keeps nothing before its end.
     let refines = matches.subcommand().is_some_and(|(_, given)| given.try_contains_id("refine").unwrap_or(false));
     let resumes = has(&matches, "resume") && !refines;

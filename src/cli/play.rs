@@ -6,7 +6,7 @@ use super::{
     motion,
     on_demand::{self, Explored, Exploring},
     output::{self, Earlier, Folder, Kind as FileKind},
-    playback_report::PlaybackReport,
+    playback_report::{Beside, PlaybackReport},
     played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, play_timed, traced, unwritten, write},
     tell,
     watch::warn_of_free_space,
@@ -111,6 +111,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         tell(format_args!("haptize: note: {advice}"));
     }
     let clearance = if exploring.is_some() { None } else { warn_of_free_space(&dataset)? };
+    let open_beside = |path| -> Result<Beside<'_>, Failure> {
+        let motion = motion::named(&setup, &dataset, &arguments.motion, arguments.topic.as_deref())?;
+        Beside::open(path, &setup, motion)
+    };
+    let beside = arguments.beside.as_deref().map(open_beside).transpose()?;
     let mut told = None;
     let (played, ticks) = traced(&dataset, &folder, |on_tick| match &arguments.replay {
         Some(file) => {
@@ -143,12 +148,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     files.push(ticks?);
     files.extend(write(&setup, &dataset, &played, &folder)?);
     let mut felt = PlaybackReport::new(&arguments.dataset, &dataset, &setup, &played.trace);
-    if let Some(path) = &arguments.beside {
-        felt.beside(
-            path,
-            motion::named(&setup, &dataset, &arguments.motion, arguments.topic.as_deref())?,
-            played.trace.summary().seconds,
-        )?;
+    if let Some(beside) = beside {
+        felt.beside(beside, played.trace.summary().seconds)?;
         let drawn = felt.draw(&folder, &played.trace)?;
         files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
     }
@@ -317,8 +318,8 @@ fn drive(
     let hand = if address.kind == Kind::Simulated { Some(setup.hand(motion)?) } else { None };
     let (key, input) = Key::new();
     let _keyboard = if hold_key { Some(Keyboard::start(input)?) } else { None };
-    let guard =
-        Guard::new(open(address, hand)?, hold_key.then_some(key)).map_err(|halt| format!("{address}: {halt}"))?;
+    let guard = Guard::new(open(address, hand.map(|hand| (hand, &setup.scene.device)))?, hold_key.then_some(key))
+        .map_err(|halt| format!("{address}: {halt}"))?;
     tell(format_args!("haptize: {}", guard.description()));
     if let Some(caution) = address.caution(guard.limits()) {
         tell(format_args!("haptize: note: {caution}"));

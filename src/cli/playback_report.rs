@@ -4,7 +4,7 @@
 use super::{Failure, played};
 use crate::{
     dataset::{Dataset, Provenance},
-    device::Motion,
+    device::{Motion, SimulatedHand},
     render::{setup::Setup, trace::Trace},
     report::{
         self,
@@ -27,6 +27,32 @@ pub struct PlaybackReport {
     forces: Vec<EndForce>,
 }
 
+/// Another dataset that is felt by the same motion.
+pub struct Beside<'path> {
+    path: &'path Path,
+    dataset: Dataset,
+    setup: Setup,
+    hand: SimulatedHand,
+}
+
+impl<'path> Beside<'path> {
+    /// Opens the dataset at `path`, to be felt by `motion` beside that of `first`.
+    pub fn open(path: &'path Path, first: &Setup, motion: Motion) -> Result<Self, Failure> {
+        let dataset = Dataset::load(path)?;
+        let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", path.display()))?;
+        if ![first, &setup].into_iter().all(|setup| EndForce::is_known(&setup.chain)) {
+            return Err(format!(
+                "--beside compares the force at the end of arms that have three joints, and contact nodes on the last \
+                 link alone; play {} by itself",
+                path.display()
+            )
+            .into());
+        }
+        let hand = setup.hand(motion)?;
+        Ok(Self { path, dataset, setup, hand })
+    }
+}
+
 impl PlaybackReport {
     /// Returns the result of playing the dataset at `path`, recorded in `trace`.
     pub fn new(path: &Path, dataset: &Dataset, setup: &Setup, trace: &Trace) -> Self {
@@ -37,20 +63,10 @@ impl PlaybackReport {
         }
     }
 
-    /// Has the dataset at `path` felt by the same motion.
-    pub fn beside(&mut self, path: &Path, motion: Motion, seconds: f64) -> Result<(), Failure> {
-        let dataset = Dataset::load(path)?;
-        let setup = Setup::new(&dataset).map_err(|error| format!("{}: {error}", path.display()))?;
-        let played = played::play(&setup, &dataset, &mut setup.hand(motion)?, seconds, &mut |_| ())?;
-        self.forces.extend(EndForce::new(&name(path, &dataset), &setup.chain, &played.trace));
-        if self.forces.len() < 2 {
-            return Err(format!(
-                "--beside compares the force at the end of arms that have three joints, and contact nodes on the last \
-                 link alone; play {} by itself",
-                path.display()
-            )
-            .into());
-        }
+    /// Has `other` felt by the same motion.
+    pub fn beside(&mut self, mut other: Beside<'_>, seconds: f64) -> Result<(), Failure> {
+        let played = played::play(&other.setup, &other.dataset, &mut other.hand, seconds, &mut |_| ())?;
+        self.forces.extend(EndForce::new(&name(other.path, &other.dataset), &other.setup.chain, &played.trace));
         Ok(())
     }
 

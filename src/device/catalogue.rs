@@ -279,11 +279,12 @@ fn known() -> String {
     Kind::ALL.map(Kind::name).join(", ")
 }
 
-/// Opens the device at `address`, its motors off. The simulated one is held by `hand`, or by a hand at rest.
+/// Opens the device at `address`, its motors off. The simulated one is the arm of a scene with such a `[device]`, held by
+/// the hand, or without a scene held at rest.
 ///
 /// # Errors
 /// [`OpenError::Device`] says what is missing and what to do.
-pub fn open(address: &Address, hand: Option<SimulatedHand>) -> Result<Box<dyn Hardware>, OpenError> {
+pub fn open(address: &Address, held: Option<(SimulatedHand, &DeviceSpec)>) -> Result<Box<dyn Hardware>, OpenError> {
     let failed = |what: String| OpenError::Device { device: address.to_string(), what };
     let line = || match (&address.place, ports().as_slice()) {
         (Some(place), _) => Ok(place.clone()),
@@ -304,11 +305,19 @@ pub fn open(address: &Address, hand: Option<SimulatedHand>) -> Result<Box<dyn Ha
             let place = address.place.as_deref().unwrap_or_default();
             let scripts: Result<Vec<Script>, String> =
                 place.split(',').filter(|script| !script.is_empty()).map(str::parse).collect();
-            let hand = hand.map_or_else(resting_hand, Ok).map_err(failed)?;
+            let (hand, spec) = match held {
+                Some((hand, spec)) => (hand, Some(spec)),
+                None => (resting_hand().map_err(failed)?, None),
+            };
             let joints = hand.joints();
+            let map = match spec {
+                Some(spec) => map(spec, Coordinates::Joints(joints), address)?,
+                None => LinearMap::identity(joints),
+            };
             let effort = JointVector::from_slice(&vec![SIMULATED_TORQUE; joints]);
             let limits = Limits { effort, watchdog: Watchdog::None };
-            Ok(Box::new(Simulated::new(hand, Coordinates::Joints(joints), limits, scripts.map_err(failed)?)))
+            let simulated = Simulated::new(hand, Coordinates::Joints(joints), limits, scripts.map_err(failed)?);
+            Ok(Box::new(simulated.mapped(map)))
         }
     }
 }
@@ -361,20 +370,26 @@ pub fn attach_joints(
     }
 }
 
+/// The map from the `coordinates` of the device at `address` to the scene's, as `spec` says.
+fn map(spec: &DeviceSpec, coordinates: Coordinates, address: &Address) -> Result<LinearMap, OpenError> {
+    let count = coordinates.count();
+    let offset = spec.offset.unwrap_or(JointVector::zeros(count));
+    Ok(match &spec.map {
+        Some(rows) => LinearMap::new(rows, &offset, count)?,
+        None if coordinates != Coordinates::Tip && address.kind != Kind::Simulated => {
+            return Err(OpenError::NoMap { device: address.to_string() });
+        }
+        None => LinearMap::identity(count).moved(&offset)?,
+    })
+}
+
 /// Limits the device as `spec` says, and switches its motors on; with the map to the scene's coordinates.
 fn mapped(mut guard: Guard, address: &Address, spec: &DeviceSpec) -> Result<(Guard, LinearMap), OpenError> {
     let count = guard.coordinates().count();
     if let Some(limit) = &spec.effort_limit {
         guard.limit_each(limit).map_err(|given| OpenError::EffortLimit { given, device: count })?;
     }
-    let offset = spec.offset.unwrap_or(JointVector::zeros(count));
-    let map = match &spec.map {
-        Some(rows) => LinearMap::new(rows, &offset, count)?,
-        None if guard.coordinates() != Coordinates::Tip && address.kind != Kind::Simulated => {
-            return Err(OpenError::NoMap { device: address.to_string() });
-        }
-        None => LinearMap::identity(count).moved(&offset)?,
-    };
+    let map = map(spec, guard.coordinates(), address)?;
     guard.enable().map_err(|halt| OpenError::Halt { device: address.to_string(), halt })?;
     Ok((guard, map))
 }

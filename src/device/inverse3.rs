@@ -23,6 +23,7 @@ use super::{Command, Coordinates, Halt, Hardware, Limits, Measurement, Watchdog}
 use crate::JointVector;
 use std::{
     fmt::Write as _,
+    io::{self, ErrorKind, Read, Write},
     net::{TcpStream, ToSocketAddrs},
     sync::{
         Arc,
@@ -45,7 +46,7 @@ pub const STALE_COMMAND: Duration = Duration::from_millis(10);
 /// Time between two messages.
 const PERIOD: Duration = Duration::from_millis(1);
 
-/// How long a connection or an answer is waited for.
+/// How long a connection, the handshake or an answer is waited for, in however many pieces it comes.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Longest message of the service [bytes]: an inventory of many devices has some thousand.
@@ -99,12 +100,13 @@ impl Inverse3 {
     pub fn open(place: Option<&str>) -> Result<Self, String> {
         let place = place.unwrap_or(ADDRESS);
         let (address, wanted_id) = place.split_once('/').map_or((place, None), |(address, id)| (address, Some(id)));
-        let stream = connect(address)?;
+        let stream = Timed { stream: connect(address)?, due: Instant::now() + PATIENCE };
         let config = tungstenite::protocol::WebSocketConfig::default()
             .max_message_size(Some(LONGEST_MESSAGE))
             .max_frame_size(Some(LONGEST_MESSAGE));
         let (mut socket, _) = tungstenite::client::client_with_config(format!("ws://{address}/"), stream, Some(config))
             .map_err(|error| format!("{address} is no Haply service: {error}"))?;
+        socket.get_mut().renew();
         let inventory = receive(&mut socket).map_err(|halt| format!("{address}: no inventory: {halt}"))?;
         let chosen = inventory.devices().find(|device| wanted_id.is_none_or(|id| device.id() == id));
         let Some(device) = chosen else {
@@ -141,13 +143,55 @@ fn connect(address: &str) -> Result<TcpStream, String> {
     let found = address.to_socket_addrs().map_err(|_| absent())?;
     let stream =
         found.into_iter().find_map(|address| TcpStream::connect_timeout(&address, PATIENCE).ok()).ok_or_else(absent)?;
-    let set = stream.set_nodelay(true).and_then(|()| stream.set_read_timeout(Some(PATIENCE)));
-    set.map_err(|error| error.to_string())?;
+    stream.set_nodelay(true).map_err(|error| error.to_string())?;
     Ok(stream)
 }
 
+/// A connection of which no read and no write lasts beyond a time. A timeout of the socket's own begins anew with each
+/// byte, and a service that sends them one by one, or pings, could hold the thread for ever.
+struct Timed {
+    stream: TcpStream,
+    due: Instant,
+}
+
+impl Timed {
+    /// Begins an exchange.
+    fn renew(&mut self) {
+        self.due = Instant::now() + PATIENCE;
+    }
+
+    /// Time that is left.
+    fn left(&self) -> io::Result<Duration> {
+        let left = self.due.saturating_duration_since(Instant::now());
+        if left.is_zero() { Err(ErrorKind::TimedOut.into()) } else { Ok(left) }
+    }
+}
+
+impl Read for Timed {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.stream.set_read_timeout(Some(self.left()?))?;
+        self.stream.read(buffer).map_err(timed_out)
+    }
+}
+
+impl Write for Timed {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.stream.set_write_timeout(Some(self.left()?))?;
+        self.stream.write(bytes).map_err(timed_out)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+/// Unix says of a timeout that the call would block.
+fn timed_out(error: io::Error) -> io::Error {
+    if error.kind() == ErrorKind::WouldBlock { ErrorKind::TimedOut.into() } else { error }
+}
+
 /// Waits for the next frame.
-fn receive(socket: &mut WebSocket<TcpStream>) -> Result<Frame, Halt> {
+fn receive(socket: &mut WebSocket<Timed>) -> Result<Frame, Halt> {
     loop {
         match socket.read() {
             Ok(Message::Text(text)) => return Frame::parse(&text),
@@ -172,7 +216,7 @@ impl Seen {
 
 /// The thread's end.
 struct Link {
-    socket: WebSocket<TcpStream>,
+    socket: WebSocket<Timed>,
     id: String,
     seen: Seen,
     publish: triple_buffer::Input<Seen>,
@@ -191,6 +235,9 @@ impl Link {
             if let Err(halt) = self.exchange(session, force) {
                 self.seen.ended = Some(halt);
                 self.publish.write(self.seen);
+                // Whether it is heard or not.
+                self.socket.get_mut().renew();
+                let _ = self.socket.send(Message::text(message("", &self.id, Some([0.0; 3]))));
                 return;
             }
             session = "";
@@ -206,6 +253,7 @@ impl Link {
 
     /// Sends one message and takes in the state that answers it.
     fn exchange(&mut self, session: &str, force: Option<[f64; 3]>) -> Result<(), Halt> {
+        self.socket.get_mut().renew();
         let message = message(session, &self.id, force);
         self.socket.send(Message::text(message)).map_err(|_| Halt::Unplugged)?;
         let frame = receive(&mut self.socket)?;

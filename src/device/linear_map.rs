@@ -94,6 +94,16 @@ impl LinearMap {
         position
     }
 
+    /// Returns `A^-1 (q - b)`, what the device measures at the position `q`.
+    #[must_use]
+    pub fn measured(&self, position: &JointVector) -> JointVector {
+        let mut measured = JointVector::zeros(self.count);
+        for (i, measured) in measured.iter_mut().enumerate() {
+            *measured = (0..self.count).map(|j| self.inverse[i][j] * (position[j] - self.offset[j])).sum();
+        }
+        measured
+    }
+
     /// Returns `A^T tau`, the device's efforts for the scene's.
     #[must_use]
     pub fn effort(&self, torque: &JointVector) -> JointVector {

@@ -1,7 +1,7 @@
 //! A device that is simulated behind the protocol of a real one, and fails on command: what rehearses the safety
 //! layer.
 
-use super::{Command, Coordinates, Device, Halt, Hardware, Limits, Measurement};
+use super::{Command, Coordinates, Device, Halt, Hardware, Limits, LinearMap, Measurement};
 use crate::JointVector;
 use std::str::FromStr;
 
@@ -70,6 +70,8 @@ impl FromStr for Script {
 /// A simulated device as hardware: its joints, or three of them as the position of a tip.
 pub struct Simulated<D> {
     device: D,
+    /// From the hardware's coordinates to those of `device`.
+    map: LinearMap,
     coordinates: Coordinates,
     limits: Limits,
     scripts: Vec<Script>,
@@ -82,7 +84,14 @@ impl<D: Device> Simulated<D> {
     #[must_use]
     pub fn new(device: D, coordinates: Coordinates, limits: Limits, scripts: Vec<Script>) -> Self {
         let latest = Measurement::plain(JointVector::zeros(coordinates.count()), 0.0);
-        Self { device, coordinates, limits, scripts, latest, time: 0.0 }
+        let map = LinearMap::identity(coordinates.count());
+        Self { device, map, coordinates, limits, scripts, latest, time: 0.0 }
+    }
+
+    /// Returns the same hardware in coordinates of its own, from which `map` leads to those of its device.
+    #[must_use]
+    pub fn mapped(self, map: LinearMap) -> Self {
+        Self { map, ..self }
     }
 
     fn fails(&self, failure: Failure) -> bool {
@@ -120,7 +129,7 @@ impl<D: Device> Hardware for Simulated<D> {
             self.latest.age += elapsed;
             return Ok(self.latest);
         }
-        let mut position = reading.position;
+        let mut position = self.map.measured(&reading.position);
         if self.fails(Failure::Garbage) {
             position.iter_mut().for_each(|x| *x = f64::NAN);
         }
@@ -139,7 +148,7 @@ impl<D: Device> Hardware for Simulated<D> {
             return Err(Halt::DeviceError(2));
         }
         if !self.fails(Failure::Unplugged) {
-            self.device.apply(effort);
+            self.device.apply(&self.map.torque(effort));
         }
         Ok(Command::Whole)
     }

@@ -58,12 +58,18 @@ pub struct SteadyForce {
 }
 
 impl EndForce {
-    /// The force of `trace`; `None` where the chain has not three joints, or contact nodes elsewhere than on its last
-    /// link.
+    /// Whether the torque of `chain` gives the force at its end: it has three joints, and contact nodes on its last link
+    /// alone.
+    #[must_use]
+    pub fn is_known(chain: &Chain) -> bool {
+        let at_the_end = chain.nodes.iter().all(|node| node.link + 1 == chain.joints.len());
+        chain.joints.len() == 3 && !chain.nodes.is_empty() && at_the_end
+    }
+
+    /// The force of `trace`; `None` where it is not known.
     #[must_use]
     pub fn new(name: &str, chain: &Chain, trace: &Trace) -> Option<Self> {
-        let at_the_end = chain.nodes.iter().all(|node| node.link + 1 == chain.joints.len());
-        if chain.joints.len() != 3 || chain.nodes.is_empty() || !at_the_end {
+        if !Self::is_known(chain) {
             return None;
         }
         let force = |tick: &Tick| end_force(chain, &tick.proxy, &tick.contact_torque).unwrap_or(DVec3::NAN);

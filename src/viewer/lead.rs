@@ -40,7 +40,8 @@ impl DeviceChoice {
             _ => None,
         };
         let (key, input) = Key::new();
-        let hardware = open(address, hand).map_err(|error| error.to_string())?;
+        let held = hand.map(|hand| (hand, &loaded.setup.scene.device));
+        let hardware = open(address, held).map_err(|error| error.to_string())?;
         let mut guard =
             Guard::new(hardware, self.hold_key.then_some(key)).map_err(|halt| format!("{address}: {halt}"))?;
         guard.end_with(self.stop);

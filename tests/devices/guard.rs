@@ -340,3 +340,25 @@ fn a_joint_true_device_leads_no_arm_whose_map_the_scene_does_not_give() {
     assert!(attach_joints(guard(), &real, 3, &spec).is_ok());
     assert!(attach_joints(guard(), &simulated, 3, &DeviceSpec::default()).is_ok());
 }
+
+/// What it rehearses for a device with coordinates of its own is the scene's motion, and the torque is the scene's.
+#[test]
+fn the_simulated_device_is_the_scene_s_arm_behind_the_scene_s_map() {
+    let rows = vec![JointVector::from_slice(&[-1.0, 0.0]), JointVector::from_slice(&[0.5, 2.0])];
+    let offset = JointVector::from_slice(&[0.3, -0.2]);
+    let map = LinearMap::new(&rows, &offset, 2).unwrap();
+    let spec = DeviceSpec { map: Some(rows), offset: Some(offset), ..DeviceSpec::default() };
+    let arm = || pressing(2, &all(2, 0.1));
+    let address: Address = "simulated".parse().unwrap();
+    let (mut device, mut alone) = (open(&address, Some((arm(), &spec))).unwrap(), arm());
+    // Of order one, in some hundred steps that each round.
+    let rounding = 1000.0 * f64::EPSILON;
+    for tick in 0..500 {
+        let seen = map.position(&device.read(PERIOD).unwrap().position);
+        let there = alone.read(PERIOD).position;
+        assert!(seen.iter().zip(there.iter()).all(|(a, b)| (a - b).abs() < rounding), "{tick}: {seen:?} {there:?}");
+        let torque = JointVector::from_slice(&[0.2, -0.1]);
+        device.write(&map.effort(&torque)).unwrap();
+        alone.apply(&torque);
+    }
+}

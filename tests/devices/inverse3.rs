@@ -12,6 +12,7 @@ use haptize::{
 };
 use serde_json::{Value, json};
 use std::{
+    io::Write,
     net::{TcpListener, TcpStream},
     sync::{
         Arc, Mutex,
@@ -34,6 +35,10 @@ enum Mood {
     Closed,
     /// No answer any more.
     Mute,
+    /// Pings instead of an answer, without end.
+    Pings,
+    /// An answer that comes byte by byte, without end.
+    Slow,
 }
 
 struct Shared {
@@ -161,10 +166,87 @@ fn serve(stream: TcpStream, shared: &Mutex<Shared>, over: &AtomicBool) {
                 false
             }
             Mood::Mute => true,
+            Mood::Pings => endless(&mut socket, over, |socket| socket.send(Message::Ping(Vec::new().into())).is_ok()),
+            Mood::Slow => {
+                // A text of 65535 bytes begins.
+                let begun = socket.get_mut().write_all(&[0x81, 126, 0xff, 0xff]).is_ok();
+                begun && endless(&mut socket, over, |socket| socket.get_mut().write_all(b" ").is_ok())
+            }
         };
         if !answered {
             return;
         }
+    }
+}
+
+/// Sends `piece` a hundred times a second, until nobody listens or the mock is `over`.
+fn endless(
+    socket: &mut WebSocket<TcpStream>,
+    over: &AtomicBool,
+    piece: impl Fn(&mut WebSocket<TcpStream>) -> bool,
+) -> bool {
+    while !over.load(Ordering::Relaxed) && piece(socket) {
+        thread::sleep(Duration::from_millis(10));
+    }
+    false
+}
+
+/// What a service may take at most until its device is given up: an exchange, and room for a busy machine.
+const GIVEN_UP: Duration = Duration::from_secs(5);
+
+#[test]
+fn a_service_that_goes_on_without_an_answer_is_given_up() {
+    for mood in [Mood::Mute, Mood::Pings, Mood::Slow] {
+        let mock = Mock::new();
+        let mut guard = enabled(&mock);
+        mock.set(mood);
+        let (begin, mut halts) = (Instant::now(), Vec::new());
+        while !halts.contains(&Halt::Unplugged) {
+            assert!(begin.elapsed() < GIVEN_UP, "{mood:?}: {halts:?}");
+            let (held, some) = push(&mut guard, 1.0, 1);
+            assert!(some.is_empty() || held.effort.iter().all(|effort| *effort == 0.0), "{mood:?}");
+            halts.extend(some);
+        }
+        let begin = Instant::now();
+        drop(guard);
+        assert!(begin.elapsed() < GIVEN_UP, "{mood:?}");
+    }
+    // It ends while an answer is waited for, too.
+    for mood in [Mood::Pings, Mood::Slow] {
+        let mock = Mock::new();
+        let mut guard = enabled(&mock);
+        mock.set(mood);
+        push(&mut guard, 1.0, 20);
+        let begin = Instant::now();
+        drop(guard);
+        assert!(begin.elapsed() < GIVEN_UP, "{mood:?}");
+    }
+}
+
+#[test]
+fn a_service_that_never_ends_its_greeting_is_refused() {
+    // The handshake; the inventory.
+    for greets in [false, true] {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        let service = thread::spawn(move || {
+            let (mut stream, _) = listener.accept().unwrap();
+            let over = AtomicBool::new(false);
+            if greets {
+                endless(&mut accept(stream).unwrap(), &over, |socket| {
+                    socket.send(Message::Ping(Vec::new().into())).is_ok()
+                });
+            } else {
+                let mut bytes = b"HTTP/1.1 101 Switching Protocols\r\nX: ".iter().chain(std::iter::repeat(&b'x'));
+                while stream.write_all(&[*bytes.next().unwrap()]).is_ok() {
+                    thread::sleep(Duration::from_millis(10));
+                }
+            }
+        });
+        let begin = Instant::now();
+        let error = Inverse3::open(Some(&address)).err().unwrap();
+        assert!(begin.elapsed() < GIVEN_UP && error.contains(&address), "{error}");
+        service.join().unwrap();
     }
 }
 

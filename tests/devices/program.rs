@@ -282,11 +282,10 @@ impl crate::emulator::Firmware for Watched {
     }
 }
 
-/// Plays in `folder` with an emulated 2DIY, sends `signal` once it is pushed, and returns with how many commands it was
-/// still pushed afterwards; nothing where the device did not answer in time, or the loop faulted, as they do when the
-/// machine holds one of the two processes up for 10 ms.
+/// Plays in `folder` with an emulated 2DIY, and sends `signal` once it is pushed. Returns what came of it, when the signal
+/// was sent, and the commands.
 #[cfg(unix)]
-fn pushed_after(folder: &Path, signal: Signal) -> Option<usize> {
+fn signalled(folder: &Path, signal: Signal) -> (std::process::Output, Instant, Sent) {
     use std::{os::unix::process::CommandExt, process::Stdio};
     let middle = haptize::JointVector::from_slice(&[168.25_f64.to_radians(), 12.5_f64.to_radians()]);
     let sent = Sent::default();
@@ -321,6 +320,14 @@ fn pushed_after(folder: &Path, signal: Signal) -> Option<usize> {
         let _ = kill_process(Pid::from_child(&play), signal);
         (play.wait_with_output().unwrap(), signalled)
     });
+    (output, signalled, sent)
+}
+
+/// With how many commands a device is still pushed after `signal`; nothing where it did not answer in time, or the loop
+/// faulted, as they do when the machine holds one of the two processes up for 10 ms.
+#[cfg(unix)]
+fn pushed_after(folder: &Path, signal: Signal) -> Option<usize> {
+    let (output, signalled, sent) = signalled(folder, signal);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     let report = json(&output);
     if !report["fault"].is_null() {
@@ -361,5 +368,33 @@ fn a_signal_ends_the_torque_within_two_ticks_and_the_session_keeps_its_files() {
         }
         eprintln!("signal {signal:?}: torque for {ticks:?} more commands");
         assert!(ticks.iter().any(|ticks| *ticks <= 2), "signal {signal:?}: torque for {ticks:?} more commands");
+    }
+}
+
+/// The 2DIY has no watchdog: it keeps the last torque. A crash leaves the guard no time, nor does memory that runs out.
+#[cfg(unix)]
+#[test]
+fn the_last_command_before_a_crash_is_zero_torque() {
+    use std::os::unix::process::ExitStatusExt;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::write(path.join("s.toml"), SLIDES).unwrap();
+    assert_eq!(haptize(path, &["bake", "s.toml", "-o", "s.haptize", "--backend", "cpu"]).status.code(), Some(0));
+    for signal in [Signal::SEGV, Signal::ABORT] {
+        let begin = Instant::now();
+        // Once at least it is pushed when the signal comes, and not let go of before.
+        let was_pushed = loop {
+            let (output, at, sent) = signalled(path, signal);
+            let sent = sent.lock().unwrap();
+            let before = sent.iter().take_while(|(sent, _)| *sent <= at).last();
+            if before.is_some_and(|(_, torque)| *torque > 0.02) && output.status.signal() == Some(signal.as_raw()) {
+                assert_eq!(sent.last().unwrap().1, 0.0, "signal {signal:?}");
+                break true;
+            }
+            if begin.elapsed() > LONGEST_UNREST {
+                break false;
+            }
+        };
+        assert!(was_pushed, "signal {signal:?}");
     }
 }

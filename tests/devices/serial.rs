@@ -9,7 +9,7 @@ use haptize::{
     JointVector,
     device::{
         Device, Guard, Halt, Hardware, JointDevice, LONGEST_AGE, LinearMap,
-        serial::{Protocol, Reply, TwoDiy, Version, WoodenHaptics},
+        serial::{Port, Protocol, Reply, TwoDiy, Version, WoodenHaptics},
     },
 };
 
@@ -54,6 +54,32 @@ fn patiently<T>(mut open: impl FnMut() -> Result<T, String>) -> T {
         }
     }
     open().unwrap()
+}
+
+/// A terminal that was named by mistake is one again.
+#[test]
+fn a_line_has_its_settings_back_whether_a_device_was_there_or_not() {
+    use rustix::termios::{LocalModes, OptionalActions, tcgetattr, tcsetattr};
+    let line = Line::new();
+    let terminal = std::fs::File::open(&line.path).unwrap();
+    let mut settings = tcgetattr(&terminal).unwrap();
+    settings.local_modes |= LocalModes::ICANON | LocalModes::ISIG;
+    tcsetattr(&terminal, OptionalActions::Now, &settings).unwrap();
+    let found = tcgetattr(&terminal).unwrap();
+    let port = Port::open(&line.path).unwrap();
+    assert_ne!(tcgetattr(&terminal).unwrap().local_modes, found.local_modes);
+    drop(port);
+    let again = || {
+        let settings = tcgetattr(&terminal).unwrap();
+        (settings.local_modes, settings.input_modes, settings.output_modes, settings.control_modes)
+    };
+    let before = (found.local_modes, found.input_modes, found.output_modes, found.control_modes);
+    assert_eq!(again(), before);
+    // Nobody answers there.
+    assert!(TwoDiy::open(&line.path, Version::V3).is_err() && WoodenHaptics::open(&line.path).is_err());
+    assert_eq!(again(), before);
+    // Others may open it, too.
+    std::fs::File::open(&line.path).unwrap();
 }
 
 /// Calls `session` with a 2DIY whose emulator runs beside it.

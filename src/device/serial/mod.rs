@@ -8,7 +8,7 @@
 //! since the last one are no positions: such lines have no check sum.
 
 #[cfg(unix)]
-mod abort;
+mod last_command;
 #[cfg(unix)]
 mod port;
 #[cfg(not(unix))]
@@ -18,9 +18,7 @@ mod two_diy;
 mod wooden_haptics;
 
 #[cfg(unix)]
-pub use abort::stop_all;
-#[cfg(not(unix))]
-pub use port::stop_all;
+pub use last_command::let_go;
 pub use port::{Port, ports};
 pub use two_diy::{TwoDiy, Version};
 pub use wooden_haptics::WoodenHaptics;
@@ -86,8 +84,6 @@ pub trait Protocol: Send {
 /// A device that speaks `P` on a serial line.
 pub struct SerialDevice<P> {
     protocol: P,
-    /// Dropped before the port.
-    _stop: Option<port::StopOnAbort>,
     port: Port,
     place: String,
     received: [u8; LONGEST],
@@ -116,13 +112,13 @@ impl<P: Protocol> SerialDevice<P> {
     ///
     /// # Errors
     /// In words, if nothing valid answers in time.
-    fn start(protocol: P, port: Port, place: &str) -> Result<Self, String> {
+    fn start(protocol: P, mut port: Port, place: &str) -> Result<Self, String> {
         let joints = protocol.limits().effort.len();
         let mut zero = [0; LONGEST];
         let length = protocol.request(&JointVector::zeros(joints), &mut zero);
+        port.end_with(&zero[..length])?;
         let mut device = Self {
             protocol,
-            _stop: port.stop_on_abort(&zero[..length]),
             port,
             place: place.to_owned(),
             received: [0; LONGEST],

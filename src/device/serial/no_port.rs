@@ -6,12 +6,6 @@ use crate::device::Halt;
 #[derive(Debug)]
 pub struct Port(std::convert::Infallible);
 
-/// Nothing is ever to be stopped.
-pub(super) type StopOnAbort = std::convert::Infallible;
-
-/// Does nothing.
-pub fn stop_all() {}
-
 impl Port {
     /// Refuses.
     ///
@@ -22,17 +16,17 @@ impl Port {
     }
 
     /// Is never called.
+    pub fn end_with(&mut self, _: &[u8]) -> Result<(), String> {
+        match self.0 {}
+    }
+
+    /// Is never called.
     pub fn receive(&mut self, _: &mut [u8]) -> Result<usize, Halt> {
         match self.0 {}
     }
 
     /// Is never called.
     pub fn send(&mut self, _: &[u8]) -> Result<usize, Halt> {
-        match self.0 {}
-    }
-
-    /// Is never called.
-    pub(super) fn stop_on_abort(&self, _: &[u8]) -> Option<StopOnAbort> {
         match self.0 {}
     }
 
