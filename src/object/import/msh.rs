@@ -310,7 +310,7 @@ fn entities(lines: &mut Lines<'_, impl BufRead>, tetrahedra: &mut Tetrahedra<'_>
     if is_partitioned {
         let _partitions: u64 = lines.word()?;
         for _ in 0..lines.word::<u64>()? {
-            (lines.word::<i64>()?, lines.word::<i64>()?);
+            let _ghost: [i64; 2] = [lines.word()?, lines.word()?];
         }
     }
     let counts: [u64; 4] = [lines.word()?, lines.word()?, lines.word()?, lines.word()?];
@@ -318,7 +318,7 @@ fn entities(lines: &mut Lines<'_, impl BufRead>, tetrahedra: &mut Tetrahedra<'_>
         for _ in 0..count {
             let tag: i64 = lines.word()?;
             if is_partitioned {
-                (lines.word::<i64>()?, lines.word::<i64>()?);
+                let _parent: [i64; 2] = [lines.word()?, lines.word()?];
                 list(lines)?;
             }
             for _ in 0..if dimension == 0 { 3 } else { 6 } {
