@@ -25,7 +25,7 @@ use crate::{
     JointVector,
     dataset::JointLabel,
     proxy::{Chain, Pose},
-    scene::{JointSpec, PlanSpec, ScanSpec},
+    scene::{JointKind, JointSpec, PlanSpec, ScanSpec},
 };
 use glam::DVec3;
 use std::{
@@ -308,7 +308,8 @@ impl<'a> Driver<'a> {
             let (unit, effort) = (kind.unit(), kind.effort_unit());
             let (torque, most) = (output.torque[joint].abs(), limits.torque[joint]);
             if torque > most {
-                return Err(format!("the effort of joint `{name}` is {torque:.3}, its limit is {most} {effort}"));
+                let what = if kind == JointKind::Revolute { "torque" } else { "force" };
+                return Err(format!("the {what} of joint `{name}` is {torque:.3}, its limit is {most} {effort}"));
             }
             let (speed, most) = (output.speed[joint].abs(), limits.speed);
             if speed > most {

@@ -31,9 +31,9 @@ static GIVEN: AtomicBool = AtomicBool::new(false);
 
 /// A line's place in the table.
 #[derive(Debug)]
-pub struct Place(usize);
+pub struct LastCommand(usize);
 
-impl Place {
+impl LastCommand {
     /// Remembers that `zero` commands zero torque on the line `descriptor`. None if too many lines are open.
     pub fn take(descriptor: i32, zero: &[u8]) -> Option<Self> {
         let is_free =
@@ -49,7 +49,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for LastCommand {
     fn drop(&mut self) {
         LINES[self.0].descriptor.store(FREE, Ordering::Release);
     }

@@ -1,6 +1,6 @@
 //! A serial line of Unix: opened raw and for this program alone, read and written without waiting.
 
-use super::last_command::{self, Place};
+use super::last_command::{self, LastCommand};
 use crate::device::Halt;
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
@@ -19,7 +19,7 @@ pub struct Port {
     file: File,
     found: Termios,
     /// Given up before the file is closed.
-    place: Option<Place>,
+    place: Option<LastCommand>,
 }
 
 impl Port {
@@ -59,7 +59,7 @@ impl Port {
     /// # Errors
     /// In words, if too many lines are open.
     pub fn end_with(&mut self, zero: &[u8]) -> Result<(), String> {
-        let place = Place::take(self.file.as_raw_fd(), zero);
+        let place = LastCommand::take(self.file.as_raw_fd(), zero);
         self.place = Some(place.ok_or("too many serial devices are open: close some")?);
         Ok(())
     }
